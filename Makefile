@@ -1,0 +1,49 @@
+# The two commands of the README are `run` and `test`; every target sets up what it needs.
+
+PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do command -v $$p >/dev/null 2>&1 && $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+BIN := .venv/bin
+export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
+NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
+
+.PHONY: setup run test check bench chromium clean
+.DEFAULT_GOAL := run
+
+setup: .venv/ready static/node_modules/.ready
+
+.venv/ready: requirements.lock pyproject.toml
+	@test -n "$(PYTHON)" || { echo "Touchline needs Python 3.11 or newer with venv (Debian: apt-get install python3-venv)."; exit 1; }
+	@echo "Installing Python packages into .venv"
+	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+static/node_modules/.ready: static/package-lock.json .venv/ready
+	@echo "Installing browser libraries into static/node_modules"
+	@cd static && PATH="$(CURDIR)/$(BIN):$$PATH" npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
+
+run: setup
+	@$(BIN)/touchline migrate >/dev/null
+	@$(BIN)/python -m app.sample.ensure
+	@$(BIN)/touchline serve
+
+test: setup chromium
+	$(BIN)/python -m pytest
+	$(BIN)/npm --prefix static test
+
+check: setup
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/npm --prefix static run check
+
+bench: setup
+	$(BIN)/python -m tests.bench
+
+chromium: setup
+	@$(BIN)/python docker/chromium.py
+
+clean:
+	rm -rf .venv static/node_modules

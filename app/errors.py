@@ -1,0 +1,145 @@
+"""The error tree: one base, and for each branch the sentence a reviewer would want to read.
+
+    ReviewError
+      InputError            the caller's data
+        UnknownMarkingError
+        DatasetFormatError  (path, record, field)
+        UnsafePathError
+        TooLargeError
+        ImageError
+      NotFoundError
+      ConflictError
+        StaleRevisionError  (current)
+        SharedStationError  (station)
+        IdempotencyError
+      GeometryError
+        DegenerateGeometryError
+        NoConvergenceError
+      StorageError          the disk or the database refuses
+    ShapeError(ValueError)  our own mistake, outside the tree
+
+Only ``api/errors.py`` knows which HTTP status belongs to which branch, and only ``cli.py`` which
+exit code.
+"""
+
+from __future__ import annotations
+
+
+class ReviewError(Exception):
+    """Base of everything that a caller can cause or must be told.
+
+    Args:
+        message: One sentence that says what is wrong.
+        hint: What to do about it, when there is something to do.
+        pointer: JSON pointer to the field of the request that is at fault.
+    """
+
+    def __init__(self, message: str, *, hint: str | None = None, pointer: str | None = None):
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+        self.pointer = pointer
+
+
+class InputError(ReviewError):
+    """The caller's data cannot be used as it is."""
+
+
+class UnknownMarkingError(InputError):
+    """A marking name that is none of the 26 markings of the pitch."""
+
+    def __init__(self, marking: str, *, pointer: str | None = None):
+        super().__init__(
+            f'"{marking}" is not a pitch marking',
+            hint="docs/glossary.md lists the 26 names; trailing spaces do not matter.",
+            pointer=pointer,
+        )
+        self.marking = marking
+
+
+class DatasetFormatError(InputError):
+    """A file, or a record in it, that is not what its format says.
+
+    Args:
+        path: File as the user knows it (inside an archive: ``archive.zip/member``).
+        record: Which record of the file (an image name, a frame, a line), or None for the file.
+        field: Which field of the record, or None.
+        problem: What is wrong, in words.
+    """
+
+    def __init__(self, path: str, record: str | None, field: str | None, problem: str):
+        place = ", ".join(part for part in (path, record, field) if part)
+        super().__init__(f"{place}: {problem}")
+        self.path = path
+        self.record = record
+        self.field = field
+        self.problem = problem
+
+
+class UnsafePathError(InputError):
+    """A path that would leave the folder it belongs to."""
+
+
+class TooLargeError(InputError):
+    """More bytes, pixels or members than the limits in Settings allow."""
+
+
+class ImageError(InputError):
+    """Bytes that are not an image of an accepted kind."""
+
+
+class NotFoundError(ReviewError):
+    """Nothing of that name or number exists."""
+
+
+class ConflictError(ReviewError):
+    """The request does not fit the present state."""
+
+
+class StaleRevisionError(ConflictError):
+    """Somebody else changed the group (or station) first.
+
+    Args:
+        base_etag: The state the caller built on.
+        current_etag: The state as it is now.
+    """
+
+    def __init__(self, message: str, *, base_etag: str, current_etag: str):
+        super().__init__(message, hint="Load the current state and apply the change again.")
+        self.base_etag = base_etag
+        self.current_etag = current_etag
+
+
+class SharedStationError(ConflictError):
+    """Lines of a static camera are edited on its station, not on one of its views."""
+
+    def __init__(self, view: str, station: int, station_key: str):
+        super().__init__(
+            f"view {view} takes its lines from the static camera {station_key}",
+            hint=f"Edit the lines of station {station} instead.",
+        )
+        self.station = station
+
+
+class IdempotencyError(ConflictError):
+    """An Idempotency-Key was used again with another body."""
+
+
+class GeometryError(ReviewError):
+    """Geometry that has no answer; recorded on the solution, not a crash."""
+
+
+class DegenerateGeometryError(GeometryError):
+    """The input does not determine the result."""
+
+
+class NoConvergenceError(GeometryError):
+    """An iteration ended before it arrived."""
+
+
+class StorageError(ReviewError):
+    """The disk or the database refuses; what was acknowledged before is safe."""
+
+
+class ShapeError(ValueError):
+    """An array of the wrong shape: a mistake in our own code."""

@@ -1,0 +1,25 @@
+"""The array type of this floor and the check of its shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from app.errors import ShapeError
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def require_shape(array: FloatArray, shape: tuple[int | None, ...], name: str) -> FloatArray:
+    """The array as float64, if it has that shape (None stands for any length).
+
+    Raises:
+        ShapeError: It has another shape.
+    """
+    array = np.asarray(array, dtype=np.float64)
+    fits = array.ndim == len(shape) and all(
+        wanted is None or wanted == got for wanted, got in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        raise ShapeError(f"{name} has shape {array.shape}, needs {shape}")
+    return array

@@ -1,0 +1,154 @@
+"""Camera: the pinhole with lens distortion that maps the pitch into an image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from app.errors import DegenerateGeometryError
+from app.geometry.arrays import FloatArray, require_shape
+from app.geometry.distortion import COEFFICIENTS, distort, fold_radius, undistort
+from app.geometry.rotation import pan_tilt_roll_from_rotation
+
+MIN_DEPTH = 1e-3
+"""Metres in front of the camera below which nothing is visible."""
+
+
+def _no_distortion() -> FloatArray:
+    return np.zeros(COEFFICIENTS)
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """``X_cam = R (X - C)``: x right, y down, z forward; image in pixels.
+
+    Attributes:
+        rotation: R, pitch to camera, shape (3, 3).
+        position: C in the pitch frame, metres, shape (3,).
+        focal_length: alpha_x and alpha_y, pixels.
+        principal_point: x0 and y0, pixels.
+        skew: s, pixels.
+        distortion: OpenCV's k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, shape (12,).
+    """
+
+    rotation: FloatArray
+    position: FloatArray
+    focal_length: tuple[float, float]
+    principal_point: tuple[float, float]
+    skew: float = 0.0
+    distortion: FloatArray = field(default_factory=_no_distortion)
+
+    def __post_init__(self) -> None:
+        for name, shape in (("rotation", (3, 3)), ("position", (3,)), ("distortion", (12,))):
+            array = require_shape(getattr(self, name), shape, name).copy()
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        numbers = [*self.focal_length, *self.principal_point, self.skew]
+        finite = np.isfinite(self.rotation).all() and np.isfinite(self.position).all()
+        if not (finite and np.isfinite(self.distortion).all() and np.isfinite(numbers).all()):
+            raise DegenerateGeometryError("a camera parameter is not a finite number")
+        if min(self.focal_length) <= 0:
+            raise DegenerateGeometryError("the focal length of a camera must be positive")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Camera) and np.array_equal(self.parameters, other.parameters)
+
+    def __hash__(self) -> int:
+        return hash(self.parameters.tobytes())
+
+    @cached_property
+    def parameters(self) -> FloatArray:
+        """Every number of the camera, in a fixed order, shape (29,)."""
+        numbers = [*self.focal_length, *self.principal_point, self.skew]
+        return np.concatenate([self.rotation.ravel(), self.position, numbers, self.distortion])
+
+    @property
+    def K(self) -> FloatArray:
+        """Calibration matrix, shape (3, 3)."""
+        (ax, ay), (x0, y0) = self.focal_length, self.principal_point
+        return np.array([[ax, self.skew, x0], [0.0, ay, y0], [0.0, 0.0, 1.0]])
+
+    @property
+    def P(self) -> FloatArray:
+        """Projection matrix K R [I | -C] without distortion, shape (3, 4)."""
+        KR = self.K @ self.rotation
+        return np.column_stack([KR, -KR @ self.position])
+
+    @property
+    def pan_tilt_roll_degrees(self) -> tuple[float, float, float]:
+        """SoccerNet's angles."""
+        pan, tilt, roll = np.degrees(pan_tilt_roll_from_rotation(self.rotation))
+        return float(pan), float(tilt), float(roll)
+
+    def pitch_to_camera(self, points: FloatArray) -> FloatArray:
+        """Points of the pitch frame in the camera frame, metres, both shape (N, 3)."""
+        return (require_shape(points, (None, 3), "points") - self.position) @ self.rotation.T
+
+    @cached_property
+    def _fold_radius(self) -> float:
+        return fold_radius(self.distortion)
+
+    def project(self, points: FloatArray, *, folded: bool = False) -> FloatArray:
+        """Pixels of points, as the distorted image shows them.
+
+        Args:
+            points: Pitch frame, metres, shape (N, 3).
+            folded: Also give pixels to points beyond the radius where distortion folds the
+                picture. No lens shows them; the public evaluator counts them.
+
+        Returns:
+            Shape (N, 2); NaN where the point lies less than a millimetre in front of the camera
+            or beyond the fold.
+        """
+        in_camera = self.pitch_to_camera(points)
+        depth = in_camera[:, 2]
+        visible = depth > MIN_DEPTH
+        safe = np.where(visible, depth, 1.0)
+        ideal = in_camera[:, :2] / safe[:, None]
+        if self.distortion.any():
+            if not folded:
+                visible &= np.hypot(ideal[:, 0], ideal[:, 1]) <= self._fold_radius
+            ideal = distort(np.where(visible[:, None], ideal, 0.0), self.distortion)
+        pixels = self._unit_to_pixel(ideal)
+        pixels[~visible] = np.nan
+        return pixels
+
+    def undistort(self, pixels: FloatArray) -> FloatArray:
+        """Pixels of the ideal pinhole for pixels of the image, both shape (N, 2)."""
+        pixels = require_shape(pixels, (None, 2), "pixels")
+        if not self.distortion.any():
+            return pixels.copy()
+        return self._unit_to_pixel(self.pixel_to_ideal(pixels))
+
+    def pixel_to_ideal(self, pixels: FloatArray) -> FloatArray:
+        """Ideal normalised coordinates (K^-1 and undistortion), both shape (N, 2)."""
+        pixels = require_shape(pixels, (None, 2), "pixels")
+        y = (pixels[:, 1] - self.principal_point[1]) / self.focal_length[1]
+        x = (pixels[:, 0] - self.principal_point[0] - self.skew * y) / self.focal_length[0]
+        return undistort(np.column_stack([x, y]), self.distortion)
+
+    def rays(self, pixels: FloatArray) -> FloatArray:
+        """Directions (not of unit length: camera z is 1) in the pitch frame, shape (N, 3)."""
+        ideal = self.pixel_to_ideal(pixels)
+        return np.column_stack([ideal, np.ones(len(ideal))]) @ self.rotation
+
+    def scaled(self, factor_x: float, factor_y: float) -> Camera:
+        """The same camera for the image resized by these factors.
+
+        The origin is the centre of the top-left pixel, so the principal point scales about
+        (-0.5, -0.5).
+        """
+        (ax, ay), (x0, y0) = self.focal_length, self.principal_point
+        return replace(
+            self,
+            focal_length=(ax * factor_x, ay * factor_y),
+            principal_point=((x0 + 0.5) * factor_x - 0.5, (y0 + 0.5) * factor_y - 0.5),
+            skew=self.skew * factor_x,
+        )
+
+    def _unit_to_pixel(self, ideal: FloatArray) -> FloatArray:
+        x = self.focal_length[0] * ideal[:, 0] + self.skew * ideal[:, 1] + self.principal_point[0]
+        y = self.focal_length[1] * ideal[:, 1] + self.principal_point[1]
+        return np.column_stack([x, y])

@@ -1,0 +1,112 @@
+"""Lens distortion: OpenCV's full model on normalised image coordinates.
+
+Coefficients stand in the order k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 (OpenCV documentation,
+"Camera Calibration and 3D Reconstruction").
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray, require_shape
+
+COEFFICIENTS = 12
+_NEWTON_STEPS = 25
+
+
+def distort(points: FloatArray, coefficients: FloatArray) -> FloatArray:
+    """Distorted normalised coordinates of ideal ones, both shape (N, 2).
+
+    Source: OpenCV, projectPoints without its tilt terms.
+    """
+    points = require_shape(points, (None, 2), "points")
+    x, y = points[:, 0], points[:, 1]
+    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = coefficients
+    r2 = x * x + y * y
+    r4 = r2 * r2
+    radial = (1 + k1 * r2 + k2 * r4 + k3 * r4 * r2) / (1 + k4 * r2 + k5 * r4 + k6 * r4 * r2)
+    return np.column_stack(
+        [
+            x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + s1 * r2 + s2 * r4,
+            y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + s3 * r2 + s4 * r4,
+        ]
+    )
+
+
+def distort_jacobian(points: FloatArray, coefficients: FloatArray) -> FloatArray:
+    """Derivative of ``distort`` by the ideal coordinates, shape (N, 2, 2)."""
+    points = require_shape(points, (None, 2), "points")
+    x, y = points[:, 0], points[:, 1]
+    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = coefficients
+    r2 = x * x + y * y
+    r4 = r2 * r2
+    numerator = 1 + k1 * r2 + k2 * r4 + k3 * r4 * r2
+    denominator = 1 + k4 * r2 + k5 * r4 + k6 * r4 * r2
+    radial = numerator / denominator
+    # Derivative of the radial factor by r^2.
+    slope = (k1 + 2 * k2 * r2 + 3 * k3 * r4) / denominator - radial * (
+        k4 + 2 * k5 * r2 + 3 * k6 * r4
+    ) / denominator
+    jacobian = np.empty((len(points), 2, 2))
+    jacobian[:, 0, 0] = (
+        radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x + 2 * x * (s1 + 2 * s2 * r2)
+    )
+    jacobian[:, 0, 1] = 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y + 2 * y * (s1 + 2 * s2 * r2)
+    jacobian[:, 1, 0] = 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y + 2 * x * (s3 + 2 * s4 * r2)
+    jacobian[:, 1, 1] = (
+        radial + 2 * y * y * slope + 6 * p1 * y + 2 * p2 * x + 2 * y * (s3 + 2 * s4 * r2)
+    )
+    return jacobian
+
+
+def undistort(points: FloatArray, coefficients: FloatArray) -> FloatArray:
+    """Ideal normalised coordinates of distorted ones, both shape (N, 2).
+
+    Newton's method on ``distort``; a point that no ideal point maps to (beyond the radius where
+    distortion folds) comes back as NaN, so that nobody takes it for a measurement.
+    """
+    points = require_shape(points, (None, 2), "points")
+    if not np.any(coefficients):
+        return points.copy()
+    ideal = points.copy()
+    with np.errstate(all="ignore"):
+        for _ in range(_NEWTON_STEPS):
+            error = distort(ideal, coefficients) - points
+            jacobian = distort_jacobian(ideal, coefficients)
+            determinant = (
+                jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
+            )
+            step_x = (
+                jacobian[:, 1, 1] * error[:, 0] - jacobian[:, 0, 1] * error[:, 1]
+            ) / determinant
+            step_y = (
+                jacobian[:, 0, 0] * error[:, 1] - jacobian[:, 1, 0] * error[:, 0]
+            ) / determinant
+            ideal -= np.column_stack([step_x, step_y])
+            if np.nanmax(np.abs(error), initial=0.0) < 1e-15:
+                break
+        residual = np.abs(distort(ideal, coefficients) - points).max(axis=1)
+        reachable = np.hypot(ideal[:, 0], ideal[:, 1]) <= fold_radius(coefficients)
+        ideal[~((residual < 1e-9) & reachable)] = np.nan
+    return ideal
+
+
+def fold_radius(coefficients: FloatArray) -> float:
+    """Ideal radius up to which the distorted radius grows; infinite where it always does.
+
+    Beyond it far points fold back into the picture, so they count as not visible.
+    Tangential and prism terms are small and left out.
+    """
+    k1, k2, _, _, k3, k4, k5, k6 = coefficients[:8]
+    if k2 == k3 == k4 == k5 == k6 == 0.0:
+        return float(np.sqrt(-1 / (3 * k1))) if k1 < 0 else np.inf
+    # d/dr of r N(r^2) / D(r^2) is zero where N D + 2 s (N' D - N D') is, with s = r^2.
+    numerator = np.polynomial.Polynomial([1.0, k1, k2, k3])
+    denominator = np.polynomial.Polynomial([1.0, k4, k5, k6])
+    s = np.polynomial.Polynomial([0.0, 1.0])
+    slope = numerator * denominator + 2 * s * (
+        numerator.deriv() * denominator - numerator * denominator.deriv()
+    )
+    roots = np.concatenate([slope.roots(), denominator.roots()])
+    real = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
+    return float(np.sqrt(real.min())) if len(real) else np.inf

@@ -1,0 +1,193 @@
+"""Resection: the camera that puts known curves of space through points of its image.
+
+The unknowns of one camera are a row of ``PARAMETERS`` numbers: pan, tilt, roll (radians), the
+position (metres), the logarithm of the focal length (pixels) and kappa, the radial
+displacement at half the diagonal as a share of it: an ideal pixel at radius rho from the
+principal point appears at ``rho (1 + u + u^2 / 2)`` with ``u = kappa (rho / half_diagonal)^2``.
+That is OpenCV's k1 = kappa (f / half_diagonal)^2 in a form that does not depend on the focal
+length, with k2 = k1^2 / 2 tied to it: below a tenth of a pixel inside real pictures, and the
+radius then grows everywhere, so that no far point folds back into the picture.
+
+The residual of a point is its signed distance to the projected curve. The place on the curve
+is eliminated: at the nearest place the derivative of the distance by that place is zero, so the
+derivative by the camera is taken with the place held (variable projection). Beyond the end of
+a segment or arc both components of the offset to the end count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.geometry.curve_residuals import (
+    accumulate,
+    projection_derivatives,
+    residual_rows,
+    unpack,
+)
+from app.geometry.rotation import pan_tilt_roll_from_rotation, rotation_from_pan_tilt_roll
+
+PARAMETERS = 8
+PAN, TILT, ROLL, X, Y, Z, LOG_FOCAL, KAPPA = range(PARAMETERS)
+
+SEGMENT, ARC = 0, 1
+
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Known curves of space.
+
+    Attributes:
+        kinds: ``SEGMENT`` or ``ARC``, shape (M,).
+        shapes: Segments: start xyz and end xyz. Arcs in the plane z = 0: centre x and y,
+            radius, first and last angle, 0. Metres and radians, shape (M, 6).
+    """
+
+    kinds: IntArray
+    shapes: FloatArray
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """Image points that lie on the curves.
+
+    Attributes:
+        pixels: Relative to the principal point, shape (N, 2).
+        curve: Index of each point's curve, shape (N,), grouped and increasing.
+        weight: Weight of each point, shape (N,).
+    """
+
+    pixels: FloatArray
+    curve: IntArray
+    weight: FloatArray
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Gaussian prior: ``(parameters - mean) / sigma``; an infinite sigma is no prior.
+
+    Attributes:
+        mean: Shape (8,).
+        sigma: Shape (8,).
+    """
+
+    mean: FloatArray
+    sigma: FloatArray
+
+
+def camera_from_parameters(
+    parameters: FloatArray, principal_point: tuple[float, float], half_diagonal: float
+) -> Camera:
+    """Camera of one row of parameters.
+
+    Args:
+        parameters: Shape (8,).
+        principal_point: Pixels.
+        half_diagonal: Half the image diagonal, pixels, to which kappa refers.
+    """
+    pan, tilt, roll = (float(angle) for angle in parameters[PAN : ROLL + 1])
+    focal = float(np.exp(parameters[LOG_FOCAL]))
+    distortion = np.zeros(12)
+    distortion[0] = parameters[KAPPA] * (focal / half_diagonal) ** 2
+    distortion[1] = distortion[0] ** 2 / 2
+    return Camera(
+        rotation=rotation_from_pan_tilt_roll(pan, tilt, roll),
+        position=parameters[X : Z + 1],
+        focal_length=(focal, focal),
+        principal_point=principal_point,
+        distortion=distortion,
+    )
+
+
+def parameters_from_camera(camera: Camera, half_diagonal: float) -> FloatArray:
+    """Row of parameters nearest to a camera; terms other than k1 are left out, shape (8,)."""
+    focal = float(np.sqrt(camera.focal_length[0] * camera.focal_length[1]))
+    kappa = camera.distortion[0] * (half_diagonal / focal) ** 2
+    angles = pan_tilt_roll_from_rotation(camera.rotation)
+    return np.array([*angles, *camera.position, np.log(focal), kappa])
+
+
+def normal_equations(
+    parameters: FloatArray,
+    curves: Curves,
+    sightings: Sightings,
+    prior: Prior,
+    scale_px: float,
+    half_diagonal: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Cost, gradient and J^T W J of the soft-L1 loss for each row of parameters.
+
+    The loss of a distance d is ``2 c^2 (sqrt(1 + (d / c)^2) - 1) / 2`` with c = ``scale_px``,
+    and J^T W J uses its weight ``1 / sqrt(1 + (d / c)^2)``.
+
+    Args:
+        parameters: Shape (B, 8).
+
+    Returns:
+        Shapes (B,), (B, 8) and (B, 8, 8); pixels squared.
+    """
+    count = len(parameters)
+    cost = np.empty(count)
+    gradient = np.empty((count, PARAMETERS))
+    information = np.empty((count, PARAMETERS, PARAMETERS))
+    accumulate(
+        np.ascontiguousarray(parameters),
+        curves.kinds,
+        curves.shapes,
+        sightings.pixels,
+        sightings.curve,
+        sightings.weight,
+        prior.mean,
+        prior.sigma,
+        scale_px,
+        half_diagonal,
+        cost,
+        gradient,
+        information,
+    )
+    return cost, gradient, information
+
+
+def distances(
+    parameters: FloatArray, curves: Curves, sightings: Sightings, half_diagonal: float
+) -> FloatArray:
+    """Distance of each point to its projected curve, pixels, shape (N,).
+
+    Args:
+        parameters: One camera, shape (8,).
+    """
+    offsets = np.empty((len(sightings.pixels), 2))
+    jacobians = np.empty((len(sightings.pixels), 2, PARAMETERS))
+    residual_rows(
+        parameters,
+        curves.kinds,
+        curves.shapes,
+        sightings.pixels,
+        sightings.curve,
+        half_diagonal,
+        offsets,
+        jacobians,
+    )
+    return np.hypot(offsets[:, 0], offsets[:, 1])
+
+
+def projection_jacobian(
+    parameters: FloatArray, point: FloatArray, half_diagonal: float
+) -> FloatArray:
+    """Derivative of a point's pixel by the parameters of its camera, shape (2, 8).
+
+    Args:
+        parameters: One camera, shape (8,).
+        point: Pitch frame, metres, in front of the camera, shape (3,).
+        half_diagonal: Half the image diagonal, pixels.
+    """
+    derivatives = np.empty((2, PARAMETERS))
+    x, y, z = point - parameters[X : Z + 1]
+    projection_derivatives(unpack(parameters, half_diagonal), x, y, z, derivatives)
+    return derivatives

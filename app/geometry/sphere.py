@@ -1,0 +1,124 @@
+"""Spheres in an image: where a ball of known size is, and how large it appears."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.errors import DegenerateGeometryError
+from app.geometry.arrays import FloatArray, require_shape
+from app.geometry.camera import Camera
+from app.geometry.distortion import distort
+
+_OUTLINE_POINTS = 64
+
+
+def position_from_diameter(
+    camera: Camera, center: FloatArray, diameter_px: float, diameter_m: float
+) -> FloatArray:
+    """Centre of a sphere from the centre and diameter of its image, pitch frame, metres, (3,).
+
+    Args:
+        camera: The camera.
+        center: Pixels as the image shows them, shape (2,).
+        diameter_px: Vertical extent, pixels.
+        diameter_m: True diameter, metres.
+
+    Raises:
+        DegenerateGeometryError: The diameter is not positive.
+
+    Source: the paper, eq. for p; method.md, section 4.
+    """
+    center = require_shape(center, (2,), "center")
+    if not diameter_px > 0:
+        raise DegenerateGeometryError("a ball's diameter must be positive")
+    half = np.array([0.0, diameter_px / 2])
+    ideal = camera.pixel_to_ideal(np.vstack([center, center + half, center - half]))
+    apart = np.linalg.norm(ideal[1] - ideal[2])
+    ray = np.append(ideal[0], 1.0)
+    position: FloatArray = diameter_m / apart * (camera.rotation.T @ ray) + camera.position
+    return position
+
+
+def optimal_diameter(
+    camera: Camera, center: FloatArray, point: FloatArray, diameter_m: float
+) -> tuple[float, float]:
+    """Image diameter whose monocular position lies nearest to a point, in closed form.
+
+    With a = R^T p_c the nearest place on the ray is at lambda = a.(p - C) / a.a, and the
+    diameter is that of a sphere there.
+
+    Args:
+        camera: The camera.
+        center: Annotated centre, pixels as the image shows them, shape (2,).
+        point: Pitch frame, metres, shape (3,).
+        diameter_m: True diameter, metres.
+
+    Returns:
+        Diameter in pixels, and the distance of the point from the ray in metres.
+
+    Raises:
+        DegenerateGeometryError: The point lies behind the camera.
+
+    Source: method.md, section 5.
+    """
+    center = require_shape(center, (2,), "center")
+    ideal = camera.pixel_to_ideal(center[None])[0]
+    ray = camera.rotation.T @ np.append(ideal, 1.0)
+    offset = require_shape(point, (3,), "point") - camera.position
+    depth = float(ray @ offset / (ray @ ray))
+    if depth <= 0:
+        raise DegenerateGeometryError("the point lies behind the camera")
+    # With skew, "vertical in the image" leans in normalised coordinates.
+    upright = np.array([-camera.skew / camera.focal_length[0], 1.0])
+    half = diameter_m / depth / 2 * upright / np.linalg.norm(upright)
+    ends = _unit_to_pixel(
+        camera, distort(np.vstack([ideal + half, ideal - half]), camera.distortion)
+    )
+    return float(np.hypot(*(ends[0] - ends[1]))), float(np.linalg.norm(offset - depth * ray))
+
+
+def tight_box(camera: Camera, center: FloatArray, radius: float) -> FloatArray:
+    """Tight box of a sphere's outline: left, top, right, bottom in pixels, shape (4,).
+
+    Exact for a pinhole, from the dual conic of the outline; with distortion the bounds of 64
+    points of it.
+
+    Args:
+        camera: The camera.
+        center: Centre of the sphere, pitch frame, metres, shape (3,).
+        radius: Metres.
+
+    Raises:
+        DegenerateGeometryError: The sphere does not lie wholly in front of the camera.
+
+    Source: Hartley & Zisserman, result 8.6 for the dual of a projected quadric.
+    """
+    in_camera = camera.pitch_to_camera(require_shape(center, (3,), "center")[None])[0]
+    if in_camera[2] <= radius:
+        raise DegenerateGeometryError("the ball does not lie wholly in front of the camera")
+    if camera.distortion.any():
+        outline = camera.project(_outline(in_camera, radius) @ camera.rotation + camera.position)
+        return np.concatenate([outline.min(axis=0), outline.max(axis=0)])
+    # A line l touches the outline when the plane K^T l is at distance r from the centre.
+    dual = camera.K @ (np.outer(in_camera, in_camera) - radius**2 * np.eye(3)) @ camera.K.T
+    middle = dual[:2, 2] / dual[2, 2]
+    half = np.sqrt(dual[:2, 2] ** 2 - np.diag(dual)[:2] * dual[2, 2]) / dual[2, 2]
+    return np.concatenate([middle - half, middle + half])
+
+
+def _outline(center: FloatArray, radius: float) -> FloatArray:
+    """Points of the circle where rays from the camera touch the sphere, camera frame, (64, 3)."""
+    squared = float(center @ center)
+    shrink = 1 - radius**2 / squared
+    axis = center / np.sqrt(squared)
+    across = np.cross(axis, [0.0, 1.0, 0.0])
+    across /= np.linalg.norm(across)
+    up = np.cross(axis, across)
+    angles = np.linspace(0, 2 * np.pi, _OUTLINE_POINTS, endpoint=False)[:, None]
+    circle = np.cos(angles) * across + np.sin(angles) * up
+    outline: FloatArray = center * shrink + radius * np.sqrt(shrink) * circle
+    return outline
+
+
+def _unit_to_pixel(camera: Camera, points: FloatArray) -> FloatArray:
+    return points @ camera.K[:2, :2].T + camera.K[:2, 2]

@@ -1,0 +1,117 @@
+"""Triangulation: points of space from their images in two or more cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.errors import DegenerateGeometryError
+from app.geometry.arrays import FloatArray, require_shape
+
+
+def triangulate_pairs(
+    P_a: FloatArray, P_b: FloatArray, pixels_a: FloatArray, pixels_b: FloatArray
+) -> FloatArray:
+    """Points of space from two views each, by the homogeneous linear DLT on pixels.
+
+    Neither pixels nor matrices are normalised: this is what ``cv2.triangulatePoints`` does, and
+    other estimators give other datasets (method.md, section 3).
+
+    Args:
+        P_a: Projection matrices of the first views, shape (N, 3, 4).
+        P_b: Of the second views, shape (N, 3, 4).
+        pixels_a: Undistorted pixels in the first views, shape (N, 2).
+        pixels_b: In the second views, shape (N, 2).
+
+    Returns:
+        Points in the pitch frame, metres, shape (N, 3).
+
+    Raises:
+        DegenerateGeometryError: Two rays are parallel: the point lies at infinity.
+
+    Source: Hartley & Zisserman, sec. 12.2.
+    """
+    count = len(P_a)
+    for name, array, shape in (
+        ("P_a", P_a, (count, 3, 4)),
+        ("P_b", P_b, (count, 3, 4)),
+        ("pixels_a", pixels_a, (count, 2)),
+        ("pixels_b", pixels_b, (count, 2)),
+    ):
+        require_shape(array, shape, name)
+    rows = np.stack(
+        [
+            pixels_a[:, :1] * P_a[:, 2] - P_a[:, 0],
+            pixels_a[:, 1:] * P_a[:, 2] - P_a[:, 1],
+            pixels_b[:, :1] * P_b[:, 2] - P_b[:, 0],
+            pixels_b[:, 1:] * P_b[:, 2] - P_b[:, 1],
+        ],
+        axis=1,
+    )
+    homogeneous = np.linalg.svd(rows)[2][:, -1]
+    if np.any(np.abs(homogeneous[:, 3]) < 1e-12):
+        raise DegenerateGeometryError("two rays are parallel, they meet nowhere")
+    points: FloatArray = homogeneous[:, :3] / homogeneous[:, 3:]
+    return points
+
+
+def parallax_angle(
+    position_a: FloatArray, position_b: FloatArray, points: FloatArray
+) -> FloatArray:
+    """Angle between the two rays that meet at each point, in radians.
+
+    A small angle means that depth is poorly constrained.
+
+    Args:
+        position_a: Position of camera A in the pitch frame, metres, shape (3,).
+        position_b: Position of camera B in the pitch frame, metres, shape (3,).
+        points: Points in the pitch frame, metres, shape (N, 3).
+
+    Returns:
+        Angles in [0, pi], shape (N,).
+
+    Raises:
+        ShapeError: An argument has another shape.
+        DegenerateGeometryError: A point coincides with a camera position.
+
+    Example:
+        >>> origin, east = np.zeros(3), np.array([2.0, 0.0, 0.0])
+        >>> np.degrees(parallax_angle(origin, east, np.array([[1.0, 1.0, 0.0]]))).round(9)
+        array([90.])
+    """
+    require_shape(position_a, (3,), "position_a")
+    require_shape(position_b, (3,), "position_b")
+    points = require_shape(points, (None, 3), "points")
+    to_a, to_b = position_a - points, position_b - points
+    sine = np.linalg.norm(np.cross(to_a, to_b), axis=1)
+    cosine = (to_a * to_b).sum(axis=1)
+    if np.any((to_a == 0).all(axis=1) | (to_b == 0).all(axis=1)):
+        raise DegenerateGeometryError("a point coincides with a camera position")
+    # atan2 of (sine, cosine): arccos loses half the digits near zero, which
+    # is exactly where small-baseline pairs live.
+    angles: FloatArray = np.arctan2(sine, cosine)
+    return angles
+
+
+def point_covariance(
+    jacobians: Sequence[FloatArray], pixel_covariances: Sequence[FloatArray]
+) -> FloatArray:
+    """Covariance of a point seen by several cameras, square metres, shape (3, 3).
+
+    Args:
+        jacobians: Of the pixel by the point in each camera, shape (2, 3).
+        pixel_covariances: Of the measured pixel in each camera, shape (2, 2).
+
+    Raises:
+        DegenerateGeometryError: The cameras do not determine the point.
+
+    Source: Hartley & Zisserman, result 5.10.
+    """
+    information = np.zeros((3, 3))
+    for jacobian, spread in zip(jacobians, pixel_covariances, strict=True):
+        information += jacobian.T @ np.linalg.solve(spread, jacobian)
+    values = np.linalg.eigvalsh(information)
+    if values[0] <= 1e-15 * values[-1]:
+        raise DegenerateGeometryError("all rays to the point are parallel")
+    return np.asarray(np.linalg.inv(information), dtype=np.float64)

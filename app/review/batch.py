@@ -1,0 +1,261 @@
+"""Batch: line files to camera files and their score, without a database."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.datasets.camera_json import camera_text, read_cameras
+from app.datasets.json_text import read_json
+from app.datasets.report import Report
+from app.datasets.sn_calibration import LineFile, read_line_files
+from app.errors import DatasetFormatError, InputError
+from app.soccer.annotation import Lines, make_lines
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.soccer.solution import Finding
+from app.solving.calibrate import calibrate
+from app.solving.findings import calibration_findings
+from app.solving.leave_one_out import leave_one_out
+from app.solving.score import score, score_frame
+
+CHUNK = 16
+"""Frames that one process takes at a time."""
+
+
+@dataclass(frozen=True)
+class CalibratedFrame:
+    """What became of one line file.
+
+    ``camera`` is the text of its file, ``left_out`` (marking, pixels) of ``leave_one_out``.
+    """
+
+    stem: str
+    camera: str | None
+    reason: str | None
+    findings: tuple[Finding, ...]
+    left_out: tuple[tuple[str, float | None], ...]
+    milliseconds: float
+
+
+def calibrate_files(
+    source: Path,
+    out: Path,
+    *,
+    size: ImageSize,
+    labels: str = "checked",
+    with_leave_one_out: bool = False,
+    executor: Executor,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """Write a camera file for each line file, and what was noticed on the way.
+
+    Args:
+        source: Folder or zip of sn-calibration line files.
+        out: Folder that gets ``camera_<stem>.json``, ``findings.json``, ``calibrate.json`` and,
+            if asked, ``leave_one_out.json``. What an earlier run left there is replaced.
+        size: Size of the annotated images.
+        labels: ``checked`` leaves out markings found mislabelled, ``given`` trusts all.
+        with_leave_one_out: Also drop each marking in turn.
+        executor: Where the frames are calibrated.
+        progress: Called with frames done and in all.
+
+    Returns:
+        What ``calibrate.json`` holds.
+
+    Raises:
+        InputError: There is no line file, or ``out`` cannot hold the result.
+    """
+    began = time.perf_counter()
+    report = Report()
+    files = list(read_line_files(source, size, report))
+    if not files:
+        raise _nothing(source, report)
+    policy = CalibrationPolicy(check_labels=labels == "checked")
+    chunks = [files[start : start + CHUNK] for start in range(0, len(files), CHUNK)]
+    jobs = [
+        executor.submit(calibrate_chunk, chunk, size, policy, with_leave_one_out)
+        for chunk in chunks
+    ]
+    frames: list[CalibratedFrame] = []
+    for job in jobs:
+        frames.extend(job.result())
+        if progress is not None:
+            progress(len(frames), len(files))
+    summary = _summary(frames, report, time.perf_counter() - began)
+    _write(out, frames, summary, with_leave_one_out)
+    return summary
+
+
+def calibrate_chunk(
+    files: list[LineFile], size: ImageSize, policy: CalibrationPolicy, with_leave_one_out: bool
+) -> list[CalibratedFrame]:
+    """Calibrate some frames in this process, one after the other on one thread."""
+    calibrate(
+        files[0].lines, Pitch(), size, policy
+    )  # compiled kernels are loaded outside the clock
+    return [_calibrate_file(file, size, policy, with_leave_one_out) for file in files]
+
+
+def score_files(
+    lines: Path, cameras: Path, *, size: ImageSize, without: Path | None = None
+) -> dict[str, Any]:
+    """Measure camera files against line files.
+
+    Args:
+        lines: Folder or zip of line files.
+        cameras: Folder or zip of ``camera_<stem>.json``.
+        size: Size of the annotated images.
+        without: ``findings.json``; markings that it calls mislabelled are left out.
+
+    Raises:
+        InputError: There is no line file.
+    """
+    report = Report()
+    found = read_cameras(cameras, report)
+    dropped = _wrong_labels(without) if without is not None else set()
+    pitch = Pitch()
+    scores = []
+    for file in read_line_files(lines, size, report):
+        kept = _without(file.lines, {marking for stem, marking in dropped if stem == file.stem})
+        camera = found.get(file.stem)
+        scores.append(None if camera is None else score_frame(camera, kept, pitch, size))
+    if not scores:
+        raise _nothing(lines, report)
+    total = score(scores)
+    return {
+        "frames": total.frames,
+        "calibrated": total.calibrated,
+        "completeness": total.completeness,
+        "jac_0.5": total.jac[0],
+        "jac_1": total.jac[1],
+        "jac_2": total.jac[2],
+        "share": total.share,
+        "fs5": total.challenge,
+        "error_median_px": total.error_median_px,
+        "error_p95_px": total.error_p95_px,
+        **_times(cameras),
+        "problems": [problem.message for problem in report.problems],
+    }
+
+
+def _calibrate_file(
+    file: LineFile, size: ImageSize, policy: CalibrationPolicy, with_leave_one_out: bool
+) -> CalibratedFrame:
+    pitch = Pitch()
+    began = time.thread_time()
+    calibration = calibrate(file.lines, pitch, size, policy)
+    milliseconds = 1000 * (time.thread_time() - began)
+    left_out = leave_one_out(file.lines, pitch, size, policy) if with_leave_one_out else ()
+    camera = calibration.camera
+    return CalibratedFrame(
+        stem=file.stem,
+        camera=None if camera is None else camera_text(camera),
+        reason=calibration.reason,
+        findings=tuple(calibration_findings(calibration, None)),
+        left_out=tuple(left_out),
+        milliseconds=milliseconds,
+    )
+
+
+def _summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> dict[str, Any]:
+    times = [frame.milliseconds for frame in frames]
+    failed = [
+        {"frame": frame.stem, "reason": frame.reason} for frame in frames if frame.camera is None
+    ]
+    failed += [
+        {"frame": Path(problem.path).stem, "reason": problem.message}
+        for problem in report.problems
+        if Path(problem.path).stem not in {frame.stem for frame in frames}
+    ]
+    return {
+        "frames": report.read,
+        "calibrated": len(frames) - sum(frame.camera is None for frame in frames),
+        "failed": failed,
+        "ms_median": float(np.median(times)),
+        "ms_p95": float(np.percentile(times, 95)),
+        "seconds": seconds,
+        "problems": [problem.message for problem in report.problems],
+    }
+
+
+def _write(
+    out: Path, frames: list[CalibratedFrame], summary: dict[str, Any], with_leave_one_out: bool
+) -> None:
+    texts = {f"camera_{frame.stem}.json": frame.camera for frame in frames if frame.camera}
+    findings = [
+        {"frame": frame.stem, **asdict(finding)} for frame in frames for finding in frame.findings
+    ]
+    texts["findings.json"] = _text(findings)
+    if with_leave_one_out:
+        rows = [
+            {"frame": frame.stem, "marking": marking, "error_px": error}
+            for frame in frames
+            for marking, error in frame.left_out
+        ]
+        texts["leave_one_out.json"] = _text(rows)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for stale in _own_files(out) - set(texts):
+            (out / stale).unlink()
+        # calibrate.json says what the folder holds, so it comes last.
+        for name, text in chain(texts.items(), [("calibrate.json", _text(summary))]):
+            _write_atomically(out / name, text)
+    except OSError as error:
+        raise InputError(f"{out} cannot hold the cameras ({error.strerror})") from error
+
+
+def _own_files(out: Path) -> set[str]:
+    """Files of an earlier run; none where no run ended, so nothing foreign is removed."""
+    if not (out / "calibrate.json").is_file():
+        return set()
+    names = {path.name for path in out.glob("camera_*.json")}
+    return names | ({"leave_one_out.json"} if (out / "leave_one_out.json").is_file() else set())
+
+
+def _write_atomically(path: Path, text: str) -> None:
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(path)
+
+
+def _wrong_labels(findings: Path) -> set[tuple[str, str]]:
+    """Frame and marking of each finding ``wrong_label``."""
+    value = read_json(findings.read_bytes(), str(findings))
+    if not isinstance(value, list):
+        raise DatasetFormatError(str(findings), None, None, "is not a list of findings")
+    rows = [item for item in value if isinstance(item, dict) and item.get("kind") == "wrong_label"]
+    return {(str(item.get("frame")), str(item.get("marking"))) for item in rows}
+
+
+def _without(lines: Lines, markings: set[str]) -> Lines:
+    return make_lines({name: points for name, points in lines.items() if name not in markings})
+
+
+def _times(cameras: Path) -> dict[str, Any]:
+    """Milliseconds a frame from the ``calibrate.json`` beside the cameras, or null."""
+    beside = cameras / "calibrate.json"
+    value = read_json(beside.read_bytes(), str(beside)) if beside.is_file() else {}
+    return {name: value.get(name) for name in ("ms_median", "ms_p95")}
+
+
+def _nothing(source: Path, report: Report) -> InputError:
+    if report.problems:
+        return report.problems[0]
+    return InputError(
+        f"{source} holds no line files", hint="A line file is a JSON file for one image."
+    )
+
+
+def _text(value: Any) -> str:
+    return json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n"

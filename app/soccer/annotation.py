@@ -1,0 +1,53 @@
+"""What people and datasets said about one image."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from app.soccer.frames import Box, ImagePoint
+
+Lines = Mapping[str, tuple[ImagePoint, ...]]
+"""Annotated points per marking; keys are names from ``pitch.MARKINGS``, sorted."""
+
+
+def make_lines(lines: Mapping[str, Any]) -> Lines:
+    """Lines from any mapping of marking to points, in the order of names."""
+    return {
+        marking: tuple(ImagePoint(float(x), float(y)) for x, y in lines[marking])
+        for marking in sorted(lines)
+    }
+
+
+@dataclass(frozen=True)
+class BallAnnotation:
+    """One ball as annotated: a box, or (ISSIA) its centre alone.
+
+    Exactly one of ``box`` and ``point`` is set, unless the ball is out of view.
+    """
+
+    box: Box | None = None
+    point: ImagePoint | None = None
+    occluded: bool = False
+    out_of_view: bool = False
+
+    @property
+    def center(self) -> ImagePoint | None:
+        """Centre of the ball in the image, pixels; None when it is out of view."""
+        if self.out_of_view:
+            return None
+        return self.box.center if self.box is not None else self.point
+
+
+@dataclass(frozen=True)
+class Extras:
+    """What a dataset brings and the ball pipeline does not use; exported unchanged.
+
+    ``boxes`` are players, referees and unclassified boxes, ``lines`` have no geometry
+    (``Line unknown``, null class), ``metadata`` is the source's own record of the image.
+    """
+
+    boxes: tuple[Mapping[str, Any], ...] = ()
+    lines: tuple[Mapping[str, Any], ...] = ()
+    metadata: Mapping[str, Any] = field(default_factory=dict)

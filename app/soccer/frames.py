@@ -1,0 +1,65 @@
+"""The image frame and its units; docs/coordinates.md has the whole story."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+
+class ImagePoint(NamedTuple):
+    """A point in an image, pixels, origin at the centre of the top-left pixel."""
+
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class ImageSize:
+    """Width and height of the annotated image, pixels; never inferred, always explicit."""
+
+    width: int
+    height: int
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the diagonal in pixels, the yardstick of every threshold in per cent."""
+        return math.hypot(self.width, self.height)
+
+    def unit_to_pixel(self, x: float, y: float) -> ImagePoint:
+        """Pixel of a normalised file coordinate, which scales by (width - 1, height - 1)."""
+        return ImagePoint(x * (self.width - 1), y * (self.height - 1))
+
+    def pixel_to_unit(self, point: ImagePoint) -> tuple[float, float]:
+        """Normalised file coordinate of a pixel."""
+        return point.x / (self.width - 1), point.y / (self.height - 1)
+
+
+@dataclass(frozen=True)
+class Box:
+    """An axis-aligned box: top-left corner, width and height, pixels."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+    @property
+    def center(self) -> ImagePoint:
+        """Centre of the box."""
+        return ImagePoint(self.x + self.width / 2, self.y + self.height / 2)
+
+    @property
+    def diameter(self) -> float:
+        """The d of a ball's box, (w + h) / 2, pixels."""
+        return (self.width + self.height) / 2
+
+    @staticmethod
+    def square(center: ImagePoint, diameter: float) -> Box:
+        """The square of side ``diameter`` (pixels) around ``center``."""
+        return Box(center.x - diameter / 2, center.y - diameter / 2, diameter, diameter)
+
+
+def height_above_grass(z: float) -> float:
+    """Height in metres of a pitch-frame z, which points down."""
+    return -z

@@ -1,0 +1,94 @@
+"""Group: the views of one instant, the unit of review and of solving."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from app.geometry.camera import Camera
+from app.soccer.annotation import BallAnnotation, Extras, Lines
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+
+
+@dataclass(frozen=True)
+class Station:
+    """A camera that stands still for all views that share it; it owns lines and calibration.
+
+    A broadcast view has a station of its own (``shared`` is False).
+
+    Attributes:
+        key: Unique in the dataset, ``cam3`` or the key of its only view.
+        given: Calibration that came with the data, or None.
+        calibration: Which one counts when both exist: ``given`` or ``lines``.
+    """
+
+    key: str
+    size: ImageSize
+    shared: bool = False
+    lines: Lines = field(default_factory=dict)
+    given: Camera | None = None
+    calibration: str = "given"
+    flipped: bool = False
+    """The frames of this camera are mirrored; annotations and calibration are not."""
+
+
+@dataclass(frozen=True)
+class Media:
+    """Where the frame of a view can be read: a file, or a member of an archive."""
+
+    path: str
+    member: str | None = None
+    frame: int | None = None
+    """Number of the frame when ``path`` is a video."""
+
+
+@dataclass(frozen=True)
+class View:
+    """One image of one instant: its camera station, and the balls seen in it."""
+
+    key: str
+    station: Station
+    balls: tuple[BallAnnotation, ...] = ()
+    media: Media | None = None
+    included: bool = True
+    """False when a person left this view out of the group."""
+    extras: Extras = field(default_factory=Extras)
+
+    @property
+    def size(self) -> ImageSize:
+        """Annotated size of the image."""
+        return self.station.size
+
+    @property
+    def ball(self) -> BallAnnotation | None:
+        """The ball of this view; None when there is none, or several to pick from."""
+        seen = [ball for ball in self.balls if not ball.out_of_view]
+        return seen[0] if len(seen) == 1 else None
+
+
+@dataclass(frozen=True)
+class Group:
+    """Views of the same instant, ordered, the main camera first.
+
+    Attributes:
+        key: ``<league>/<season>/<match>/7.png`` (SoccerNet) or the frame number (ISSIA).
+        match: Key of the match or station set, which owns the pitch size.
+        split: ``train``, ``test``, ``valid`` or empty.
+        label: What people read: teams and time of play.
+    """
+
+    key: str
+    views: tuple[View, ...]
+    match: str = ""
+    pitch: Pitch = field(default_factory=Pitch)
+    split: str = ""
+    label: str = ""
+
+    def view(self, key: str) -> View | None:
+        """The view of that key, or None."""
+        return next((view for view in self.views if view.key == key), None)
+
+    def with_view(self, view: View) -> Group:
+        """The same group with the view of that key replaced."""
+        views = tuple(view if old.key == view.key else old for old in self.views)
+        return replace(self, views=views)

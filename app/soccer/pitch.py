@@ -1,0 +1,209 @@
+"""The pitch and its 26 named markings in the pitch frame (docs/coordinates.md).
+
+Metres, origin at the centre mark, x to the right goal, y to the touchline of the main cameras
+("bottom"), z down. Heights above the grass are negative z.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from app.errors import InputError, UnknownMarkingError
+from app.geometry.arrays import FloatArray
+
+PENALTY_AREA_LENGTH = 16.5
+PENALTY_AREA_WIDTH = 40.32
+GOAL_AREA_LENGTH = 5.5
+GOAL_AREA_WIDTH = 18.32
+PENALTY_MARK_DISTANCE = 11.0
+CIRCLE_RADIUS = 9.15
+GOAL_WIDTH = 7.32
+GOAL_HEIGHT = 2.44
+LINE_WIDTH = 0.12
+LENGTH_RANGE = (90.0, 120.0)
+WIDTH_RANGE = (45.0, 90.0)
+
+MARKINGS: tuple[str, ...] = (
+    "Big rect. left bottom",
+    "Big rect. left main",
+    "Big rect. left top",
+    "Big rect. right bottom",
+    "Big rect. right main",
+    "Big rect. right top",
+    "Circle central",
+    "Circle left",
+    "Circle right",
+    "Goal left crossbar",
+    "Goal left post left",
+    "Goal left post right",
+    "Goal right crossbar",
+    "Goal right post left",
+    "Goal right post right",
+    "Middle line",
+    "Side line bottom",
+    "Side line left",
+    "Side line right",
+    "Side line top",
+    "Small rect. left bottom",
+    "Small rect. left main",
+    "Small rect. left top",
+    "Small rect. right bottom",
+    "Small rect. right main",
+    "Small rect. right top",
+)
+CIRCLES = ("Circle central", "Circle left", "Circle right")
+WITHOUT_GEOMETRY = ("Line unknown", "Goal unknown")
+
+
+def canonical_marking(name: str) -> str:
+    """The name as Touchline spells it; spaces at the ends do not matter.
+
+    Raises:
+        UnknownMarkingError: None of the 26 markings has that name.
+    """
+    stripped = name.strip()
+    if stripped not in _KNOWN:
+        raise UnknownMarkingError(name)
+    return stripped
+
+
+def twin_marking(marking: str) -> str:
+    """The marking that this one becomes when the pitch is turned by 180 degrees.
+
+    Example:
+        >>> twin_marking("Big rect. left top")
+        'Big rect. right bottom'
+    """
+    if marking.startswith("Goal") and "post" in marking:
+        # Both goals name their posts as seen from the pitch, so a half turn keeps the post.
+        side, post = marking.split()[1], marking.split()[3]
+        return f"Goal {_SWAP[side]} post {post}"
+    return " ".join(_SWAP.get(word, word) for word in marking.split(" "))
+
+
+_KNOWN = frozenset(MARKINGS)
+_SWAP = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A straight marking from ``start`` to ``end``, pitch frame, metres."""
+
+    start: tuple[float, float, float]
+    end: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A circular marking on the grass, counted from angle ``first`` up to ``last``, radians.
+
+    The angle grows from +x to +y. A full circle has ``last - first = 2 pi``.
+    """
+
+    center: tuple[float, float]
+    radius: float
+    first: float
+    last: float
+
+    @property
+    def is_full(self) -> bool:
+        """Whether it closes on itself."""
+        return self.last - self.first >= 2 * math.pi - 1e-12
+
+
+@dataclass(frozen=True)
+class Pitch:
+    """A pitch of the given size; everything else is fixed by the Laws of the Game."""
+
+    length: float = 105.0
+    width: float = 68.0
+
+    def __post_init__(self) -> None:
+        for name, value, (low, high) in (
+            ("length", self.length, LENGTH_RANGE),
+            ("width", self.width, WIDTH_RANGE),
+        ):
+            if not low <= value <= high:
+                raise InputError(f"pitch {name} is {value} m; the Laws allow {low:g} to {high:g}")
+
+    @cached_property
+    def shapes(self) -> dict[str, Segment | Arc]:
+        """Geometry of each marking, by name."""
+        return _shapes(self.length / 2, self.width / 2)
+
+    def sample(self, marking: str, spacing: float, circle_spacing: float) -> FloatArray:
+        """Points along a marking, pitch frame, shape (N, 3).
+
+        Steps are counted from the start, as the public sn-calibration evaluator counts them:
+        the last step may be longer (up to twice) and the central circle stays open by one step.
+
+        Args:
+            marking: One of ``MARKINGS``.
+            spacing: Step on straight markings, metres.
+            circle_spacing: Step on circles, metres.
+        """
+        shape = self.shapes[marking]
+        if isinstance(shape, Arc):
+            return _sample_arc(shape, circle_spacing)
+        start, end = np.array(shape.start), np.array(shape.end)
+        length = float(np.linalg.norm(end - start))
+        steps = np.arange(int(length / spacing - 1) + 1)
+        direction = (end - start) / length
+        return np.vstack([start + np.outer(steps * spacing, direction), end])
+
+
+def _sample_arc(arc: Arc, spacing: float) -> FloatArray:
+    count = int(arc.radius * (arc.last - arc.first) / spacing)
+    angles = arc.first + np.arange(count + (0 if arc.is_full else 1)) * spacing / arc.radius
+    if not arc.is_full:
+        angles = np.append(angles, arc.last)
+    x = arc.center[0] + arc.radius * np.cos(angles)
+    y = arc.center[1] + arc.radius * np.sin(angles)
+    return np.column_stack([x, y, np.zeros_like(x)])
+
+
+def _shapes(half_length: float, half_width: float) -> dict[str, Segment | Arc]:
+    shapes: dict[str, Segment | Arc] = {
+        "Side line top": _grass((-half_length, -half_width), (half_length, -half_width)),
+        "Side line bottom": _grass((-half_length, half_width), (half_length, half_width)),
+        "Side line left": _grass((-half_length, -half_width), (-half_length, half_width)),
+        "Side line right": _grass((half_length, -half_width), (half_length, half_width)),
+        "Middle line": _grass((0.0, -half_width), (0.0, half_width)),
+        "Circle central": Arc((0.0, 0.0), CIRCLE_RADIUS, 0.0, 2 * math.pi),
+    }
+    # The penalty arc is what lies outside the penalty area.
+    half_opening = math.acos((PENALTY_AREA_LENGTH - PENALTY_MARK_DISTANCE) / CIRCLE_RADIUS)
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        goal_line = sign * half_length
+        for name, depth, width in (
+            ("Big rect.", PENALTY_AREA_LENGTH, PENALTY_AREA_WIDTH),
+            ("Small rect.", GOAL_AREA_LENGTH, GOAL_AREA_WIDTH),
+        ):
+            front = goal_line - sign * depth
+            left, right = sorted((goal_line, front))
+            half = width / 2
+            shapes[f"{name} {side} top"] = _grass((left, -half), (right, -half))
+            shapes[f"{name} {side} bottom"] = _grass((left, half), (right, half))
+            shapes[f"{name} {side} main"] = _grass((front, -half), (front, half))
+        mark = goal_line - sign * PENALTY_MARK_DISTANCE
+        facing = 0.0 if side == "left" else math.pi
+        shapes[f"Circle {side}"] = Arc(
+            (mark, 0.0), CIRCLE_RADIUS, facing - half_opening, facing + half_opening
+        )
+        # Posts are named as seen from the pitch.
+        post_left, post_right = -sign * GOAL_WIDTH / 2, sign * GOAL_WIDTH / 2
+        top_left = (goal_line, post_left, -GOAL_HEIGHT)
+        top_right = (goal_line, post_right, -GOAL_HEIGHT)
+        crossbar = (top_right, top_left) if side == "left" else (top_left, top_right)
+        shapes[f"Goal {side} crossbar"] = Segment(*crossbar)
+        shapes[f"Goal {side} post left"] = Segment(top_left, (goal_line, post_left, 0.0))
+        shapes[f"Goal {side} post right"] = Segment(top_right, (goal_line, post_right, 0.0))
+    return shapes
+
+
+def _grass(start: tuple[float, float], end: tuple[float, float]) -> Segment:
+    return Segment((*start, 0.0), (*end, 0.0))

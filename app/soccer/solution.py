@@ -1,0 +1,276 @@
+"""Solution: everything computed for one group, from cameras to findings.
+
+Nothing here is edited by anybody; a solution is inserted, or deleted and computed again.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from app.geometry.camera import Camera
+from app.soccer.frames import Box, ImagePoint
+
+SOLVER_VERSION = "1"
+"""Part of every solution's key; raised by one whenever a number changes."""
+
+GAMMAS_PERCENT = (0.5, 1.0, 2.0)
+
+GATES = (
+    "calibratable",
+    "jac",
+    "two_views",
+    "ball",
+    "baseline",
+    "reprojection",
+    "parallax",
+    "sigma",
+)
+"""Names of the gates in the order in which they are judged (method.md, section 6)."""
+
+FINDING_KINDS = (
+    "wrong_label",
+    "sides_swapped",
+    "visible_not_annotated",
+    "bad_point",
+    "under_constrained",
+    "view_disagrees",
+    "not_synchronous",
+    "ball_size",
+    "low_parallax",
+    "high_uncertainty",
+    "implausible_ball",
+    "implausible_camera",
+    "several_balls",
+    "upstream_changed",
+)
+
+
+@dataclass(frozen=True)
+class MarkingFit:
+    """One marking of one view: where the camera puts it and how far the annotation is off.
+
+    Attributes:
+        outcome: ``tp``, ``fp`` or ``fn`` at the policy's gamma, as JaC counts it.
+        distances_px: Distance of each annotated point to the projected polyline; empty when
+            the marking is not annotated or not visible.
+        nearest: The closest place on the polyline for each annotated point.
+        polyline: The projected marking, clipped at the image border; empty when not visible.
+        used: False when the solver left the marking out.
+    """
+
+    marking: str
+    outcome: str
+    distances_px: tuple[float, ...] = ()
+    nearest: tuple[ImagePoint, ...] = ()
+    polyline: tuple[ImagePoint, ...] = ()
+    used: bool = True
+
+    @property
+    def largest_px(self) -> float | None:
+        """Largest distance of an annotated point, pixels; None without one."""
+        return max(self.distances_px, default=None)
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A marking whose label looks wrong: the solver left it out and says what fits.
+
+    ``suggested`` is the class that fits, or None when none does.
+    """
+
+    marking: str
+    suggested: str | None
+    confidence: float
+    error_px: float
+    """Largest distance of its points under the annotated class, pixels."""
+    suggested_error_px: float | None = None
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The camera of one view (or station), and how well it is known.
+
+    Attributes:
+        source: ``given`` or ``lines``.
+        camera: None when the lines do not determine one; ``reason`` then says why.
+        jac: JaC for each of ``GAMMAS_PERCENT``; None when there are no lines to measure it.
+        error_px: Median distance of the annotated points, pixels.
+        covariance: Of pan, tilt, roll, position, log focal length and kappa (see
+            ``geometry.resection``), 8 x 8, row by row; None for a given camera, or where the
+            lines leave a combination open.
+        unobservable: Parameters that the lines do not determine, in words.
+    """
+
+    source: str
+    camera: Camera | None
+    reason: str | None = None
+    jac: tuple[float, ...] | None = None
+    error_px: float | None = None
+    markings: tuple[MarkingFit, ...] = ()
+    suspects: tuple[Suspect, ...] = ()
+    covariance: tuple[float, ...] | None = None
+    unobservable: tuple[str, ...] = ()
+
+    @property
+    def position_sigma_m(self) -> float | None:
+        """Standard deviation of the camera's position, all axes together; None if unknown."""
+        if self.covariance is None:
+            return None
+        return math.sqrt(sum(self.covariance[axis * 9] for axis in (3, 4, 5)))
+
+
+@dataclass(frozen=True)
+class Pair:
+    """The ball triangulated from two views.
+
+    Attributes:
+        a: Key of the first view; ``b`` of the second.
+        point: Pitch frame, metres.
+        errors_px: Reprojection error in view a and in view b.
+        valid: Both errors below tau and the cameras far enough apart.
+        failed: Name of the gate that made it invalid, or None.
+    """
+
+    a: str
+    b: str
+    point: tuple[float, float, float]
+    errors_px: tuple[float, float]
+    baseline_m: float
+    parallax_degrees: float
+    valid: bool
+    failed: str | None = None
+
+
+@dataclass(frozen=True)
+class Ball3D:
+    """The triangulated ball: mean of the valid pairs, pitch frame, metres, z down."""
+
+    point: tuple[float, float, float]
+    covariance: tuple[float, ...]
+    """3 x 3, row by row, square metres."""
+    sigma_m: float
+    """Standard deviation along the longest axis of the covariance."""
+    parallax_degrees: float
+    """The largest over the valid pairs, at ``point``."""
+    views: tuple[str, ...]
+    """Views in a valid pair."""
+
+
+@dataclass(frozen=True)
+class BallFit:
+    """The 3D ball seen again in one view."""
+
+    reprojected: ImagePoint | None
+    error_px: float | None
+    """Annotated centre to reprojection."""
+    error_percent: float | None
+    """The same in per cent of the diagonal."""
+    optimized_diameter_px: float | None
+    """d* of the paper's square; None when the point lies behind the camera."""
+    optimized_box: Box | None
+    """Square of side d* around the annotated centre."""
+    optimized_error_m: float | None
+    """Distance of the point from the ray of the annotated centre."""
+    exact_box: Box | None
+    """Tight box of the sphere's outline."""
+    size_ratio: float | None
+    """Annotated diameter over optimised diameter; None for a point annotation."""
+    depth_m: float | None
+    """Distance of the ball along the optical axis."""
+
+
+@dataclass(frozen=True)
+class ViewSolution:
+    """What was computed for one view.
+
+    ``calibration_key`` names the calibration among others of the same lines and policy.
+    """
+
+    view: str
+    calibration: Calibration
+    calibration_key: str
+    included: bool
+    """In a valid pair."""
+    failed: str | None
+    """First gate that dropped this view, or None."""
+    ball: BallFit | None = None
+
+
+@dataclass(frozen=True)
+class Gate:
+    """One gate as judged for the group.
+
+    ``margin`` is positive when passed: how far the value is from the threshold, in its unit.
+    """
+
+    name: str
+    passed: bool
+    value: float | None
+    threshold: float | None
+    margin: float | None
+    sentence: str
+    view: str | None = None
+    active: bool = True
+    """False when the policy does not ask for it."""
+
+
+@dataclass(frozen=True)
+class Fix:
+    """An edit that a finding proposes.
+
+    ``action`` is ``relabel``, ``drop_point``, ``drop_marking``, ``swap_sides``,
+    ``exclude_view`` or ``pick_ball``.
+    """
+
+    action: str
+    view: str | None = None
+    marking: str | None = None
+    to: str | None = None
+    index: int | None = None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that a person should look at, with its number, its limit and one sentence."""
+
+    kind: str
+    sentence: str
+    view: str | None = None
+    marking: str | None = None
+    suggested: str | None = None
+    number: float | None = None
+    threshold: float | None = None
+    confidence: float | None = None
+    fix: Fix | None = None
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Everything computed for one group under one policy."""
+
+    views: tuple[ViewSolution, ...]
+    pairs: tuple[Pair, ...]
+    ball: Ball3D | None
+    gates: tuple[Gate, ...]
+    findings: tuple[Finding, ...] = ()
+    policy_hash: str = ""
+    solver_version: str = field(default=SOLVER_VERSION)
+
+    @property
+    def passes(self) -> bool:
+        """Whether every active gate is passed."""
+        return all(gate.passed for gate in self.gates if gate.active)
+
+    @property
+    def first_failing(self) -> Gate | None:
+        """The gate to name to a person, or None when the group passes.
+
+        The solver orders it: where a group is short of views because some fell at the first
+        two gates, that earlier gate is the one that failed.
+        """
+        return next((gate for gate in self.gates if gate.active and not gate.passed), None)
+
+    def view(self, key: str) -> ViewSolution | None:
+        """The solution of the view of that key, or None."""
+        return next((view for view in self.views if view.view == key), None)

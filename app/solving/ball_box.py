@@ -1,0 +1,66 @@
+"""Ball box: the triangulated ball seen again in a view, and the box that fits it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.errors import DegenerateGeometryError
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.geometry.sphere import optimal_diameter, tight_box
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.solution import BallFit
+
+
+def fit_ball(
+    camera: Camera, size: ImageSize, ball: BallAnnotation, point: FloatArray, diameter_m: float
+) -> BallFit:
+    """How the 3D ball and the annotation of one view agree.
+
+    Args:
+        camera: The view's camera.
+        size: Annotated size.
+        ball: The ball of the view, in view.
+        point: The triangulated ball, pitch frame, metres, shape (3,).
+        diameter_m: True diameter, metres.
+
+    Returns:
+        The parts that do not exist are None: no box for a point behind the camera, no size
+        ratio for a point annotation.
+    """
+    center = ball.center
+    assert center is not None
+    pixel = camera.project(point[None])[0]
+    seen = not np.isnan(pixel[0])
+    error = float(np.hypot(*(pixel - center))) if seen else None
+    diameter, off_ray = _optimal(camera, center, point, diameter_m)
+    annotated = ball.box.diameter if ball.box is not None else None
+    return BallFit(
+        reprojected=ImagePoint(float(pixel[0]), float(pixel[1])) if seen else None,
+        error_px=error,
+        error_percent=100 * error / size.diagonal if error is not None else None,
+        optimized_diameter_px=diameter,
+        optimized_box=Box.square(center, diameter) if diameter is not None else None,
+        optimized_error_m=off_ray,
+        exact_box=_exact_box(camera, point, diameter_m),
+        size_ratio=annotated / diameter if annotated and diameter else None,
+        depth_m=float(camera.pitch_to_camera(point[None])[0, 2]),
+    )
+
+
+def _optimal(
+    camera: Camera, center: ImagePoint, point: FloatArray, diameter_m: float
+) -> tuple[float | None, float | None]:
+    try:
+        return optimal_diameter(camera, np.array(center), point, diameter_m)
+    except DegenerateGeometryError:
+        return None, None
+
+
+def _exact_box(camera: Camera, point: FloatArray, diameter_m: float) -> Box | None:
+    try:
+        left, top, right, bottom = tight_box(camera, point, diameter_m / 2).tolist()
+    except DegenerateGeometryError:
+        return None
+    return Box(left, top, right - left, bottom - top)

@@ -1,0 +1,131 @@
+"""Calibrate: the camera of one view from its annotated lines, with everything that judges it."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+
+import numpy as np
+
+from app.errors import DegenerateGeometryError
+from app.geometry.arrays import FloatArray
+from app.geometry.resection import LOG_FOCAL, PARAMETERS, X, Z
+from app.soccer.annotation import Lines
+from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.group import Station
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.soccer.solution import GAMMAS_PERCENT, SOLVER_VERSION, Calibration, MarkingFit, Suspect
+from app.solving.jaccard import jaccard, measure_markings, outcomes, project_markings
+from app.solving.labels import find_suspects
+from app.solving.observations import observe
+from app.solving.resect import ResectionProblem, measurement_count
+
+MIN_MEASUREMENTS = 7
+"""A camera with one focal length has seven unknowns; the distortion has a prior."""
+
+MAX_POSITION_SIGMA_M = 5.0
+MAX_FOCAL_SIGMA = 0.10
+"""Above these the position (metres) or focal length (share) counts as not observable."""
+
+
+def calibrate(
+    lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+) -> Calibration:
+    """Calibration of one image from its lines; its camera is None where they do not suffice.
+
+    Args:
+        lines: Annotated points by marking, pixels of ``size``.
+        pitch: The pitch.
+        size: Annotated size.
+        policy: Robust scale, prior of the distortion, whether labels are checked.
+    """
+    observations = observe(lines, pitch, size)
+    measurements = measurement_count(observations)
+    if measurements < MIN_MEASUREMENTS:
+        count = len(observations.markings)
+        reason = (
+            f"{count} {'marking gives' if count == 1 else 'markings give'} {measurements} "
+            f"independent measurements, a camera needs {MIN_MEASUREMENTS}"
+        )
+        return Calibration("lines", None, reason=reason)
+    problem = ResectionProblem.of(size, policy)
+    fit = problem.resect(observations)
+    suspects: tuple[Suspect, ...] = ()
+    if policy.check_labels:
+        fit, observations, suspects = find_suspects(problem, observations, fit)
+    try:
+        spread = problem.covariance(fit.parameters, observations)
+    except DegenerateGeometryError:
+        spread = np.full((PARAMETERS, PARAMETERS), np.inf)
+    calibration = Calibration(
+        "lines",
+        problem.camera(fit.parameters),
+        suspects=suspects,
+        covariance=tuple(spread.ravel().tolist()) if np.isfinite(spread).all() else None,
+        unobservable=_unobservable(spread),
+    )
+    return measure(calibration, lines, pitch, size)
+
+
+def calibrate_station(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> Calibration:
+    """Calibration of a station: the given camera where that counts, else from its lines."""
+    if station.given is not None and station.calibration == "given":
+        return measure(Calibration("given", station.given), station.lines, pitch, station.size)
+    return calibrate(station.lines, pitch, station.size, policy)
+
+
+def measure(calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize) -> Calibration:
+    """The calibration with JaC and the distances of the annotated points filled in.
+
+    Without lines there is no JaC; the projected markings are there all the same.
+    """
+    if calibration.camera is None:
+        return calibration
+    measured = measure_markings(project_markings(calibration.camera, pitch, size), lines)
+    by_gamma = [outcomes(measured, lines, gamma / 100 * size.diagonal) for gamma in GAMMAS_PERCENT]
+    left_out = {suspect.marking for suspect in calibration.suspects}
+    markings = []
+    for marking, outcome in by_gamma[0].items():
+        fit = MarkingFit(marking, outcome, used=marking not in left_out)
+        if marking in measured:
+            seen = measured[marking]
+            fit = replace(
+                fit,
+                distances_px=tuple(seen.distances.tolist()),
+                nearest=_points(seen.nearest),
+                polyline=_points(seen.polyline),
+            )
+        markings.append(fit)
+    distances = np.concatenate([np.array(fit.distances_px) for fit in markings] or [np.empty(0)])
+    has_lines = any(lines.values())
+    return replace(
+        calibration,
+        jac=tuple(jaccard(found) for found in by_gamma) if has_lines else None,
+        error_px=float(np.median(distances)) if len(distances) else None,
+        markings=tuple(markings),
+    )
+
+
+def calibration_key(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> str:
+    """Digest of all that ``calibrate_station`` reads: the same key, the same calibration."""
+    parts: list[object] = [SOLVER_VERSION, station.size, pitch, policy]
+    parts.append([(marking, station.lines[marking]) for marking in sorted(station.lines)])
+    if station.given is not None and station.calibration == "given":
+        parts.append(station.given.parameters.tolist())
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
+
+
+def _unobservable(spread: FloatArray) -> tuple[str, ...]:
+    """Names of what the lines leave open, from the covariance of the parameters."""
+    deviations = np.sqrt(np.diag(spread))
+    words = []
+    if not np.hypot.reduce(deviations[X : Z + 1]) <= MAX_POSITION_SIGMA_M:
+        words.append("position")
+    if not deviations[LOG_FOCAL] <= MAX_FOCAL_SIGMA:
+        words.append("focal length")
+    return tuple(words)
+
+
+def _points(pixels: FloatArray) -> tuple[ImagePoint, ...]:
+    return tuple(ImagePoint(x, y) for x, y in pixels.tolist())

@@ -1,0 +1,211 @@
+"""Gates: what a group must pass to enter the dataset, in order (method.md, section 6).
+
+The first two drop views; the others judge the group from the views that are left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from app.soccer.policy import Policy
+from app.soccer.solution import Ball3D, Calibration, Gate, Pair
+
+MIN_VIEWS = 2
+
+
+@dataclass(frozen=True)
+class JudgedView:
+    """What the gates know of a view.
+
+    Attributes:
+        key: Of the view.
+        letter: What people call it.
+        calibration: Its calibration.
+        jac: At the policy's gamma; None without lines to measure it.
+        tau_px: Largest reprojection error of a valid pair in this view, pixels.
+        has_ball: Whether it shows the one ball.
+        failed: First gate that dropped it, or None.
+    """
+
+    key: str
+    letter: str
+    calibration: Calibration
+    jac: float | None
+    tau_px: float
+    has_ball: bool
+    failed: str | None
+
+
+def view_failure(calibration: Calibration, jac: float | None, policy: Policy) -> str | None:
+    """The first gate that drops a view, or None."""
+    if calibration.camera is None:
+        return "calibratable"
+    if jac is not None and not jac > policy.min_jac:
+        return "jac"
+    return None
+
+
+def judge(
+    views: Sequence[JudgedView], pairs: Sequence[Pair], ball: Ball3D | None, policy: Policy
+) -> tuple[Gate, ...]:
+    """All gates in order, those that the policy does not ask for as not active.
+
+    Args:
+        views: The included views.
+        pairs: Their pairs.
+        ball: The triangulated ball, or None.
+        policy: The thresholds.
+    """
+    left = [view for view in views if view.failed is None]
+    short = len(left) < MIN_VIEWS
+    return (
+        _calibratable(views, short),
+        _jac(views, short, policy),
+        _two_views(left),
+        _ball(left),
+        _baseline(left, pairs, policy),
+        _reprojection(left, pairs),
+        _parallax(ball, policy),
+        _sigma(ball, policy),
+    )
+
+
+def _calibratable(views: Sequence[JudgedView], short: bool) -> Gate:
+    fallen = [view for view in views if view.failed == "calibratable"]
+    count = len(views) - len(fallen)
+    blamed = short and bool(fallen) and count < MIN_VIEWS
+    sentence = f"{count} of {len(views)} views"
+    if blamed:
+        sentence = f"{fallen[0].letter}: {fallen[0].calibration.reason}"
+    return _gate(
+        "calibratable",
+        not blamed,
+        count,
+        min(MIN_VIEWS, len(views)),
+        sentence,
+        view=fallen[0].key if blamed else None,
+    )
+
+
+def _jac(views: Sequence[JudgedView], short: bool, policy: Policy) -> Gate:
+    measured = [(view.jac, view) for view in views if view.jac is not None]
+    fallen = [(jac, view) for jac, view in measured if view.failed == "jac"]
+    calibrated = sum(view.failed != "calibratable" for view in views)
+    blamed = short and bool(fallen) and calibrated >= MIN_VIEWS
+    if not measured:
+        given = any(view.calibration.source == "given" for view in views)
+        sentence = "given, not measured" if given else "nothing to measure"
+        return Gate("jac", True, None, policy.min_jac, None, sentence)
+    shown = fallen if blamed else [item for item in measured if item[1].failed is None] or measured
+    jac, view = min(shown, key=lambda item: item[0])
+    sentence = f"{'worst ' if len(shown) > 1 else ''}{jac:.2f} · {view.letter}"
+    if fallen and not blamed:
+        sentence += f", {_letters([view for _, view in fallen])} left out"
+    key = view.key if blamed else None
+    return _gate("jac", not blamed, jac, policy.min_jac, sentence, view=key)
+
+
+def _two_views(left: Sequence[JudgedView]) -> Gate:
+    return _gate(
+        "two_views",
+        len(left) >= MIN_VIEWS,
+        len(left),
+        MIN_VIEWS,
+        f"{len(left)} calibrated {'view' if len(left) == 1 else 'views'}",
+    )
+
+
+def _ball(left: Sequence[JudgedView]) -> Gate:
+    without = [view for view in left if not view.has_ball]
+    count = len(left) - len(without)
+    passed = count >= MIN_VIEWS
+    sentence = f"in {count} {'view' if count == 1 else 'views'}"
+    if without:
+        sentence += f", not in {_letters(without)}"
+    view = without[0].key if without and not passed else None
+    return _gate("ball", passed, count, MIN_VIEWS, sentence, view=view)
+
+
+def _baseline(left: Sequence[JudgedView], pairs: Sequence[Pair], policy: Policy) -> Gate:
+    names = {view.key for view in left}
+    apart = [pair.baseline_m for pair in pairs if pair.a in names and pair.b in names]
+    if not apart:
+        return _unjudged("baseline", policy.min_baseline_m)
+    widest = max(apart)
+    passed = widest >= policy.min_baseline_m
+    return _gate("baseline", passed, widest, policy.min_baseline_m, f"{widest:.1f} m")
+
+
+def _reprojection(left: Sequence[JudgedView], pairs: Sequence[Pair]) -> Gate:
+    """Judged by the best pair: its error that is larger in units of tau."""
+    views = {view.key: view for view in left}
+    judged = [
+        (max(_shares(pair, views), key=lambda share: share[0]), pair)
+        for pair in pairs
+        if pair.failed in (None, "reprojection") and pair.a in views and pair.b in views
+    ]
+    if not judged:
+        return _unjudged("reprojection", None)
+    (_, error, tau), best = min(judged, key=lambda item: (not item[1].valid, item[0][0]))
+    sentence = f"{_name(best, views)} {error:.1f} px"
+    left_out = [pair for _, pair in judged if not pair.valid]
+    if best.valid and left_out:
+        sentence += f"; {', '.join(_name(pair, views) for pair in left_out)} left out"
+    return Gate("reprojection", best.valid, error, tau, tau - error, sentence)
+
+
+def _shares(
+    pair: Pair, views: Mapping[str, JudgedView]
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """For both views: error in units of tau, error, tau."""
+    first, second = views[pair.a].tau_px, views[pair.b].tau_px
+    return (
+        (pair.errors_px[0] / first, pair.errors_px[0], first),
+        (pair.errors_px[1] / second, pair.errors_px[1], second),
+    )
+
+
+def _name(pair: Pair, views: Mapping[str, JudgedView]) -> str:
+    return f"{views[pair.a].letter}–{views[pair.b].letter}"
+
+
+def _parallax(ball: Ball3D | None, policy: Policy) -> Gate:
+    threshold, active = policy.min_parallax_degrees, policy.min_parallax_degrees is not None
+    if ball is None:
+        return _unjudged("parallax", threshold, active=active)
+    value = ball.parallax_degrees
+    passed = threshold is None or value >= threshold
+    return _gate("parallax", passed, value, threshold, f"{value:.1f}°", active=active)
+
+
+def _sigma(ball: Ball3D | None, policy: Policy) -> Gate:
+    threshold, active = policy.max_sigma_m, policy.max_sigma_m is not None
+    if ball is None:
+        return _unjudged("sigma", threshold, active=active)
+    value = ball.sigma_m
+    margin = None if threshold is None else threshold - value
+    passed = margin is None or margin >= 0
+    return Gate("sigma", passed, value, threshold, margin, f"{value:.2f} m", active=active)
+
+
+def _gate(
+    name: str,
+    passed: bool,
+    value: float,
+    threshold: float | None,
+    sentence: str,
+    *,
+    view: str | None = None,
+    active: bool = True,
+) -> Gate:
+    margin = None if threshold is None else float(value - threshold)
+    return Gate(name, passed, float(value), threshold, margin, sentence, view, active)
+
+
+def _unjudged(name: str, threshold: float | None, *, active: bool = True) -> Gate:
+    return Gate(name, False, None, threshold, None, "not judged", active=active)
+
+
+def _letters(views: Sequence[JudgedView]) -> str:
+    return ", ".join(view.letter for view in views)

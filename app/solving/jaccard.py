@@ -1,0 +1,135 @@
+"""JaC, the Jaccard index for camera calibration (method.md, section 2).
+
+Numbers equal those of the public sn-calibration evaluator: a marking that is annotated and
+visible counts as found when every annotated point lies closer than gamma to its projection.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.geometry.polyline import clip_polyline, distance_to_polyline
+from app.soccer.annotation import Lines
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import MARKINGS, Pitch, twin_marking
+from app.soccer.solution import Calibration
+
+SPACING_M = 0.9
+CIRCLE_SPACING_M = 0.2
+
+TRUE_POSITIVE, FALSE_POSITIVE, FALSE_NEGATIVE = "tp", "fp", "fn"
+
+
+@dataclass(frozen=True)
+class ProjectedMarking:
+    """A marking as the camera sees it, with the annotation measured against it.
+
+    Attributes:
+        polyline: Pixels, clipped at the border, shape (M, 2).
+        distances: Of the annotated points, pixels, shape (N,); empty when not annotated.
+        nearest: Nearest places on the polyline, shape (N, 2).
+    """
+
+    polyline: FloatArray
+    distances: FloatArray
+    nearest: FloatArray
+
+
+def project_markings(camera: Camera, pitch: Pitch, size: ImageSize) -> dict[str, FloatArray]:
+    """The visible markings as clipped polylines, pixels, in the order of ``MARKINGS``."""
+    samples, limits = _samples(pitch)
+    pixels = camera.project(samples, folded=True)
+    visible = {}
+    for marking, first, last in limits:
+        polyline = clip_polyline(pixels[first:last], size.width, size.height)
+        if len(polyline):
+            visible[marking] = polyline
+    return visible
+
+
+def measure_markings(projected: dict[str, FloatArray], lines: Lines) -> dict[str, ProjectedMarking]:
+    """Each visible marking with the distances of its annotated points."""
+    measured = {}
+    for marking, polyline in projected.items():
+        points = np.array(lines.get(marking, ()), dtype=np.float64).reshape(-1, 2)
+        apart, nearest = distance_to_polyline(points, polyline)
+        measured[marking] = ProjectedMarking(polyline, apart, nearest)
+    return measured
+
+
+def outcomes(
+    measured: dict[str, ProjectedMarking], lines: Lines, gamma_px: float
+) -> dict[str, str]:
+    """What each marking counts as at a threshold: ``tp``, ``fp`` or ``fn``."""
+    result = {}
+    for marking in MARKINGS:
+        annotated = bool(lines.get(marking))
+        if marking in measured:
+            close = annotated and bool(np.all(measured[marking].distances < gamma_px))
+            result[marking] = TRUE_POSITIVE if close else FALSE_POSITIVE
+        elif annotated:
+            result[marking] = FALSE_NEGATIVE
+    return result
+
+
+def jaccard(found: dict[str, str]) -> float:
+    """TP / (TP + FN + FP); 0 when nothing is visible and nothing annotated."""
+    if not found:
+        return 0.0
+    return sum(outcome == TRUE_POSITIVE for outcome in found.values()) / len(found)
+
+
+def jac_at(calibration: Calibration, gamma_px: float) -> float | None:
+    """JaC of a measured calibration at any threshold, or None without lines."""
+    if calibration.jac is None:
+        return None
+    largest = [fit.largest_px for fit in calibration.markings]
+    close = sum(apart is not None and apart < gamma_px for apart in largest)
+    return close / len(calibration.markings) if calibration.markings else 0.0
+
+
+def camera_jaccard(
+    camera: Camera,
+    lines: Lines,
+    pitch: Pitch,
+    size: ImageSize,
+    gammas_px: tuple[float, ...],
+    *,
+    symmetric: bool = False,
+) -> tuple[float, ...]:
+    """JaC of a camera at each threshold.
+
+    Args:
+        camera: The camera to measure.
+        lines: Annotated points by marking, pixels.
+        pitch: The pitch.
+        size: Annotated size.
+        gammas_px: Thresholds, pixels.
+        symmetric: Benchmark mode: the better of the labels as given and turned by 180 degrees.
+            Never for curation, where a wrong side is an error to be found.
+    """
+    projected = project_markings(camera, pitch, size)
+    measured = measure_markings(projected, lines)
+    values = tuple(jaccard(outcomes(measured, lines, gamma)) for gamma in gammas_px)
+    if not symmetric:
+        return values
+    turned: Lines = {twin_marking(marking): points for marking, points in lines.items()}
+    measured = measure_markings(projected, turned)
+    twins = (jaccard(outcomes(measured, turned, gamma)) for gamma in gammas_px)
+    return tuple(max(pair) for pair in zip(values, twins, strict=True))
+
+
+@lru_cache(maxsize=8)
+def _samples(pitch: Pitch) -> tuple[FloatArray, tuple[tuple[str, int, int], ...]]:
+    parts, limits, count = [], [], 0
+    for marking in MARKINGS:
+        part = pitch.sample(marking, SPACING_M, CIRCLE_SPACING_M)
+        parts.append(part)
+        limits.append((marking, count, count + len(part)))
+        count += len(part)
+    return np.vstack(parts), tuple(limits)

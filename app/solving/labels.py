@@ -1,0 +1,206 @@
+"""Labels: markings annotated under the wrong class.
+
+A wrong label pulls the whole camera away, so that nothing fits. Markings are left out in turn
+and the rest is resected from scratch; the one to suspect is the one without which everything
+else falls into place. Where its points then lie on the projection of another marking, that is
+what it should have been called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+from app.soccer.pitch import CIRCLES, MARKINGS
+from app.soccer.solution import Suspect
+from app.solving.observations import Observations
+from app.solving.resect import Resection, ResectionProblem, measurement_count
+
+GAMMA_SHARE = 0.005
+"""Gamma as a share of the diagonal; the distances below are in units of it."""
+MISFIT = 1.5
+"""A marking is off when a point of it lies farther than this."""
+NAMELESS_MISFIT = 4.0
+"""The same for a marking that fits no other class either."""
+FITS = 2.0
+"""Without the suspects every other marking lies within this."""
+SETTLES = 3.0
+"""The same where the cost falls decisively."""
+RELABELLED = 1.5
+"""The points of a relabelled marking lie within this."""
+DECISIVE = 0.35
+"""Without a class that fits, the cost must fall to this share to suspect a marking."""
+MAX_SUSPECTS = 3
+MIN_MEASUREMENTS_LEFT = 8
+
+
+@dataclass(frozen=True)
+class _Doubt:
+    """A marking left out: how far off it is, and the class that its points fit, if any."""
+
+    marking: str
+    error: float
+    suggested: str | None
+    suggested_error: float
+
+    @property
+    def is_off(self) -> bool:
+        return self.error > (NAMELESS_MISFIT if self.suggested is None else MISFIT)
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """What happens without some markings: the camera, and the largest distance of the others."""
+
+    doubts: tuple[_Doubt, ...]
+    rest: Observations
+    fit: Resection
+    worst: float
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether all that was left out is off."""
+        return all(doubt.is_off for doubt in self.doubts)
+
+    @property
+    def explains(self) -> bool:
+        """Whether all others fit, and what was left out fits another class."""
+        return self.worst <= FITS and all(doubt.suggested for doubt in self.doubts)
+
+
+def find_suspects(
+    problem: ResectionProblem, observations: Observations, fit: Resection
+) -> tuple[Resection, Observations, tuple[Suspect, ...]]:
+    """The camera, the observations it rests on, and the markings left out of them.
+
+    Args:
+        problem: The image.
+        observations: All annotated points.
+        fit: The camera from all of them.
+
+    Returns:
+        The arguments themselves and no suspect where every marking fits.
+    """
+    search = _Search(problem, GAMMA_SHARE * problem.size.diagonal)
+    if search.all_fit(observations, fit):
+        return fit, observations, ()
+    trial = search.without_minority(observations)
+    doubts: tuple[_Doubt, ...] = trial.doubts if trial is not None else ()
+    rest, now = observations, fit
+    while trial is None or not search.settled(trial, fit.cost):
+        trial = search.next_without(rest, now)
+        if trial is None or len(doubts) == MAX_SUSPECTS:
+            return fit, observations, ()
+        doubts += trial.doubts
+        rest, now = trial.rest, trial.fit
+    # Only now is it known which classes are free: two posts may have been swapped.
+    final = (search.doubt(observations, trial.rest, trial.fit, item.marking) for item in doubts)
+    return trial.fit, trial.rest, tuple(search.suspect(doubt) for doubt in final)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Trials on one image; distances are in units of ``gamma`` (pixels)."""
+
+    problem: ResectionProblem
+    gamma: float
+
+    def all_fit(self, observations: Observations, fit: Resection) -> bool:
+        """Whether no marking is off."""
+        return max(self.largest(observations, fit).values(), default=0.0) <= MISFIT
+
+    def settled(self, trial: _Trial, cost: float) -> bool:
+        """Whether a trial is good enough to believe, against the cost with all markings."""
+        return trial.explains or (trial.fit.cost < DECISIVE * cost and trial.worst <= SETTLES)
+
+    def without_minority(self, observations: Observations) -> _Trial | None:
+        """The trial without the few markings of the other side, if that settles everything."""
+        minority = _minority(observations.markings)
+        if not 2 <= len(minority) <= MAX_SUSPECTS:
+            return None
+        trial = self.try_without(observations, minority)
+        return trial if trial is not None and trial.is_sound and trial.worst <= FITS else None
+
+    def next_without(self, observations: Observations, fit: Resection) -> _Trial | None:
+        """The first marking whose removal explains everything, else the one that helps most."""
+        trials = []
+        for marking in _by_suspicion(self.largest(observations, fit)):
+            trial = self.try_without(observations, [marking])
+            if trial is None or not trial.is_sound:
+                continue
+            if trial.explains:
+                return trial
+            trials.append(trial)
+        return min(trials, key=lambda item: item.fit.cost, default=None)
+
+    def try_without(self, observations: Observations, markings: Sequence[str]) -> _Trial | None:
+        """The camera without some markings; None when too little would be left."""
+        rest = observations
+        for marking in markings:
+            rest = rest.without(marking)
+        if measurement_count(rest) < MIN_MEASUREMENTS_LEFT:
+            return None
+        fit = self.problem.resect(rest)
+        doubts = tuple(self.doubt(observations, rest, fit, marking) for marking in markings)
+        return _Trial(doubts, rest, fit, max(self.largest(rest, fit).values()))
+
+    def doubt(
+        self, observations: Observations, rest: Observations, fit: Resection, marking: str
+    ) -> _Doubt:
+        """A marking against the camera from the rest, under its label and those not in use."""
+        error = self.distance(fit.parameters, observations.only(marking))
+        taken = {*rest.markings, marking}
+        best, smallest = None, RELABELLED
+        for other in MARKINGS:
+            if other in taken or (other in CIRCLES) != (marking in CIRCLES):
+                continue
+            apart = self.distance(fit.parameters, observations.only(marking, other))
+            if apart < smallest:
+                best, smallest = other, apart
+        return _Doubt(marking, error, best, smallest)
+
+    def largest(self, observations: Observations, fit: Resection) -> dict[str, float]:
+        """Largest distance of each marking's points."""
+        apart = self.problem.distances(fit.parameters, observations) / self.gamma
+        return {
+            MARKINGS[index]: float(apart[observations.marking == index].max())
+            for index in np.unique(observations.marking)
+        }
+
+    def distance(self, parameters: FloatArray, observations: Observations) -> float:
+        """Largest distance of all points."""
+        return float(self.problem.distances(parameters, observations).max()) / self.gamma
+
+    def suspect(self, doubt: _Doubt) -> Suspect:
+        """The doubt as people are told of it; a class that fits as badly is worth nothing."""
+        named = doubt.suggested is not None
+        return Suspect(
+            marking=doubt.marking,
+            suggested=doubt.suggested,
+            confidence=1 - doubt.suggested_error / doubt.error if named else 0.5,
+            error_px=doubt.error * self.gamma,
+            suggested_error_px=doubt.suggested_error * self.gamma if named else None,
+        )
+
+
+def _by_suspicion(largest: dict[str, float]) -> list[str]:
+    """Markings in the order in which they are tried.
+
+    Those on the other side of the pitch than most come first, then what fits worst.
+    """
+    minority = _minority(tuple(largest))
+    return sorted(largest, key=lambda name: (name not in minority, -largest[name], name))
+
+
+def _minority(markings: Sequence[str]) -> list[str]:
+    """The markings of that half of the pitch which fewer of them belong to."""
+    halves = ([name for name in markings if _half(name) == half] for half in ("left", "right"))
+    return min(halves, key=len)
+
+
+def _half(marking: str) -> str | None:
+    """``left`` or ``right`` of the pitch; None for what belongs to both."""
+    return next((word for word in marking.split(" ")[1:3] if word in ("left", "right")), None)

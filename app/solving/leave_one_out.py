@@ -1,0 +1,38 @@
+"""Leave one out: does the camera predict a marking that it was not shown?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from app.soccer.annotation import Lines, make_lines
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.solving.calibrate import calibrate
+from app.solving.observations import observe
+from app.solving.resect import ResectionProblem
+
+
+def leave_one_out(
+    lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+) -> Iterator[tuple[str, float | None]]:
+    """Each marking with the largest distance of its points from where the others put it.
+
+    Args:
+        lines: Annotated points by marking, pixels of ``size``.
+        pitch: The pitch.
+        size: Annotated size.
+        policy: How the others are calibrated.
+
+    Yields:
+        Marking and pixels; None where the others do not give a camera.
+    """
+    problem = ResectionProblem.of(size, policy)
+    for marking in lines:
+        others = make_lines({name: points for name, points in lines.items() if name != marking})
+        camera = calibrate(others, pitch, size, policy).camera
+        if camera is None:
+            yield marking, None
+            continue
+        seen = observe(make_lines({marking: lines[marking]}), pitch, size)
+        yield marking, float(problem.distances(problem.parameters(camera), seen).max())

@@ -1,0 +1,118 @@
+"""Observations: annotated lines as the resection uses them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+from app.geometry.resection import ARC, SEGMENT, Curves, IntArray, Sightings
+from app.soccer.annotation import Lines
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import MARKINGS, Arc, Pitch, Segment
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Points of one image, each on a marking of the pitch.
+
+    Attributes:
+        curves: All markings, in the order of ``MARKINGS``.
+        pixels: Relative to the principal point, shape (N, 2).
+        marking: Index into ``MARKINGS`` of each point, shape (N,), increasing.
+    """
+
+    curves: Curves
+    pixels: FloatArray
+    marking: IntArray
+
+    @property
+    def markings(self) -> tuple[str, ...]:
+        """Names of the markings that are seen."""
+        return tuple(MARKINGS[index] for index in np.unique(self.marking))
+
+    def sightings(self) -> Sightings:
+        """All points with weight one."""
+        return Sightings(self.pixels, self.marking, np.ones(len(self.pixels)))
+
+    def without(self, marking: str) -> Observations:
+        """The same without the points of one marking."""
+        keep = self.marking != MARKINGS.index(marking)
+        return Observations(self.curves, self.pixels[keep], self.marking[keep])
+
+    def only(self, marking: str, as_marking: str | None = None) -> Observations:
+        """The points of one marking alone, if asked under another label."""
+        keep = self.marking == MARKINGS.index(marking)
+        label = MARKINGS.index(as_marking or marking)
+        return Observations(self.curves, self.pixels[keep], np.full(int(keep.sum()), label))
+
+    def thinned(self, straight: int, circular: int) -> Observations:
+        """At most so many points of each straight marking and of each circle.
+
+        The points farthest apart are kept: they say nearly all there is.
+        """
+        kept: list[int] = []
+        for index in np.unique(self.marking):
+            rows = np.flatnonzero(self.marking == index)
+            limit = circular if self.curves.kinds[index] == ARC else straight
+            kept.extend(_spread(self.pixels[rows], rows, limit))
+        chosen = np.array(sorted(kept), dtype=np.int64)
+        return Observations(self.curves, self.pixels[chosen], self.marking[chosen])
+
+
+def observe(lines: Lines, pitch: Pitch, size: ImageSize) -> Observations:
+    """Observations of annotated lines; points far outside the image are kept.
+
+    Args:
+        lines: Points by marking, pixels.
+        pitch: The pitch.
+        size: Annotated size; its centre is the principal point.
+    """
+    x0, y0 = principal_point(size)
+    pixels, marking = [], []
+    for index, name in enumerate(MARKINGS):
+        for point in lines.get(name, ()):
+            pixels.append((point.x - x0, point.y - y0))
+            marking.append(index)
+    return Observations(
+        pitch_curves(pitch),
+        np.array(pixels, dtype=np.float64).reshape(-1, 2),
+        np.array(marking, dtype=np.int64),
+    )
+
+
+def principal_point(size: ImageSize) -> tuple[float, float]:
+    """Centre of the image in pixels: (W - 1) / 2, (H - 1) / 2."""
+    return (size.width - 1) / 2, (size.height - 1) / 2
+
+
+@lru_cache(maxsize=8)
+def pitch_curves(pitch: Pitch) -> Curves:
+    """The markings as curves, in the order of ``MARKINGS``."""
+    shapes = [pitch.shapes[marking] for marking in MARKINGS]
+    kinds = [ARC if isinstance(shape, Arc) else SEGMENT for shape in shapes]
+    return Curves(np.array(kinds, dtype=np.int64), np.array([_numbers(item) for item in shapes]))
+
+
+def _numbers(shape: Segment | Arc) -> tuple[float, ...]:
+    if isinstance(shape, Arc):
+        return (*shape.center, shape.radius, shape.first, shape.last, 0.0)
+    return (*shape.start, *shape.end)
+
+
+def _spread(pixels: FloatArray, rows: Iterable[int], limit: int) -> list[int]:
+    """Rows of up to ``limit`` points, each chosen farthest from those before it."""
+    candidates = list(rows)
+    if len(candidates) <= limit:
+        return candidates
+    first = int(np.argmax(((pixels - pixels.mean(axis=0)) ** 2).sum(axis=1)))
+    chosen = [first]
+    nearest = ((pixels - pixels[first]) ** 2).sum(axis=1)
+    while len(chosen) < limit:
+        following = int(np.argmax(nearest))
+        chosen.append(following)
+        nearest = np.minimum(nearest, ((pixels - pixels[following]) ** 2).sum(axis=1))
+    return [candidates[index] for index in chosen]

@@ -1,0 +1,195 @@
+"""Resect: the camera parameters that fit observations best, from a cold start.
+
+A bank of stands, each aimed at what is seen, is refined side by side with a wide robust scale;
+the best go on with narrower ones. No earlier camera is looked at, so the same lines always
+give the same bits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.geometry.least_squares import Fit, NormalEquations, covariance, levenberg_marquardt
+from app.geometry.resection import (
+    ARC,
+    KAPPA,
+    PARAMETERS,
+    Prior,
+    camera_from_parameters,
+    distances,
+    normal_equations,
+    parameters_from_camera,
+)
+from app.soccer.frames import ImageSize
+from app.soccer.policy import CalibrationPolicy
+from app.solving.observations import Observations, principal_point
+from app.solving.starts import stand_starts
+
+REFERENCE_DIAGONAL = float(np.hypot(960, 540))
+"""Scales in pixels hold for 960 x 540 and grow with the diagonal."""
+
+MIN_CLICK_SIGMA_PX = 0.5
+"""Clicks are not trusted to be better than this, however well they fit, at 960 x 540."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One round of refinement: how many starts go in, how far, how forgiving."""
+
+    starts: int
+    steps: int
+    scale_px: float
+    tolerance: float
+
+
+SEARCH = Stage(starts=1000, steps=12, scale_px=30.0, tolerance=1e-3)
+NARROW = Stage(starts=8, steps=10, scale_px=8.0, tolerance=1e-4)
+FINAL = Stage(starts=3, steps=25, scale_px=0.0, tolerance=1e-6)
+"""Its scale is the policy's."""
+POINTS_PER_LINE, POINTS_PER_CIRCLE = 4, 8
+"""Points that the search looks at; the later stages use them all."""
+
+
+@dataclass(frozen=True)
+class Resection:
+    """A camera as parameters of ``geometry.resection``, shape (8,), and its robust cost."""
+
+    parameters: FloatArray
+    cost: float
+
+
+@dataclass(frozen=True)
+class ResectionProblem:
+    """What all resections of one image share.
+
+    Attributes:
+        size: Annotated size.
+        robust_scale_px: Scale of the final soft-L1 loss at 960 x 540.
+        distortion_sigma: Standard deviation of the prior on kappa.
+    """
+
+    size: ImageSize
+    robust_scale_px: float
+    distortion_sigma: float
+
+    @staticmethod
+    def of(size: ImageSize, policy: CalibrationPolicy) -> ResectionProblem:
+        """The problem of one image under a policy."""
+        return ResectionProblem(size, policy.robust_scale_px, policy.distortion_sigma)
+
+    @property
+    def unit(self) -> float:
+        """Pixels of this image for a pixel at 960 x 540."""
+        return self.size.diagonal / REFERENCE_DIAGONAL
+
+    def resect(self, observations: Observations) -> Resection:
+        """The best camera from the whole bank of stands."""
+        thinned = observations.thinned(POINTS_PER_LINE, POINTS_PER_CIRCLE)
+        starts = stand_starts(observations, self.size.diagonal)
+        searched = self._run(thinned, starts, SEARCH, damping=1e-2)
+        return self.refine(observations, best(searched, NARROW.starts))
+
+    def refine(self, observations: Observations, starts: FloatArray) -> Resection:
+        """The best camera from some starts near a minimum, shape (B, 8)."""
+        narrowed = self._run(observations, starts, NARROW)
+        fit = self._run(observations, best(narrowed, FINAL.starts), FINAL)
+        return Resection(best(fit, 1)[0], float(fit.cost.min()))
+
+    def distances(self, parameters: FloatArray, observations: Observations) -> FloatArray:
+        """Distance of each observed point to its marking, pixels, shape (N,)."""
+        return distances(
+            parameters, observations.curves, observations.sightings(), self.size.diagonal / 2
+        )
+
+    def cost(self, parameters: FloatArray, observations: Observations) -> float:
+        """Robust cost of one camera at the final scale, square pixels."""
+        problem = self._equations(observations, self.robust_scale_px)
+        return float(problem(parameters[None])[0][0])
+
+    def covariance(self, parameters: FloatArray, observations: Observations) -> FloatArray:
+        """Covariance of the parameters at a minimum, shape (8, 8).
+
+        The clicks' variance is estimated from the robust fit. Only the distortion keeps its
+        prior: what the lines do not determine must show.
+
+        Raises:
+            DegenerateGeometryError: The lines leave a combination of parameters open.
+        """
+        free = Prior(np.zeros(PARAMETERS), np.full(PARAMETERS, np.inf))
+        free.sigma[KAPPA] = self.distortion_sigma
+        scale = self.robust_scale_px * self.unit
+        _, _, information = normal_equations(
+            parameters[None],
+            observations.curves,
+            observations.sightings(),
+            free,
+            scale,
+            self.size.diagonal / 2,
+        )
+        apart = self.distances(parameters, observations)
+        spare = max(len(apart) - PARAMETERS + 1, 1)
+        robust = 2 * scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)
+        variance = max(float(robust.sum()) / spare, (MIN_CLICK_SIGMA_PX * self.unit) ** 2)
+        # The prior's share of the information is not scaled by the clicks' variance.
+        information[0, KAPPA, KAPPA] += (variance - 1) / self.distortion_sigma**2
+        return covariance(information[0], variance)
+
+    def camera(self, parameters: FloatArray) -> Camera:
+        """Camera of one row of parameters."""
+        return camera_from_parameters(
+            parameters, principal_point(self.size), self.size.diagonal / 2
+        )
+
+    def parameters(self, camera: Camera) -> FloatArray:
+        """Row of parameters of one camera, shape (8,)."""
+        return parameters_from_camera(camera, self.size.diagonal / 2)
+
+    def _run(
+        self, observations: Observations, starts: FloatArray, stage: Stage, damping: float = 1e-3
+    ) -> Fit:
+        equations = self._equations(observations, stage.scale_px or self.robust_scale_px)
+        return levenberg_marquardt(
+            equations, starts, stage.steps, tolerance=stage.tolerance, damping=damping
+        )
+
+    def _equations(self, observations: Observations, scale_px: float) -> NormalEquations:
+        sightings = observations.sightings()
+        prior = self._prior()
+
+        def equations(parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            return normal_equations(
+                parameters,
+                observations.curves,
+                sightings,
+                prior,
+                scale_px * self.unit,
+                self.size.diagonal / 2,
+            )
+
+        return equations
+
+    def _prior(self) -> Prior:
+        """Wide enough to decide nothing that a few points decide; it keeps the rest on earth."""
+        focal = np.log(2000.0 * self.unit)
+        mean = np.array([0.0, np.radians(78), 0.0, 0.0, 0.0, -15.0, focal, 0.0])
+        sigma = np.array([np.inf, np.inf, np.radians(5), 300.0, 300.0, 60.0, 3.0, 1.0])
+        sigma[KAPPA] = self.distortion_sigma
+        return Prior(mean, sigma)
+
+
+def best(fit: Fit, count: int) -> FloatArray:
+    """Parameters of the ``count`` starts of lowest cost, lowest first."""
+    return fit.parameters[np.argsort(fit.cost, kind="stable")[:count]]
+
+
+def measurement_count(observations: Observations) -> int:
+    """Independent numbers that the observations give: two a line, at most five a circle."""
+    total = 0
+    for index in np.unique(observations.marking):
+        points = int((observations.marking == index).sum())
+        total += min(points, 5 if observations.curves.kinds[index] == ARC else 2)
+    return total

@@ -1,0 +1,173 @@
+"""Triangulate: the ball from every pair of calibrated views, and their mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import MIN_DEPTH, Camera
+from app.geometry.resection import (
+    PARAMETERS,
+    parameters_from_camera,
+    projection_jacobian,
+)
+from app.geometry.triangulation import parallax_angle, point_covariance, triangulate_pairs
+from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.policy import Policy
+from app.soccer.solution import Ball3D, Calibration, Pair
+
+CLICK_DIAGONAL = float(np.hypot(1920, 1080))
+"""The policy's click sigma holds for 1920 x 1080 and grows with the diagonal."""
+
+_STEP_M = 1e-3
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The ball in one calibrated view.
+
+    Attributes:
+        view: Key of the view.
+        calibration: Its calibration, with a camera.
+        center: Annotated centre, pixels as the image shows them.
+        size: Annotated size.
+        failed: First gate that dropped the view, or None.
+    """
+
+    view: str
+    calibration: Calibration
+    center: ImagePoint
+    size: ImageSize
+    failed: str | None
+
+    @property
+    def camera(self) -> Camera:
+        """The camera of the view."""
+        assert self.calibration.camera is not None
+        return self.calibration.camera
+
+    def tau_px(self, policy: Policy) -> float:
+        """Largest reprojection error of a valid pair, pixels."""
+        return policy.tau_percent / 100 * self.size.diagonal
+
+
+def triangulate(sights: Sequence[Sight], policy: Policy) -> tuple[Pair, ...]:
+    """Every pair of views with its point, whatever the gates say of it.
+
+    Source: method.md, section 3; the paper, section 3.2.
+    """
+    couples = [
+        (a, b) for a, b in combinations(sights, 2) if not np.array_equal(a.camera.P, b.camera.P)
+    ]
+    if not couples:
+        return ()
+    ideal = {sight.view: sight.camera.undistort(np.array([sight.center]))[0] for sight in sights}
+    points = triangulate_pairs(
+        np.array([a.camera.P for a, _ in couples]),
+        np.array([b.camera.P for _, b in couples]),
+        np.array([ideal[a.view] for a, _ in couples]),
+        np.array([ideal[b.view] for _, b in couples]),
+    )
+    return tuple(_pair(a, b, point, policy) for (a, b), point in zip(couples, points, strict=True))
+
+
+def mean_ball(pairs: Sequence[Pair], sights: Sequence[Sight], policy: Policy) -> Ball3D | None:
+    """The mean of the valid pairs with its uncertainty; None without a valid pair."""
+    valid = [pair for pair in pairs if pair.valid]
+    if not valid:
+        return None
+    point = np.mean([pair.point for pair in valid], axis=0)
+    used = {pair.a for pair in valid} | {pair.b for pair in valid}
+    seen = {sight.view: sight for sight in sights if sight.view in used}
+    spread = ball_covariance(point, tuple(seen.values()), policy.click_sigma_px)
+    return Ball3D(
+        point=_triple(point),
+        covariance=tuple(spread.ravel().tolist()),
+        sigma_m=float(np.sqrt(np.linalg.eigvalsh(spread)[-1])),
+        parallax_degrees=max(_parallax(seen, pair, point) for pair in valid),
+        views=tuple(seen),
+    )
+
+
+def ball_covariance(
+    point: FloatArray, sights: Sequence[Sight], click_sigma_px: float
+) -> FloatArray:
+    """Covariance of a triangulated ball, square metres, shape (3, 3).
+
+    Each view contributes the noise of the click and, where the camera comes from lines, the
+    covariance of its calibration carried to the ball's pixel.
+    """
+    jacobians, spreads = [], []
+    for sight in sights:
+        jacobians.append(_jacobian_by_point(sight.camera, point))
+        click = click_sigma_px * sight.size.diagonal / CLICK_DIAGONAL
+        spreads.append(click**2 * np.eye(2) + _calibration_spread(sight, point))
+    return point_covariance(jacobians, spreads)
+
+
+def _pair(a: Sight, b: Sight, point: FloatArray, policy: Policy) -> Pair:
+    errors = tuple(_reprojection_error(sight, point) for sight in (a, b))
+    baseline = float(np.linalg.norm(a.camera.position - b.camera.position))
+    in_front = all(sight.camera.pitch_to_camera(point[None])[0, 2] > MIN_DEPTH for sight in (a, b))
+    failed = a.failed or b.failed
+    if failed is None and baseline < policy.min_baseline_m:
+        failed = "baseline"
+    close = errors[0] < a.tau_px(policy) and errors[1] < b.tau_px(policy)
+    if failed is None and not (close and in_front):
+        failed = "reprojection"
+    angle = parallax_angle(a.camera.position, b.camera.position, point[None])[0]
+    return Pair(
+        a=a.view,
+        b=b.view,
+        point=_triple(point),
+        errors_px=(errors[0], errors[1]),
+        baseline_m=baseline,
+        parallax_degrees=float(np.degrees(angle)),
+        valid=failed is None,
+        failed=failed,
+    )
+
+
+def _reprojection_error(sight: Sight, point: FloatArray) -> float:
+    """Distance of the annotated centre from the image of a point, pixels.
+
+    A point behind the camera has no image; it is measured by the pinhole's formula, so that
+    the number stays finite, and is refused by its depth.
+    """
+    pixel = sight.camera.project(point[None])[0]
+    if np.isnan(pixel[0]):
+        homogeneous = sight.camera.P @ np.append(point, 1.0)
+        pixel = homogeneous[:2] / homogeneous[2]
+    return float(np.hypot(*(pixel - sight.center)))
+
+
+def _parallax(seen: Mapping[str, Sight], pair: Pair, point: FloatArray) -> float:
+    positions = (seen[pair.a].camera.position, seen[pair.b].camera.position)
+    return float(np.degrees(parallax_angle(*positions, point[None])[0]))
+
+
+def _jacobian_by_point(camera: Camera, point: FloatArray) -> FloatArray:
+    """Derivative of the seen pixel by the point, pixels per metre, shape (2, 3)."""
+    steps = _STEP_M * np.vstack([np.eye(3), -np.eye(3)])
+    pixels = camera.project(point + steps)
+    return (pixels[:3] - pixels[3:]).T / (2 * _STEP_M)
+
+
+def _calibration_spread(sight: Sight, point: FloatArray) -> FloatArray:
+    """Covariance of the ball's pixel that the calibration brings, shape (2, 2)."""
+    if sight.calibration.covariance is None:
+        return np.zeros((2, 2))
+    spread = np.array(sight.calibration.covariance).reshape(PARAMETERS, PARAMETERS)
+    half_diagonal = sight.size.diagonal / 2
+    parameters = parameters_from_camera(sight.camera, half_diagonal)
+    jacobian = projection_jacobian(parameters, point, half_diagonal)
+    carried: FloatArray = jacobian @ spread @ jacobian.T
+    return carried
+
+
+def _triple(point: FloatArray) -> tuple[float, float, float]:
+    return float(point[0]), float(point[1]), float(point[2])

@@ -1,0 +1,59 @@
+import cv2
+import numpy as np
+from app.geometry.distortion import distort, distort_jacobian, fold_radius, undistort
+from hypothesis import given
+from hypothesis import strategies as st
+
+FULL = np.array([0.12, -0.03, 0.002, -0.001, 0.01, 0.05, 0.01, 0.002, 1e-3, -2e-3, 3e-3, 1e-3])
+POINTS = np.array([[0.0, 0.0], [0.3, -0.2], [-0.4, 0.25], [0.1, 0.45]])
+
+
+class TestDistort:
+    def test_equals_opencv_with_all_twelve_coefficients(self):
+        homogeneous = np.column_stack([POINTS, np.ones(len(POINTS))])
+        expected, _ = cv2.projectPoints(homogeneous, np.zeros(3), np.zeros(3), np.eye(3), FULL)
+        assert np.allclose(distort(POINTS, FULL), expected[:, 0], atol=1e-12)
+
+    def test_nothing_happens_without_coefficients(self):
+        assert np.array_equal(distort(POINTS, np.zeros(12)), POINTS)
+
+
+class TestDistortJacobian:
+    def test_equals_its_finite_difference(self):
+        step = 1e-6
+        for axis in (0, 1):
+            move = np.zeros(2)
+            move[axis] = step
+            numeric = (distort(POINTS + move, FULL) - distort(POINTS - move, FULL)) / (2 * step)
+            assert np.allclose(distort_jacobian(POINTS, FULL)[:, :, axis], numeric, atol=1e-8)
+
+
+class TestUndistort:
+    @given(st.floats(-0.4, 0.4), st.floats(-0.3, 0.3), st.floats(-0.3, 0.5))
+    def test_undoes_distortion(self, x, y, k1):
+        coefficients = np.zeros(12)
+        coefficients[0] = k1
+        ideal = np.array([[x, y]])
+        assert np.allclose(undistort(distort(ideal, coefficients), coefficients), ideal, atol=1e-9)
+
+    def test_undoes_the_full_model(self):
+        assert np.allclose(undistort(distort(POINTS, FULL), FULL), POINTS, atol=1e-10)
+
+    def test_what_no_ideal_point_maps_to_is_nan(self):
+        barrel = np.zeros(12)
+        barrel[0] = -0.5
+        largest = fold_radius(barrel) * 2 / 3
+        assert np.isnan(undistort(np.array([[1.1 * largest, 0.0]]), barrel)).all()
+
+
+class TestFoldRadius:
+    def test_a_barrel_folds_where_its_radius_stops_growing(self):
+        barrel = np.zeros(12)
+        barrel[0] = -0.12
+        assert np.isclose(fold_radius(barrel), np.sqrt(1 / 0.36))
+
+    def test_a_pincushion_never_folds(self):
+        assert fold_radius(np.array([0.2, *np.zeros(11)])) == np.inf
+
+    def test_half_the_square_as_second_term_keeps_a_barrel_from_folding(self):
+        assert fold_radius(np.array([-0.3, 0.045, *np.zeros(10)])) == np.inf

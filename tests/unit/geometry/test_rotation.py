@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+from app.geometry.rotation import (
+    pan_tilt_roll_from_rotation,
+    rotation_from_pan_tilt_roll,
+    rotation_looking,
+)
+from hypothesis import given
+from hypothesis import strategies as st
+
+ANGLE = st.floats(-3.1, 3.1)
+
+
+class TestRotationFromPanTiltRoll:
+    def test_pan_zero_and_tilt_ninety_look_along_minus_y(self):
+        rotation = rotation_from_pan_tilt_roll(0.0, np.pi / 2, 0.0)
+        assert np.allclose(rotation @ [0.0, -1.0, 0.0], [0.0, 0.0, 1.0])
+
+    def test_less_tilt_looks_down(self):
+        forward = rotation_from_pan_tilt_roll(0.0, np.radians(70), 0.0)[2]
+        assert forward[2] > 0  # z points down
+
+    def test_is_the_published_matrix_of_a_soccernet_camera(self):
+        # From the camera JSON convention: R = (Rz(pan) Rx(tilt) Rz(roll))^T, written out.
+        pan, tilt, roll = np.radians([40.5, 75.8, -0.23])
+        sp, cp, st_, ct = np.sin(pan), np.cos(pan), np.sin(tilt), np.cos(tilt)
+        sr, cr = np.sin(roll), np.cos(roll)
+        expected = [
+            [-sp * sr * ct + cp * cr, sp * cr + sr * cp * ct, sr * st_],
+            [-sp * cr * ct - sr * cp, -sp * sr + cp * cr * ct, st_ * cr],
+            [sp * st_, -st_ * cp, ct],
+        ]
+        assert np.allclose(rotation_from_pan_tilt_roll(pan, tilt, roll), expected, atol=1e-15)
+
+
+class TestPanTiltRollFromRotation:
+    @given(ANGLE, st.floats(0.05, 3.0), st.floats(-1.5, 1.5))
+    def test_gives_back_the_angles_of_a_camera_that_is_not_upside_down(self, pan, tilt, roll):
+        rotation = rotation_from_pan_tilt_roll(pan, tilt, roll)
+        assert pan_tilt_roll_from_rotation(rotation) == pytest.approx((pan, tilt, roll), abs=1e-9)
+
+    @given(ANGLE, st.floats(-3.1, 3.1), ANGLE)
+    def test_any_rotation_is_rebuilt_from_its_angles(self, pan, tilt, roll):
+        rotation = rotation_from_pan_tilt_roll(pan, tilt, roll)
+        again = rotation_from_pan_tilt_roll(*pan_tilt_roll_from_rotation(rotation))
+        assert np.allclose(again, rotation, atol=1e-9)
+
+    def test_straight_down_has_no_roll(self):
+        rotation = rotation_from_pan_tilt_roll(0.4, 0.0, 0.3)
+        pan, tilt, roll = pan_tilt_roll_from_rotation(rotation)
+        assert (pan, tilt, roll) == pytest.approx((0.7, 0.0, 0.0))
+
+
+class TestRotationLooking:
+    def test_the_target_lies_on_the_optical_axis_and_the_horizon_is_level(self):
+        position, target = np.array([3.0, 60.0, -15.0]), np.array([-20.0, 5.0, 0.0])
+        rotation = rotation_looking(position, target)
+        in_camera = rotation @ (target - position)
+        assert np.allclose(in_camera[:2], 0.0, atol=1e-12)
+        assert in_camera[2] > 0
+        assert np.isclose(np.linalg.det(rotation), 1.0)
+        assert rotation[0, 2] == 0.0
+        assert rotation[1, 2] > 0  # image y and pitch z both point down

@@ -1,0 +1,74 @@
+import cv2
+import numpy as np
+import pytest
+from app.errors import DegenerateGeometryError, ShapeError
+from app.geometry.camera import Camera
+from app.geometry.rotation import rotation_looking
+from app.geometry.triangulation import parallax_angle, point_covariance, triangulate_pairs
+
+
+def camera_at(*position: float) -> Camera:
+    place = np.array(position)
+    return Camera(
+        rotation_looking(place, np.array([20.0, 0.0, 0.0])), place, (2500.0, 2500.0), (960.0, 540.0)
+    )
+
+
+MAIN, REPLAY = camera_at(0.0, 60.0, -15.0), camera_at(75.0, -10.0, -8.0)
+
+
+class TestTriangulatePairs:
+    def test_exact_images_give_the_exact_point(self):
+        points = np.array([[20.0, 3.0, -1.0], [25.0, -8.0, -0.11]])
+        P_a, P_b = np.stack([MAIN.P] * 2), np.stack([REPLAY.P] * 2)
+        found = triangulate_pairs(P_a, P_b, MAIN.project(points), REPLAY.project(points))
+        assert np.allclose(found, points, atol=1e-8)
+
+    def test_equals_opencv_on_noisy_images(self):
+        generator = np.random.default_rng(5)
+        points = generator.uniform([10, -20, -5], [40, 20, 0], (50, 3))
+        a = MAIN.project(points) + generator.normal(0, 3, (50, 2))
+        b = REPLAY.project(points) + generator.normal(0, 3, (50, 2))
+        expected = cv2.triangulatePoints(MAIN.P, REPLAY.P, a.T, b.T)
+        found = triangulate_pairs(np.stack([MAIN.P] * 50), np.stack([REPLAY.P] * 50), a, b)
+        assert np.allclose(found, (expected[:3] / expected[3]).T, atol=1e-6)
+
+    def test_parallel_rays_meet_nowhere(self):
+        aside = Camera(MAIN.rotation, MAIN.position + np.eye(3)[0], (1.0, 1.0), (0.0, 0.0))
+        alike = Camera(MAIN.rotation, MAIN.position, (1.0, 1.0), (0.0, 0.0))
+        center = np.zeros((1, 2))
+        with pytest.raises(DegenerateGeometryError, match="parallel"):
+            triangulate_pairs(alike.P[None], aside.P[None], center, center)
+
+
+class TestParallaxAngle:
+    def test_is_symmetric_in_the_two_cameras(self):
+        points = np.array([[20.0, 3.0, -1.0]])
+        there = parallax_angle(MAIN.position, REPLAY.position, points)
+        assert np.array_equal(there, parallax_angle(REPLAY.position, MAIN.position, points))
+
+    def test_a_one_millimetre_baseline_at_a_hundred_metres_keeps_its_digits(self):
+        near, far = np.zeros(3), np.array([1e-3, 0.0, 0.0])
+        angle = parallax_angle(near, far, np.array([[0.0, 100.0, 0.0]]))[0]
+        assert angle == pytest.approx(1e-5, rel=1e-9)
+
+    def test_a_point_at_a_camera_has_no_angle(self):
+        with pytest.raises(DegenerateGeometryError):
+            parallax_angle(np.zeros(3), np.ones(3), np.zeros((1, 3)))
+
+    def test_a_flat_point_is_our_mistake(self):
+        with pytest.raises(ShapeError):
+            parallax_angle(np.zeros(3), np.ones(3), np.zeros(3))
+
+
+class TestPointCovariance:
+    def test_two_perpendicular_views_of_known_resolution(self):
+        # One pixel is a centimetre for a camera that looks along x, and for one along y.
+        along_x = np.array([[0.0, 100.0, 0.0], [0.0, 0.0, 100.0]])
+        along_y = np.array([[100.0, 0.0, 0.0], [0.0, 0.0, 100.0]])
+        spread = point_covariance([along_x, along_y], [np.eye(2), np.eye(2)])
+        assert np.allclose(np.sqrt(np.diag(spread)), [0.01, 0.01, 0.01 / np.sqrt(2)])
+
+    def test_one_view_alone_determines_nothing(self):
+        with pytest.raises(DegenerateGeometryError):
+            point_covariance([np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])], [np.eye(2)])

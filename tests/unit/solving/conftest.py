@@ -1,0 +1,68 @@
+"""Synthetic stadium: cameras with known truth, and the clicks they would get."""
+
+from __future__ import annotations
+
+import numpy as np
+from app.geometry.camera import Camera
+from app.geometry.polyline import clip_polyline
+from app.geometry.rotation import rotation_looking
+from app.soccer.annotation import BallAnnotation, Lines, make_lines
+from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.group import Group, Station, View
+from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
+
+SIZE = ImageSize(1280, 720)
+CENTER = ((SIZE.width - 1) / 2, (SIZE.height - 1) / 2)
+PITCH = Pitch()
+BALL_M = 0.226
+
+
+def looking(position, target, focal: float, kappa: float = 0.02) -> Camera:
+    """A level camera; kappa is the displacement at half the diagonal as a share of it."""
+    place = np.array(position, dtype=float)
+    k1 = kappa * (focal / (SIZE.diagonal / 2)) ** 2
+    distortion = np.array([k1, k1 * k1 / 2, *np.zeros(10)])
+    rotation = rotation_looking(place, np.array(target, dtype=float))
+    return Camera(rotation, place, (focal, focal), CENTER, distortion=distortion)
+
+
+MAIN = looking((3.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2200.0)
+BEHIND_GOAL = looking((78.0, -6.0, -9.0), (38.0, 2.0, 0.0), 1500.0)
+OPPOSITE = looking((20.0, -66.0, -14.0), (38.0, 2.0, 0.0), 2400.0)
+
+
+def click(camera: Camera, noise_px: float = 0.0, seed: int = 0, pitch: Pitch = PITCH) -> Lines:
+    """Points on every visible marking, four a straight line and eight a circle."""
+    generator = np.random.default_rng(seed)
+    lines = {}
+    for marking in MARKINGS:
+        pixels = camera.project(pitch.sample(marking, 0.2, 0.05))
+        visible = clip_polyline(pixels, SIZE.width, SIZE.height)
+        if len(visible) < 10 or np.ptp(visible, axis=0).max() < 25:
+            continue
+        count = 8 if marking in CIRCLES else 4
+        chosen = visible[np.linspace(0, len(visible) - 1, count).astype(int)]
+        lines[marking] = chosen + generator.normal(0, noise_px, chosen.shape)
+    return make_lines(lines)
+
+
+def box_around(camera: Camera, point, scale: float = 1.0) -> BallAnnotation:
+    """A square box around the image of a ball, ``scale`` times as large as the ball."""
+    point = np.array(point, dtype=float)
+    x, y = camera.project(point[None])[0]
+    depth = camera.pitch_to_camera(point[None])[0, 2]
+    diameter = scale * BALL_M * camera.focal_length[1] / depth
+    return BallAnnotation(box=Box.square(ImagePoint(float(x), float(y)), float(diameter)))
+
+
+def view(key: str, camera: Camera, point, *, noise_px: float = 0.0, seed: int = 0) -> View:
+    station = Station(key, SIZE, lines=click(camera, noise_px, seed))
+    return View(key, station, (box_around(camera, point),))
+
+
+def given_view(key: str, camera: Camera, point) -> View:
+    return View(key, Station(key, SIZE, given=camera), (box_around(camera, point),))
+
+
+def group(*views: View, key: str = "g") -> Group:
+    return Group(key, views)

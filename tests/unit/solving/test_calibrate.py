@@ -1,0 +1,142 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from app.soccer.annotation import make_lines
+from app.soccer.group import Station
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.solving.calibrate import calibrate, calibrate_station, calibration_key
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH, SIZE, click, looking
+
+POLICY = CalibrationPolicy()
+VIEWS = {"main": MAIN, "behind goal": BEHIND_GOAL, "opposite": OPPOSITE}
+
+
+def relabel(lines, marking, to):
+    return make_lines({to if name == marking else name: at for name, at in lines.items()})
+
+
+class TestCalibrate:
+    @pytest.mark.parametrize("truth", VIEWS.values(), ids=VIEWS.keys())
+    def test_exact_clicks_give_the_exact_camera(self, truth):
+        found = calibrate(click(truth), PITCH, SIZE, POLICY)
+        # The prior of the distortion pulls by a hair.
+        assert np.linalg.norm(found.camera.position - truth.position) < 0.05
+        assert found.camera.focal_length[0] == pytest.approx(truth.focal_length[0], rel=2e-3)
+        assert found.error_px < 0.05
+
+    @pytest.mark.parametrize("truth", VIEWS.values(), ids=VIEWS.keys())
+    def test_the_truth_lies_where_the_covariance_says(self, truth):
+        ratios = []
+        for seed in range(12):
+            found = calibrate(click(truth, 1.0, seed), PITCH, SIZE, POLICY)
+            spread = np.array(found.covariance).reshape(8, 8)[3:6, 3:6]
+            off = found.camera.position - truth.position
+            ratios.append(off @ np.linalg.solve(spread, off))
+        # Chi-squared with three degrees of freedom has median 2.4.
+        assert 0.8 < np.median(ratios) < 6.0
+
+    def test_the_same_lines_give_the_same_bits(self):
+        lines = click(MAIN, 1.0)
+        first, second = (calibrate(lines, PITCH, SIZE, POLICY) for _ in range(2))
+        assert first == second
+
+    def test_noise_of_a_pixel_keeps_every_marking_found(self):
+        found = calibrate(click(MAIN, 0.8, seed=4), PITCH, SIZE, POLICY)
+        assert found.jac[0] > 0.9
+
+    def test_the_circle_alone_is_not_enough_and_that_is_said(self):
+        lines = click(looking((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), 2200.0))
+        few = {name: lines[name] for name in ("Circle central",)}
+        found = calibrate(make_lines(few), PITCH, SIZE, POLICY)
+        assert found.camera is None
+        assert found.reason == ("1 marking gives 5 independent measurements, a camera needs 7")
+
+    def test_parallel_lines_leave_the_camera_open_and_that_is_said(self):
+        # Four lines along y, each clicked in its middle: nothing says how far away y is.
+        names = ("Big rect. right main", "Small rect. right main", "Side line right", "Middle line")
+        wide = looking((3.0, 62.0, -16.0), (30.0, 0.0, 0.0), 700.0)
+        middle = {name: wide.project(PITCH.sample(name, 0.5, 0.5)[12:24:4]) for name in names}
+        found = calibrate(make_lines(middle), PITCH, SIZE, POLICY)
+        assert "position" in found.unobservable
+
+    def test_no_lines_at_all_give_no_camera(self):
+        assert calibrate({}, PITCH, SIZE, POLICY).camera is None
+
+
+class TestWrongLabels:
+    @pytest.mark.parametrize(
+        ("marking", "wrong"),
+        [
+            ("Big rect. right top", "Big rect. left top"),
+            ("Small rect. right bottom", "Small rect. left bottom"),
+            ("Circle right", "Circle left"),
+            ("Goal right post left", "Goal left post left"),
+        ],
+    )
+    def test_a_wrong_label_is_left_out_and_the_right_one_proposed(self, marking, wrong):
+        lines = relabel(click(MAIN, 0.7), marking, wrong)
+        found = calibrate(lines, PITCH, SIZE, POLICY)
+        assert [(item.marking, item.suggested) for item in found.suspects] == [(wrong, marking)]
+        assert np.linalg.norm(found.camera.position - MAIN.position) < 1.5
+        assert found.suspects[0].confidence > 0.9
+
+    def test_two_swapped_posts_are_both_named(self):
+        lines = click(MAIN, 0.5)
+        left, right = "Goal right post left", "Goal right post right"
+        swapped = make_lines({**lines, left: lines[right], right: lines[left]})
+        found = calibrate(swapped, PITCH, SIZE, POLICY)
+        assert {(item.marking, item.suggested) for item in found.suspects} == {
+            (left, right),
+            (right, left),
+        }
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_clean_labels_raise_no_alarm(self, seed):
+        assert calibrate(click(MAIN, 1.0, seed), PITCH, SIZE, POLICY).suspects == ()
+
+    def test_labels_taken_as_given_are_not_doubted(self):
+        lines = relabel(click(MAIN), "Circle right", "Circle left")
+        trusting = replace(POLICY, check_labels=False)
+        assert calibrate(lines, PITCH, SIZE, trusting).suspects == ()
+
+
+class TestCalibrateStation:
+    def test_given_wins_over_lines_and_is_measured_with_them(self):
+        station = Station("cam1", SIZE, lines=click(MAIN), given=MAIN)
+        found = calibrate_station(station, PITCH, POLICY)
+        assert found.source == "given"
+        assert found.camera == MAIN
+        assert found.jac[0] > 0.9
+
+    def test_the_switch_makes_the_lines_win(self):
+        station = Station("cam1", SIZE, lines=click(MAIN), given=OPPOSITE, calibration="lines")
+        found = calibrate_station(station, PITCH, POLICY)
+        assert found.source == "lines"
+        assert np.linalg.norm(found.camera.position - MAIN.position) < 0.1
+
+    def test_given_without_lines_has_no_jac(self):
+        found = calibrate_station(Station("cam1", SIZE, given=MAIN), PITCH, POLICY)
+        assert found.jac is None
+        assert found.markings  # the projection is shown all the same
+
+
+class TestCalibrationKey:
+    def test_names_all_that_is_read(self):
+        station = Station("7.png", SIZE, lines=click(MAIN), given=MAIN)
+        key = calibration_key(station, PITCH, POLICY)
+        others = [
+            calibration_key(replace(station, lines=click(MAIN, 0.1)), PITCH, POLICY),
+            calibration_key(replace(station, given=OPPOSITE), PITCH, POLICY),
+            calibration_key(replace(station, calibration="lines"), PITCH, POLICY),
+            calibration_key(station, Pitch(104.0), POLICY),
+            calibration_key(station, PITCH, replace(POLICY, robust_scale_px=3.0)),
+        ]
+        assert len({key, *others}) == 6
+
+    def test_does_not_depend_on_the_name_or_the_order_of_lines(self):
+        lines = click(MAIN)
+        station = Station("7.png", SIZE, lines=lines)
+        other = Station("8.png", SIZE, lines=dict(reversed(list(lines.items()))))
+        assert calibration_key(station, PITCH, POLICY) == calibration_key(other, PITCH, POLICY)

@@ -1,0 +1,28 @@
+import pytest
+from app.solving.score import FrameScore, score, score_frame
+from tests.unit.solving.conftest import MAIN, PITCH, SIZE, click
+
+
+class TestScore:
+    def test_a_frame_without_a_camera_counts_as_zero(self):
+        good = FrameScore((1.0, 1.0, 1.0), 0.9, (1.0, 3.0))
+        total = score([good, None])
+        assert (total.frames, total.calibrated, total.completeness) == (2, 1, 0.5)
+        assert total.jac == (0.5, 0.5, 0.5)
+        assert (total.share, total.challenge) == (0.5, 0.45)
+        assert total.error_median_px == 2.0
+
+    def test_three_quarters_is_not_above_three_quarters(self):
+        assert score([FrameScore((0.75, 1.0, 1.0), 1.0, ())]).share == 0.0
+
+    def test_nothing_is_zero(self):
+        total = score([])
+        assert (total.completeness, total.share, total.error_median_px) == (0.0, 0.0, None)
+
+
+class TestScoreFrame:
+    def test_the_true_camera_scores_high_with_small_errors(self):
+        found = score_frame(MAIN, click(MAIN, 0.5), PITCH, SIZE)
+        assert min(found.jac) > 0.9
+        assert max(found.distances_px) < 3
+        assert found.challenge == pytest.approx(found.jac[0], abs=0.1)

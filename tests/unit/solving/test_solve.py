@@ -1,0 +1,227 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box, ImagePoint
+from app.soccer.policy import PAPER, STRICT
+from app.solving.solve import solve, view_letter
+from tests.unit.solving.conftest import (
+    BALL_M,
+    BEHIND_GOAL,
+    MAIN,
+    OPPOSITE,
+    SIZE,
+    given_view,
+    group,
+    looking,
+    view,
+)
+
+BALL = (38.0, 2.0, -1.4)
+TAU = 0.01 * SIZE.diagonal
+
+
+def shifted(one, x: float, y: float):
+    """The view with its ball moved by so many pixels."""
+    box = one.balls[0].box
+    return replace(one, balls=(BallAnnotation(box=replace(box, x=box.x + x, y=box.y + y)),))
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return group(
+        view("7.png", MAIN, BALL),
+        view("7_1.png", BEHIND_GOAL, BALL),
+        view("7_2.png", OPPOSITE, BALL),
+    )
+
+
+class TestSolve:
+    def test_exact_annotations_give_the_exact_ball(self, clean):
+        solution = solve(clean, PAPER)
+        assert solution.passes
+        assert np.allclose(solution.ball.point, BALL, atol=0.02)
+        assert solution.first_failing is None
+
+    def test_every_calibrated_pair_is_kept(self, clean):
+        pairs = {(pair.a, pair.b) for pair in solve(clean, PAPER).pairs}
+        assert pairs == {("7.png", "7_1.png"), ("7.png", "7_2.png"), ("7_1.png", "7_2.png")}
+
+    def test_known_calibrations_change_no_bit(self, clean):
+        cold = solve(clean, PAPER)
+        known = {item.calibration_key: item.calibration for item in cold.views}
+        assert solve(clean, PAPER, known) == cold
+
+    def test_known_calibrations_are_not_computed_again(self, clean):
+        cold = solve(clean, PAPER)
+        marked = {
+            item.calibration_key: replace(item.calibration, reason="kept") for item in cold.views
+        }
+        assert all(item.calibration.reason == "kept" for item in solve(clean, PAPER, marked).views)
+
+    def test_the_mean_is_over_valid_pairs_only(self):
+        wrong = shifted(given_view("c", OPPOSITE, BALL), 0.0, 60.0)
+        solution = solve(
+            group(given_view("a", MAIN, BALL), given_view("b", BEHIND_GOAL, BALL), wrong), PAPER
+        )
+        assert solution.ball.views == ("a", "b")
+        assert np.allclose(solution.ball.point, BALL, atol=1e-6)
+        assert [item.included for item in solution.views] == [True, True, False]
+
+    def test_the_optimised_box_has_the_true_size_however_loose_the_annotation(self, clean):
+        loose = replace(clean.views[0].balls[0].box, width=40.0, height=36.0)
+        center = clean.views[0].balls[0].box.center
+        loose = replace(loose, x=center.x - 20.0, y=center.y - 18.0)
+        changed = clean.with_view(replace(clean.views[0], balls=(BallAnnotation(box=loose),)))
+        fit = solve(changed, PAPER).view("7.png").ball
+        depth = MAIN.pitch_to_camera(np.array([BALL]))[0, 2]
+        assert fit.optimized_diameter_px == pytest.approx(BALL_M * 2200.0 / depth, rel=0.03)
+        assert fit.size_ratio == pytest.approx(38.0 / fit.optimized_diameter_px)
+        assert fit.optimized_box.center == pytest.approx(center)
+
+    def test_a_view_that_a_person_left_out_takes_no_part(self, clean):
+        without = clean.with_view(replace(clean.views[1], included=False))
+        solution = solve(without, PAPER)
+        assert {pair.a for pair in solution.pairs} | {pair.b for pair in solution.pairs} == {
+            "7.png",
+            "7_2.png",
+        }
+        assert solution.view("7_1.png").failed == "excluded"
+
+    def test_points_without_a_box_are_enough(self):
+        views = [given_view("a", MAIN, BALL), given_view("b", OPPOSITE, BALL)]
+        points = [replace(one, balls=(BallAnnotation(point=one.balls[0].center),)) for one in views]
+        solution = solve(group(*points), PAPER)
+        assert solution.passes
+        assert solution.views[0].ball.size_ratio is None
+        assert solution.views[0].ball.optimized_diameter_px > 5
+
+
+class TestGates:
+    def first(self, *views, policy=PAPER):
+        gate = solve(group(*views), policy).first_failing
+        return (gate.name, gate.view) if gate else None
+
+    def test_a_group_short_of_views_names_the_view_without_a_camera(self, clean):
+        bare = replace(clean.views[1], station=replace(clean.views[1].station, lines={}))
+        assert self.first(clean.views[0], bare) == ("calibratable", "7_1.png")
+
+    def test_a_bad_fit_is_named_when_it_leaves_one_view(self, clean):
+        station = clean.views[1].station
+        lines = {
+            name: tuple(ImagePoint(x + 9 * (-1) ** index, y) for index, (x, y) in enumerate(points))
+            for name, points in station.lines.items()
+        }
+        bad = replace(clean.views[1], station=replace(station, lines=lines))
+        assert self.first(clean.views[0], bad) == ("jac", "7_1.png")
+
+    def test_a_fallen_view_does_not_stop_two_others(self, clean):
+        bare = replace(clean.views[2], station=replace(clean.views[2].station, lines={}))
+        assert self.first(*clean.views[:2], bare) is None
+
+    def test_one_view_alone_fails_at_two_views(self, clean):
+        assert self.first(clean.views[0]) == ("two_views", None)
+
+    def test_a_missing_ball_is_named(self, clean):
+        blind = replace(clean.views[1], balls=())
+        assert self.first(clean.views[0], blind) == ("ball", "7_1.png")
+
+    def test_two_views_from_one_place_have_no_baseline(self):
+        beside = looking((3.3, 62.1, -16.0), (34.0, -4.0, 0.0), 2300.0)
+        views = given_view("a", MAIN, BALL), given_view("b", beside, BALL)
+        assert self.first(*views) == ("baseline", None)
+
+    def test_views_of_different_instants_do_not_meet(self):
+        views = given_view("a", MAIN, BALL), given_view("b", OPPOSITE, (36.0, 2.0, -0.11))
+        assert self.first(*views) == ("reprojection", None)
+
+    def test_an_error_just_below_tau_passes_and_one_above_does_not(self):
+        a, b = given_view("a", MAIN, BALL), given_view("b", BEHIND_GOAL, BALL)
+        errors = [
+            max(solve(group(a, shifted(b, 0.0, dy)), PAPER).pairs[0].errors_px)
+            for dy in (10.0, 40.0)
+        ]
+        assert errors[0] < TAU < errors[1]
+        assert self.first(a, shifted(b, 0.0, 10.0)) is None
+        assert self.first(a, shifted(b, 0.0, 40.0)) == ("reprojection", None)
+
+    def test_parallax_is_a_gate_of_the_strict_policy_alone(self):
+        near = looking((7.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2300.0)
+        views = given_view("a", MAIN, BALL), given_view("b", near, BALL)
+        assert self.first(*views) is None
+        assert self.first(*views, policy=STRICT) == ("parallax", None)
+
+    def test_a_given_camera_without_lines_is_not_measured(self):
+        views = given_view("a", MAIN, BALL), given_view("b", OPPOSITE, BALL)
+        gate = solve(group(*views), PAPER).gates[1]
+        assert (gate.passed, gate.value, gate.sentence) == (True, None, "given, not measured")
+
+    def test_nine_of_twelve_is_not_above_three_quarters(self, clean):
+        exactly = replace(PAPER, min_jac=1.0)
+        assert solve(clean, exactly).first_failing.name == "jac"
+
+
+class TestFindings:
+    def kinds(self, *views, policy=PAPER):
+        return [item.kind for item in solve(group(*views), policy).findings]
+
+    def test_a_clean_group_has_none(self, clean):
+        assert self.kinds(*clean.views) == []
+
+    def test_a_view_in_no_valid_pair_disagrees(self):
+        wrong = shifted(given_view("c", OPPOSITE, BALL), 0.0, 60.0)
+        found = solve(
+            group(given_view("a", MAIN, BALL), given_view("b", BEHIND_GOAL, BALL), wrong), PAPER
+        ).findings
+        assert [(item.kind, item.view, item.fix.action) for item in found] == [
+            ("view_disagrees", "c", "exclude_view")
+        ]
+        assert found[0].number > found[0].threshold == pytest.approx(TAU)
+
+    def test_several_balls_ask_to_pick_one(self, clean):
+        twice = replace(clean.views[0], balls=clean.views[0].balls * 2)
+        assert "several_balls" in self.kinds(twice, *clean.views[1:])
+
+    def test_a_low_parallax_is_said(self):
+        near = looking((7.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2300.0)
+        assert "low_parallax" in self.kinds(
+            given_view("a", MAIN, BALL), given_view("b", near, BALL)
+        )
+
+    @pytest.mark.parametrize(
+        ("place", "words"),
+        [
+            ((38.0, 2.0, 2.0), "below the grass"),
+            ((38.0, 2.0, -45.0), "high"),
+            ((38.0, -48.0, -1.0), "outside the pitch"),
+        ],
+    )
+    def test_an_implausible_ball_is_said_with_its_number(self, place, words):
+        wide = looking((3.0, 80.0, -20.0), (38.0, 0.0, -10.0), 700.0, kappa=0.0)
+        side = looking((90.0, 20.0, -20.0), (38.0, 0.0, -10.0), 500.0, kappa=0.0)
+        found = solve(group(given_view("a", wide, place), given_view("b", side, place)), PAPER)
+        (finding,) = [item for item in found.findings if item.kind == "implausible_ball"]
+        assert words in finding.sentence
+        assert finding.number > finding.threshold
+
+    def test_a_camera_below_the_grass_is_said(self):
+        buried = replace(MAIN, position=np.array([3.0, 62.0, 2.0]))
+        kinds = self.kinds(given_view("a", buried, BALL), given_view("b", OPPOSITE, BALL))
+        assert "implausible_camera" in kinds
+
+    def test_a_goal_behind_the_line_is_no_fault(self):
+        goal = (53.2, 1.0, -0.5)
+        assert self.kinds(given_view("a", MAIN, goal), given_view("b", OPPOSITE, goal)) == []
+
+
+class TestViewLetter:
+    def test_counts_on_after_the_alphabet(self):
+        assert [view_letter(index) for index in (0, 2, 25, 26)] == ["A", "C", "Z", "V27"]
+
+
+class TestBallInGroup:
+    def test_a_ball_box_without_area_still_has_a_centre(self, clean):
+        dot = BallAnnotation(box=Box(*clean.views[0].balls[0].box.center, 0.0, 0.0))
+        changed = clean.with_view(replace(clean.views[0], balls=(dot,)))
+        assert solve(changed, PAPER).view("7.png").ball.size_ratio is None
