@@ -25,7 +25,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Finding
 from app.solving.calibrate import calibrate
-from app.solving.findings import calibration_findings
+from app.solving.calibration_findings import calibration_findings
 from app.solving.leave_one_out import leave_one_out
 from app.solving.score import score, score_frame
 
@@ -162,7 +162,7 @@ def _calibrate_file(
         stem=file.stem,
         camera=None if camera is None else camera_text(camera),
         reason=calibration.reason,
-        findings=tuple(calibration_findings(calibration, None)),
+        findings=tuple(calibration_findings(calibration, size)),
         left_out=tuple(left_out),
         milliseconds=milliseconds,
     )

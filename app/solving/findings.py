@@ -1,4 +1,4 @@
-"""Findings: what a person should look at, each with its number, its limit and one sentence."""
+"""Findings: what a person should look at in a group, each with number, limit and sentence."""
 
 from __future__ import annotations
 
@@ -8,102 +8,42 @@ from app.soccer.frames import height_above_grass
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.soccer.solution import Ball3D, Calibration, Finding, Fix, Pair, ViewSolution
+from app.soccer.solution import Ball3D, Finding, Fix, Pair, ViewSolution
+from app.solving.calibration_findings import calibration_findings
+from app.solving.sides import Swap, find_swaps
+from app.solving.triangulate import Sight
 
-MAX_CAMERA_HEIGHT_M = 100.0
-MAX_CAMERA_DISTANCE_M = 250.0
+MAX_SIZE_RATIO = 2.0
+"""A ball box may be so many times larger or smaller than the 3D point implies."""
+HIGH_SIGMA_M = 1.0
 
 
 def find(
     group: Group,
     views: Sequence[ViewSolution],
+    sights: Sequence[Sight],
     pairs: Sequence[Pair],
     ball: Ball3D | None,
     policy: Policy,
 ) -> tuple[Finding, ...]:
     """All findings of a group: first of its views in their order, then of its ball."""
+    swaps = {swap.view: swap for swap in find_swaps(sights, policy)}
     found: list[Finding] = []
     for view, solved in zip(group.views, views, strict=True):
-        found.extend(calibration_findings(solved.calibration, view.key))
+        found.extend(calibration_findings(solved.calibration, view.size, view.key))
         found.extend(_several_balls(view))
-        found.extend(_view_disagrees(view, solved, pairs, policy))
+        if view.key in swaps:
+            found.append(_sides_swapped(swaps[view.key]))
+        else:
+            found.extend(_view_disagrees(view, solved, pairs, policy))
+        found.extend(_ball_size(solved))
+    if ball is None and not swaps:
+        found.extend(_not_synchronous(pairs, policy, group))
     if ball is not None:
         found.extend(_low_parallax(ball, policy))
+        found.extend(_high_uncertainty(ball))
         found.extend(_implausible_ball(ball, group.pitch, policy))
     return tuple(found)
-
-
-def calibration_findings(calibration: Calibration, view: str | None) -> Iterator[Finding]:
-    """What the calibration of one view (or line file) has to say."""
-    yield from _wrong_labels(calibration, view)
-    yield from _under_constrained(calibration, view)
-    yield from _implausible_camera(calibration, view)
-
-
-def _wrong_labels(calibration: Calibration, view: str | None) -> Iterator[Finding]:
-    for suspect in calibration.suspects:
-        text = f"“{suspect.marking}” misses by {suspect.error_px:.1f} px"
-        if suspect.suggested is None:
-            yield Finding(
-                "wrong_label",
-                f"{text} and fits no other marking.",
-                view,
-                suspect.marking,
-                number=suspect.error_px,
-                confidence=suspect.confidence,
-                fix=Fix("drop_marking", view, suspect.marking),
-            )
-            continue
-        yield Finding(
-            "wrong_label",
-            f"{text}; as “{suspect.suggested}” it fits within {suspect.suggested_error_px:.1f} px.",
-            view,
-            suspect.marking,
-            suspect.suggested,
-            number=suspect.error_px,
-            threshold=suspect.suggested_error_px,
-            confidence=suspect.confidence,
-            fix=Fix("relabel", view, suspect.marking, to=suspect.suggested),
-        )
-
-
-def _under_constrained(calibration: Calibration, view: str | None) -> Iterator[Finding]:
-    if calibration.camera is None and calibration.source == "lines":
-        yield Finding("under_constrained", f"No camera: {calibration.reason}.", view)
-    elif calibration.unobservable:
-        words = " and ".join(calibration.unobservable)
-        verb = "are" if len(calibration.unobservable) > 1 else "is"
-        yield Finding(
-            "under_constrained",
-            f"The annotated lines do not determine the camera: its {words} {verb} a guess.",
-            view,
-            number=calibration.position_sigma_m,
-        )
-
-
-def _implausible_camera(calibration: Calibration, view: str | None) -> Iterator[Finding]:
-    if calibration.camera is None:
-        return
-    x, y, z = calibration.camera.position.tolist()
-    height = height_above_grass(z)
-    distance = (x * x + y * y) ** 0.5
-    for wrong, number, threshold, sentence in (
-        (height <= 0, height, 0.0, f"The camera stands {-height:.1f} m below the grass."),
-        (
-            height > MAX_CAMERA_HEIGHT_M,
-            height,
-            MAX_CAMERA_HEIGHT_M,
-            f"The camera hangs {height:.0f} m above the grass.",
-        ),
-        (
-            distance > MAX_CAMERA_DISTANCE_M,
-            distance,
-            MAX_CAMERA_DISTANCE_M,
-            f"The camera stands {distance:.0f} m from the centre mark.",
-        ),
-    ):
-        if wrong:
-            yield Finding("implausible_camera", sentence, view, number=number, threshold=threshold)
 
 
 def _several_balls(view: View) -> Iterator[Finding]:
@@ -117,6 +57,19 @@ def _several_balls(view: View) -> Iterator[Finding]:
             threshold=1.0,
             fix=Fix("pick_ball", view.key),
         )
+
+
+def _sides_swapped(swap: Swap) -> Finding:
+    return Finding(
+        "sides_swapped",
+        f"Labelled for the other side: turned by 180° its ball meets the others within "
+        f"{swap.turned_error_px:.1f} px.",
+        swap.view,
+        number=swap.error_px,
+        threshold=swap.turned_error_px,
+        confidence=swap.confidence,
+        fix=Fix("swap_sides", swap.view),
+    )
 
 
 def _view_disagrees(
@@ -141,6 +94,38 @@ def _view_disagrees(
     )
 
 
+def _ball_size(solved: ViewSolution) -> Iterator[Finding]:
+    ratio = solved.ball.size_ratio if solved.ball is not None and solved.included else None
+    if ratio is None or 1 / MAX_SIZE_RATIO <= ratio <= MAX_SIZE_RATIO:
+        return
+    yield Finding(
+        "ball_size",
+        f"The ball's box is {ratio:.2f} times as large as its distance implies.",
+        solved.view,
+        number=ratio,
+        threshold=MAX_SIZE_RATIO if ratio > 1 else 1 / MAX_SIZE_RATIO,
+    )
+
+
+def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Iterator[Finding]:
+    """Well calibrated views whose balls do not meet, from either side: another instant.
+
+    Static cameras run on one clock; there the failed gate says enough.
+    """
+    judged = [pair for pair in pairs if pair.failed == "reprojection"]
+    if not judged or all(view.station.shared for view in group.views):
+        return
+    best = min(judged, key=lambda pair: max(pair.errors_px))
+    sizes = [view.size.diagonal for view in group.views if view.key in (best.a, best.b)]
+    yield Finding(
+        "not_synchronous",
+        f"The balls of no two views meet ({max(best.errors_px):.0f} px apart at best): the views "
+        "may show different instants.",
+        number=max(best.errors_px),
+        threshold=policy.tau_percent / 100 * max(sizes),
+    )
+
+
 def _low_parallax(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
     if ball.parallax_degrees < policy.low_parallax_degrees:
         yield Finding(
@@ -149,6 +134,17 @@ def _low_parallax(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
             f"{ball.sigma_m:.1f} m only.",
             number=ball.parallax_degrees,
             threshold=policy.low_parallax_degrees,
+        )
+
+
+def _high_uncertainty(ball: Ball3D) -> Iterator[Finding]:
+    if ball.sigma_m > HIGH_SIGMA_M:
+        yield Finding(
+            "high_uncertainty",
+            f"The ball's place is known to {ball.sigma_m:.1f} m only, however small its "
+            "reprojection error.",
+            number=ball.sigma_m,
+            threshold=HIGH_SIGMA_M,
         )
 
 

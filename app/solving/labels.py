@@ -30,7 +30,10 @@ FITS = 2.0
 SETTLES = 3.0
 """The same where the cost falls decisively."""
 RELABELLED = 1.5
-"""The points of a relabelled marking lie within this."""
+"""The points of a relabelled marking lie within this, which counts as evidence."""
+NEAREST = 8.0
+"""A class is proposed without being evidence when the points lie within this and only half as
+far as from any other class: what is left out is extrapolated, circles above all."""
 DECISIVE = 0.35
 """Without a class that fits, the cost must fall to this share to suspect a marking."""
 MAX_SUSPECTS = 3
@@ -39,7 +42,7 @@ MIN_MEASUREMENTS_LEFT = 8
 
 @dataclass(frozen=True)
 class _Doubt:
-    """A marking left out: how far off it is, and the class that its points fit, if any."""
+    """A marking left out: how far off it is, and the class that its points fit best, if any."""
 
     marking: str
     error: float
@@ -48,7 +51,12 @@ class _Doubt:
 
     @property
     def is_off(self) -> bool:
-        return self.error > (NAMELESS_MISFIT if self.suggested is None else MISFIT)
+        return self.error > (MISFIT if self.fits else NAMELESS_MISFIT)
+
+    @property
+    def fits(self) -> bool:
+        """Whether the class that it is nearest to fits."""
+        return self.suggested is not None and self.suggested_error <= RELABELLED
 
 
 @dataclass(frozen=True)
@@ -68,7 +76,7 @@ class _Trial:
     @property
     def explains(self) -> bool:
         """Whether all others fit, and what was left out fits another class."""
-        return self.worst <= FITS and all(doubt.suggested for doubt in self.doubts)
+        return self.worst <= FITS and all(doubt.fits for doubt in self.doubts)
 
 
 def find_suspects(
@@ -153,14 +161,17 @@ class _Search:
         """A marking against the camera from the rest, under its label and those not in use."""
         error = self.distance(fit.parameters, observations.only(marking))
         taken = {*rest.markings, marking}
-        best, smallest = None, RELABELLED
-        for other in MARKINGS:
-            if other in taken or (other in CIRCLES) != (marking in CIRCLES):
-                continue
-            apart = self.distance(fit.parameters, observations.only(marking, other))
-            if apart < smallest:
-                best, smallest = other, apart
-        return _Doubt(marking, error, best, smallest)
+        ranked = sorted(
+            (self.distance(fit.parameters, observations.only(marking, other)), other)
+            for other in MARKINGS
+            if other not in taken and (other in CIRCLES) == (marking in CIRCLES)
+        )
+        if not ranked:
+            return _Doubt(marking, error, None, np.inf)
+        nearest, best = ranked[0]
+        rival = ranked[1][0] if len(ranked) > 1 else np.inf
+        plausible = nearest <= RELABELLED or (nearest <= NEAREST and 2 * nearest < rival)
+        return _Doubt(marking, error, best if plausible else None, nearest)
 
     def largest(self, observations: Observations, fit: Resection) -> dict[str, float]:
         """Largest distance of each marking's points."""

@@ -56,7 +56,7 @@ def solve(
         pairs=pairs,
         ball=ball,
         gates=judge(_judged(group, views, policy), pairs, ball, policy),
-        findings=find(group, views, pairs, ball, policy),
+        findings=find(group, views, sights, pairs, ball, policy),
         policy_hash=policy.hash,
         solver_version=SOLVER_VERSION,
     )

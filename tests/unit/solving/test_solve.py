@@ -2,8 +2,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from app.soccer.annotation import BallAnnotation
+from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
+from app.soccer.pitch import twin_marking
 from app.soccer.policy import PAPER, STRICT
 from app.solving.solve import solve, view_letter
 from tests.unit.solving.conftest import (
@@ -213,6 +214,52 @@ class TestFindings:
     def test_a_goal_behind_the_line_is_no_fault(self):
         goal = (53.2, 1.0, -0.5)
         assert self.kinds(given_view("a", MAIN, goal), given_view("b", OPPOSITE, goal)) == []
+
+
+class TestSidesSwapped:
+    def test_a_replay_labelled_for_the_other_side_is_found_by_its_ball(self, clean):
+        replay = clean.views[1]
+        lines = {twin_marking(name): points for name, points in replay.station.lines.items()}
+        turned = replace(replay, station=replace(replay.station, lines=make_lines(lines)))
+        found = solve(group(clean.views[0], turned, clean.views[2]), PAPER).findings
+        assert [(item.kind, item.view, item.fix.action) for item in found] == [
+            ("sides_swapped", "7_1.png", "swap_sides")
+        ]
+        assert found[0].confidence > 0.9
+
+    def test_a_main_camera_on_the_far_side_is_the_one_that_is_swapped(self, clean):
+        main = clean.views[0]
+        lines = {twin_marking(name): points for name, points in main.station.lines.items()}
+        turned = replace(main, station=replace(main.station, lines=make_lines(lines)))
+        found = solve(group(turned, clean.views[1]), PAPER).findings
+        assert [(item.kind, item.view) for item in found] == [("sides_swapped", "7.png")]
+
+    def test_another_instant_is_not_taken_for_another_side(self, clean):
+        other = view("7_1.png", BEHIND_GOAL, (40.0, -9.0, -0.11))
+        found = solve(group(clean.views[0], other), PAPER).findings
+        assert [item.kind for item in found] == ["not_synchronous"]
+
+
+class TestCalibrationFindings:
+    def test_one_point_off_its_line_is_a_bad_point(self, clean):
+        station = clean.views[0].station
+        points = list(station.lines["Big rect. right main"])
+        points[2] = ImagePoint(points[2].x, points[2].y + 25)
+        lines = {**station.lines, "Big rect. right main": tuple(points)}
+        moved = replace(clean.views[0], station=replace(station, lines=lines))
+        found = solve(group(moved, *clean.views[1:]), PAPER).findings
+        assert [(item.kind, item.marking, item.fix.index) for item in found] == [
+            ("bad_point", "Big rect. right main", 2)
+        ]
+
+    def test_a_marking_in_sight_that_nobody_annotated_is_said(self, clean):
+        station = clean.views[0].station
+        fewer = {name: at for name, at in station.lines.items() if name != "Side line top"}
+        partial = replace(clean.views[0], station=replace(station, lines=fewer))
+        found = solve(group(partial, *clean.views[1:]), PAPER).findings
+        assert [(item.kind, item.marking) for item in found] == [
+            ("visible_not_annotated", "Side line top")
+        ]
 
 
 class TestViewLetter:
