@@ -9,7 +9,7 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, require_shape
-from app.geometry.distortion import COEFFICIENTS, distort, fold_radius, undistort
+from app.geometry.distortion import COEFFICIENTS, distort, distort_jacobian, fold_radius, undistort
 from app.geometry.rotation import pan_tilt_roll_from_rotation
 
 MIN_DEPTH = 1e-3
@@ -114,6 +114,19 @@ class Camera:
         pixels = self._unit_to_pixel(ideal)
         pixels[~visible] = np.nan
         return pixels
+
+    def jacobian(self, point: FloatArray) -> FloatArray:
+        """Derivative of a point's pixel by the point, pixels per metre, shape (2, 3).
+
+        Args:
+            point: Pitch frame, metres, in front of the camera, shape (3,).
+        """
+        x, y, z = self.rotation @ (require_shape(point, (3,), "point") - self.position)
+        ideal = np.array([[1.0, 0.0, -x / z], [0.0, 1.0, -y / z]]) / z @ self.rotation
+        if self.distortion.any():
+            ideal = distort_jacobian(np.array([[x / z, y / z]]), self.distortion)[0] @ ideal
+        slope: FloatArray = self.K[:2, :2] @ ideal
+        return slope
 
     def undistort(self, pixels: FloatArray) -> FloatArray:
         """Pixels of the ideal pinhole for pixels of the image, both shape (N, 2)."""

@@ -286,10 +286,9 @@ def residual(camera, place, inside, pixel, offset, jacobian):
         gx, gy = 1.0, 0.0
     offset[0] = gx * ey - gy * ex
     offset[1] = 0.0 if inside else gx * ex + gy * ey
-    by_parameter = np.empty((2, 8))
-    projection_derivatives(camera, dx, dy, dz, by_parameter)
+    projection_derivatives(camera, dx, dy, dz, jacobian)
     for k in range(8):
-        jx, jy = by_parameter[0, k], by_parameter[1, k]
+        jx, jy = jacobian[0, k], jacobian[1, k]
         jacobian[0, k] = gy * jx - gx * jy
         jacobian[1, k] = 0.0 if inside else -(gx * jx + gy * jy)
 

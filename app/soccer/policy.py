@@ -41,6 +41,8 @@ class Policy:
     """Below: the finding ``low_parallax``; it is no gate of the policy ``paper``."""
     click_sigma_px: float = 1.0
     """Standard deviation of an annotated ball centre at 1920 x 1080; grows with the diagonal."""
+    box_sigma_share: float = 0.04
+    """What the diameter of a ball's box adds to that standard deviation, as a share of it."""
     below_grass_m: float = 0.5
     max_height_m: float = 40.0
     outside_pitch_m: float = 10.0

@@ -158,6 +158,23 @@ class Ball3D:
 
 
 @dataclass(frozen=True)
+class BestBall:
+    """The maximum-likelihood ball over all views, pitch frame, metres, z down."""
+
+    point: tuple[float, float, float]
+    covariance: tuple[float, ...]
+    """3 x 3, row by row, square metres."""
+    sigma_m: float
+    """Standard deviation along the longest axis of the covariance."""
+    views: tuple[str, ...]
+    """Views that the point rests on."""
+    contradicting: tuple[str, ...] = ()
+    """Views left out because they contradict the others."""
+    influence_m: tuple[tuple[str, float], ...] = ()
+    """How far the point moves when that view is left out; empty with two views."""
+
+
+@dataclass(frozen=True)
 class BallFit:
     """The 3D ball seen again in one view."""
 
@@ -178,6 +195,8 @@ class BallFit:
     """Annotated diameter over optimised diameter; None for a point annotation."""
     depth_m: float | None
     """Distance of the ball along the optical axis."""
+    depth_per_px_m: float | None = None
+    """Metres that the monocular ball moves along the axis for one pixel of diameter."""
 
 
 @dataclass(frozen=True)
@@ -254,6 +273,7 @@ class Solution:
     ball: Ball3D | None
     gates: tuple[Gate, ...]
     findings: tuple[Finding, ...] = ()
+    best_ball: BestBall | None = None
     policy_hash: str = ""
     solver_version: str = field(default=SOLVER_VERSION)
 

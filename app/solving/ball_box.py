@@ -36,6 +36,7 @@ def fit_ball(
     error = float(np.hypot(*(pixel - center))) if seen else None
     diameter, off_ray = _optimal(camera, center, point, diameter_m)
     annotated = ball.box.diameter if ball.box is not None else None
+    depth = float(camera.pitch_to_camera(point[None])[0, 2])
     return BallFit(
         reprojected=ImagePoint(float(pixel[0]), float(pixel[1])) if seen else None,
         error_px=error,
@@ -45,7 +46,9 @@ def fit_ball(
         optimized_error_m=off_ray,
         exact_box=_exact_box(camera, point, diameter_m),
         size_ratio=annotated / diameter if annotated and diameter else None,
-        depth_m=float(camera.pitch_to_camera(point[None])[0, 2]),
+        depth_m=depth,
+        # Depth times diameter is constant, so the slope is depth over diameter.
+        depth_per_px_m=depth / diameter if diameter else None,
     )
 
 

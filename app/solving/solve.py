@@ -16,6 +16,7 @@ from app.soccer.group import Group, View
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Ball3D, Calibration, Solution, ViewSolution
 from app.solving.ball_box import fit_ball
+from app.solving.best_ball import best_ball
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.findings import find
 from app.solving.gates import JudgedView, judge, view_failure
@@ -55,6 +56,7 @@ def solve(
         views=views,
         pairs=pairs,
         ball=ball,
+        best_ball=best_ball(pairs, sights, policy),
         gates=judge(_judged(group, views, policy), pairs, ball, policy),
         findings=find(group, views, sights, pairs, ball, policy),
         policy_hash=policy.hash,
@@ -89,7 +91,8 @@ def _sight(view: View, solved: ViewSolution) -> Sight | None:
     if solved.calibration.camera is None or ball is None or not view.included:
         return None
     assert ball.center is not None
-    sight = Sight(view.key, solved.calibration, ball.center, view.size, solved.failed)
+    diameter = ball.box.diameter if ball.box is not None else 0.0
+    sight = Sight(view.key, solved.calibration, ball.center, diameter, view.size, solved.failed)
     undistorted = sight.camera.undistort(np.array([ball.center]))
     return sight if np.isfinite(undistorted).all() else None
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.geometry.resection import ARC, PARAMETERS, Curves
-from app.geometry.rotation import pan_tilt_roll_from_rotation, rotation_looking
+from app.geometry.resection import ARC, LOG_FOCAL, PAN, PARAMETERS, TILT, Curves, X, Z
 from app.solving.observations import Observations
 
 STANDS: FloatArray = np.array(
@@ -48,28 +47,40 @@ def stand_starts(observations: Observations, diagonal: float) -> FloatArray:
     image = np.array(
         [observations.pixels[observations.marking == index].mean(axis=0) for index in seen]
     )
-    target = weight @ centers
+    pan, tilt, spread = _aim(STANDS, weight @ centers, centers, weight)
     image_center = weight @ image
     image_spread = np.sqrt(weight @ ((image - image_center) ** 2).sum(axis=1))
+    focal = max(image_spread, 0.1 * diagonal) / np.maximum(spread, 1e-3)
+    focal = np.clip(focal, _FOCAL_RANGE[0] * diagonal, _FOCAL_RANGE[1] * diagonal)
     starts = np.zeros((len(STANDS), PARAMETERS))
-    for row, stand in zip(starts, STANDS, strict=True):
-        rotation = rotation_looking(stand, target)
-        directions = (centers - stand) @ rotation.T
-        in_front = directions[:, 2] > 1.0
-        unit = directions[in_front, :2] / directions[in_front, 2:]
-        spread = np.sqrt(weight[in_front] @ (unit**2).sum(axis=1)) if in_front.any() else 0.0
-        low, high = _FOCAL_RANGE[0] * diagonal, _FOCAL_RANGE[1] * diagonal
-        focal = np.clip(max(image_spread, 0.1 * diagonal) / max(spread, 1e-3), low, high)
-        pan, tilt, _ = pan_tilt_roll_from_rotation(rotation)
-        # Turn so that the aim appears where the annotation has it, not in the middle.
-        row[:3] = (
-            pan - np.arctan(image_center[0] / focal),
-            tilt + np.arctan(image_center[1] / focal),
-            0.0,
-        )
-        row[3:6] = stand
-        row[6] = np.log(focal)
+    # Turn so that the aim appears where the annotation has it, not in the middle.
+    starts[:, PAN] = pan - np.arctan(image_center[0] / focal)
+    starts[:, TILT] = tilt + np.arctan(image_center[1] / focal)
+    starts[:, X : Z + 1] = STANDS
+    starts[:, LOG_FOCAL] = np.log(focal)
     return starts
+
+
+def _aim(
+    stands: FloatArray, target: FloatArray, points: FloatArray, weight: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Level cameras that look at a target: pan and tilt, and how wide they see the points.
+
+    The width is the weighted root mean square of the normalised image coordinates of the
+    points in front, zero where none is; each result has shape (S,).
+    """
+    forward = target - stands
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    pan, tilt = np.arctan2(forward[:, 0], -forward[:, 1]), np.arccos(forward[:, 2])
+    right = np.column_stack([np.cos(pan), np.sin(pan), np.zeros_like(pan)])
+    lift = np.cos(tilt)
+    down = np.column_stack([-lift * right[:, 1], lift * right[:, 0], np.sin(tilt)])
+    offset = points[None] - stands[:, None]
+    x, y, depth = (np.einsum("snk,sk->sn", offset, axis) for axis in (right, down, forward))
+    in_front = depth > 1.0
+    depth = np.where(in_front, depth, 1.0)
+    squared = np.where(in_front, (x**2 + y**2) / depth**2, 0.0)
+    return pan, tilt, np.sqrt(squared @ weight)
 
 
 def _centers(curves: Curves) -> FloatArray:

@@ -23,8 +23,6 @@ from app.soccer.solution import Ball3D, Calibration, Pair
 CLICK_DIAGONAL = float(np.hypot(1920, 1080))
 """The policy's click sigma holds for 1920 x 1080 and grows with the diagonal."""
 
-_STEP_M = 1e-3
-
 
 @dataclass(frozen=True)
 class Sight:
@@ -34,6 +32,7 @@ class Sight:
         view: Key of the view.
         calibration: Its calibration, with a camera.
         center: Annotated centre, pixels as the image shows them.
+        diameter_px: Of the annotated box, 0 for a point.
         size: Annotated size.
         failed: First gate that dropped the view, or None.
     """
@@ -41,6 +40,7 @@ class Sight:
     view: str
     calibration: Calibration
     center: ImagePoint
+    diameter_px: float
     size: ImageSize
     failed: str | None
 
@@ -83,7 +83,7 @@ def mean_ball(pairs: Sequence[Pair], sights: Sequence[Sight], policy: Policy) ->
     point = np.mean([pair.point for pair in valid], axis=0)
     used = {pair.a for pair in valid} | {pair.b for pair in valid}
     seen = {sight.view: sight for sight in sights if sight.view in used}
-    spread = ball_covariance(point, tuple(seen.values()), policy.click_sigma_px)
+    spread = ball_covariance(point, tuple(seen.values()), policy)
     return Ball3D(
         point=_triple(point),
         covariance=tuple(spread.ravel().tolist()),
@@ -93,20 +93,23 @@ def mean_ball(pairs: Sequence[Pair], sights: Sequence[Sight], policy: Policy) ->
     )
 
 
-def ball_covariance(
-    point: FloatArray, sights: Sequence[Sight], click_sigma_px: float
-) -> FloatArray:
-    """Covariance of a triangulated ball, square metres, shape (3, 3).
+def ball_covariance(point: FloatArray, sights: Sequence[Sight], policy: Policy) -> FloatArray:
+    """Covariance of the best point from these views, square metres, shape (3, 3)."""
+    return point_covariance(
+        [sight.camera.jacobian(point) for sight in sights],
+        [pixel_spread(sight, point, policy) for sight in sights],
+    )
 
-    Each view contributes the noise of the click and, where the camera comes from lines, the
-    covariance of its calibration carried to the ball's pixel.
+
+def pixel_spread(sight: Sight, point: FloatArray, policy: Policy) -> FloatArray:
+    """Covariance of the ball's pixel in a view, square pixels, shape (2, 2).
+
+    The noise of the click, which grows with the size of the ball, and, where the camera comes
+    from lines, the covariance of its calibration carried to the ball.
     """
-    jacobians, spreads = [], []
-    for sight in sights:
-        jacobians.append(_jacobian_by_point(sight.camera, point))
-        click = click_sigma_px * sight.size.diagonal / CLICK_DIAGONAL
-        spreads.append(click**2 * np.eye(2) + _calibration_spread(sight, point))
-    return point_covariance(jacobians, spreads)
+    click = policy.click_sigma_px * sight.size.diagonal / CLICK_DIAGONAL
+    click = float(np.hypot(click, policy.box_sigma_share * sight.diameter_px))
+    return click**2 * np.eye(2) + _calibration_spread(sight, point)
 
 
 def _pair(a: Sight, b: Sight, point: FloatArray, policy: Policy) -> Pair:
@@ -148,13 +151,6 @@ def _reprojection_error(sight: Sight, point: FloatArray) -> float:
 def _parallax(seen: Mapping[str, Sight], pair: Pair, point: FloatArray) -> float:
     positions = (seen[pair.a].camera.position, seen[pair.b].camera.position)
     return float(np.degrees(parallax_angle(*positions, point[None])[0]))
-
-
-def _jacobian_by_point(camera: Camera, point: FloatArray) -> FloatArray:
-    """Derivative of the seen pixel by the point, pixels per metre, shape (2, 3)."""
-    steps = _STEP_M * np.vstack([np.eye(3), -np.eye(3)])
-    pixels = camera.project(point + steps)
-    return (pixels[:3] - pixels[3:]).T / (2 * _STEP_M)
 
 
 def _calibration_spread(sight: Sight, point: FloatArray) -> FloatArray:

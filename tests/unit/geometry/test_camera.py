@@ -65,6 +65,15 @@ class TestProject:
             main_camera().project(np.zeros((4, 2)))
 
 
+class TestJacobian:
+    def test_equals_its_finite_difference(self):
+        distortion = np.array([0.2, -0.1, 1e-3, 2e-3, 0.05, 0, 0, 0, 1e-4, 0, 0, 2e-4])
+        camera, point = main_camera(distortion=distortion, skew=2.0), np.array([15.0, -20.0, -2.0])
+        steps = 1e-4 * np.vstack([np.eye(3), -np.eye(3)])
+        pixels = camera.project(point + steps)
+        assert np.allclose(camera.jacobian(point), (pixels[:3] - pixels[3:]).T / 2e-4, atol=1e-5)
+
+
 class TestRays:
     def test_a_ray_meets_the_point_that_it_came_from(self):
         camera = main_camera(distortion=np.array([0.3, 0.045, *np.zeros(10)]))
