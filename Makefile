@@ -43,7 +43,7 @@ bench: setup
 	$(BIN)/python -m tests.bench
 
 chromium: setup
-	@$(BIN)/python docker/chromium.py
+	@$(BIN)/python tests/e2e/install_chromium.py
 
 clean:
 	rm -rf .venv static/node_modules

@@ -27,12 +27,18 @@ def leave_one_out(
     Yields:
         Marking and pixels; None where the others do not give a camera.
     """
-    problem = ResectionProblem.of(size, policy)
     for marking in lines:
-        others = make_lines({name: points for name, points in lines.items() if name != marking})
-        camera = calibrate(others, pitch, size, policy).camera
-        if camera is None:
-            yield marking, None
-            continue
-        seen = observe(make_lines({marking: lines[marking]}), pitch, size)
-        yield marking, float(problem.distances(problem.parameters(camera), seen).max())
+        yield marking, error_without(lines, marking, pitch, size, policy)
+
+
+def error_without(
+    lines: Lines, marking: str, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+) -> float | None:
+    """Largest distance of a marking's points from where the others put it, pixels."""
+    others = make_lines({name: points for name, points in lines.items() if name != marking})
+    camera = calibrate(others, pitch, size, policy).camera
+    if camera is None:
+        return None
+    problem = ResectionProblem.of(size, policy)
+    seen = observe(make_lines({marking: lines[marking]}), pitch, size)
+    return float(problem.distances(problem.parameters(camera), seen).max())

@@ -1,8 +1,9 @@
 import cv2
 import numpy as np
-from app.geometry.distortion import distort, distort_jacobian, fold_radius, undistort
 from hypothesis import given
 from hypothesis import strategies as st
+
+from app.geometry.distortion import distort, distort_jacobian, fold_radius, undistort
 
 FULL = np.array([0.12, -0.03, 0.002, -0.001, 0.01, 0.05, 0.01, 0.002, 1e-3, -2e-3, 3e-3, 1e-3])
 POINTS = np.array([[0.0, 0.0], [0.3, -0.2], [-0.4, 0.25], [0.1, 0.45]])

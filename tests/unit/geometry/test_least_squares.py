@@ -2,6 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
+
 from app.errors import DegenerateGeometryError
 from app.geometry.least_squares import CONVERGED, OUT_OF_STEPS, covariance, levenberg_marquardt
 

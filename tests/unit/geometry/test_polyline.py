@@ -1,4 +1,5 @@
 import numpy as np
+
 from app.geometry.polyline import clip_polyline, distance_to_polyline
 
 

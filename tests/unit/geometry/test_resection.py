@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from app.geometry.curve_residuals import residual_rows
 from app.geometry.resection import (
     KAPPA,

@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from app.geometry.rotation import (
     pan_tilt_roll_from_rotation,
     rotation_from_pan_tilt_roll,
     rotation_looking,
 )
-from hypothesis import given
-from hypothesis import strategies as st
 
 ANGLE = st.floats(-3.1, 3.1)
 

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from app.errors import DegenerateGeometryError
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_looking

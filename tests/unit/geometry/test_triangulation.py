@@ -1,6 +1,7 @@
 import cv2
 import numpy as np
 import pytest
+
 from app.errors import DegenerateGeometryError, ShapeError
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_looking

@@ -1,4 +1,5 @@
 import pytest
+
 from app.soccer.frames import Box, ImagePoint, ImageSize
 
 

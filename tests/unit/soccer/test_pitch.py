@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from app.errors import InputError, UnknownMarkingError
 from app.soccer.pitch import (
     CIRCLES,

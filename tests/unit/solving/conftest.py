@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from app.geometry.camera import Camera
 from app.geometry.polyline import clip_polyline
 from app.geometry.rotation import rotation_looking

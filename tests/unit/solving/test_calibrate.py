@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from app.soccer.annotation import make_lines
 from app.soccer.group import Station
 from app.soccer.pitch import Pitch

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize

@@ -1,4 +1,5 @@
 import pytest
+
 from app.solving.score import FrameScore, score, score_frame
 from tests.unit.solving.conftest import MAIN, PITCH, SIZE, click
 

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.pitch import twin_marking

@@ -1,0 +1,30 @@
+"""``make bench``: what Touchline measures of itself, printed as tables.
+
+Accuracy is compared with the peer's published figures, speed with libraries in the same run.
+Timings gate no test: machines are shared and noisy.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from tests.bench.ball import bench_ball
+from tests.bench.calibration import bench_calibration
+from tests.bench.geometry import bench_geometry
+
+REAL_DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", "../shared/data"))
+
+
+def main() -> None:
+    """Run every benchmark; those on real data only where it is."""
+    bench_ball()
+    bench_geometry()
+    if (REAL_DATA / "sn22-dev" / "lines.zip").is_file():
+        bench_calibration(REAL_DATA)
+    else:
+        print(f"\nCalibration on real lines: no data in {REAL_DATA}, left out")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+"""Speed of the kernels, as ratios to OpenCV and scipy in the same run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+from scipy.optimize import least_squares
+
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.geometry.rotation import rotation_looking
+from app.geometry.triangulation import triangulate_pairs
+from app.soccer.annotation import make_lines
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.solving.jaccard import project_markings
+from app.solving.observations import observe
+from app.solving.resect import ResectionProblem
+from tests.bench.table import print_table
+
+SIZE = ImageSize(960, 540)
+PAIRS = 200_000
+REPEATS = 5
+
+
+def bench_geometry() -> None:
+    """Triangulation of many pairs, and one refinement of a camera."""
+    rows = [*_triangulation(), *_refinement()]
+    print_table(
+        "Speed against libraries, same run, best of five",
+        ("what", "Touchline", "library", "unit", "ratio library / Touchline"),
+        rows,
+    )
+
+
+def _triangulation() -> list[list[object]]:
+    generator = np.random.default_rng(1)
+    main, replay = _camera(0.0, 60.0, -15.0), _camera(75.0, -10.0, -8.0)
+    points = generator.uniform([10, -20, -5], [40, 20, 0], (PAIRS, 3))
+    a, b = main.project(points), replay.project(points)
+    P_a, P_b = (np.broadcast_to(camera.P, (PAIRS, 3, 4)) for camera in (main, replay))
+    few = 2000
+
+    def one_by_one() -> None:
+        for index in range(few):
+            cv2.triangulatePoints(P_a[index], P_b[index], a[index][:, None], b[index][:, None])
+
+    ours = _best(lambda: triangulate_pairs(P_a, P_b, a, b)) / PAIRS
+    # Every pair of a dataset has cameras of its own, so OpenCV is called pair by pair.
+    theirs = _best(one_by_one) / few
+    return [["triangulate pairs (cv2)", 1e6 * ours, 1e6 * theirs, "us a pair", theirs / ours]]
+
+
+def _refinement() -> list[list[object]]:
+    camera, pitch = _camera(0.0, 60.0, -15.0), Pitch()
+    lines = {
+        marking: polyline[:: max(len(polyline) // 5, 1)]
+        for marking, polyline in project_markings(camera, pitch, SIZE).items()
+    }
+    observations = observe(make_lines(lines), pitch, SIZE)
+    problem = ResectionProblem.of(SIZE, CalibrationPolicy())
+    start = problem.parameters(camera) + np.array([0.01, 0.01, 0.002, 1.0, 1.0, 0.5, 0.02, 0.0])
+    ours = _best(lambda: problem.refine(observations, start[None]))
+    theirs = _best(
+        lambda: least_squares(
+            lambda row: problem.distances(row, observations), start, loss="soft_l1", f_scale=2.0
+        )
+    )
+    return [["refine one camera (scipy)", 1e3 * ours, 1e3 * theirs, "ms", theirs / ours]]
+
+
+def _camera(*position: float) -> Camera:
+    place: FloatArray = np.array(position)
+    rotation = rotation_looking(place, np.array([25.0, 0.0, 0.0]))
+    return Camera(rotation, place, (2000.0, 2000.0), (479.5, 269.5))
+
+
+def _best(work: Callable[[], object]) -> float:
+    """Shortest CPU time of several runs after one that is not counted, seconds."""
+    work()
+    times = []
+    for _ in range(REPEATS):
+        began = time.process_time()
+        work()
+        times.append(time.process_time() - began)
+    return min(times)
