@@ -227,14 +227,19 @@ def sample_arc(camera, shape, samples):
 
 @njit(cache=True)
 def nearest_on_arc(camera, shape, samples, pixel, place):
-    """Writes the place of the arc nearest to the pixel and its tangent, starting at a sample."""
-    best, closest = 0, np.inf
-    for i in range(ARC_SAMPLES + 1):
-        distance = (samples[i, 0] - pixel[0]) ** 2 + (samples[i, 1] - pixel[1]) ** 2
-        if distance < closest:
-            best, closest = i, distance
+    """Writes the place of the arc nearest to the pixel and its tangent, starting at a chord."""
     step = (shape[4] - shape[3]) / ARC_SAMPLES
-    angle = shape[3] + step * best
+    angle, closest = shape[3], np.inf
+    for i in range(ARC_SAMPLES):
+        ax, ay = samples[i, 0], samples[i, 1]
+        lx, ly = samples[i + 1, 0] - ax, samples[i + 1, 1] - ay
+        squared = lx * lx + ly * ly
+        share = ((pixel[0] - ax) * lx + (pixel[1] - ay) * ly) / squared if squared > 0 else 0.0
+        share = min(max(share, 0.0), 1.0)
+        distance = (ax + share * lx - pixel[0]) ** 2 + (ay + share * ly - pixel[1]) ** 2
+        # A chord with an end behind the camera is NaN and never closer.
+        if distance < closest:
+            angle, closest = shape[3] + step * (i + share), distance
     full = shape[4] - shape[3] > 2 * np.pi - 1e-9
     focal, kappa = camera[12], camera[13]
     for _ in range(ARC_STEPS):

@@ -104,9 +104,15 @@ def find_suspects(
             return fit, observations, ()
         doubts += trial.doubts
         rest, now = trial.rest, trial.fit
-    # Only now is it known which classes are free: two posts may have been swapped.
-    final = (search.doubt(observations, trial.rest, trial.fit, item.marking) for item in doubts)
-    return trial.fit, trial.rest, tuple(search.suspect(doubt) for doubt in final)
+    # Only now is it known which classes are free (two posts may have been swapped), and whether
+    # what was left out on the way there is off at all.
+    final = [search.doubt(observations, trial.rest, trial.fit, item.marking) for item in doubts]
+    suspects = [doubt for doubt in final if doubt.is_off]
+    fit, rest = trial.fit, trial.rest
+    if len(suspects) < len(final):
+        rest = observations.without(*(doubt.marking for doubt in suspects))
+        fit = problem.refine(rest, fit.parameters[None])
+    return fit, rest, tuple(search.suspect(doubt) for doubt in suspects)
 
 
 @dataclass(frozen=True)
@@ -146,12 +152,10 @@ class _Search:
 
     def try_without(self, observations: Observations, markings: Sequence[str]) -> _Trial | None:
         """The camera without some markings; None when too little would be left."""
-        rest = observations
-        for marking in markings:
-            rest = rest.without(marking)
+        rest = observations.without(*markings)
         if measurement_count(rest) < MIN_MEASUREMENTS_LEFT:
             return None
-        fit = self.problem.resect(rest)
+        fit = self.problem.search(rest)
         doubts = tuple(self.doubt(observations, rest, fit, marking) for marking in markings)
         return _Trial(doubts, rest, fit, max(self.largest(rest, fit).values()))
 

@@ -38,9 +38,9 @@ class Observations:
         """All points with weight one."""
         return Sightings(self.pixels, self.marking, np.ones(len(self.pixels)))
 
-    def without(self, marking: str) -> Observations:
-        """The same without the points of one marking."""
-        keep = self.marking != MARKINGS.index(marking)
+    def without(self, *markings: str) -> Observations:
+        """The same without the points of some markings."""
+        keep = ~np.isin(self.marking, [MARKINGS.index(marking) for marking in markings])
         return Observations(self.curves, self.pixels[keep], self.marking[keep])
 
     def only(self, marking: str, as_marking: str | None = None) -> Observations:

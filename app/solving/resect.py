@@ -25,6 +25,7 @@ from app.geometry.resection import (
     parameters_from_camera,
 )
 from app.soccer.frames import ImageSize
+from app.soccer.pitch import CIRCLES
 from app.soccer.policy import CalibrationPolicy
 from app.solving.observations import Observations, principal_point
 from app.solving.starts import stand_starts
@@ -50,6 +51,8 @@ SEARCH = Stage(starts=1000, steps=12, scale_px=30.0, tolerance=1e-3)
 NARROW = Stage(starts=8, steps=10, scale_px=8.0, tolerance=1e-4)
 FINAL = Stage(starts=3, steps=25, scale_px=0.0, tolerance=1e-6)
 """Its scale is the policy's."""
+POOR_PX = 8.0
+"""A fit is poor when a point lies farther than this from its marking, at 960 x 540."""
 POINTS_PER_LINE, POINTS_PER_CIRCLE = 4, 8
 """Points that the search looks at; the later stages use them all."""
 
@@ -87,6 +90,23 @@ class ResectionProblem:
         return self.size.diagonal / REFERENCE_DIAGONAL
 
     def resect(self, observations: Observations) -> Resection:
+        """The best camera; where it fits badly, also sought without the circles first.
+
+        Points of a circle of which little is seen can settle on its wrong side and hold the
+        camera there; straight markings have no wrong side.
+        """
+        fit = self.search(observations)
+        straight = observations.without(*CIRCLES)
+        if (
+            self.distances(fit.parameters, observations).max() <= POOR_PX * self.unit
+            or len(straight.pixels) == len(observations.pixels)
+            or measurement_count(straight) < PARAMETERS
+        ):
+            return fit
+        other = self.refine(observations, self.search(straight).parameters[None])
+        return min(fit, other, key=lambda item: item.cost)
+
+    def search(self, observations: Observations) -> Resection:
         """The best camera from the whole bank of stands."""
         thinned = observations.thinned(POINTS_PER_LINE, POINTS_PER_CIRCLE)
         starts = stand_starts(observations, self.size.diagonal)
