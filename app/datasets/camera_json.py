@@ -1,0 +1,265 @@
+"""SoccerNet camera JSON: one camera a file (``camera_00002.json``), or ISSIA's six in one."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path, PurePosixPath
+from typing import Any, TypeVar
+
+import numpy as np
+
+from app.datasets import fields
+from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree, resolve_inside
+from app.datasets.json_text import read_json
+from app.datasets.report import Report
+from app.errors import DatasetFormatError, GeometryError
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.geometry.rotation import rotation_from_pan_tilt_roll
+
+MAX_DISAGREEMENT_DEGREES = 0.01
+"""Between the angles and the matrix of one file; beyond, the file contradicts itself."""
+MAX_NUMBER = 1e7
+"""No angle, distance or focal length of a camera is beyond."""
+ROUNDING = 1e-10
+"""Below, a matrix and its angles are the same rotation but for rounding."""
+
+_ANGLES = ("pan_degrees", "tilt_degrees", "roll_degrees")
+_DISTORTION = (("radial_distortion", 6), ("tangential_distortion", 2), ("thin_prism_distortion", 4))
+_FILE = re.compile(r"(?:camera_)?(.+)\.json", re.ASCII | re.IGNORECASE)
+
+T = TypeVar("T")
+
+
+def camera_to_json(camera: Camera) -> dict[str, Any]:
+    """The camera as SoccerNet spells it: angles, matrix and all three distortion arrays.
+
+    Every number is a plain float, so that ``repr`` and JSON keep it exactly. ``skew`` is ours
+    and stands there only when it is not zero.
+    """
+    k1, k2, p1, p2, k3, k4, k5, k6, *prism = (float(value) for value in camera.distortion)
+    pan, tilt, roll = camera.pan_tilt_roll_degrees
+    value = {
+        "pan_degrees": pan,
+        "tilt_degrees": tilt,
+        "roll_degrees": roll,
+        "x_focal_length": float(camera.focal_length[0]),
+        "y_focal_length": float(camera.focal_length[1]),
+        "principal_point": [float(item) for item in camera.principal_point],
+        "position_meters": [float(item) for item in camera.position],
+        "rotation_matrix": [[float(item) for item in row] for row in camera.rotation],
+        "radial_distortion": [k1, k2, k3, k4, k5, k6],
+        "tangential_distortion": [p1, p2],
+        "thin_prism_distortion": prism,
+    }
+    return value | ({"skew": float(camera.skew)} if camera.skew else {})
+
+
+def camera_from_json(value: Any, path: str, record: str | None = None) -> Camera:
+    """The camera of a SoccerNet camera object.
+
+    The angles are authoritative; ``rotation_matrix`` may be missing and must agree when it is
+    there. Missing distortion arrays are zero. The image size is not in the file and is not
+    inferred. A camera below the grass is a camera: judging it is the solver's part.
+
+    Args:
+        value: The parsed JSON object.
+        path: File as the user knows it, for the error.
+        record: Name of the camera inside the file, for the error.
+
+    Raises:
+        DatasetFormatError: A field is missing, no number, or contradicts another.
+    """
+    if not isinstance(value, dict):
+        raise DatasetFormatError(path, record, None, "is not a camera object")
+    reader = _Fields(value, path, record)
+    rotation = _rotation(reader)
+    radial, tangential, prism = (reader.distortion(name, count) for name, count in _DISTORTION)
+    k1, k2, k3, k4, k5, k6 = radial
+    try:
+        return Camera(
+            rotation=rotation,
+            position=np.array(reader.read("position_meters", _three)),
+            focal_length=(
+                reader.read("x_focal_length", _positive),
+                reader.read("y_focal_length", _positive),
+            ),
+            principal_point=reader.read("principal_point", _two),
+            skew=reader.read("skew", fields.number) if "skew" in value else 0.0,
+            distortion=np.array([k1, k2, *tangential, k3, k4, k5, k6, *prism]),
+        )
+    except GeometryError as error:
+        raise DatasetFormatError(path, record, None, error.message) from error
+
+
+class _Fields:
+    """One camera object, read field by field."""
+
+    def __init__(self, value: Mapping[str, Any], path: str, record: str | None):
+        self.value, self.path, self.record = value, path, record
+
+    def read(self, name: str, parse: Callable[[Any], T]) -> T:
+        if name not in self.value:
+            raise self.error(name, "is missing")
+        try:
+            return _within_reason(parse(self.value[name]))
+        except ValueError as error:
+            raise self.error(name, str(error)) from error
+
+    def distortion(self, name: str, count: int) -> tuple[float, ...]:
+        if self.value.get(name) is None:
+            return (0.0,) * count
+        return self.read(name, lambda value: fields.numbers(value, count))
+
+    def error(self, name: str, problem: str) -> DatasetFormatError:
+        return DatasetFormatError(self.path, self.record, name, problem)
+
+
+def _rotation(reader: _Fields) -> FloatArray:
+    pan, tilt, roll = (reader.read(name, fields.number) for name in _ANGLES)
+    rotation = rotation_from_pan_tilt_roll(*np.radians([pan, tilt, roll]))
+    if reader.value.get("rotation_matrix") is None:
+        return rotation
+    matrix = np.array(reader.read("rotation_matrix", _matrix))
+    if float(np.abs(matrix - rotation).max()) < ROUNDING:
+        # The same rotation: the matrix keeps the last digits that the angles lose, so what we
+        # wrote comes back exactly.
+        return matrix
+    # The chord |A - B| of two rotations by an angle apart is 2 sqrt(2) sin(angle / 2).
+    chord = float(np.linalg.norm(matrix - rotation))
+    apart = float(np.degrees(2 * np.arcsin(min(chord / np.sqrt(8.0), 1.0))))
+    if apart > MAX_DISAGREEMENT_DEGREES:
+        problem = f"disagrees with pan, tilt and roll by {apart:.2g} degrees"
+        raise reader.error("rotation_matrix", problem)
+    return rotation
+
+
+def _within_reason(value: T) -> T:
+    if np.abs(np.asarray(value)).max() > MAX_NUMBER:
+        raise ValueError("is beyond any camera")
+    return value
+
+
+def _positive(value: Any) -> float:
+    result = fields.number(value)
+    if result <= 0:
+        raise ValueError(f"is {result:g}; a focal length is positive")
+    return result
+
+
+def _two(value: Any) -> tuple[float, float]:
+    x, y = fields.numbers(value, 2)
+    return x, y
+
+
+def _three(value: Any) -> tuple[float, ...]:
+    return fields.numbers(value, 3)
+
+
+def _matrix(value: Any) -> list[tuple[float, ...]]:
+    rows = fields.sequence(value)
+    if len(rows) != 3:
+        raise ValueError(f"has {len(rows)} rows, not 3")
+    return [fields.numbers(row, 3) for row in rows]
+
+
+def read_cameras(path: Path, report: Report, limits: Limits = DEFAULT_LIMITS) -> dict[str, Camera]:
+    """Every camera below ``path``, by key.
+
+    ``path`` is a folder or zip of ``camera_<stem>.json``, one such file, or a file with ISSIA's
+    ``{"cam1": {...}, ...}`` (also inside ``{"cameras": {...}}``, also double-encoded). The key
+    is the stem, with ``<league>/<season>/<match>/`` before it where the file lies that deep.
+    """
+    tree = open_tree(path, report, limits)
+    if tree is None:
+        return {}
+    with closing(tree):
+        cameras = cameras_of(tree, _camera_files(tree), report)
+    report.imported += len(cameras)
+    return cameras
+
+
+def cameras_of(tree: FileTree, names: Sequence[str], report: Report) -> dict[str, Camera]:
+    """The cameras of some files of a tree, by key."""
+    cameras: dict[str, Camera] = {}
+    stems = Counter(_key(name, deep=False) for name in names)
+    for name in names:
+        deep = stems[_key(name, deep=False)] > 1
+        _read_file(tree, name, _key(name, deep), cameras, report)
+    return cameras
+
+
+def _camera_files(tree: FileTree) -> list[str]:
+    """Camera files; where none is called ``camera_...``, every JSON file may be one."""
+    names = [name for name in tree.names() if name.lower().endswith(".json")]
+    named = [name for name in names if PurePosixPath(name).name.startswith("camera_")]
+    return named or [name for name in names if PurePosixPath(name).name not in _NO_CAMERAS]
+
+
+_NO_CAMERAS = ("manifest.json", "match_info.json", "findings.json", "calibrate.json")
+
+
+def _key(name: str, deep: bool) -> str:
+    place = PurePosixPath(name)
+    found = _FILE.fullmatch(place.name)
+    stem = found.group(1) if found else place.stem
+    folders = place.parts[:-1]
+    keep = folders if deep else folders[-3:] if len(folders) >= 3 else ()
+    return "/".join((*keep, stem))
+
+
+def _read_file(
+    tree: FileTree, name: str, key: str, cameras: dict[str, Camera], report: Report
+) -> None:
+    shown = tree.shown(name)
+    try:
+        value = read_json(tree.read_bytes(name), shown, double_encoded=True)
+    except DatasetFormatError as error:
+        report.read += 1
+        report.skip(error)
+        return
+    several = _several(value)
+    for record, item in several.items() if several is not None else ((None, value),):
+        report.read += 1
+        try:
+            cameras[record or key] = camera_from_json(item, shown, record)
+        except DatasetFormatError as error:
+            report.skip(error)
+
+
+def _several(value: Any) -> dict[str, Any] | None:
+    """The cameras by name when the file holds several, else None."""
+    if not isinstance(value, dict) or "pan_degrees" in value:
+        return None
+    if isinstance(value.get("cameras"), dict):
+        return dict(value["cameras"])
+    if not any(isinstance(item, dict) for item in value.values()):
+        return None
+    return {name: item for name, item in value.items() if not name.startswith("_")}
+
+
+def camera_text(camera: Camera) -> str:
+    """The text of one camera file."""
+    return json.dumps(camera_to_json(camera), indent=1, allow_nan=False) + "\n"
+
+
+def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:
+    """Write ``camera_<stem>.json`` per camera below an existing folder; the paths written.
+
+    A key with folders (``<league>/<season>/<match>/7_1``) becomes a file in those folders.
+
+    Raises:
+        UnsafePathError: A key that would leave the folder.
+    """
+    written = []
+    for key, camera in cameras.items():
+        place = PurePosixPath(key)
+        path = resolve_inside(root, str(place.with_name(f"camera_{place.name}.json")))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(camera_text(camera), encoding="utf-8")
+        written.append(path)
+    return written

@@ -1,0 +1,74 @@
+"""What a writer gets per group: the group, its solution and what people decided."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.geometry.camera import Camera
+from app.soccer.frames import Box
+from app.soccer.group import Group, View
+from app.soccer.solution import BallFit, Solution, ViewSolution
+
+BOX_KINDS = ("optimized", "annotated", "exact")
+_NOT_CALIBRATED = ("calibratable", "jac")
+
+
+@dataclass(frozen=True)
+class ExportRecord:
+    """One group on its way out.
+
+    Attributes:
+        solution: None for a group that was never solved (only in an export of everything).
+        verdict: ``accepted``, ``rejected``, ``deferred`` or ``unreviewed``.
+        reason: Why it was rejected, or why it was accepted against a gate.
+    """
+
+    group: Group
+    solution: Solution | None
+    verdict: str
+    reason: str | None = None
+
+    def view_solution(self, view: View) -> ViewSolution | None:
+        """What was computed for one view."""
+        return self.solution.view(view.key) if self.solution else None
+
+    def camera(self, view: View) -> Camera | None:
+        """Camera of one view, whatever the gates say."""
+        solved = self.view_solution(view)
+        return solved.calibration.camera if solved else None
+
+    def is_calibrated(self, view: View) -> bool:
+        """Whether the view has a camera that passed the gates on cameras."""
+        solved = self.view_solution(view)
+        return (
+            solved is not None
+            and solved.calibration.camera is not None
+            and solved.failed not in _NOT_CALIBRATED
+        )
+
+    def ball_fit(self, view: View, everything: bool) -> BallFit | None:
+        """The 3D ball in one view; in views of no valid pair only when everything is asked."""
+        solved = self.view_solution(view)
+        if solved is None or self.solution is None or self.solution.ball is None:
+            return None
+        return solved.ball if solved.included or everything else None
+
+    @property
+    def point(self) -> tuple[float, float, float] | None:
+        """The 3D ball, pitch frame, metres, z down."""
+        return self.solution.ball.point if self.solution and self.solution.ball else None
+
+    @property
+    def verdict_text(self) -> str:
+        """Verdict and reason in one cell."""
+        return f"{self.verdict}: {self.reason}" if self.reason else self.verdict
+
+
+def chosen_box(record: ExportRecord, view: View, kind: str) -> Box | None:
+    """The ball's box of one of ``BOX_KINDS``; the annotated one where that does not exist."""
+    annotated = view.ball.box if view.ball else None
+    fit = record.ball_fit(view, everything=True)
+    if fit is None or kind == "annotated":
+        return annotated
+    box = fit.exact_box if kind == "exact" else fit.optimized_box
+    return box if box is not None else annotated

@@ -1,0 +1,127 @@
+"""ISSIA-3D as released: ISSIA-3D.csv and issia_calibration.json."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from app.datasets.camera_json import camera_to_json
+from app.datasets.csv_text import Table, Value, plain_list
+from app.datasets.export_record import ExportRecord
+from app.datasets.issia import CALIBRATION
+from app.errors import InputError
+from app.geometry.camera import Camera
+from app.soccer.group import View
+from app.soccer.solution import BallFit
+
+TABLE = "ISSIA-3D.csv"
+CAMERAS = (1, 2, 3, 4, 5, 6)
+COLUMNS = (
+    "frame",
+    *(f"{axis}_cam{camera}" for camera in CAMERAS for axis in "xy"),
+    "num_cameras",
+    "ball_3D",
+    *(f"err_cam{camera}" for camera in CAMERAS),
+    "cam_list",
+    *(f"opt_d_cam{camera}" for camera in CAMERAS),
+    *(f"opt_e_cam{camera}" for camera in CAMERAS),
+)
+
+_VIEW = re.compile(r"cam([1-6])", re.ASCII)
+_FRAME = re.compile(r"-?\d{1,9}", re.ASCII)
+
+
+def write_issia_3d(
+    root: Path, records: Iterable[ExportRecord], *, everything: bool = False
+) -> dict[str, int]:
+    """Write both files below an existing folder.
+
+    One row per frame in which a camera annotates the ball, by frame number. ``num_cameras`` and
+    ``cam_list`` are the cameras that annotate it; ``err_*`` and ``opt_*`` stand for each of them
+    once there is a 3D point. ``everything`` adds the column ``verdict``.
+
+    Returns:
+        Counts: ``groups`` (rows) and ``balls`` (rows with a 3D ball).
+
+    Raises:
+        InputError: A group is not from ISSIA.
+    """
+    rows: list[tuple[int, tuple[Value, ...]]] = []
+    cameras: dict[int, Camera] = {}
+    for record in records:
+        annotating = _annotating(record)
+        _collect_cameras(record, cameras)
+        if annotating:
+            verdict = (record.verdict_text,) if everything else ()
+            rows.append((_frame(record), (*_row(record, annotating), *verdict)))
+    rows.sort(key=lambda row: row[0])
+    with (root / TABLE).open("w", encoding="utf-8", newline="") as file:
+        table = Table(file, (*COLUMNS, *(("verdict",) if everything else ())))
+        for _, values in rows:
+            table.add(values)
+    _write_calibration(root, cameras)
+    balls = sum(values[COLUMNS.index("ball_3D")] is not None for _, values in rows)
+    return {"groups": len(rows), "balls": balls}
+
+
+def _annotating(record: ExportRecord) -> dict[int, View]:
+    """Views that annotate the ball, by camera number."""
+    numbered = {_camera(record, view): view for view in record.group.views}
+    return {
+        camera: view
+        for camera, view in sorted(numbered.items())
+        if view.ball is not None and view.ball.center is not None
+    }
+
+
+def _camera(record: ExportRecord, view: View) -> int:
+    found = _VIEW.fullmatch(view.key)
+    if found is None or not _FRAME.fullmatch(record.group.key):
+        raise InputError(
+            f"group {record.group.key}, view {view.key} is not from ISSIA (frame, cam1 to cam6)",
+            hint="Export it as soccernet-v3d or cameras instead.",
+        )
+    return int(found[1])
+
+
+def _frame(record: ExportRecord) -> int:
+    return int(record.group.key)
+
+
+def _collect_cameras(record: ExportRecord, cameras: dict[int, Camera]) -> None:
+    for view in record.group.views:
+        camera = record.camera(view)
+        if camera is not None:
+            cameras.setdefault(_camera(record, view), camera)
+
+
+def _row(record: ExportRecord, annotating: dict[int, View]) -> Iterator[Value]:
+    fits = {camera: record.ball_fit(view, True) for camera, view in annotating.items()}
+    yield _frame(record)
+    for camera in CAMERAS:
+        yield from _center(annotating.get(camera))
+    yield len(annotating)
+    yield plain_list(record.point) if record.point else None
+    yield from (_of(fits.get(camera), "error_px") for camera in CAMERAS)
+    yield plain_list(list(annotating))
+    yield from (_of(fits.get(camera), "optimized_diameter_px") for camera in CAMERAS)
+    yield from (_of(fits.get(camera), "optimized_error_m") for camera in CAMERAS)
+
+
+def _center(view: View | None) -> tuple[float | None, float | None]:
+    if view is None or view.ball is None or view.ball.center is None:
+        return None, None
+    return view.ball.center.x, view.ball.center.y
+
+
+def _of(fit: BallFit | None, name: str) -> float | None:
+    value: float | None = getattr(fit, name) if fit is not None else None
+    return value
+
+
+def _write_calibration(root: Path, cameras: dict[int, Camera]) -> None:
+    value = {f"cam{number}": camera_to_json(cameras[number]) for number in sorted(cameras)}
+    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
+    (root / CALIBRATION).write_text(text, encoding="utf-8")

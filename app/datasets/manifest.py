@@ -1,0 +1,102 @@
+"""manifest.json: what an export holds, from what, under which settings."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+MANIFEST = "manifest.json"
+SOFTWARE = "touchline"
+LICENCES: Mapping[str, str] = {
+    "soccernet": (
+        "SoccerNet annotations and frames are for research; the terms at www.soccer-net.org apply "
+        "to everything derived from them."
+    ),
+    "issia": (
+        "ISSIA-Soccer was published by CNR-ISSIA for research; ask its authors before you pass "
+        "it on, or anything derived from it."
+    ),
+    "sample": "Synthetic scenes made by Touchline itself; no rights are reserved.",
+}
+UNKNOWN_LICENCE = "The terms of the source were not recorded; ask whoever supplied the data."
+
+_CHUNK = 1024 * 1024
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """Everything that the manifest says besides the files themselves.
+
+    Attributes:
+        dataset: Name of the dataset.
+        version: Name of the frozen version, or None for a live export.
+        date: ISO 8601: freeze time of the version, or time of the newest revision.
+        format: ``soccernet-v3d``, ``issia-3d`` ...
+        counts: What the writer counted.
+        settings: Policy and options of the export, plain JSON values.
+        licence: Licence text of the source, one of ``LICENCES``.
+        media: Per frame that the dataset refers to: path, bytes and checksum.
+    """
+
+    dataset: str
+    format: str
+    date: str
+    counts: Mapping[str, int]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    licence: str = UNKNOWN_LICENCE
+    version: str | None = None
+    media: tuple[Mapping[str, Any], ...] = ()
+
+
+def software_version() -> str:
+    """Version of the installed package."""
+    try:
+        return version(SOFTWARE)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def write_manifest(root: Path, manifest: Manifest) -> Path:
+    """Write ``manifest.json`` with size and sha256 of every other file below ``root``."""
+    value = {
+        "dataset": manifest.dataset,
+        "version": manifest.version,
+        "date": manifest.date,
+        "format": manifest.format,
+        "counts": dict(manifest.counts),
+        "settings": dict(manifest.settings),
+        "software": {"name": SOFTWARE, "version": software_version()},
+        "licence": manifest.licence,
+        "files": list(_files(root)),
+        "media": [dict(item) for item in manifest.media],
+    }
+    path = root / MANIFEST
+    path.write_text(
+        json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
+    )
+    return path
+
+
+def _files(root: Path) -> Iterator[dict[str, Any]]:
+    names = {path.relative_to(root).as_posix(): path for path in root.rglob("*") if path.is_file()}
+    for name in sorted(names):
+        if name != MANIFEST:
+            yield {
+                "path": name,
+                "bytes": names[name].stat().st_size,
+                "sha256": sha256_of(names[name]),
+            }
+
+
+def sha256_of(path: Path) -> str:
+    """Digest of a file's content, hexadecimal."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while chunk := file.read(_CHUNK):
+            digest.update(chunk)
+    return digest.hexdigest()

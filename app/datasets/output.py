@@ -1,0 +1,130 @@
+"""Output that appears whole or not at all: a folder, or a zip by its ending."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from app.datasets.manifest import MANIFEST, SOFTWARE
+from app.errors import InputError, StorageError
+
+_DATE = (1980, 1, 1, 0, 0, 0)
+"""Of every zip entry, so that the same content makes the same file."""
+
+
+@contextmanager
+def output_tree(out: Path) -> Iterator[Path]:
+    """A folder to write into, which becomes ``out`` when the block ends without an error.
+
+    The files are written beside ``out`` under a temporary name, synced and renamed. An error
+    inside the block leaves nothing behind and an earlier ``out`` as it was.
+
+    Args:
+        out: Folder, or file that ends in ``.zip``. An earlier export there is replaced.
+
+    Raises:
+        InputError: Something else than an earlier export is there.
+        StorageError: The disk refuses.
+    """
+    out = Path.cwd() / out
+    _check_free(out)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        staging = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent))
+    except OSError as error:
+        raise StorageError(f"{out.parent} cannot be written ({error.strerror})") from error
+    try:
+        yield staging
+        if out.suffix.lower() == ".zip":
+            _publish_zip(staging, out)
+        else:
+            _publish_folder(staging, out)
+    except OSError as error:
+        raise StorageError(f"{out} cannot be written ({error.strerror or error})") from error
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def _check_free(out: Path) -> None:
+    if out.suffix.lower() == ".zip":
+        if out.is_dir():
+            raise InputError(f"{out} is a folder, not a zip file")
+        return
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out} is a file; name a folder or a file that ends in .zip")
+    if out.is_dir() and any(out.iterdir()) and not _is_earlier_export(out):
+        raise InputError(
+            f"{out} holds other files and is no earlier export",
+            hint="Name a new folder; an earlier export would be replaced.",
+        )
+
+
+def _is_earlier_export(out: Path) -> bool:
+    """Whether the folder holds what its manifest lists and nothing else."""
+    try:
+        manifest = json.loads((out / MANIFEST).read_bytes())
+        ours = manifest["software"]["name"] == SOFTWARE
+        listed = {MANIFEST, *(item["path"] for item in manifest["files"])}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return False
+    present = {path.relative_to(out).as_posix() for path in out.rglob("*") if not path.is_dir()}
+    return ours and present <= listed
+
+
+def _publish_zip(staging: Path, out: Path) -> None:
+    handle, name = tempfile.mkstemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent)
+    partial = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            write_zip(staging, file)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.chmod(0o644)
+        partial.replace(out)
+    finally:
+        partial.unlink(missing_ok=True)
+    _sync(out.parent)
+
+
+def write_zip(root: Path, file: object) -> None:
+    """All files below ``root`` into a zip: sorted names, dated 1980-01-01."""
+    names = {path.relative_to(root).as_posix(): path for path in root.rglob("*") if path.is_file()}
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:  # type: ignore[call-overload]
+        for name in sorted(names):
+            entry = zipfile.ZipInfo(name, _DATE)
+            entry.external_attr = 0o644 << 16
+            entry.create_system = 3
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            with names[name].open("rb") as source, archive.open(entry, "w") as target:
+                shutil.copyfileobj(source, target, 1024 * 1024)
+
+
+def _publish_folder(staging: Path, out: Path) -> None:
+    for folder, _, files in os.walk(staging, topdown=False):
+        for name in files:
+            _sync(Path(folder) / name)
+        _sync(Path(folder))
+    staging.chmod(0o755)
+    if not out.exists():
+        staging.rename(out)
+    else:
+        # A folder cannot be renamed onto one that holds files: the old one steps aside.
+        aside = staging.with_suffix(".replaced")
+        out.rename(aside)
+        staging.rename(out)
+        shutil.rmtree(aside, ignore_errors=True)
+    _sync(out.parent)
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

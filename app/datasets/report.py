@@ -1,0 +1,41 @@
+"""What an importer read, what it imported, and what it had to leave out and why."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from app.errors import DatasetFormatError
+
+MAX_PROBLEMS = 10_000
+"""Problems kept with their sentence; beyond, they are only counted."""
+
+
+@dataclass
+class Report:
+    """Filled by a reader while it runs.
+
+    Attributes:
+        read: Records (groups, frames, cameras) that the files hold.
+        imported: Records that were handed on.
+        problems: One error per thing that was left out, each with file, record and field.
+        counts: What else there was, by name: ``persons``, ``views without frame``.
+        dropped: Problems beyond ``MAX_PROBLEMS``.
+    """
+
+    read: int = 0
+    imported: int = 0
+    problems: list[DatasetFormatError] = field(default_factory=list)
+    counts: Counter[str] = field(default_factory=Counter)
+    dropped: int = 0
+
+    def skip(self, error: DatasetFormatError) -> None:
+        """Note that something was left out; the reader goes on."""
+        if len(self.problems) < MAX_PROBLEMS:
+            self.problems.append(error)
+        else:
+            self.dropped += 1
+
+    def note(self, path: str, record: str | None, where: str | None, problem: str) -> None:
+        """The same from its parts."""
+        self.skip(DatasetFormatError(path, record, where, problem))

@@ -1,0 +1,167 @@
+"""SoccerNet-v3D as released: SNv3D.csv, the split lists and Labels-v3D.json per match."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
+from itertools import groupby
+from pathlib import Path
+from typing import Any, TextIO
+
+from app.datasets.camera_json import camera_to_json
+from app.datasets.csv_text import Table, Value, plain_list
+from app.datasets.export_record import ExportRecord
+from app.datasets.soccernet_record import GAME, IMAGE
+from app.datasets.soccernet_v3 import (
+    LabelsWriter,
+    image_numbers,
+    labels_to_json,
+    split_key,
+)
+from app.soccer.frames import Box
+from app.soccer.group import View
+from app.soccer.solution import GAMMAS_PERCENT, BallFit
+
+LABELS = "Labels-v3D.json"
+TABLE = "SNv3D.csv"
+SPLIT_FILES = {"train": "SNv3D-train.txt", "test": "SNv3D-test.txt"}
+JAC_NAMES = tuple(f"JaC@{gamma / 100:g}" for gamma in GAMMAS_PERCENT)
+COLUMNS = (
+    "league",
+    "season",
+    "match",
+    "main_action",
+    "action",
+    "replay",
+    "img_w",
+    "img_h",
+    "is_ball",
+    "ball_bbox",
+    "calibration",
+    *JAC_NAMES,
+    "ball_3D",
+    "rep_error",
+    "optimized_error",
+    "optimized_d",
+    "set",
+)
+
+
+def write_soccernet_v3d(
+    root: Path, records: Iterable[ExportRecord], *, everything: bool = False
+) -> dict[str, int]:
+    """Write the dataset's files below an existing folder.
+
+    ``ball_bbox`` is the annotated box; the optimised one is the square of side ``optimized_d``
+    around its centre. Ball values stand in the rows of views in a valid pair, or in all rows
+    with ``everything``, which also adds the column ``verdict``.
+
+    Args:
+        root: Existing folder.
+        records: Groups of SoccerNet; one run of a match is in memory at a time.
+        everything: Whether groups and views that failed a gate take part.
+
+    Returns:
+        Counts: ``groups``, ``views``, ``balls`` (rows with a 3D ball).
+
+    Raises:
+        InputError: A group is not from SoccerNet.
+        UnsafePathError: A key would leave ``root``.
+    """
+    counts = {"groups": 0, "views": 0, "balls": 0}
+    labels = LabelsWriter(root, LABELS)
+    with ExitStack() as stack:
+        lists = {
+            split: stack.enter_context((root / name).open("w", encoding="utf-8", newline="\n"))
+            for split, name in SPLIT_FILES.items()
+        }
+        file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
+        table = Table(file, (*COLUMNS, *(("verdict",) if everything else ())))
+        for match, run in groupby(records, key=lambda record: split_key(record.group)):
+            members = list(run)
+            for record in members:
+                _add_rows(table, lists, record, everything, counts)
+            labels.write("/".join(match), _labels("/".join(match), members, everything))
+    return counts
+
+
+def _add_rows(
+    table: Table,
+    lists: Mapping[str, TextIO],
+    record: ExportRecord,
+    everything: bool,
+    counts: dict[str, int],
+) -> None:
+    counts["groups"] += 1
+    match = split_key(record.group)[2]
+    for view in record.group.views:
+        fit = record.ball_fit(view, everything)
+        verdict = (record.verdict_text,) if everything else ()
+        table.add((*_row(record, view, fit), *verdict))
+        counts["views"] += 1
+        counts["balls"] += fit is not None
+        if record.group.split in lists:
+            lists[record.group.split].write(f"{match}/{Path(view.key).stem}\n")
+
+
+def _row(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Value]:
+    numbers = image_numbers(view.key)
+    assert numbers is not None, "split_key has checked it"
+    action, replay = numbers
+    camera = record.camera(view)
+    box = view.ball.box if view.ball else None
+    yield from split_key(record.group)
+    yield from (action, replay is None, None if replay is None else float(replay))
+    yield from (view.size.width, view.size.height, view.ball is not None)
+    yield box_text(box) if box else None
+    yield repr(camera_to_json(camera)) if camera else None
+    yield from _jac(record, view) or (None,) * len(JAC_NAMES)
+    yield f"[array({plain_list(record.point)})]" if fit and record.point else None
+    yield from (fit.error_px, fit.optimized_error_m) if fit else (None, None)
+    yield fit.optimized_diameter_px if fit else None
+    yield record.group.split or None
+
+
+def box_text(box: Box) -> str:
+    """``[x, y, w, h]`` with every digit."""
+    return plain_list((box.x, box.y, box.width, box.height))
+
+
+def _jac(record: ExportRecord, view: View) -> tuple[float, ...] | None:
+    solved = record.view_solution(view)
+    return solved.calibration.jac if solved else None
+
+
+def _labels(match: str, records: list[ExportRecord], everything: bool) -> dict[str, Any]:
+    labels = labels_to_json(match, [record.group for record in records])
+    for record in records:
+        main, *replays = record.group.views
+        for view in record.group.views:
+            images = labels["actions"] if view is main else labels["replays"]
+            images[view.key][IMAGE] |= _computed(record, view, everything)
+        calibrated = [view.key for view in replays if record.is_calibrated(view)]
+        labels["actions"][main.key][IMAGE]["calibrated_replays"] = calibrated
+    labels[GAME]["reconstructions"] = [
+        record.group.views[0].key
+        for record in records
+        if sum(map(record.is_calibrated, record.group.views)) > 1
+    ]
+    return labels
+
+
+def _computed(record: ExportRecord, view: View, everything: bool) -> dict[str, Any]:
+    """What stands beside the source's own metadata of an image."""
+    values: dict[str, Any] = {}
+    camera, jac, fit = record.camera(view), _jac(record, view), record.ball_fit(view, everything)
+    if camera is not None:
+        values["calibration"] = camera_to_json(camera)
+    if jac is not None:
+        values["JaC"] = {name: float(value) for name, value in zip(JAC_NAMES, jac, strict=True)}
+    if fit is not None and record.point is not None:
+        values["ball_3D"] = [float(value) for value in record.point]
+        values["rep_error"] = fit.error_px
+        values["optimized_error"] = fit.optimized_error_m
+        values["optimized_d"] = fit.optimized_diameter_px
+    if everything:
+        values["verdict"] = record.verdict_text
+    return values

@@ -1,0 +1,248 @@
+from __future__ import annotations
+
+import os
+import stat
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.config import Settings
+from app.datasets.archive import Limits, ZipTree, check_name, open_tree, resolve_inside
+from app.datasets.report import Report
+from app.errors import DatasetFormatError, UnsafePathError
+
+MakeZip = Callable[..., Path]
+
+HOSTILE = [
+    "", "..", "../a", "a/../../b", "a/..", "/etc/passwd", "//host/share", "C:/a", "c:a",
+    "a\\b", "..\\a", "a\x00b", "a\nb", "a\x7f", "%2e%2e/a", "%2e%2e%2fa", "%252e%252e%252fa",
+    "..%2fa", "%2fetc/passwd", "..%5ca", "a%00b", "\uff0e\uff0e/a", "\u2025/a", "a/\ud800",
+]  # fmt: skip
+
+
+class TestCheckName:
+    @pytest.mark.parametrize("name", HOSTILE)
+    def test_a_hostile_path_is_refused(self, name: str) -> None:
+        with pytest.raises(UnsafePathError):
+            check_name(name)
+
+    @pytest.mark.parametrize(
+        "name",
+        ["7.png", "a/b/c", "spain_laliga/2014-2015/2015-02-14 - 20-00 Málaga 1 - 0 Elche/x.json",
+         "100% FC 2 - 1 A.C. Ö/..7.png", "a..b", "...", ".hidden"],
+    )  # fmt: skip
+    def test_the_names_of_matches_are_fine(self, name: str) -> None:
+        assert check_name(name) == name
+
+
+class TestResolveInside:
+    @pytest.mark.parametrize("name", HOSTILE)
+    def test_a_hostile_path_is_refused(self, tmp_path: Path, name: str) -> None:
+        with pytest.raises(UnsafePathError):
+            resolve_inside(tmp_path, name)
+
+    def test_a_file_that_is_still_to_be_made_is_fine(self, tmp_path: Path) -> None:
+        assert resolve_inside(tmp_path, "a/b.json") == tmp_path.resolve() / "a/b.json"
+
+    def test_a_link_that_leads_out_is_refused(self, tmp_path: Path) -> None:
+        root = tmp_path / "root"
+        root.mkdir()
+        (tmp_path / "secret").write_text("x")
+        (root / "file").symlink_to(tmp_path / "secret")
+        (root / "folder").symlink_to(tmp_path)
+        for name in ("file", "folder/secret", "folder/new"):
+            with pytest.raises(UnsafePathError, match="leads out"):
+                resolve_inside(root, name)
+
+    def test_a_link_that_stays_inside_is_followed(self, tmp_path: Path) -> None:
+        (tmp_path / "a").write_text("x")
+        (tmp_path / "b").symlink_to(tmp_path / "a")
+        assert resolve_inside(tmp_path, "b") == (tmp_path / "a").resolve()
+
+    def test_the_root_may_be_a_link_itself(self, tmp_path: Path) -> None:
+        (tmp_path / "real").mkdir()
+        (tmp_path / "root").symlink_to(tmp_path / "real")
+        assert resolve_inside(tmp_path / "root", "a") == (tmp_path / "real").resolve() / "a"
+
+    @given(st.text(max_size=30))
+    def test_whatever_is_accepted_lies_inside(self, name: str) -> None:
+        root = Path("/srv/data")
+        try:
+            real = resolve_inside(root, name)
+        except (UnsafePathError, OSError):
+            return
+        assert real == root or root in real.parents
+
+
+class TestLimits:
+    def test_they_come_from_the_settings(self) -> None:
+        limits = Limits.of(Settings(max_members=3, max_file_bytes=5))
+        assert (limits.members, limits.file_bytes) == (3, 5)
+
+
+class TestOpenTree:
+    def test_a_missing_path_is_one_problem(self, tmp_path: Path, report: Report) -> None:
+        assert open_tree(tmp_path / "none", report) is None
+        assert [problem.problem for problem in report.problems] == ["does not exist"]
+
+    def test_one_file_is_a_tree_of_one(self, tmp_path: Path, report: Report) -> None:
+        (tmp_path / "a.json").write_text("{}")
+        (tmp_path / "b.json").write_text("{}")
+        tree = open_tree(tmp_path / "a.json", report)
+        assert tree is not None
+        assert tree.names() == ["a.json"]
+        assert tree.read_bytes("a.json") == b"{}"
+
+    def test_a_zip_is_known_by_its_content_too(self, make_zip: MakeZip, report: Report) -> None:
+        path = make_zip({"a": "1"})
+        tree = open_tree(path.rename(path.with_suffix(".data")), report)
+        assert tree is not None
+        assert tree.read_bytes("a") == b"1"
+
+    def test_a_truncated_zip_is_one_clear_problem(self, make_zip: MakeZip, report: Report) -> None:
+        path = make_zip({f"{index}.json": os.urandom(500) for index in range(20)})
+        path.write_bytes(path.read_bytes()[:4000])
+        assert open_tree(path, report) is None
+        assert len(report.problems) == 1
+        assert "not a complete zip file" in str(report.problems[0])
+
+
+class TestFolderTree:
+    def test_hidden_files_are_left_out(self, tmp_path: Path, report: Report) -> None:
+        for name in ("b/1.json", "a.json", ".git/x", "b/.DS_Store", "__MACOSX/a.json"):
+            path = tmp_path / name
+            path.parent.mkdir(exist_ok=True)
+            path.write_text("{}")
+        tree = open_tree(tmp_path, report)
+        assert tree is not None
+        assert tree.names() == ["a.json", "b/1.json"]
+
+    def test_a_file_behind_a_link_out_of_the_folder_is_refused(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        (tmp_path / "root").mkdir()
+        (tmp_path / "secret").write_text("x")
+        (tmp_path / "root" / "a").symlink_to(tmp_path / "secret")
+        (tmp_path / "root" / "b").symlink_to(tmp_path)
+        (tmp_path / "root" / "c").write_text("x")
+        (tmp_path / "root" / "d").symlink_to(tmp_path / "root" / "c")
+        tree = open_tree(tmp_path / "root", report)
+        assert tree is not None
+        assert tree.names() == ["c", "d"]
+        assert len(report.problems) == 2
+        with pytest.raises(DatasetFormatError, match="leads out"):
+            tree.read_bytes("a")
+
+    def test_a_pipe_is_refused_without_waiting(self, tmp_path: Path, report: Report) -> None:
+        os.mkfifo(tmp_path / "a")
+        tree = open_tree(tmp_path, report)
+        assert tree is not None
+        with pytest.raises(DatasetFormatError, match="not a plain file"):
+            tree.read_bytes("a")
+
+    def test_a_file_beyond_the_limit_is_refused(self, tmp_path: Path, report: Report) -> None:
+        (tmp_path / "a").write_bytes(b"x" * 11)
+        tree = open_tree(tmp_path, report, Limits(file_bytes=10))
+        assert tree is not None
+        with pytest.raises(DatasetFormatError, match="longer than 10 bytes"):
+            tree.read_bytes("a")
+
+
+class TestZipTree:
+    def test_members_are_read_in_place(self, make_zip: MakeZip, report: Report) -> None:
+        tree = ZipTree(make_zip({"b/2": "two", "a": "one", "b/": ""}), report, Limits())
+        assert tree.names() == ["a", "b/2"]
+        assert tree.read_bytes("b/2") == b"two"
+        assert report.problems == []
+
+    @pytest.mark.parametrize("name", ["../a", "/a", "a/../../b", "c:/a", "%2e%2e/a", "a\\..\\b"])
+    def test_an_unsafe_member_is_left_out_and_the_rest_is_read(
+        self, make_zip: MakeZip, report: Report, name: str
+    ) -> None:
+        tree = ZipTree(make_zip({name: "evil", "good": "1"}), report, Limits())
+        assert tree.names() == ["good"]
+        assert len(report.problems) == 1
+
+    def test_a_name_with_nul_is_left_out(self, make_zip: MakeZip, report: Report) -> None:
+        path = make_zip({"aXb.json": "evil", "good": "1"})
+        path.write_bytes(path.read_bytes().replace(b"aXb.json", b"a\x00b.json"))
+        assert ZipTree(path, report, Limits()).names() == ["good"]
+
+    def test_a_link_is_left_out(self, tmp_path: Path, report: Report) -> None:
+        path = tmp_path / "a.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            entry = zipfile.ZipInfo("link")
+            entry.external_attr = (stat.S_IFLNK | 0o777) << 16
+            archive.writestr(entry, "/etc/passwd")
+        assert ZipTree(path, report, Limits()).names() == []
+        assert "link or device" in str(report.problems[0])
+
+    @pytest.mark.filterwarnings("ignore:Duplicate name")
+    def test_names_that_collide_are_all_left_out(self, tmp_path: Path, report: Report) -> None:
+        path = tmp_path / "a.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            for name in ("a.json", "a.json", "B.json", "b.json", "c.json"):
+                archive.writestr(name, name)
+        assert ZipTree(path, report, Limits()).names() == ["c.json"]
+        assert len(report.problems) == 4
+
+    def test_too_many_members_are_refused(self, make_zip: MakeZip, report: Report) -> None:
+        with pytest.raises(DatasetFormatError, match="has 3 members"):
+            ZipTree(make_zip({"a": "", "b": "", "c": ""}), report, Limits(members=2))
+
+    def test_too_large_a_total_is_refused(self, make_zip: MakeZip, report: Report) -> None:
+        with pytest.raises(DatasetFormatError, match="unpacks to 12 bytes"):
+            ZipTree(make_zip({"a": "123456", "b": "123456"}), report, Limits(total_bytes=11))
+
+    def test_a_bomb_is_left_out(self, make_zip: MakeZip, report: Report) -> None:
+        path = make_zip({"bomb": b"0" * 8_000_000, "good": "1"})
+        assert ZipTree(path, report, Limits()).names() == ["good"]
+        assert "grows more than 200 times" in str(report.problems[0])
+
+    def test_a_member_beyond_the_limit_is_refused(self, make_zip: MakeZip, report: Report) -> None:
+        tree = ZipTree(make_zip({"a": os.urandom(100)}), report, Limits(file_bytes=99))
+        with pytest.raises(DatasetFormatError, match="longer than 99 bytes"):
+            tree.read_bytes("a")
+
+    def test_a_damaged_member_says_so(self, make_zip: MakeZip, report: Report) -> None:
+        path = make_zip({"a": os.urandom(1000)})
+        content = bytearray(path.read_bytes())
+        content[200:210] = bytes(10)
+        path.write_bytes(content)
+        with pytest.raises(DatasetFormatError, match=r"archive.zip/a: is damaged"):
+            ZipTree(path, report, Limits()).read_bytes("a")
+
+    def test_a_member_that_lies_about_its_size_is_refused(
+        self, make_zip: MakeZip, report: Report
+    ) -> None:
+        path = make_zip({"a": b"0" * 100_000})
+        size = (100_000).to_bytes(4, "little")
+        path.write_bytes(path.read_bytes().replace(size, (10).to_bytes(4, "little")))
+        with pytest.raises(DatasetFormatError, match="damaged"):
+            ZipTree(path, report, Limits()).read_bytes("a")
+
+    @given(data=st.data())
+    def test_any_damage_is_a_clear_error(
+        self, data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
+    ) -> None:
+        path = tmp_path_factory.mktemp("zip") / "a.zip"
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("a.json", '{"a": 1}' * 20)
+            archive.writestr("b/c.json", "[]")
+        content = bytearray(path.read_bytes())
+        for _ in range(data.draw(st.integers(1, 4))):
+            content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+        path.write_bytes(content[: data.draw(st.integers(1, len(content)))])
+        report = Report()
+        tree = open_tree(path, report)
+        for name in tree.names() if tree else ():
+            try:
+                tree.read_bytes(name)
+            except DatasetFormatError as error:
+                report.skip(error)
+        if tree:
+            tree.close()

@@ -1,0 +1,216 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.datasets.camera_json import (
+    camera_from_json,
+    camera_text,
+    camera_to_json,
+    read_cameras,
+    write_cameras,
+)
+from app.datasets.report import Report
+from app.errors import DatasetFormatError, UnsafePathError
+from app.geometry.camera import Camera
+from app.geometry.rotation import rotation_from_pan_tilt_roll
+
+FINITE = st.floats(-1e6, 1e6)
+ANGLE = st.floats(-180, 180)
+FIELDS = (
+    "pan_degrees", "x_focal_length", "principal_point", "position_meters", "rotation_matrix",
+    "radial_distortion", "tangential_distortion", "thin_prism_distortion", "skew",
+)  # fmt: skip
+NUMBERS = st.floats() | st.integers() | st.booleans() | st.none() | st.text(max_size=5)
+JUNK = st.recursive(NUMBERS, lambda inner: st.lists(inner, max_size=6), max_leaves=12)
+
+
+@st.composite
+def cameras(draw: st.DrawFn) -> Camera:
+    angles = [draw(ANGLE) for _ in range(3)]
+    return Camera(
+        rotation=rotation_from_pan_tilt_roll(*np.radians(angles)),
+        position=np.array([draw(FINITE) for _ in range(3)]),
+        focal_length=(draw(st.floats(1, 1e5)), draw(st.floats(1, 1e5))),
+        principal_point=(draw(FINITE), draw(FINITE)),
+        skew=draw(st.sampled_from([0.0, 1.25])),
+        distortion=np.array([draw(st.floats(-2, 2)) for _ in range(12)]),
+    )
+
+
+class TestCameraToJson:
+    def test_angles_matrix_and_all_distortion_arrays_are_always_written(
+        self, camera: Camera
+    ) -> None:
+        value = camera_to_json(camera)
+        assert value["pan_degrees"] == pytest.approx(12.3)
+        assert value["tilt_degrees"] == pytest.approx(78.9)
+        assert value["roll_degrees"] == pytest.approx(-0.4)
+        assert np.shape(value["rotation_matrix"]) == (3, 3)
+        assert value["radial_distortion"] == [0.1, -0.02, 0.3, 0.4, 0.5, 0.6]
+        assert value["tangential_distortion"] == [1e-3, 2e-3]
+        assert value["thin_prism_distortion"] == [1e-4, 2e-4, 3e-4, 4e-4]
+        assert "skew" not in value
+
+    def test_every_number_is_a_plain_float(self, camera: Camera) -> None:
+        assert "np." not in repr(camera_to_json(camera))
+
+    @given(cameras())
+    def test_what_is_written_comes_back_exactly(self, camera: Camera) -> None:
+        again = camera_from_json(json.loads(camera_text(camera)), "f")
+        assert again == camera
+
+
+class TestCameraFromJson:
+    def test_the_rotation_is_built_from_the_angles(self, camera_json: dict[str, Any]) -> None:
+        camera = camera_from_json(camera_json, "f")
+        expected = rotation_from_pan_tilt_roll(*np.radians([12.3, 78.9, -0.4]))
+        assert np.array_equal(camera.rotation, expected)
+        assert not camera.distortion.any()
+
+    def test_without_a_matrix_position_and_intrinsics_are_exact(
+        self, camera_json: dict[str, Any]
+    ) -> None:
+        camera = camera_from_json(camera_json, "f")
+        assert camera.position.tolist() == [1.25, 61.5, -18.75]
+        assert camera.focal_length == (2100.5, 2099.25)
+        assert camera.principal_point == (639.5, 359.5)
+
+    def test_a_matrix_that_disagrees_with_the_angles_is_said(
+        self, camera_json: dict[str, Any]
+    ) -> None:
+        other = rotation_from_pan_tilt_roll(*np.radians([12.4, 78.9, -0.4]))
+        with pytest.raises(DatasetFormatError, match=r"rotation_matrix: disagrees .* by 0\.1 deg"):
+            camera_from_json(camera_json | {"rotation_matrix": other.tolist()}, "f")
+
+    def test_a_matrix_that_differs_by_little_yields_to_the_angles(
+        self, camera_json: dict[str, Any]
+    ) -> None:
+        other = rotation_from_pan_tilt_roll(*np.radians([12.305, 78.9, -0.4]))
+        camera = camera_from_json(camera_json | {"rotation_matrix": other.tolist()}, "f")
+        assert camera.pan_tilt_roll_degrees[0] == pytest.approx(12.3)
+
+    @pytest.mark.parametrize("z", [0.0, 0.5, 25.0])
+    def test_a_camera_at_or_below_the_grass_is_imported(
+        self, camera_json: dict[str, Any], z: float
+    ) -> None:
+        camera_json["position_meters"][2] = z
+        assert camera_from_json(camera_json, "f").position[2] == z
+
+    @pytest.mark.parametrize(
+        ("field", "value", "problem"),
+        [
+            ("pan_degrees", float("nan"), "not a finite number"),
+            ("x_focal_length", -1.0, "a focal length is positive"),
+            ("y_focal_length", 0, "a focal length is positive"),
+            ("x_focal_length", None, "is null, not a number"),
+            ("principal_point", [1.0], "has 1 numbers, not 2"),
+            ("position_meters", [1.0, float("inf"), 2.0], "not a finite number"),
+            ("position_meters", [1.0, "a", 2.0], "'a', not a number"),
+            ("radial_distortion", [0.0] * 5, "has 5 numbers, not 6"),
+            ("tangential_distortion", {}, "not a list"),
+            ("rotation_matrix", [[1, 0, 0]], "has 1 rows, not 3"),
+            ("rotation_matrix", [[0, 0, 0]] * 3, "disagrees"),
+            ("rotation_matrix", [[1e308] * 3] * 3, "beyond any camera"),
+            ("position_meters", [1e300, 0, 0], "beyond any camera"),
+            ("tilt_degrees", True, "not a number"),
+        ],
+    )
+    def test_a_wrong_field_is_refused_by_name(
+        self, camera_json: dict[str, Any], field: str, value: Any, problem: str
+    ) -> None:
+        with pytest.raises(DatasetFormatError, match=problem) as caught:
+            camera_from_json(camera_json | {field: value}, "c.json", "cam3")
+        assert (caught.value.path, caught.value.record, caught.value.field) == (
+            "c.json", "cam3", field,
+        )  # fmt: skip
+
+    @pytest.mark.parametrize("field", ["roll_degrees", "x_focal_length", "position_meters"])
+    def test_a_missing_field_is_refused_by_name(
+        self, camera_json: dict[str, Any], field: str
+    ) -> None:
+        del camera_json[field]
+        with pytest.raises(DatasetFormatError, match=f"{field}: is missing"):
+            camera_from_json(camera_json, "f")
+
+    @given(st.dictionaries(st.sampled_from(FIELDS), JUNK))
+    def test_whatever_a_field_holds_the_answer_is_a_camera_or_a_clear_error(
+        self, changes: dict[str, Any]
+    ) -> None:
+        value = {"pan_degrees": 1, "tilt_degrees": 2, "roll_degrees": 3, "x_focal_length": 4}
+        value |= {"y_focal_length": 5, "principal_point": [6, 7], "position_meters": [8, 9, 10]}
+        try:
+            camera_from_json(value | changes, "f")
+        except DatasetFormatError as error:
+            assert error.field in changes
+
+    def test_something_else_is_no_camera(self) -> None:
+        with pytest.raises(DatasetFormatError, match="not a camera object"):
+            camera_from_json([1, 2], "f")
+
+
+class TestReadCameras:
+    def test_a_folder_of_camera_files_is_keyed_by_stem(
+        self, tmp_path: Path, camera: Camera, report: Report
+    ) -> None:
+        write_cameras(tmp_path, {"00002": camera, "00005": camera})
+        (tmp_path / "00002.json").write_text("{}")
+        assert read_cameras(tmp_path, report) == {"00002": camera, "00005": camera}
+        assert (report.read, report.imported, report.problems) == (2, 2, [])
+
+    def test_files_in_match_folders_keep_their_match(
+        self, tmp_path: Path, camera: Camera, report: Report, match: str
+    ) -> None:
+        write_cameras(tmp_path / "..", {f"{tmp_path.name}/{match}/7_1": camera})
+        assert list(read_cameras(tmp_path, report)) == [f"{match}/7_1"]
+
+    def test_equal_stems_in_two_folders_keep_their_folders(
+        self, make_zip: Callable[..., Path], camera: Camera, report: Report
+    ) -> None:
+        text = camera_text(camera)
+        path = make_zip({"a/camera_1.json": text, "b/camera_1.json": text})
+        assert list(read_cameras(path, report)) == ["a/1", "b/1"]
+
+    def test_a_bad_camera_is_reported_and_the_rest_imported(
+        self, make_zip: Callable[..., Path], camera: Camera, report: Report
+    ) -> None:
+        bad = camera_text(camera).replace("2100.5", "NaN")
+        path = make_zip({"camera_1.json": bad, "camera_2.json": camera_text(camera)})
+        assert list(read_cameras(path, report)) == ["2"]
+        assert (report.read, report.imported) == (2, 1)
+        assert "camera_1.json: holds NaN" in str(report.problems[0])
+
+    @pytest.mark.parametrize("wrapped", [False, True])
+    @pytest.mark.parametrize("encoded", ["plain", "json", "python"])
+    def test_several_cameras_in_one_file(
+        self, tmp_path: Path, camera: Camera, report: Report, wrapped: bool, encoded: str
+    ) -> None:
+        value: Any = {"cam1": camera_to_json(camera), "cam2": camera_to_json(camera)}
+        value = {"_note": "ours", "cameras": value} if wrapped else value
+        inner = {"plain": lambda v: v, "json": json.dumps, "python": repr}[encoded](value)
+        path = tmp_path / "issia_calibration.json"
+        path.write_text(json.dumps(inner))
+        assert read_cameras(path, report) == {"cam1": camera, "cam2": camera}
+        assert report.problems == []
+
+    def test_one_bad_camera_of_several_is_named(
+        self, tmp_path: Path, camera: Camera, report: Report
+    ) -> None:
+        value = {"cam1": camera_to_json(camera), "cam2": 5, "_note": "x"}
+        path = tmp_path / "issia_calibration.json"
+        path.write_text(json.dumps(value))
+        assert list(read_cameras(path, report)) == ["cam1"]
+        assert report.problems[0].record == "cam2"
+
+
+class TestWriteCameras:
+    def test_a_key_that_leaves_the_folder_is_refused(self, tmp_path: Path, camera: Camera) -> None:
+        with pytest.raises(UnsafePathError):
+            write_cameras(tmp_path, {"../x": camera})

@@ -1,0 +1,99 @@
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from app.datasets.manifest import Manifest, write_manifest
+from app.datasets.output import output_tree
+from app.errors import InputError, StorageError
+
+MANIFEST = Manifest("d", "cameras", "2030-01-02", {})
+
+
+def _names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def _export(out: Path, text: str = "1") -> None:
+    with output_tree(out) as root:
+        (root / "b").mkdir()
+        (root / "b" / "x.txt").write_text(text)
+        (root / "a.txt").write_text(text)
+        write_manifest(root, MANIFEST)
+
+
+class TestOutputTree:
+    def test_a_folder_appears_when_all_is_written(self, tmp_path: Path) -> None:
+        out = tmp_path / "new" / "out"
+        with output_tree(out) as root:
+            (root / "a.txt").write_text("1")
+            assert not out.exists()
+        assert (out / "a.txt").read_text() == "1"
+        assert _names(out.parent) == ["out"]
+
+    def test_a_zip_by_its_ending_has_sorted_entries_of_1980(self, tmp_path: Path) -> None:
+        _export(tmp_path / "out.zip")
+        with zipfile.ZipFile(tmp_path / "out.zip") as archive:
+            assert archive.namelist() == ["a.txt", "b/x.txt", "manifest.json"]
+            assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+            assert archive.read("b/x.txt") == b"1"
+        assert _names(tmp_path) == ["out.zip"]
+
+    def test_the_same_content_makes_the_same_zip(self, tmp_path: Path) -> None:
+        for name in ("a.zip", "b.zip"):
+            _export(tmp_path / name)
+        assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+
+    @pytest.mark.parametrize("name", ["out", "out.zip"])
+    def test_an_error_leaves_nothing_behind(self, tmp_path: Path, name: str) -> None:
+        with pytest.raises(InputError), output_tree(tmp_path / name) as root:
+            (root / "a.txt").write_text("1")
+            raise InputError("nothing to export")
+        assert _names(tmp_path) == []
+
+    @pytest.mark.parametrize("name", ["out", "out.zip"])
+    def test_an_error_keeps_an_earlier_export(self, tmp_path: Path, name: str) -> None:
+        _export(tmp_path / name)
+        before = sorted(tmp_path.rglob("*"))
+        with pytest.raises(KeyError), output_tree(tmp_path / name) as root:
+            (root / "c.txt").write_text("1")
+            raise KeyError
+        assert sorted(tmp_path.rglob("*")) == before
+
+    @pytest.mark.parametrize("name", ["out", "out.zip"])
+    def test_an_earlier_export_is_replaced(self, tmp_path: Path, name: str) -> None:
+        _export(tmp_path / name, "old")
+        with output_tree(tmp_path / name) as root:
+            (root / "a.txt").write_text("new")
+        assert _names(tmp_path) == [name]
+        if name == "out":
+            assert _names(tmp_path / name) == ["a.txt"]
+
+    def test_a_folder_with_other_files_is_never_touched(self, tmp_path: Path) -> None:
+        _export(tmp_path / "out")
+        (tmp_path / "out" / "thesis.txt").write_text("mine")
+        with pytest.raises(InputError, match="is no earlier export"), output_tree(tmp_path / "out"):
+            raise AssertionError("not reached")
+        assert (tmp_path / "out" / "thesis.txt").read_text() == "mine"
+
+    @pytest.mark.parametrize(
+        "text", ["{}", "[]", "not json", '{"software": {"name": "touchline"}}']
+    )
+    def test_a_foreign_manifest_does_not_make_an_export(self, tmp_path: Path, text: str) -> None:
+        (tmp_path / "manifest.json").write_text(text)
+        with pytest.raises(InputError, match="is no earlier export"), output_tree(tmp_path):
+            raise AssertionError("not reached")
+
+    def test_an_empty_folder_is_used(self, tmp_path: Path) -> None:
+        (tmp_path / "out").mkdir()
+        _export(tmp_path / "out")
+        assert (tmp_path / "out" / "a.txt").is_file()
+
+    def test_a_file_in_the_way_is_said(self, tmp_path: Path) -> None:
+        (tmp_path / "out").write_text("x")
+        with pytest.raises(InputError, match="is a file"), output_tree(tmp_path / "out"):
+            raise AssertionError("not reached")
+        with pytest.raises(StorageError), output_tree(tmp_path / "out" / "deeper"):
+            raise AssertionError("not reached")

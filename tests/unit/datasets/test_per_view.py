@@ -1,0 +1,66 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from app.datasets.camera_json import read_cameras
+from app.datasets.export_record import ExportRecord
+from app.datasets.per_view import view_stem, write_camera_files, write_sn_calibration
+from app.datasets.report import Report
+from app.datasets.sn_calibration import read_line_files
+from app.errors import UnsafePathError
+from app.geometry.camera import Camera
+from app.soccer.frames import ImageSize
+from app.soccer.group import Group
+
+Solved = Callable[..., ExportRecord]
+Make = Callable[..., Group]
+
+
+class TestWriteCameraFiles:
+    def test_one_file_a_calibrated_view_in_the_folder_of_its_match(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, match: str, camera: Camera,
+        report: Report,
+    ) -> None:  # fmt: skip
+        counts = write_camera_files(tmp_path, [solved(soccer_group(replays=3))])
+        assert counts == {"groups": 1, "cameras": 3}
+        assert (tmp_path / match / "camera_7_1.json").is_file()
+        assert read_cameras(tmp_path, report) == {
+            f"{match}/{stem}": camera for stem in ("7", "7_1", "7_2")
+        }
+
+    def test_a_static_camera_is_written_once(
+        self, tmp_path: Path, solved: Solved, issia_group: Make
+    ) -> None:
+        records = [solved(issia_group(frame)) for frame in (1, 2, 3)]
+        assert write_camera_files(tmp_path, records) == {"groups": 3, "cameras": 2}
+        names = sorted(path.name for path in (tmp_path / "issia").iterdir())
+        assert names == ["camera_cam3.json", "camera_cam4.json"]
+
+    def test_a_match_that_leaves_the_folder_is_refused(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        group = replace(soccer_group(), match="../..")
+        with pytest.raises(UnsafePathError):
+            write_camera_files(tmp_path, [solved(group)])
+
+
+class TestWriteSnCalibration:
+    def test_lines_and_cameras_lie_beside_each_other_and_come_back(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        group = soccer_group()
+        counts = write_sn_calibration(tmp_path, [solved(group)])
+        assert counts == {"groups": 1, "frames": 2, "cameras": 2}
+        files = list(read_line_files(tmp_path, ImageSize(1280, 720), report))
+        assert [file.stem for file in files] == ["7", "7_1"]
+        assert [file.lines for file in files] == [view.station.lines for view in group.views]
+        assert len(read_cameras(tmp_path, report)) == 2
+
+
+class TestViewStem:
+    def test_only_the_ending_of_an_image_is_cut(self) -> None:
+        assert [view_stem(key) for key in ("7_1.png", "cam3", "00002")] == ["7_1", "cam3", "00002"]
