@@ -1,0 +1,268 @@
+"""Figures: players, goalkeepers and the referee in their kits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+
+import cv2
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.sample.instant import TEAM, Instant
+from app.sample.look import Colour, Kit, Look
+from app.sample.patch import Image, Patch
+from app.sample.pose import INDEX, Pose
+
+SKIN: tuple[Colour, ...] = (
+    (142, 176, 222),
+    (112, 148, 200),
+    (82, 116, 168),
+    (58, 82, 124),
+    (40, 56, 86),
+)
+HAIR: tuple[Colour, ...] = (
+    (22, 24, 28),
+    (34, 46, 66),
+    (62, 104, 142),
+    (18, 20, 22),
+    (90, 150, 196),
+)
+BOOTS: tuple[Colour, ...] = (
+    (28, 26, 26),
+    (236, 238, 240),
+    (90, 240, 210),
+    (60, 60, 240),
+    (240, 170, 40),
+)
+_TURNS = np.radians(np.arange(-90, 91, 15.0))
+
+
+@dataclass(frozen=True)
+class Person:
+    """One person as seen in one view: joints in pixels and how large a metre is there."""
+
+    index: int
+    joints: FloatArray
+    """Pixels, shape (17, 2)."""
+    depths: FloatArray
+    """Along the optical axis, metres, shape (17,)."""
+    scale: float
+    """Pixels per metre at the person."""
+    turn: float
+    """Angle from the way to the camera to the way the person faces, radians: 0 faces it."""
+    height: float
+
+
+def people_in_view(camera: Camera, instant: Instant, pose: Pose, image: Image) -> list[Person]:
+    """Everybody who is at least partly in the frame."""
+    count, joints = pose.joints.shape[:2]
+    flat = pose.joints.reshape(-1, 3)
+    pixels = camera.project(flat).reshape(count, joints, 2)
+    depths = camera.pitch_to_camera(flat)[:, 2].reshape(count, joints)
+    rows, columns = image.shape[:2]
+    people = []
+    for index in range(count):
+        if np.isnan(pixels[index]).any() or depths[index].min() < 1.0:
+            continue
+        low, high = pixels[index].min(axis=0), pixels[index].max(axis=0)
+        scale = camera.focal_length[0] / float(depths[index].mean())
+        margin = 0.2 * scale
+        if (high + margin < 0).any() or low[0] - margin > columns or low[1] - margin > rows:
+            continue
+        toward = camera.position[:2] - instant.feet[index]
+        turn = float(instant.heading[index] - np.arctan2(toward[1], toward[0]))
+        people.append(
+            Person(index, pixels[index], depths[index], scale, turn, float(instant.height[index]))
+        )
+    return people
+
+
+def kit_of(look: Look, index: int) -> Kit:
+    """What person ``index`` of an instant wears."""
+    if index == 2 * TEAM:
+        return look.referee
+    if index % TEAM == 0:
+        return look.home_keeper if index == 0 else look.away_keeper
+    return look.home if index < TEAM else look.away
+
+
+def draw_person(
+    image: Image, person: Person, look: Look, number: int, gain: Colour, lit_from: float
+) -> None:
+    """Draw one person.
+
+    Args:
+        number: On the shirt; 0 for none.
+        gain: Light on the person, per channel.
+        lit_from: -1 where light comes from the left of the image, +1 from the right.
+    """
+    margin = 0.14 * person.scale
+    low, high = person.joints.min(axis=0) - margin, person.joints.max(axis=0) + margin
+    tall = float(high[1] - low[1])
+    patch = Patch(low, high, int(np.clip(round(420 / max(tall, 1.0)), 2, 5)), image)
+    if patch.is_empty:
+        return
+    rng = np.random.default_rng([look.seed, person.index])
+    skin, hair, boots = (
+        choices[int(rng.integers(len(choices)))] for choices in (SKIN, HAIR, BOOTS)
+    )
+    painter = _Painter(patch, person, kit_of(look, person.index), skin, hair, boots, lit_from)
+    painter.draw(number)
+    patch.lay(gain)
+
+
+@dataclass
+class _Painter:
+    patch: Patch
+    person: Person
+    kit: Kit
+    skin: Colour
+    hair: Colour
+    boots: Colour
+    lit_from: float
+
+    def draw(self, number: int) -> None:
+        """Limbs far from the camera first, then the torso, then the near ones."""
+        parts: list[tuple[float, Callable[[], None]]] = [
+            (self._depth("chest", "pelvis"), partial(self._torso_and_head, number))
+        ]
+        for side in ("l", "r"):
+            nudge = self._behind(side)
+            leg, arm = partial(self._leg, side), partial(self._arm, side)
+            parts.append((self._depth(f"hip_{side}", f"knee_{side}") + nudge, leg))
+            parts.append((self._depth(f"elbow_{side}", f"hand_{side}") + nudge, arm))
+        for _, paint in sorted(parts, key=lambda part: -part[0]):
+            paint()
+
+    def _behind(self, side: str) -> float:
+        # Breaks ties the way the body is turned; a limb is beside the torso, not within.
+        away = np.sin(self.person.turn) * (1.0 if side == "l" else -1.0)
+        return 0.03 * float(np.sign(away)) * float(abs(away) > 0.2) - 0.01
+
+    def _depth(self, a: str, b: str) -> float:
+        return float(self.person.depths[INDEX[a]] + self.person.depths[INDEX[b]]) / 2
+
+    def _at(self, joint: str) -> FloatArray:
+        point: FloatArray = self.person.joints[INDEX[joint]]
+        return point
+
+    def _size(self, share: float) -> float:
+        return share * self.person.height * self.person.scale
+
+    def _limb(self, a: FloatArray, b: FloatArray, ra: float, rb: float, colour: Colour) -> None:
+        ra, rb = self._size(ra), self._size(rb)
+        self.patch.capsule(a, b, ra, rb, _dim(colour, 0.66))
+        shift = np.array([0.26 * self.lit_from, -0.10])
+        self.patch.capsule(a + shift * ra, b + shift * rb, ra * 0.72, rb * 0.72, colour)
+
+    def _leg(self, side: str) -> None:
+        hip, knee, ankle, toe = (
+            self._at(f"{joint}_{side}") for joint in ("hip", "knee", "ankle", "toe")
+        )
+        self._limb(ankle, toe, 0.024, 0.016, self.boots)
+        self._limb(knee, ankle, 0.033, 0.023, self.kit.socks)
+        cuff = hip + 0.62 * (knee - hip)
+        self._limb(cuff, knee, 0.042, 0.034, self.skin)
+        self._limb(hip, cuff, 0.058, 0.056, self.kit.shorts)
+
+    def _arm(self, side: str) -> None:
+        shoulder, elbow, hand = (
+            self._at(f"{joint}_{side}") for joint in ("shoulder", "elbow", "hand")
+        )
+        keeper = self.person.index in (0, TEAM)
+        self._limb(elbow, hand, 0.023, 0.018, self.kit.shirt if keeper else self.skin)
+        if keeper:
+            self.patch.disc(hand, self._size(0.030), (230, 234, 236))
+        cuff = shoulder + 0.75 * (elbow - shoulder)
+        self._limb(cuff, elbow, 0.025, 0.023, self.skin)
+        sleeve = self.kit.second if self.kit.pattern == "halves" else self.kit.shirt
+        self._limb(shoulder, cuff, 0.036, 0.034, sleeve)
+
+    def _torso_and_head(self, number: int) -> None:
+        self._torso()
+        self._limb(self._at("hip_l"), self._at("hip_r"), 0.060, 0.060, self.kit.shorts)
+        if number:
+            self._number(number)
+        neck, head = self._at("chest"), self._at("head")
+        self._limb(
+            neck + 0.42 * (head - neck), neck + 0.65 * (head - neck), 0.026, 0.026, self.skin
+        )
+        self._head(head)
+
+    def _torso(self) -> None:
+        top, low = self._at("chest"), self._at("pelvis")
+        chest, waist = self._size(self._reach(0.108, 0.066)), self._size(self._reach(0.080, 0.058))
+        self.patch.capsule(top, low, chest * 0.92, waist, _dim(self.kit.shirt, 0.66))
+        # The shirt is a cylinder around the spine; each strip has its own light and colour.
+        for left, right in pairwise(_TURNS):
+            middle = (left + right) / 2
+            light = 0.80 + 0.24 * np.cos(middle - 0.6 * self.lit_from)
+            for a, b, colour in self._strip_colours(float(middle)):
+                ends = [top + a * (low - top), top + b * (low - top)]
+                reach = [chest + a * (waist - chest), chest + b * (waist - chest)]
+                quad = [
+                    ends[0] + (reach[0] * np.sin(left), -reach[0] * 0.25 * (1 - a)),
+                    ends[0] + (reach[0] * np.sin(right), -reach[0] * 0.25 * (1 - a)),
+                    ends[1] + (reach[1] * np.sin(right), 0.0),
+                    ends[1] + (reach[1] * np.sin(left), 0.0),
+                ]
+                self.patch.polygon(np.array(quad), _dim(colour, float(light)))
+
+    def _reach(self, side: float, front: float) -> float:
+        return float(np.hypot(side * np.cos(self.person.turn), front * np.sin(self.person.turn)))
+
+    def _strip_colours(self, angle: float) -> list[tuple[float, float, Colour]]:
+        kit = self.kit
+        around = angle + self.person.turn
+        if kit.pattern == "stripes":
+            odd = int(np.floor(np.degrees(around) / 30.0)) % 2
+            return [(0.0, 1.0, kit.second if odd else kit.shirt)]
+        if kit.pattern == "halves":
+            return [(0.0, 1.0, kit.second if np.sin(around) > 0 else kit.shirt)]
+        if kit.pattern == "hoops":
+            edges = np.linspace(0, 1, 6)
+            pairs = pairwise(edges)
+            return [
+                (float(a), float(b), (kit.shirt, kit.second)[i % 2])
+                for i, (a, b) in enumerate(pairs)
+            ]
+        return [(0.0, 1.0, kit.shirt)]
+
+    def _number(self, number: int) -> None:
+        """On the back, where it can be read."""
+        facing_away = -float(np.cos(self.person.turn))
+        tall = self._size(0.15) * self.patch.fine
+        if facing_away < 0.45 or tall < 14 or self._size(0.15) < 7:
+            return
+        text, font = str(number), cv2.FONT_HERSHEY_DUPLEX
+        (width, height), _ = cv2.getTextSize(text, font, 1.0, 2)
+        scale = min(tall / height, self._size(0.15) * facing_away * self.patch.fine / width)
+        bright = sum(self.kit.shirt) > 330 or self.kit.pattern == "stripes"
+        ink = (30, 28, 28, 255) if bright else (240, 240, 240, 255)
+        center = self._at("chest") + 0.36 * (self._at("pelvis") - self._at("chest"))
+        x, y = self.patch.to_fine(center) / 16
+        origin = (int(x - width * scale / 2), int(y + height * scale / 2))
+        thick = max(1, round(scale * 3))
+        cv2.putText(self.patch.pixels, text, origin, font, scale, ink, thick, cv2.LINE_AA)
+
+    def _head(self, head: FloatArray) -> None:
+        radius = self._size(0.056)
+        toward = float(np.cos(self.person.turn))
+        side = float(np.sin(self.person.turn))
+        self.patch.disc(head, radius, _dim(self.hair, 0.9))
+        if toward > -0.35:
+            # The face: shifted the way the person looks, below the hair line.
+            share = min(1.0, 0.62 + 0.4 * toward)
+            face = head + np.array([-side * 0.42, 0.26]) * radius
+            self.patch.disc(face, radius * 0.84 * share, _dim(self.skin, 0.78))
+            lit = face + np.array([0.16 * self.lit_from, -0.06]) * radius
+            self.patch.disc(lit, radius * 0.66 * share, self.skin)
+
+
+def _dim(colour: Colour, light: float) -> Colour:
+    b, g, r = (min(255.0, channel * light) for channel in colour)
+    return b, g, r

@@ -1,0 +1,195 @@
+"""Props: goals with their nets, corner flags, and the ball as a shaded sphere."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.geometry.sphere import tight_box
+from app.sample.instant import BALL_DIAMETER, HALF_LENGTH, HALF_WIDTH, Instant
+from app.sample.look import Colour
+from app.sample.patch import Image, Patch
+from app.soccer.pitch import GOAL_HEIGHT, GOAL_WIDTH
+
+POST_RADIUS = 0.06
+NET_DEPTH_TOP, NET_DEPTH_LOW = 0.9, 2.1
+MESH = 0.20
+WHITE: Colour = (238.0, 240.0, 240.0)
+
+
+def draw_net(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
+    """The net of the goal at x = ``sign`` * 52.5 m."""
+    strands = _strands(sign)
+    everything = camera.project(np.vstack(strands))
+    scale = _pixels_per_metre(camera, sign)
+    if scale is None or np.isnan(everything).any() or not _in_frame(everything, image):
+        return
+    patch = Patch(everything.min(axis=0) - 2, everything.max(axis=0) + 2, 2, image)
+    if patch.is_empty:
+        return
+    # A cord of 4 mm is thinner than a pixel of the enlarged patch: it covers a part of it.
+    wide = 0.005 * scale * 2
+    opacity = float(np.clip(0.16 + 0.5 * wide, 0.2, 0.75))
+    ends = np.cumsum([len(strand) for strand in strands])
+    for path in np.split(everything, ends[:-1]):
+        patch.polyline(path, WHITE, opacity, max(1, round(wide)))
+    patch.lay(gain)
+
+
+@lru_cache(maxsize=2)
+def _strands(sign: float) -> list[FloatArray]:
+    """Cords of the net: across the back, over the roof and down, and on both sides."""
+    half = GOAL_WIDTH / 2
+    profile = np.array(
+        [(0.0, GOAL_HEIGHT), (NET_DEPTH_TOP, GOAL_HEIGHT - 0.06), (NET_DEPTH_LOW, 0.0)]
+    )
+    cords = []
+    for y in np.linspace(-half, half, round(GOAL_WIDTH / MESH) + 1):
+        cords.append(_on_goal(sign, profile, y))
+    lengths = np.hypot(*np.diff(profile, axis=0).T)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    for s in np.arange(MESH, along[-1], MESH):
+        depth, up = (np.interp(s, along, profile[:, axis]) for axis in (0, 1))
+        sag = 0.05 * np.sin(np.linspace(0, np.pi, 7))
+        row = np.column_stack([depth + sag, np.full(7, up)])
+        cords.append(_on_goal(sign, row, np.linspace(-half, half, 7)))
+    for y in (-half, half):
+        for up in np.arange(0.0, GOAL_HEIGHT, MESH):
+            end = NET_DEPTH_LOW + (NET_DEPTH_TOP - NET_DEPTH_LOW) * up / GOAL_HEIGHT
+            cords.append(_on_goal(sign, np.array([(0.0, up), (end, up)]), y))
+        for depth in np.arange(MESH, NET_DEPTH_LOW, MESH):
+            top = GOAL_HEIGHT * min(1.0, (NET_DEPTH_LOW - depth) / (NET_DEPTH_LOW - NET_DEPTH_TOP))
+            cords.append(_on_goal(sign, np.array([(depth, 0.0), (depth, top)]), y))
+    return cords
+
+
+def _on_goal(sign: float, profile: FloatArray, y: FloatArray | float) -> FloatArray:
+    x = sign * (HALF_LENGTH + profile[:, 0])
+    return np.column_stack([x, np.broadcast_to(y, x.shape), -profile[:, 1]])
+
+
+def draw_frame(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
+    """Posts and crossbar of the goal at x = ``sign`` * 52.5 m, round and 12 cm thick."""
+    half = GOAL_WIDTH / 2
+    corners = np.array([(-half, 0.0), (-half, GOAL_HEIGHT), (half, GOAL_HEIGHT), (half, 0.0)])
+    pieces = [a + np.linspace(0, 1, 9)[:, None] * (b - a) for a, b in pairwise(corners)]
+    bars = [np.column_stack([np.full(9, sign * HALF_LENGTH), p[:, 0], -p[:, 1]]) for p in pieces]
+    pixels = [camera.project(bar) for bar in bars]
+    everything = np.vstack(pixels)
+    if np.isnan(everything).any() or not _in_frame(everything, image):
+        return
+    depths = [camera.pitch_to_camera(bar)[:, 2] for bar in bars]
+    radii = [POST_RADIUS * camera.focal_length[0] / depth for depth in depths]
+    margin = max(float(r.max()) for r in radii) + 2
+    patch = Patch(everything.min(axis=0) - margin, everything.max(axis=0) + margin, 3, image)
+    if patch.is_empty:
+        return
+    for share, shift, colour in ((1.0, 0.0, (150.0, 150.0, 150.0)), (0.74, -0.22, WHITE)):
+        for path, radius in zip(pixels, radii, strict=True):
+            for i in range(len(path) - 1):
+                move = np.array([shift, shift]) * radius[i]
+                patch.capsule(
+                    path[i] + move,
+                    path[i + 1] + move,
+                    radius[i] * share,
+                    radius[i + 1] * share,
+                    colour,
+                )
+    patch.lay(gain)
+
+
+def draw_flag(image: Image, camera: Camera, corner: tuple[float, float], gain: Colour) -> None:
+    """A corner flag; ``corner`` holds the signs of x and y."""
+    x, y = corner[0] * HALF_LENGTH, corner[1] * HALF_WIDTH
+    points = np.array([(x, y, 0), (x, y, -1.55), (x, y, -1.2), (x + 0.36, y + 0.25, -1.42)])
+    pixels = camera.project(points)
+    if np.isnan(pixels).any() or not _in_frame(pixels, image):
+        return
+    radius = 0.02 * camera.focal_length[0] / float(camera.pitch_to_camera(points)[:, 2].mean())
+    patch = Patch(pixels.min(axis=0) - 3, pixels.max(axis=0) + 3, 3, image)
+    if patch.is_empty:
+        return
+    patch.capsule(pixels[0], pixels[1], radius, radius, (60.0, 210.0, 235.0))
+    patch.polygon(pixels[1:4], (40.0, 60.0, 220.0))
+    patch.lay(gain)
+
+
+def draw_ball(
+    image: Image, camera: Camera, instant: Instant, gain: Colour, lit_from: float
+) -> None:
+    """The ball where it is: each of 25 rays a pixel meets the sphere or passes it.
+
+    Args:
+        lit_from: -1 where light comes from the left of the image, +1 from the right.
+    """
+    radius = BALL_DIAMETER / 2
+    box = tight_box(camera, instant.ball, radius)
+    rows, columns = image.shape[:2]
+    left, top = (int(value) for value in np.floor(box[:2]))
+    right, bottom = (int(value) + 1 for value in np.ceil(box[2:]))
+    left, top, right, bottom = max(left, 0), max(top, 0), min(right, columns), min(bottom, rows)
+    if right <= left or bottom <= top:
+        return
+    fine = 5
+    offsets = (np.arange(fine) + 0.5) / fine - 0.5
+    xs = (np.arange(left, right)[:, None] + offsets).ravel()
+    ys = (np.arange(top, bottom)[:, None] + offsets).ravel()
+    grid = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
+    hit, normals = _meet_sphere(camera, grid, instant.ball, radius)
+    colour = _leather(camera, normals, instant.spin, lit_from) * np.array(gain)
+    shape = (bottom - top, fine, right - left, fine)
+    cover = hit.reshape(shape).mean(axis=(1, 3))[..., None]
+    summed = (colour * hit[:, None]).reshape(*shape, 3).mean(axis=(1, 3))
+    area = image[top:bottom, left:right]
+    area[...] = np.clip(area * (1 - cover) + summed, 0, 255).astype(np.uint8)
+
+
+def _meet_sphere(
+    camera: Camera, pixels: FloatArray, center: FloatArray, radius: float
+) -> tuple[FloatArray, FloatArray]:
+    """1 where the ray of a pixel meets the sphere, and the normal there."""
+    rays = camera.rays(pixels)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    to_center = center - camera.position
+    along = rays @ to_center
+    miss = (to_center @ to_center) - along**2
+    hit = miss < radius**2
+    t = along - np.sqrt(np.where(hit, radius**2 - miss, 0.0))
+    normals = (camera.position + rays * t[:, None] - center) / radius
+    return hit.astype(np.float64), normals
+
+
+def _leather(camera: Camera, normals: FloatArray, spin: FloatArray, lit_from: float) -> FloatArray:
+    """White with dark pentagons at the corners of an icosahedron, lit from above."""
+    golden = (1 + 5**0.5) / 2
+    corners = np.array(
+        [p for a in (-1, 1) for b in (-golden, golden) for p in ((0, a, b), (a, b, 0), (b, 0, a))]
+    ) / np.hypot(1.0, golden)
+    angle = float(np.linalg.norm(spin)) + 1e-9
+    axis = spin / angle
+    turned = (
+        normals * np.cos(angle)
+        + np.cross(axis, normals) * np.sin(angle)
+        + np.outer(normals @ axis, axis) * (1 - np.cos(angle))
+    )
+    dark = (turned @ corners.T).max(axis=1) > 0.957
+    base = np.where(dark[:, None], (64.0, 58.0, 56.0), (244.0, 246.0, 246.0))
+    light = np.array([0.0, 0.0, -0.85]) + 0.5 * lit_from * camera.rotation[0]
+    light /= np.linalg.norm(light)
+    shade = 0.70 + 0.36 * np.clip(normals @ light, -0.6, 1.0)
+    return np.asarray(base * shade[:, None], dtype=np.float64)
+
+
+def _pixels_per_metre(camera: Camera, sign: float) -> float | None:
+    depth = float(camera.pitch_to_camera(np.array([[sign * HALF_LENGTH, 0.0, -1.2]]))[0, 2])
+    return camera.focal_length[0] / depth if depth > 0.5 else None
+
+
+def _in_frame(pixels: FloatArray, image: Image) -> bool:
+    rows, columns = image.shape[:2]
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    return bool((high > -20).all() and low[0] < columns + 20 and low[1] < rows + 20)

@@ -1,0 +1,98 @@
+"""Table 1 of the paper: how annotated and optimised ball boxes compare with the true ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.sample.scene import SceneTruth
+from app.soccer.frames import Box
+from app.soccer.group import Group
+from app.soccer.solution import Solution
+
+
+@dataclass(frozen=True)
+class BoxRow:
+    """One line of the table.
+
+    Attributes:
+        boxes: ``annotated`` or ``optimized``.
+        iou: Mean intersection over union with the true box.
+        size_error_percent: Mean of |d - d_true| in per cent of the true box's diagonal, with d of
+            a box (w + h) / 2.
+        count: Boxes compared; the same views for both lines.
+    """
+
+    boxes: str
+    iou: float
+    size_error_percent: float
+    count: int
+
+
+def paper_table_1(
+    groups: Iterable[Group], solutions: Mapping[str, Solution], truth: Mapping[str, SceneTruth]
+) -> list[BoxRow]:
+    """Compare boxes with the truth, over the views that have all three.
+
+    Args:
+        groups: As annotated.
+        solutions: By group key.
+        truth: By group key; its tight boxes take the place of careful manual ones.
+
+    Returns:
+        The line of the annotated boxes and the line of the optimised ones; both count 0 and hold
+        zeros when there is nothing to compare.
+    """
+    annotated: list[tuple[Box, Box]] = []
+    optimized: list[tuple[Box, Box]] = []
+    for group in groups:
+        solution, true = solutions.get(group.key), truth.get(group.key)
+        if solution is None or true is None:
+            continue
+        for said, found, careful in _boxes(group, solution, true):
+            annotated.append((said, careful))
+            optimized.append((found, careful))
+    return [_row("annotated", annotated), _row("optimized", optimized)]
+
+
+def box_iou(a: Box, b: Box) -> float:
+    """Intersection over union of two boxes.
+
+    Example:
+        >>> box_iou(Box(0, 0, 2, 2), Box(1, 0, 2, 2))
+        0.3333333333333333
+    """
+    width = min(a.x + a.width, b.x + b.width) - max(a.x, b.x)
+    height = min(a.y + a.height, b.y + b.height) - max(a.y, b.y)
+    shared = max(width, 0.0) * max(height, 0.0)
+    return shared / (a.width * a.height + b.width * b.height - shared)
+
+
+def size_error_percent(box: Box, careful: Box) -> float:
+    """|d - d_careful| in per cent of the careful box's diagonal."""
+    diagonal = float(np.hypot(careful.width, careful.height))
+    return 100.0 * abs(box.diameter - careful.diameter) / diagonal
+
+
+def _boxes(group: Group, solution: Solution, truth: SceneTruth) -> Iterable[tuple[Box, Box, Box]]:
+    """Annotated, optimised and true box of every view that has them."""
+    for view in group.views:
+        solved, true = solution.view(view.key), truth.view(view.key)
+        if view.ball is None or view.ball.box is None or true is None:
+            continue
+        if solved is None or solved.ball is None or solved.ball.optimized_box is None:
+            continue
+        yield view.ball.box, solved.ball.optimized_box, true.ball_box
+
+
+def _row(name: str, pairs: list[tuple[Box, Box]]) -> BoxRow:
+    if not pairs:
+        return BoxRow(name, 0.0, 0.0, 0)
+    return BoxRow(
+        boxes=name,
+        iou=float(np.mean([box_iou(box, careful) for box, careful in pairs])),
+        size_error_percent=float(np.mean([size_error_percent(*pair) for pair in pairs])),
+        count=len(pairs),
+    )

@@ -1,0 +1,205 @@
+"""Write: a sample as a SoccerNet-v3 tree with ``truth.json`` beside it."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import groupby
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TypeVar
+
+import cv2
+
+from app.datasets.match_frames import ARCHIVE
+from app.datasets.soccernet_v3 import write_soccernet_v3
+from app.errors import InputError
+from app.sample.fixture import group_counts, make_fixture
+from app.sample.render import render
+from app.sample.scenes import make_match
+from app.sample.truth import TRUTH, TruthWriter, truth_to_json
+
+SEED = 20_260_101
+GROUPS = 60
+JPEG_QUALITY = 85
+GROUPS_PER_JOB = 3
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)
+"""A fixed date, so that the same sample is the same bytes."""
+
+Progress = Callable[[int, int], None]
+"""Called with the groups that are done and their total."""
+J = TypeVar("J")
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class SampleReport:
+    """What was written."""
+
+    matches: int
+    groups: int
+    views: int
+    faults: int
+
+
+@dataclass(frozen=True)
+class _Job:
+    """Some groups of one match, for one process."""
+
+    match: int
+    groups: int
+    first: int
+    last: int
+    seed: int
+    faults: bool
+    out: Path
+
+
+@dataclass(frozen=True)
+class _Labelled:
+    """One match whose labels are written: key and truth of its groups, as text."""
+
+    truths: list[tuple[str, str]]
+    views: int
+    faults: int
+
+
+def write_sample(
+    out: Path,
+    groups: int = GROUPS,
+    seed: int = SEED,
+    labels_only: bool = False,
+    faults: bool = True,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> SampleReport:
+    """Write ``<league>/<season>/<match>/{Labels-v3.json, Frames-v3.zip}`` and ``truth.json``.
+
+    The same seed gives the same bytes, however many processes work. Frames are JPEG inside,
+    under the names ``7.png`` that the format wants; readers look at the bytes.
+
+    Args:
+        out: Folder, made when missing.
+        groups: How many groups; about 32 a match, but at least four matches.
+        seed: Whole number from 0.
+        labels_only: Draw no frames.
+        faults: Plant faults in about a third of the groups.
+        progress: Called with (groups done, groups in all).
+        workers: Processes; None for one per processor.
+
+    Raises:
+        InputError: ``groups`` or ``seed`` is not usable, or ``out`` is a file.
+    """
+    if groups < 1 or seed < 0:
+        raise InputError("a sample needs at least one group and a seed from 0")
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out} is a file; the sample needs a folder")
+    out.mkdir(parents=True, exist_ok=True)
+    counts = group_counts(groups)
+    whole = [_Job(i, n, 0, n, seed, faults, out) for i, n in enumerate(counts)]
+    with _mapper(workers, len(whole) if labels_only else groups) as run:
+        # With frames, drawing them is nearly all of the work, so it alone is reported.
+        report = _write_labels(out, whole, run, groups, progress if labels_only else None)
+        if not labels_only:
+            _write_frames(out, whole, run, groups, progress)
+    return report
+
+
+def _write_labels(
+    out: Path, jobs: list[_Job], run: _Mapper, total: int, progress: Progress | None
+) -> SampleReport:
+    done = views = faults = 0
+    temporary = out / f".{TRUTH}.part"
+    with temporary.open("w", encoding="utf-8") as stream:
+        writer = TruthWriter(stream, jobs[0].seed)
+        for labelled in run(_label_match, jobs):
+            writer.write(labelled.truths)
+            done += len(labelled.truths)
+            views += labelled.views
+            faults += labelled.faults
+            if progress is not None:
+                progress(done, total)
+        writer.close()
+    temporary.replace(out / TRUTH)
+    return SampleReport(len(jobs), done, views, faults)
+
+
+def _label_match(job: _Job) -> _Labelled:
+    scenes = make_match(job.match, job.groups, job.seed, job.faults)
+    write_soccernet_v3(job.out, [scene.group for scene in scenes])
+    truths = [
+        (scene.truth.key, json.dumps(truth_to_json(scene.truth), separators=(",", ":")))
+        for scene in scenes
+    ]
+    return _Labelled(
+        truths,
+        views=sum(len(scene.group.views) for scene in scenes),
+        faults=sum(len(scene.truth.faults) for scene in scenes),
+    )
+
+
+def _write_frames(
+    out: Path, matches: list[_Job], run: _Mapper, total: int, progress: Progress | None
+) -> None:
+    done = 0
+    jobs = [part for match in matches for part in _parts(match)]
+    drawn = zip(jobs, run(_draw_groups, jobs), strict=True)
+    for match, parts in groupby(drawn, key=lambda pair: pair[0].match):
+        archive = out / make_fixture(match, jobs[0].seed).folder / ARCHIVE
+        temporary = archive.with_suffix(".part")
+        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as frames:
+            for job, members in parts:
+                for name, content in members:
+                    frames.writestr(zipfile.ZipInfo(name, ZIP_DATE), content)
+                done += job.last - job.first
+                if progress is not None:
+                    progress(done, total)
+        temporary.replace(archive)
+
+
+def _parts(job: _Job) -> Iterator[_Job]:
+    for first in range(0, job.groups, GROUPS_PER_JOB):
+        last = min(first + GROUPS_PER_JOB, job.groups)
+        yield _Job(job.match, job.groups, first, last, job.seed, job.faults, job.out)
+
+
+def _draw_groups(job: _Job) -> list[tuple[str, bytes]]:
+    """Name and JPEG of every frame of the job's groups."""
+    numbers = range(job.first, job.last)
+    members = []
+    for scene in make_match(job.match, job.groups, job.seed, job.faults, numbers):
+        for view in scene.group.views:
+            image = render(scene, view.key)
+            _, content = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+            members.append((view.key, content.tobytes()))
+    return members
+
+
+class _Mapper:
+    """Runs a function over jobs in order, in this process or in several."""
+
+    def __init__(self, pool: ProcessPoolExecutor | None) -> None:
+        self._pool = pool
+
+    def __call__(self, function: Callable[[J], R], jobs: Iterable[J]) -> Iterator[R]:
+        return self._pool.map(function, jobs) if self._pool else map(function, jobs)
+
+
+@contextmanager
+def _mapper(workers: int | None, jobs: int) -> Iterator[_Mapper]:
+    count = min(workers or os.cpu_count() or 1, jobs)
+    if count == 1:
+        yield _Mapper(None)
+        return
+    # Spawned, not forked: a fork of a process with threads may hang.
+    with ProcessPoolExecutor(count, get_context("spawn"), _one_thread) as pool:
+        yield _Mapper(pool)
+
+
+def _one_thread() -> None:
+    cv2.setNumThreads(1)

@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import numpy as np
+
+from app.sample.cameras import REPLAYS, make_rig, parallax, replay_seat
+from app.sample.scene import Scene
+from app.sample.views import CORNER_RADIUS
+
+
+class TestAim:
+    def test_main_cameras_are_such_as_soccernet_has(self, clean_scenes: list[Scene]):
+        for scene in clean_scenes:
+            camera = scene.truth.views[0].camera
+            x, y, z = camera.position
+            _, tilt, roll = camera.pan_tilt_roll_degrees
+            assert -10 <= x <= 11
+            assert 41 <= y <= 98
+            assert -25 <= z <= -9
+            assert 1200 <= camera.focal_length[0] <= 6100
+            assert 65 <= tilt <= 84
+            assert abs(roll) < 1
+
+    def test_lenses_move_the_corners_by_five_to_twenty_five_pixels(self, clean_scenes: list[Scene]):
+        for scene in clean_scenes:
+            for view in scene.truth.views:
+                focal = view.camera.focal_length[0]
+                corner = view.camera.distortion[0] * CORNER_RADIUS**3 / focal**2
+                assert 5 <= corner <= 25
+
+    def test_the_ball_is_in_every_view_and_five_pixels_or_more(self, clean_scenes: list[Scene]):
+        for scene in clean_scenes:
+            for view in scene.truth.views:
+                center = view.ball_box.center
+                assert 0 < center.x < 1279
+                assert 0 < center.y < 719
+                assert view.ball_diameter_px >= 5.0
+
+    def test_six_markings_and_both_directions_are_in_view(self, clean_scenes: list[Scene]):
+        for scene in clean_scenes:
+            for view in scene.group.views:
+                names = list(view.station.lines)
+                assert len(names) >= 6
+                assert any(name.endswith(("top", "bottom")) for name in names)
+                assert any(
+                    name.endswith((" main", "Middle line")) or "Side line" in name for name in names
+                )
+
+
+class TestReplaySeat:
+    def test_replays_come_from_all_around(self):
+        rng = np.random.default_rng(1)
+        rig = make_rig(rng)
+        drawn = [replay_seat(rng, rig, np.array([40.0, 0.0, -0.1])) for _ in range(300)]
+        assert {kind for kind, _ in drawn} == set(REPLAYS)
+        seats = np.array([seat for _, seat in drawn])
+        assert (seats[:, 1] < -40).any()
+        assert (seats[:, 0] > 55).any()
+        assert (seats[:, 0] < -55).any()
+
+
+class TestParallax:
+    def test_a_right_angle(self):
+        ball = np.array([0.0, 0.0, 0.0])
+        assert parallax(np.array([9.0, 0, 0]), np.array([0, 4.0, 0]), ball) == np.pi / 2
