@@ -1,0 +1,225 @@
+"""Said data to JSON and back, explicit field by field: what the log keeps must stay readable.
+
+Floats go through ``repr`` and come back the same bits. Nothing here knows the database.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from app.geometry.camera import Camera
+from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
+from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.group import Group, Media, Station, View
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy, Policy
+
+Json = Any
+"""What ``json`` makes: dict, list, str, int, float, bool or None."""
+
+
+def canonical(value: Json) -> str:
+    """The one JSON text of a value: sorted keys, no spaces, no NaN."""
+    return json.dumps(
+        value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
+    )
+
+
+def parse(text: str) -> Json:
+    """The value of a JSON text."""
+    return json.loads(text)
+
+
+def pack(value: Json) -> bytes:
+    """A value as compressed canonical JSON."""
+    return zlib.compress(canonical(value).encode())
+
+
+def unpack(data: bytes) -> Json:
+    """The value of compressed JSON."""
+    return json.loads(zlib.decompress(data))
+
+
+def lines_to_json(lines: Lines) -> Json:
+    """``{marking: [[x, y], ...]}``."""
+    # float(): a reader may hand over integers, and 5 and 5.0 would have different digests.
+    return {
+        marking: [[float(p.x), float(p.y)] for p in points] for marking, points in lines.items()
+    }
+
+
+def lines_from_json(value: Mapping[str, Any]) -> Lines:
+    """Back from ``lines_to_json``."""
+    return make_lines(value)
+
+
+def ball_to_json(ball: BallAnnotation) -> Json:
+    """``{"box": [x, y, w, h] | null, "point": [x, y] | null, ...}``."""
+    box = ball.box
+    return {
+        "box": None if box is None else [*map(float, (box.x, box.y, box.width, box.height))],
+        "point": None if ball.point is None else [*map(float, ball.point)],
+        "occluded": ball.occluded,
+        "out_of_view": ball.out_of_view,
+    }
+
+
+def ball_from_json(value: Mapping[str, Any]) -> BallAnnotation:
+    """Back from ``ball_to_json``."""
+    box, point = value["box"], value["point"]
+    return BallAnnotation(
+        box=None if box is None else Box(*map(float, box)),
+        point=None if point is None else ImagePoint(*map(float, point)),
+        occluded=value["occluded"],
+        out_of_view=value["out_of_view"],
+    )
+
+
+def camera_to_json(camera: Camera) -> Json:
+    """Every number of the camera; the rotation as it is, not as angles."""
+    return {
+        "rotation": camera.rotation.ravel().tolist(),
+        "position": camera.position.tolist(),
+        "focal_length": [*map(float, camera.focal_length)],
+        "principal_point": [*map(float, camera.principal_point)],
+        "skew": float(camera.skew),
+        "distortion": camera.distortion.tolist(),
+    }
+
+
+def camera_from_json(value: Mapping[str, Any]) -> Camera:
+    """Back from ``camera_to_json``."""
+    ax, ay = value["focal_length"]
+    x0, y0 = value["principal_point"]
+    return Camera(
+        rotation=np.array(value["rotation"], dtype=float).reshape(3, 3),
+        position=np.array(value["position"], dtype=float),
+        focal_length=(ax, ay),
+        principal_point=(x0, y0),
+        skew=value["skew"],
+        distortion=np.array(value["distortion"], dtype=float),
+    )
+
+
+def station_to_json(station: Station) -> Json:
+    """A station with everything that was said about it."""
+    return {
+        "key": station.key,
+        "size": [station.size.width, station.size.height],
+        "shared": station.shared,
+        "lines": lines_to_json(station.lines),
+        "given": None if station.given is None else camera_to_json(station.given),
+        "calibration": station.calibration,
+        "flipped": station.flipped,
+    }
+
+
+def station_from_json(value: Mapping[str, Any]) -> Station:
+    """Back from ``station_to_json``."""
+    given = value["given"]
+    return Station(
+        key=value["key"],
+        size=ImageSize(*value["size"]),
+        shared=value["shared"],
+        lines=lines_from_json(value["lines"]),
+        given=None if given is None else camera_from_json(given),
+        calibration=value["calibration"],
+        flipped=value["flipped"],
+    )
+
+
+def extras_to_json(extras: Extras) -> Json:
+    """None when there is nothing."""
+    if not (extras.boxes or extras.lines or extras.metadata):
+        return None
+    return {
+        "boxes": [dict(box) for box in extras.boxes],
+        "lines": [dict(line) for line in extras.lines],
+        "metadata": dict(extras.metadata),
+    }
+
+
+def extras_from_json(value: Mapping[str, Any] | None) -> Extras:
+    """Back from ``extras_to_json``."""
+    if value is None:
+        return Extras()
+    return Extras(tuple(value["boxes"]), tuple(value["lines"]), value["metadata"])
+
+
+def media_to_json(media: Media | None) -> Json:
+    """``[path, member, frame]`` or None."""
+    return None if media is None else [media.path, media.member, media.frame]
+
+
+def media_from_json(value: list[Any] | None) -> Media | None:
+    """Back from ``media_to_json``."""
+    return None if value is None else Media(*value)
+
+
+def view_to_json(view: View, station: Json | None = None) -> Json:
+    """A view; ``station`` stands in for the station's own JSON (a shared one is a key)."""
+    return {
+        "key": view.key,
+        "station": station_to_json(view.station) if station is None else station,
+        "balls": [ball_to_json(ball) for ball in view.balls],
+        "media": media_to_json(view.media),
+        "included": view.included,
+        "extras": extras_to_json(view.extras),
+    }
+
+
+def view_from_json(value: Mapping[str, Any], station: Station | None = None) -> View:
+    """Back from ``view_to_json``; ``station`` where the JSON holds only its key."""
+    return View(
+        key=value["key"],
+        station=station_from_json(value["station"]) if station is None else station,
+        balls=tuple(ball_from_json(ball) for ball in value["balls"]),
+        media=media_from_json(value["media"]),
+        included=value["included"],
+        extras=extras_from_json(value["extras"]),
+    )
+
+
+def group_to_json(group: Group) -> Json:
+    """A group; each shared station is written once a view, in full."""
+    return {**group_head_to_json(group), "views": [view_to_json(view) for view in group.views]}
+
+
+def group_from_json(value: Mapping[str, Any]) -> Group:
+    """Back from ``group_to_json``."""
+    return Group(
+        key=value["key"],
+        views=tuple(view_from_json(view) for view in value["views"]),
+        match=value["match"],
+        pitch=Pitch(*value["pitch"]),
+        split=value["split"],
+        label=value["label"],
+    )
+
+
+def group_head_to_json(group: Group) -> dict[str, Json]:
+    """What a group is without its views."""
+    return {
+        "key": group.key,
+        "match": group.match,
+        "pitch": [float(group.pitch.length), float(group.pitch.width)],
+        "split": group.split,
+        "label": group.label,
+    }
+
+
+def policy_to_json(policy: Policy) -> Json:
+    """Every threshold by name."""
+    return asdict(policy)
+
+
+def policy_from_json(value: Mapping[str, Any]) -> Policy:
+    """Back from ``policy_to_json``; thresholds that are not named keep their default."""
+    calibration = CalibrationPolicy(**value.get("calibration", {}))
+    return Policy(**{**value, "calibration": calibration})

@@ -1,0 +1,59 @@
+"""Digests: of what solving reads, and of what a dataset brought."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+
+from app.soccer.group import Group, Station, View
+from app.soccer.pitch import Pitch
+from app.store.codecs import (
+    Json,
+    ball_to_json,
+    canonical,
+    group_head_to_json,
+    station_to_json,
+    view_to_json,
+)
+
+
+def digest(value: Json) -> str:
+    """Digest of a JSON value, 32 hexadecimal digits."""
+    return hashlib.sha256(canonical(value).encode()).hexdigest()[:32]
+
+
+def station_digest(station: Station) -> str:
+    """Of size, lines, given camera and which of the two counts."""
+    value = station_to_json(station)
+    return digest([value["size"], value["lines"], value["given"], value["calibration"]])
+
+
+def view_digest(view: View) -> str:
+    """Of the view's key, its balls and whether it takes part; its station has its own."""
+    return digest([view.key, view.included, [ball_to_json(ball) for ball in view.balls]])
+
+
+def inputs_hash(pitch: Pitch, views: Iterable[tuple[str, str]]) -> str:
+    """Of all that solving a group reads, from (view digest, station digest) in order of views.
+
+    Made of digests, so that a station shared by a thousand groups costs a thousand short sums.
+    """
+    return digest([float(pitch.length), float(pitch.width), [list(pair) for pair in views]])
+
+
+def group_inputs_hash(group: Group) -> str:
+    """``inputs_hash`` of a group at hand."""
+    pairs = ((view_digest(view), station_digest(view.station)) for view in group.views)
+    return inputs_hash(group.pitch, pairs)
+
+
+def source_hash(group: Group) -> str:
+    """Of everything that a dataset says about a group, media and extras too.
+
+    A shared station counts by its key alone: it is compared once, not once a group.
+    """
+    views = [
+        view_to_json(view, view.station.key if view.station.shared else None)
+        for view in group.views
+    ]
+    return digest([group_head_to_json(group), views])

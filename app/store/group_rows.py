@@ -1,0 +1,148 @@
+"""Rows of groups, views and stations made from their values, and gathered for bulk inserts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import func, insert, select
+from sqlalchemy.orm import Session
+
+from app.soccer.group import Group, Station, View
+from app.store import codecs
+from app.store.digest import group_inputs_hash, station_digest, view_digest
+from app.store.models import GroupModel, StationModel, ViewModel
+
+
+def station_values(station: Station) -> dict[str, Any]:
+    """Columns of a station that follow from its value."""
+    given = station.given
+    return {
+        "key": station.key,
+        "shared": station.shared,
+        "width": station.size.width,
+        "height": station.size.height,
+        "flipped": station.flipped,
+        "calibration": station.calibration,
+        "lines": codecs.canonical(codecs.lines_to_json(station.lines)),
+        "given": None if given is None else codecs.canonical(codecs.camera_to_json(given)),
+        "digest": station_digest(station),
+    }
+
+
+def view_values(view: View, position: int) -> dict[str, Any]:
+    """Columns of a view that follow from its value."""
+    media, extras = view.media, codecs.extras_to_json(view.extras)
+    return {
+        "key": view.key,
+        "position": position,
+        "included": view.included,
+        "balls": codecs.canonical([codecs.ball_to_json(ball) for ball in view.balls]),
+        "media_path": None if media is None else media.path,
+        "media_member": None if media is None else media.member,
+        "media_frame": None if media is None else media.frame,
+        "extras": None if extras is None else codecs.pack(extras),
+        "digest": view_digest(view),
+    }
+
+
+def head_values(group: Group) -> dict[str, Any]:
+    """Columns of a group that follow from its value."""
+    return {
+        "key": group.key,
+        "match": group.match,
+        "split": group.split,
+        "label": group.label,
+        "pitch_length": group.pitch.length,
+        "pitch_width": group.pitch.width,
+        "inputs_hash": group_inputs_hash(group),
+    }
+
+
+def next_id(session: Session, model: Any) -> int:
+    """The id that a new row gets; sound because writes hold the lock from their start."""
+    return int(session.execute(select(func.coalesce(func.max(model.id), 0))).scalar_one()) + 1
+
+
+@dataclass
+class NewRows:
+    """Rows gathered for a bulk insert, with ids counted from what is there."""
+
+    session: Session
+    dataset_id: int
+
+    def __post_init__(self) -> None:
+        self.stations: list[dict[str, Any]] = []
+        self.views: list[dict[str, Any]] = []
+        self.groups: list[dict[str, Any]] = []
+        self._station = next_id(self.session, StationModel)
+        self._view = next_id(self.session, ViewModel)
+        self._group = next_id(self.session, GroupModel)
+        newest = select(func.coalesce(func.max(GroupModel.number), 0)).where(
+            GroupModel.dataset_id == self.dataset_id
+        )
+        self._number = int(self.session.execute(newest).scalar_one())
+
+    def add_station(self, station: Station) -> int:
+        """Gather a station; returns its id."""
+        values = station_values(station)
+        identity = {"id": self._station + len(self.stations), "dataset_id": self.dataset_id}
+        self.stations.append(
+            {**values, **identity, "revision": 1, "source_digest": values["digest"]}
+        )
+        return int(identity["id"])
+
+    def add_group(
+        self, group: Group, source: str, at: str, shared: Mapping[str, int], revision: int = 1
+    ) -> int:
+        """Gather a group with its views and own stations; returns its id.
+
+        ``shared`` has the ids of shared stations by key.
+        """
+        identity = self._group + len(self.groups)
+        self.groups.append(
+            {
+                **head_values(group),
+                "id": identity,
+                "dataset_id": self.dataset_id,
+                "number": self._number + len(self.groups) + 1,
+                "revision": revision,
+                "changed": at,
+                "source_hash": source,
+            }
+        )
+        for position, view in enumerate(group.views):
+            self.add_view(identity, view, position, shared)
+        return identity
+
+    def add_view(
+        self, group_id: int, view: View, position: int, shared: Mapping[str, int]
+    ) -> tuple[int, int]:
+        """Gather a view and, where it has its own, its station; returns both ids."""
+        station = view.station
+        station_id = shared[station.key] if station.shared else self.add_station(station)
+        values = view_values(view, position)
+        identity = self._view + len(self.views)
+        self.views.append(
+            {
+                **values,
+                "id": identity,
+                "group_id": group_id,
+                "station_id": station_id,
+                "source_digest": values["digest"],
+            }
+        )
+        return identity, station_id
+
+    def insert(self) -> None:
+        """Insert everything gathered and forget it."""
+        for model, rows in (
+            (StationModel, self.stations),
+            (GroupModel, self.groups),
+            (ViewModel, self.views),
+        ):
+            if rows:
+                # Without it rows are sorted out by which of their columns are NULL.
+                self.session.execute(insert(model), rows, execution_options={"render_nulls": True})
+        self.__post_init__()

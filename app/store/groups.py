@@ -1,0 +1,296 @@
+"""Groups in the database: rows to values and back, in batches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import delete, select, update
+from sqlalchemy.orm import Session
+
+from app.soccer.annotation import Extras
+from app.soccer.frames import ImageSize
+from app.soccer.group import Group, Media, Station, View
+from app.soccer.pitch import Pitch
+from app.store import codecs
+from app.store.digest import inputs_hash, station_digest, view_digest
+from app.store.group_rows import NewRows, head_values, station_values, view_values
+from app.store.models import GroupModel, ImportFindingModel, StationModel, ViewModel
+
+
+@dataclass(frozen=True)
+class StoredStation:
+    """A station with its row's keeping; ``edited`` says that a person changed it."""
+
+    id: int
+    dataset_id: int
+    revision: int
+    station: Station
+    digest: str
+    source_digest: str
+
+    @property
+    def edited(self) -> bool:
+        """Whether it differs from what its dataset brought."""
+        return self.digest != self.source_digest
+
+
+@dataclass(frozen=True)
+class StoredGroup:
+    """A group with its row's keeping.
+
+    Attributes:
+        view_ids: Id of each view, by key.
+        stations: Stored station of each view, by the view's key.
+        view_digests: Digest and source digest of each view, by key.
+    """
+
+    id: int
+    dataset_id: int
+    number: int
+    revision: int
+    changed: str
+    inputs_hash: str
+    source_hash: str
+    group: Group
+    view_ids: Mapping[str, int]
+    stations: Mapping[str, StoredStation]
+    view_digests: Mapping[str, tuple[str, str]]
+
+    @property
+    def edited_views(self) -> frozenset[str]:
+        """Keys of views whose balls or inclusion a person changed."""
+        return frozenset(key for key, (now, then) in self.view_digests.items() if now != then)
+
+    @property
+    def edited(self) -> bool:
+        """Whether a person changed this group (a shared station is not the group's)."""
+        return any(self.is_edited(key) for key in self.view_ids)
+
+    def is_edited(self, key: str) -> bool:
+        """Whether a person changed a view or its own station."""
+        own = self.stations[key]
+        return key in self.edited_views or (not own.station.shared and own.edited)
+
+
+def read_groups(
+    session: Session, ids: Sequence[int], *, extras: bool = True
+) -> dict[int, StoredGroup]:
+    """Groups by id, in the order asked for; ids that do not exist are left out.
+
+    Args:
+        session: Any session.
+        ids: At most a few hundred.
+        extras: Read what the ball pipeline does not use, too.
+    """
+    heads = {
+        row.id: row
+        for row in session.execute(
+            select(*GroupModel.__table__.columns).where(GroupModel.id.in_(ids))
+        )
+    }
+    columns = [c for c in ViewModel.__table__.columns if extras or c.name != "extras"]
+    views: dict[int, list[Any]] = {}
+    for row in session.execute(
+        select(*columns).where(ViewModel.group_id.in_(ids)).order_by(ViewModel.position)
+    ):
+        views.setdefault(row.group_id, []).append(row)
+    stations = read_stations(session, {row.station_id for rows in views.values() for row in rows})
+    return {
+        number: _stored_group(heads[number], views.get(number, []), stations)
+        for number in ids
+        if number in heads
+    }
+
+
+def read_stations(session: Session, ids: Iterable[int]) -> dict[int, StoredStation]:
+    """Stations by id."""
+    statement = select(*StationModel.__table__.columns).where(StationModel.id.in_(list(ids)))
+    return {row.id: stored_station(row) for row in session.execute(statement)}
+
+
+def _stored_group(
+    head: Any, rows: Sequence[Any], stations: Mapping[int, StoredStation]
+) -> StoredGroup:
+    group = Group(
+        key=head.key,
+        views=tuple(_view_from_row(row, stations[row.station_id].station) for row in rows),
+        match=head.match,
+        pitch=Pitch(head.pitch_length, head.pitch_width),
+        split=head.split,
+        label=head.label,
+    )
+    return StoredGroup(
+        id=head.id,
+        dataset_id=head.dataset_id,
+        number=head.number,
+        revision=head.revision,
+        changed=head.changed,
+        inputs_hash=head.inputs_hash,
+        source_hash=head.source_hash,
+        group=group,
+        view_ids={row.key: row.id for row in rows},
+        stations={row.key: stations[row.station_id] for row in rows},
+        view_digests={row.key: (row.digest, row.source_digest) for row in rows},
+    )
+
+
+def _view_from_row(row: Any, station: Station) -> View:
+    media = None
+    if row.media_path is not None:
+        media = Media(row.media_path, row.media_member, row.media_frame)
+    extras = getattr(row, "extras", None)
+    return View(
+        key=row.key,
+        station=station,
+        balls=tuple(map(codecs.ball_from_json, codecs.parse(row.balls))),
+        media=media,
+        included=row.included,
+        extras=Extras() if extras is None else codecs.extras_from_json(codecs.unpack(extras)),
+    )
+
+
+def stored_station(row: Any) -> StoredStation:
+    """A station from all columns of its row."""
+    station = Station(
+        key=row.key,
+        size=ImageSize(row.width, row.height),
+        shared=row.shared,
+        lines=codecs.lines_from_json(codecs.parse(row.lines)),
+        given=None if row.given is None else codecs.camera_from_json(codecs.parse(row.given)),
+        calibration=row.calibration,
+        flipped=row.flipped,
+    )
+    return StoredStation(
+        row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
+    )
+
+
+def save_group(
+    session: Session,
+    stored: StoredGroup,
+    group: Group,
+    *,
+    at: str,
+    source: Group | None = None,
+    digest: str | None = None,
+    shared: Mapping[str, int] | None = None,
+) -> None:
+    """Write the next revision of a group: what changed of its head, views and own stations.
+
+    Shared stations are left alone; ``save_station`` writes those. Views that are gone are
+    deleted, new ones inserted.
+
+    Args:
+        session: A write session.
+        stored: The group as it is.
+        group: The group as it shall be.
+        at: Time of the change.
+        source: Where the change comes from the dataset: the group as it would be had nobody
+            edited it.
+    """
+    rows = NewRows(session, stored.dataset_id)
+    kept = {view.key for view in group.views if keeps_station(stored, view)}
+    _delete_views(session, stored, set(stored.view_ids) - kept)
+    for position, view in enumerate(group.views):
+        if view.key in kept:
+            base = None if source is None else source.view(view.key)
+            _save_view(session, stored, view, position, base)
+        else:
+            rows.add_view(stored.id, view, position, shared or {})
+    rows.insert()
+    values = {**head_values(group), "revision": stored.revision + 1, "changed": at}
+    if digest is not None:
+        values["source_hash"] = digest
+    session.execute(update(GroupModel).where(GroupModel.id == stored.id).values(values))
+
+
+def keeps_station(stored: StoredGroup, view: View) -> bool:
+    """Whether a view is stored and still has its own station, or still shares the same one."""
+    if view.key not in stored.stations:
+        return False
+    old, new = stored.stations[view.key].station, view.station
+    return old.shared == new.shared and (not new.shared or old.key == new.key)
+
+
+def _save_view(
+    session: Session, stored: StoredGroup, view: View, position: int, source: View | None
+) -> None:
+    old = stored.group.view(view.key)
+    if source is None and view == old and stored.group.views.index(old) == position:
+        return
+    values = view_values(view, position)
+    if source is not None:
+        values["source_digest"] = view_digest(source)
+    identity = stored.view_ids[view.key]
+    session.execute(update(ViewModel).where(ViewModel.id == identity).values(values))
+    own = stored.stations[view.key]
+    base = None if source is None else source.station
+    if not own.station.shared and (view.station != own.station or base is not None):
+        save_station(session, own, view.station, source=base)
+
+
+def _delete_views(session: Session, stored: StoredGroup, keys: set[str]) -> None:
+    for key in keys:
+        session.execute(delete(ViewModel).where(ViewModel.id == stored.view_ids[key]))
+        own = stored.stations[key]
+        if not own.station.shared:
+            session.execute(
+                delete(ImportFindingModel).where(ImportFindingModel.station_id == own.id)
+            )
+            session.execute(delete(StationModel).where(StationModel.id == own.id))
+
+
+def save_station(
+    session: Session, stored: StoredStation, station: Station, *, source: Station | None = None
+) -> None:
+    """Write the next revision of a station; its groups' hashes are the caller's to refresh.
+
+    ``source`` is the station as it would be had nobody edited it, where the dataset changed.
+    """
+    values = {**station_values(station), "revision": stored.revision + 1}
+    if source is not None:
+        values["source_digest"] = station_digest(source)
+    session.execute(update(StationModel).where(StationModel.id == stored.id).values(values))
+
+
+def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
+    """Bring the inputs hashes of groups in step after a station of theirs changed."""
+    statement = (
+        select(
+            GroupModel.id,
+            GroupModel.pitch_length,
+            GroupModel.pitch_width,
+            ViewModel.digest,
+            StationModel.digest.label("station_digest"),
+        )
+        .join(ViewModel, ViewModel.group_id == GroupModel.id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(GroupModel.id.in_(group_ids))
+        .order_by(GroupModel.id, ViewModel.position)
+    )
+    pitches: dict[int, Pitch] = {}
+    pairs: dict[int, list[tuple[str, str]]] = {}
+    for row in session.execute(statement):
+        pitches.setdefault(row.id, Pitch(row.pitch_length, row.pitch_width))
+        pairs.setdefault(row.id, []).append((row.digest, row.station_digest))
+    session.execute(
+        update(GroupModel),
+        [{"id": key, "inputs_hash": inputs_hash(pitches[key], pairs[key])} for key in pairs],
+    )
+
+
+def groups_of_station(session: Session, station_id: int) -> list[int]:
+    """Ids of the groups that a station's views belong to."""
+    statement = select(ViewModel.group_id).where(ViewModel.station_id == station_id).distinct()
+    return list(session.scalars(statement.order_by(ViewModel.group_id)))
+
+
+def bump_groups(session: Session, group_ids: Sequence[int], at: str) -> None:
+    """Count a revision of groups that a change of something of theirs made."""
+    session.execute(
+        update(GroupModel)
+        .where(GroupModel.id.in_(group_ids))
+        .values(revision=GroupModel.revision + 1, changed=at)
+    )

@@ -1,0 +1,121 @@
+"""The log: append-only, each row's hash covering the row before it."""
+
+from __future__ import annotations
+
+import hashlib
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import ColumnElement, insert, select
+from sqlalchemy.orm import Session
+
+from app.errors import StorageError
+from app.store.codecs import Json, canonical, unpack
+from app.store.models import LogModel
+
+GENESIS = "0" * 64
+"""The hash before the first row."""
+
+_BATCH = 500
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One thing that was said.
+
+    ``kind`` is ``dataset``, ``policy``, ``station``, ``import``, ``camera``, ``spare``,
+    ``edit``, ``undo``, ``redo``, the same after ``station_``, or ``verdict``; ``body`` is JSON that
+    suffices to do it again.
+    """
+
+    kind: str
+    actor: str
+    at: str
+    body: Json
+    dataset_id: int | None = None
+    group_id: int | None = None
+    station_id: int | None = None
+
+
+@dataclass(frozen=True)
+class LogEntry(Entry):
+    """An entry as it stands in the log."""
+
+    id: int = 0
+    hash: str = ""
+
+
+def append(session: Session, entries: Sequence[Entry]) -> list[int]:
+    """Write entries at the end of the log, inside the caller's write transaction.
+
+    Returns:
+        Their ids.
+    """
+    if not entries:
+        return []
+    last = session.execute(
+        select(LogModel.id, LogModel.hash).order_by(LogModel.id.desc()).limit(1)
+    ).one_or_none()
+    number, previous = (0, GENESIS) if last is None else last
+    rows: list[dict[str, Any]] = []
+    for entry in entries:
+        number += 1
+        body = canonical(entry.body).encode()
+        previous = chain_hash(previous, number, entry, body)
+        row = {name: getattr(entry, name) for name in _COLUMNS}
+        rows.append({**row, "id": number, "hash": previous, "body": zlib.compress(body)})
+    session.execute(insert(LogModel), rows, execution_options={"render_nulls": True})
+    return [row["id"] for row in rows]
+
+
+def read_log(session: Session, *where: ColumnElement[bool], after: int = 0) -> Iterator[LogEntry]:
+    """Entries in order, in batches, so that a long log fits into memory."""
+    while True:
+        rows = session.execute(
+            select(*(getattr(LogModel, name) for name in (*_COLUMNS, "body", "id", "hash")))
+            .where(LogModel.id > after, *where)
+            .order_by(LogModel.id)
+            .limit(_BATCH)
+        ).all()
+        for row in rows:
+            yield LogEntry(**{**row._mapping, "body": unpack(row.body)})
+        if len(rows) < _BATCH:
+            return
+        after = rows[-1].id
+
+
+def verify_chain(session: Session) -> int:
+    """Check every hash of the log; returns the number of rows.
+
+    Raises:
+        StorageError: A row was changed, removed or put in from outside.
+    """
+    count, previous = 0, GENESIS
+    for entry in read_log(session):
+        count += 1
+        previous = chain_hash(previous, count, entry, canonical(entry.body).encode())
+        if entry.id != count or entry.hash != previous:
+            raise StorageError(
+                f"row {entry.id} of the log is not what was written",
+                hint="Restore the database from a backup.",
+            )
+    return count
+
+
+def chain_hash(previous: str, number: int, entry: Entry, body: bytes) -> str:
+    """Hash of a row: SHA-256 over the hash before it, its columns and the hash of its body.
+
+    Args:
+        previous: Hash of the row before.
+        number: Id of the row.
+        entry: Its columns.
+        body: Canonical JSON of its body.
+    """
+    values: dict[str, Json] = {name: getattr(entry, name) for name in _COLUMNS}
+    values |= {"id": number, "body": hashlib.sha256(body).hexdigest()}
+    return hashlib.sha256((previous + canonical(values)).encode()).hexdigest()
+
+
+_COLUMNS = ("kind", "actor", "at", "dataset_id", "group_id", "station_id")

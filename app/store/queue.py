@@ -1,0 +1,157 @@
+"""The queue's rows: one a group, brought in step whenever something it shows has changed."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import asdict, fields
+from typing import Any
+
+from sqlalchemy import and_, func, insert, select
+from sqlalchemy.orm import Session
+
+from app.soccer.solution import SOLVER_VERSION
+from app.store.models import (
+    DatasetModel,
+    GroupModel,
+    ImportFindingModel,
+    QueueModel,
+    SolutionModel,
+    VerdictModel,
+    ViewModel,
+)
+from app.store.solutions import read_summary
+from app.store.summary import Summary
+
+_BATCH = 1000
+_NUMBERS = [item.name for item in fields(Summary) if item.name not in ("passes", "findings")]
+
+
+def refresh_queue(session: Session, group_ids: Sequence[int]) -> None:
+    """Project groups, views, verdicts and solutions onto the queue's rows, anew for each group."""
+    for start in range(0, len(group_ids), _BATCH):
+        _refresh(session, group_ids[start : start + _BATCH])
+
+
+def _refresh(session: Session, ids: Sequence[int]) -> None:
+    views, verdicts = _views(session, ids), _verdicts(session, ids)
+    findings = import_findings(session, ids)
+    rows = []
+    for head, summary in _heads(session, ids):
+        row = {**_said(head, views[head.id]), **_judged(head, verdicts.get(head.id))}
+        row.update(_computed(summary, [item.kind for item in findings[head.id]]))
+        rows.append(row)
+    if rows:
+        statement = insert(QueueModel).prefix_with("OR REPLACE")
+        session.execute(statement, rows, execution_options={"render_nulls": True})
+
+
+def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, Summary | None]]:
+    """Groups with the summary of the solution that fits their present state, if there is one."""
+    statement = (
+        select(*GroupModel.__table__.columns, SolutionModel.summary)
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .outerjoin(
+            SolutionModel,
+            and_(
+                SolutionModel.group_id == GroupModel.id,
+                SolutionModel.inputs_hash == GroupModel.inputs_hash,
+                SolutionModel.policy_hash == DatasetModel.policy_hash,
+                SolutionModel.solver_version == SOLVER_VERSION,
+            ),
+        )
+        .where(GroupModel.id.in_(ids))
+    )
+    return [
+        (row, None if row.summary is None else read_summary(row.summary))
+        for row in session.execute(statement)
+    ]
+
+
+def _views(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
+    statement = (
+        select(ViewModel.group_id, ViewModel.id, ViewModel.key, ViewModel.media_path)
+        .where(ViewModel.group_id.in_(ids))
+        .order_by(ViewModel.position)
+    )
+    views: dict[int, list[Any]] = defaultdict(list)
+    for row in session.execute(statement):
+        views[row.group_id].append(row)
+    return views
+
+
+def _verdicts(session: Session, ids: Sequence[int]) -> dict[int, Any]:
+    newest = (
+        select(func.max(VerdictModel.id))
+        .where(VerdictModel.group_id.in_(ids))
+        .group_by(VerdictModel.group_id)
+    )
+    rows = session.execute(
+        select(*VerdictModel.__table__.columns).where(VerdictModel.id.in_(newest))
+    )
+    return {row.group_id: row for row in rows}
+
+
+def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
+    """What imports noticed about groups and about the shared stations of their views.
+
+    Returns:
+        Rows (kind, sentence, view) by group id.
+    """
+    found: dict[int, list[Any]] = defaultdict(list)
+    model = ImportFindingModel
+    own = select(model.group_id.label("group"), model.kind, model.sentence, model.view)
+    for row in session.execute(own.where(model.group_id.in_(ids)).order_by(model.id)):
+        found[row.group].append(row)
+    shared = (
+        select(
+            ViewModel.group_id.label("group"),
+            model.kind,
+            model.sentence,
+            ViewModel.key.label("view"),
+        )
+        .join(ViewModel, ViewModel.station_id == model.station_id)
+        .where(ViewModel.group_id.in_(ids))
+        .order_by(model.id)
+    )
+    for row in session.execute(shared):
+        found[row.group].append(row)
+    return found
+
+
+def _said(head: Any, views: Sequence[Any]) -> dict[str, Any]:
+    main = views[0].id if views and views[0].media_path is not None else None
+    names = ("dataset_id", "number", "key", "label", "match", "split", "changed")
+    return {
+        **{name: getattr(head, name) for name in names},
+        "group_id": head.id,
+        "views": len(views),
+        "view_keys": _list([view.key for view in views]),
+        "main_view": main,
+    }
+
+
+def _judged(head: Any, verdict: Any) -> dict[str, Any]:
+    if verdict is None or verdict.state == "unreviewed":
+        nobody = dict.fromkeys(("reason", "reviewer", "override"))
+        return {**nobody, "status": "unreviewed", "stale": False, "fixed": False}
+    return {
+        "status": verdict.state,
+        "stale": verdict.inputs_hash != head.inputs_hash,
+        "reason": verdict.reason,
+        "reviewer": verdict.actor,
+        "override": verdict.override,
+        "fixed": verdict.fixed,
+    }
+
+
+def _computed(summary: Summary | None, noticed: Sequence[str]) -> dict[str, Any]:
+    if summary is None:
+        nothing: dict[str, Any] = dict.fromkeys(_NUMBERS)
+        return {**nothing, "solved": False, "passes": None, "findings": _list(noticed)}
+    values = asdict(summary)
+    return {**values, "solved": True, "findings": _list([*summary.findings, *noticed])}
+
+
+def _list(items: Sequence[str]) -> str:
+    return f",{','.join(dict.fromkeys(items))}," if items else ""

@@ -1,0 +1,155 @@
+"""Solutions in the database: inserted under their key, never changed."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from sqlalchemy import select
+from sqlalchemy.dialects.sqlite import insert
+from sqlalchemy.orm import Session
+
+from app.soccer.group import Group
+from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
+from app.store import value_codec
+from app.store.models import CalibrationModel, SolutionModel
+from app.store.summary import Summary, summarize
+
+_ELSEWHERE = Calibration(source="", camera=None)
+"""Stands in a stored solution for the calibration that is kept under its key."""
+
+
+@dataclass(frozen=True)
+class SolutionKey:
+    """What a solution was computed from."""
+
+    group_id: int
+    inputs_hash: str
+    policy_hash: str
+    solver_version: str = SOLVER_VERSION
+
+
+@dataclass(frozen=True)
+class EncodedSolution:
+    """A solution as it is stored; small enough to travel between processes."""
+
+    calibrations: Mapping[str, bytes]
+    """Calibrations by key, those that the encoder was not told to be known."""
+    calibration_keys: tuple[str, ...]
+    summary: str
+    body: bytes
+
+
+def encode_solution(group: Group, solution: Solution, known: Iterable[str] = ()) -> EncodedSolution:
+    """A solution as bytes; calibrations under a known key are not encoded again."""
+    skip = set(known)
+    calibrations = {
+        view.calibration_key: encode_calibration(view.calibration)
+        for view in solution.views
+        if view.calibration_key not in skip
+    }
+    bare = tuple(replace(view, calibration=_ELSEWHERE) for view in solution.views)
+    return EncodedSolution(
+        calibrations=calibrations,
+        calibration_keys=tuple(view.calibration_key for view in solution.views),
+        summary=value_codec.dumps(value_codec.to_json(summarize(group, solution))),
+        body=_compress(value_codec.to_json(replace(solution, views=bare))),
+    )
+
+
+def encode_calibration(calibration: Calibration) -> bytes:
+    """A calibration as compressed JSON."""
+    return _compress(value_codec.to_json(calibration))
+
+
+def decode_calibration(body: bytes) -> Calibration:
+    """Back from ``encode_calibration``."""
+    return value_codec.from_json(Calibration, json.loads(zlib.decompress(body)))
+
+
+def _compress(value: object) -> bytes:
+    return zlib.compress(value_codec.dumps(value).encode())
+
+
+def insert_solutions(
+    session: Session, solutions: Sequence[tuple[SolutionKey, EncodedSolution]]
+) -> None:
+    """Insert solutions with their calibrations; what is already there stays."""
+    bodies: dict[str, bytes] = {}
+    for _key, encoded in solutions:
+        bodies.update(encoded.calibrations)
+    insert_calibrations(session, bodies)
+    if solutions:
+        session.execute(
+            insert(SolutionModel).on_conflict_do_nothing(),
+            [_row(key, encoded) for key, encoded in solutions],
+        )
+
+
+def insert_calibrations(session: Session, bodies: Mapping[str, bytes]) -> None:
+    """Insert encoded calibrations by key; what is already there stays."""
+    if bodies:
+        session.execute(
+            insert(CalibrationModel).on_conflict_do_nothing(),
+            [{"key": key, "body": body} for key, body in bodies.items()],
+        )
+
+
+def _row(key: SolutionKey, encoded: EncodedSolution) -> dict[str, object]:
+    return {
+        "group_id": key.group_id,
+        "inputs_hash": key.inputs_hash,
+        "policy_hash": key.policy_hash,
+        "solver_version": key.solver_version,
+        "calibrations": json.dumps(encoded.calibration_keys),
+        "summary": encoded.summary,
+        "body": encoded.body,
+    }
+
+
+def read_solutions(session: Session, keys: Iterable[SolutionKey]) -> dict[int, Solution]:
+    """Solutions by group id; a group without one under its key is left out."""
+    wanted = {key.group_id: key for key in keys}
+    statement = select(*SolutionModel.__table__.columns).where(
+        SolutionModel.group_id.in_(wanted),
+        SolutionModel.policy_hash.in_({key.policy_hash for key in wanted.values()}),
+        SolutionModel.inputs_hash.in_({key.inputs_hash for key in wanted.values()}),
+    )
+    rows = [
+        row
+        for row in session.execute(statement)
+        if wanted[row.group_id]
+        == SolutionKey(row.group_id, row.inputs_hash, row.policy_hash, row.solver_version)
+    ]
+    names = {name for row in rows for name in json.loads(row.calibrations)}
+    calibrations = read_calibrations(session, names)
+    return {row.group_id: _decode(row.body, calibrations) for row in rows}
+
+
+def _decode(body: bytes, calibrations: Mapping[str, Calibration]) -> Solution:
+    solution = value_codec.from_json(Solution, json.loads(zlib.decompress(body)))
+    views = tuple(
+        replace(view, calibration=calibrations[view.calibration_key]) for view in solution.views
+    )
+    return replace(solution, views=views)
+
+
+def read_calibrations(session: Session, keys: Iterable[str]) -> dict[str, Calibration]:
+    """Calibrations by key; unknown keys are left out."""
+    bodies = read_calibration_bodies(session, keys)
+    return {key: decode_calibration(body) for key, body in bodies.items()}
+
+
+def read_calibration_bodies(session: Session, keys: Iterable[str]) -> dict[str, bytes]:
+    """Encoded calibrations by key; unknown keys are left out."""
+    statement = select(CalibrationModel.key, CalibrationModel.body).where(
+        CalibrationModel.key.in_(list(keys))
+    )
+    return {row.key: row.body for row in session.execute(statement)}
+
+
+def read_summary(text: str) -> Summary:
+    """A stored summary."""
+    return value_codec.from_json(Summary, json.loads(text))

@@ -1,0 +1,123 @@
+"""Summary: the few numbers of a solution by which groups are listed, filtered and sorted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from app.soccer.frames import height_above_grass
+from app.soccer.group import Group
+from app.soccer.solution import BallFit, Gate, Pair, Solution
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a list shows of a solution; None where there is no such number.
+
+    Attributes:
+        margin: Of the first failing gate, or of the gate nearest to failing, in its unit.
+        value: The smallest distance of a gate to its threshold, as a share of the threshold.
+        min_jac: The lowest JaC of the views at the policy's gamma.
+        error_px: The largest reprojection error of the ball, or, without a ball, that of the
+            best pair; ``error_percent`` the same in per cent of the diagonal.
+        size_ratio: Annotated over optimised diameter, the one farthest from 1.
+        findings: Kinds, each once.
+    """
+
+    passes: bool
+    gate: str | None
+    gate_view: str | None
+    gate_sentence: str | None
+    margin: float | None
+    value: float | None
+    min_jac: float | None
+    error_px: float | None
+    error_percent: float | None
+    sigma_m: float | None
+    parallax_degrees: float | None
+    size_ratio: float | None
+    height_m: float | None
+    findings: tuple[str, ...]
+
+
+def summarize(group: Group, solution: Solution) -> Summary:
+    """The summary of a group's solution."""
+    failing, ball = solution.first_failing, solution.ball
+    nearest = _nearest(solution.gates)
+    decisive = failing or nearest
+    error_px, error_percent = _error(group, solution)
+    return Summary(
+        passes=solution.passes,
+        gate=failing.name if failing else None,
+        gate_view=failing.view if failing else None,
+        gate_sentence=failing.sentence if failing else None,
+        margin=_finite(decisive.margin) if decisive else None,
+        value=_relative_margin(nearest) if nearest else None,
+        min_jac=_min_jac(solution),
+        error_px=error_px,
+        error_percent=error_percent,
+        sigma_m=_finite(ball.sigma_m) if ball else None,
+        parallax_degrees=ball.parallax_degrees if ball else _parallax(solution.pairs),
+        size_ratio=_size_ratio(solution),
+        height_m=height_above_grass(ball.point[2]) if ball else None,
+        findings=tuple(dict.fromkeys(finding.kind for finding in solution.findings)),
+    )
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
+
+
+def _relative_margin(gate: Gate) -> float | None:
+    if gate.margin is None or gate.threshold is None or not math.isfinite(gate.margin):
+        return None
+    return abs(gate.margin) / (abs(gate.threshold) or 1.0)
+
+
+def _nearest(gates: tuple[Gate, ...]) -> Gate | None:
+    measured = [gate for gate in gates if gate.active and _relative_margin(gate) is not None]
+    return min(measured, key=lambda gate: _relative_margin(gate) or 0.0, default=None)
+
+
+def _min_jac(solution: Solution) -> float | None:
+    # The first of GAMMAS_PERCENT is the one that curation speaks of.
+    measured = (view.calibration.jac for view in solution.views)
+    return min((jac[0] for jac in measured if jac), default=None)
+
+
+def _error(group: Group, solution: Solution) -> tuple[float | None, float | None]:
+    fits = [fit for fit in _fits(solution) if fit.error_percent is not None]
+    if fits:
+        worst = max(fits, key=lambda fit: fit.error_percent or 0.0)
+        return worst.error_px, worst.error_percent
+    ranked = sorted(_pair_error(group, pair) for pair in solution.pairs)
+    if not ranked or not math.isfinite(ranked[0][0]):
+        return None, None
+    return ranked[0][1], ranked[0][0]
+
+
+def _pair_error(group: Group, pair: Pair) -> tuple[float, float]:
+    errors = []
+    for key, error in zip((pair.a, pair.b), pair.errors_px, strict=True):
+        view = group.view(key)
+        diagonal = view.size.diagonal if view else math.nan
+        percent = 100.0 * error / diagonal
+        errors.append((percent if math.isfinite(percent) else math.inf, error))
+    return max(errors)
+
+
+def _fits(solution: Solution) -> list[BallFit]:
+    """Fits of the views that the ball comes from."""
+    if solution.ball is None:
+        return []
+    views = (view for view in solution.views if view.view in solution.ball.views)
+    return [view.ball for view in views if view.ball is not None]
+
+
+def _parallax(pairs: tuple[Pair, ...]) -> float | None:
+    return max((pair.parallax_degrees for pair in pairs), default=None)
+
+
+def _size_ratio(solution: Solution) -> float | None:
+    ratios = [fit.size_ratio for fit in _fits(solution) if fit.size_ratio]
+    return max(ratios, key=lambda ratio: abs(math.log(ratio)), default=None)

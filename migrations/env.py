@@ -1,0 +1,13 @@
+"""Alembic's entry: runs on the connection and in the transaction that app.store.migrate opens."""
+
+from alembic import context
+
+from app.store.models import Base
+
+context.configure(
+    connection=context.config.attributes["connection"],
+    target_metadata=Base.metadata,
+    # The connection has begun IMMEDIATE, and SQLite's DDL is transactional.
+    transactional_ddl=True,
+)
+context.run_migrations()

@@ -1,0 +1,80 @@
+"""A real database file for each test, and small values to put into it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.config import Settings
+from app.geometry.camera import Camera
+from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.soccer.annotation import BallAnnotation, Extras, make_lines
+from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.group import Group, Media, Station, View
+from app.soccer.pitch import Pitch
+from app.store.session import Store
+
+
+@pytest.fixture(scope="session")
+def migrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A migrated, empty database file; copying it is faster than migrating for each test."""
+    settings = Settings(home=tmp_path_factory.mktemp("migrated"))
+    Store.open(settings).close()
+    return settings.home / "touchline.db"
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(home=tmp_path / "home")
+
+
+@pytest.fixture
+def store(settings: Settings, migrated: Path) -> Iterator[Store]:
+    settings.home.mkdir()
+    shutil.copy(migrated, settings.home / "touchline.db")
+    store = Store.open(settings)
+    yield store
+    store.close()
+
+
+@pytest.fixture
+def camera() -> Camera:
+    return Camera(
+        rotation=rotation_from_pan_tilt_roll(*np.radians([12.3, 78.9, -0.4])),
+        position=np.array([1.25, 61.5, -18.75]),
+        focal_length=(2100.5, 2099.25),
+        principal_point=(639.5, 359.5),
+        skew=0.125,
+        distortion=np.array([0.1, -0.02, 1e-3, 2e-3, 0.3, 0.4, 0.5, 0.6, 1e-4, 2e-4, 3e-4, 4e-4]),
+    )
+
+
+@pytest.fixture
+def group(camera: Camera) -> Group:
+    """A group with one of everything that a group can hold."""
+    third = 1 / 3
+    lines = make_lines({"Middle line": [(0.1, 0.2 + 0.1), (third, -7.5)]})
+    shared = Station("cam1", ImageSize(1920, 1080), shared=True, given=camera, flipped=True)
+    own = Station("m/7.png", ImageSize(1280, 720), lines=lines, calibration="lines")
+    extras = Extras(
+        boxes=({"class": None, "ID": "7", "points": {"x1": 1, "y1": 2.5}},),
+        lines=({"class": "Line unknown", "points": [1, 2]},),
+        metadata={"gameTime": "1 - 12:41", "nested": {"a": [None, True, "ö"]}},
+    )
+    box = BallAnnotation(box=Box(1.5, third, 14.0, 15.0), occluded=True)
+    return Group(
+        "m/7.png",
+        (
+            View("7.png", own, (box,), Media("/frames.zip", "7.png"), extras=extras),
+            View("cam1", shared, (BallAnnotation(point=ImagePoint(3.0, 4.0)),), included=False),
+            View("cam2", shared, (BallAnnotation(out_of_view=True),), Media("/v.mp4", frame=12)),
+        ),
+        match="m",
+        pitch=Pitch(104.5, 67.25),
+        split="test",
+        label="Alder 3 – 1 Birch",
+    )

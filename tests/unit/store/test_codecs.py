@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.soccer.annotation import BallAnnotation, Extras
+from app.soccer.frames import Box
+from app.soccer.policy import PAPER, STRICT, CalibrationPolicy, Policy
+from app.store import codecs
+
+FLOATS = st.floats(allow_nan=False, allow_infinity=False)
+
+
+class TestGroup:
+    def test_comes_back_to_the_last_bit(self, group) -> None:
+        value = codecs.unpack(codecs.pack(codecs.group_to_json(group)))
+        assert codecs.group_from_json(value) == group
+
+    def test_a_shared_station_can_stand_as_its_key(self, group) -> None:
+        view = group.views[1]
+        value = codecs.view_to_json(view, "cam1")
+        assert value["station"] == "cam1"
+        assert codecs.view_from_json(value, view.station) == view
+
+    def test_integers_and_floats_are_one_text(self) -> None:
+        whole = BallAnnotation(box=Box(1, 2, 3, 4))
+        assert codecs.canonical(codecs.ball_to_json(whole)) == codecs.canonical(
+            codecs.ball_to_json(BallAnnotation(box=Box(1.0, 2.0, 3.0, 4.0)))
+        )
+
+    def test_no_extras_are_nothing(self) -> None:
+        assert codecs.extras_to_json(Extras()) is None
+        assert codecs.extras_from_json(None) == Extras()
+
+
+class TestCamera:
+    def test_every_number_comes_back(self, camera) -> None:
+        text = codecs.canonical(codecs.camera_to_json(camera))
+        again = codecs.camera_from_json(json.loads(text))
+        assert np.array_equal(again.parameters, camera.parameters)
+
+
+class TestPolicy:
+    @pytest.mark.parametrize("policy", [PAPER, STRICT, Policy(name="mine", tau_percent=0.7)])
+    def test_comes_back(self, policy: Policy) -> None:
+        again = codecs.policy_from_json(
+            codecs.parse(codecs.canonical(codecs.policy_to_json(policy)))
+        )
+        assert again == policy
+        assert again.hash == policy.hash
+
+    def test_thresholds_that_are_not_named_keep_their_default(self) -> None:
+        assert codecs.policy_from_json({"name": "x"}) == replace(PAPER, name="x")
+        assert codecs.policy_from_json({"calibration": {}}).calibration == CalibrationPolicy()
+
+
+class TestCanonical:
+    @given(st.lists(FLOATS))
+    def test_floats_come_back_the_same_bits(self, values: list[float]) -> None:
+        again = codecs.unpack(codecs.pack(values))
+        assert np.array(again).tobytes() == np.array(values).tobytes()
+
+    def test_keys_are_sorted_and_nan_is_refused(self) -> None:
+        assert codecs.canonical({"b": 1, "a": [1.5, None]}) == '{"a":[1.5,null],"b":1}'
+        with pytest.raises(ValueError, match="JSON"):
+            codecs.canonical(float("inf"))

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from app.soccer.annotation import BallAnnotation, Extras, make_lines
+from app.soccer.frames import ImageSize
+from app.soccer.group import Group, Media
+from app.soccer.pitch import Pitch
+from app.store.codecs import group_from_json, group_to_json
+from app.store.digest import group_inputs_hash, source_hash, station_digest, view_digest
+
+
+def with_station(group: Group, **changes) -> Group:
+    view = group.views[0]
+    return group.with_view(replace(view, station=replace(view.station, **changes)))
+
+
+def with_view(group: Group, **changes) -> Group:
+    return group.with_view(replace(group.views[0], **changes))
+
+
+class TestInputsHash:
+    @pytest.mark.parametrize(
+        "change",
+        [
+            lambda g, c: replace(g, pitch=Pitch(100.0, 64.0)),
+            lambda g, c: replace(g, views=g.views[::-1]),
+            lambda g, c: replace(g, views=g.views[:2]),
+            lambda g, c: with_view(g, included=False),
+            lambda g, c: with_view(g, balls=()),
+            lambda g, c: with_view(g, balls=(replace(g.views[0].balls[0], occluded=False),)),
+            lambda g, c: with_view(g, balls=(BallAnnotation(out_of_view=True),)),
+            lambda g, c: with_station(g, lines=make_lines({})),
+            lambda g, c: with_station(g, size=ImageSize(1280, 721)),
+            lambda g, c: with_station(g, given=c),
+            lambda g, c: with_station(g, calibration="given"),
+        ],
+    )
+    def test_changes_with_everything_that_solving_reads(self, group, camera, change) -> None:
+        assert group_inputs_hash(change(group, camera)) != group_inputs_hash(group)
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            lambda g: replace(g, label="other", split="train"),
+            lambda g: with_view(g, media=Media("/elsewhere")),
+            lambda g: with_view(g, extras=Extras()),
+            lambda g: with_station(g, flipped=True),
+        ],
+    )
+    def test_stays_with_everything_else(self, group, change) -> None:
+        assert group_inputs_hash(change(group)) == group_inputs_hash(group)
+        assert source_hash(change(group)) != source_hash(group)
+
+    def test_is_the_same_after_a_round_trip(self, group) -> None:
+        again = group_from_json(group_to_json(group))
+        assert group_inputs_hash(again) == group_inputs_hash(group)
+        assert source_hash(again) == source_hash(group)
+
+
+class TestSourceHash:
+    def test_does_not_hold_what_is_compared_once_for_all_groups(self, group, camera) -> None:
+        shared = replace(group.views[1].station, given=None)
+        other = group.with_view(replace(group.views[1], station=shared))
+        assert source_hash(other) == source_hash(group)
+        assert station_digest(shared) != station_digest(group.views[1].station)
+        assert view_digest(other.views[1]) == view_digest(group.views[1])

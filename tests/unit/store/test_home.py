@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.errors import StorageError
+from app.store.home import file_system, make_home, server_lock
+
+MOUNTS = """\
+/dev/vda / ext4 rw 0 0
+server:/share /mnt/team nfs4 rw 0 0
+//server/x /mnt/with\\040space cifs rw 0 0
+/dev/vdb /mnt/team/local ext4 rw 0 0
+"""
+
+
+class TestFileSystem:
+    @pytest.mark.parametrize(
+        ("folder", "kind"),
+        [
+            ("/home/ann", "ext4"),
+            ("/mnt/team/data", "nfs4"),
+            ("/mnt/team/local/data", "ext4"),
+            ("/mnt/with space/a", "cifs"),
+            ("/mnt/teammates", "ext4"),
+        ],
+    )
+    def test_is_that_of_the_nearest_mount(self, tmp_path: Path, folder: str, kind: str) -> None:
+        mounts = tmp_path / "mounts"
+        mounts.write_text(MOUNTS)
+        assert file_system(Path(folder), mounts) == kind
+
+    def test_nobody_says_where_there_is_no_list(self, tmp_path: Path) -> None:
+        assert file_system(tmp_path, tmp_path / "nothing") == ""
+
+
+class TestMakeHome:
+    def test_a_network_file_system_is_refused(self, settings, monkeypatch) -> None:
+        monkeypatch.setattr("app.store.home.file_system", lambda _folder: "nfs4")
+        with pytest.raises(StorageError, match="network file system"):
+            make_home(settings)
+
+    def test_a_home_that_cannot_be_made_is_said(self, settings, tmp_path: Path) -> None:
+        (tmp_path / "file").write_text("")
+        other = settings.model_copy(update={"home": tmp_path / "file" / "home"})
+        with pytest.raises(StorageError, match="cannot be made"):
+            make_home(other)
+
+
+class TestServerLock:
+    def test_a_home_has_one_server(self, settings) -> None:
+        refused = pytest.raises(StorageError, match="another Touchline server")
+        with server_lock(settings), refused, server_lock(settings):
+            pass
+        with server_lock(settings):
+            pass

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import struct
+import zlib
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.config import Settings
+from app.errors import ImageError, TooLargeError
+from app.store.image_header import ImageHeader, check_size, read_header
+
+PICTURE = np.random.default_rng(3).integers(0, 255, (37, 53, 3), dtype=np.uint8)
+WEBP_LOSSLESS = [cv2.IMWRITE_WEBP_QUALITY, 101]
+
+
+def encoded(suffix: str, *options: int) -> bytes:
+    return cv2.imencode(suffix, PICTURE, list(options))[1].tobytes()
+
+
+def png(width: int, height: int) -> bytes:
+    """The beginning of a PNG that declares a size."""
+    header = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n\x00\x00\x00\x0d" + header + struct.pack(">I", zlib.crc32(header))
+
+
+def webp_extended(width: int, height: int) -> bytes:
+    body = b"VP8X\x0a\0\0\0" + bytes(4) + (width - 1).to_bytes(3, "little")
+    body += (height - 1).to_bytes(3, "little")
+    return b"RIFF" + struct.pack("<I", len(body) + 4) + b"WEBP" + body
+
+
+class TestReadHeader:
+    @pytest.mark.parametrize(
+        ("data", "kind"),
+        [
+            (encoded(".jpg"), "image/jpeg"),
+            (encoded(".jpg", cv2.IMWRITE_JPEG_PROGRESSIVE, 1), "image/jpeg"),
+            (encoded(".png"), "image/png"),
+            (encoded(".webp"), "image/webp"),
+            (encoded(".webp", *WEBP_LOSSLESS), "image/webp"),
+        ],
+    )
+    def test_agrees_with_the_encoder(self, data: bytes, kind: str) -> None:
+        assert read_header(data) == ImageHeader(kind, 53, 37)
+
+    def test_an_extended_webp_declares_its_canvas(self) -> None:
+        assert read_header(webp_extended(16000, 9)) == ImageHeader("image/webp", 16000, 9)
+
+    def test_a_comment_before_the_frame_of_a_jpeg_is_skipped(self) -> None:
+        data = encoded(".jpg")
+        comment = b"\xff\xfe\x00\x06\xff\xc0\x00\x00"
+        assert read_header(data[:2] + comment + data[2:]) == ImageHeader("image/jpeg", 53, 37)
+
+    @pytest.mark.parametrize(
+        "data",
+        [
+            b"",
+            b"GIF89a" + bytes(50),
+            b"<svg xmlns='http://www.w3.org/2000/svg'/>",
+            b"BM" + bytes(60),
+            b"\xff\xd8\xff\xd9",
+            b"\xff\xd8\xff\xe0\x00\x00" + bytes(20),
+            b"\xff\xd8\xff",
+            encoded(".png")[:20],
+            encoded(".jpg")[:15],
+            encoded(".webp")[:16],
+            b"\x89PNG\r\n\x1a\n" + bytes(40),
+            b"RIFF\0\0\0\0WEBPJUNK" + bytes(20),
+        ],
+    )
+    def test_what_is_no_image_is_refused_in_a_sentence(self, data: bytes) -> None:
+        with pytest.raises(ImageError):
+            read_header(data)
+
+    @given(st.binary(max_size=60))
+    def test_any_bytes_are_a_header_or_an_image_error(self, data: bytes) -> None:
+        for start in (b"", b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"RIFF\0\0\0\0WEBP"):
+            try:
+                read_header(start + data)
+            except ImageError as error:
+                assert error.message
+
+
+class TestCheckSize:
+    @pytest.mark.parametrize(
+        ("width", "height", "error"),
+        [
+            (16_385, 1, TooLargeError),
+            (1, 16_385, TooLargeError),
+            (10_000, 5_001, TooLargeError),
+            (0, 5, ImageError),
+        ],
+    )
+    def test_refuses_what_is_too_large_or_nothing(self, width, height, error) -> None:
+        with pytest.raises(error, match=f"{width} x {height}"):
+            check_size(read_header(png(width, height)), Settings())
+
+    def test_takes_the_largest_that_is_allowed(self) -> None:
+        check_size(read_header(png(10_000, 5_000)), Settings())
+        check_size(read_header(png(16_384, 3_051)), Settings())

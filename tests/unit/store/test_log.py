@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from sqlalchemy import text
+
+from app.errors import StorageError
+from app.store.log import Entry, append, read_log, verify_chain
+from app.store.models import LogModel
+
+FIRST = Entry("import", "ann", "2030-01-01T00:00:00+00:00", {"x": 0.1 + 0.2}, 1, 7)
+
+
+def fill(store, count: int) -> None:
+    with store.write() as session:
+        append(session, [replace(FIRST, body={"n": number}) for number in range(count)])
+
+
+class TestAppend:
+    def test_entries_come_back_in_order_with_ids(self, store) -> None:
+        with store.write() as session:
+            assert append(session, [FIRST, replace(FIRST, kind="edit", group_id=8)]) == [1, 2]
+            assert append(session, []) == []
+        with store.write() as session:
+            assert append(session, [replace(FIRST, group_id=None, station_id=3)]) == [3]
+        with store.read() as session:
+            entries = list(read_log(session))
+        assert [(item.id, item.kind, item.group_id) for item in entries] == [
+            (1, "import", 7),
+            (2, "edit", 8),
+            (3, "import", None),
+        ]
+        assert entries[0].body == FIRST.body
+
+    def test_a_number_that_is_none_is_refused(self, store) -> None:
+        with pytest.raises(ValueError, match="JSON"), store.write() as session:
+            append(session, [replace(FIRST, body={"x": float("nan")})])
+
+
+class TestReadLog:
+    def test_a_long_log_comes_in_batches(self, store, monkeypatch) -> None:
+        monkeypatch.setattr("app.store.log._BATCH", 3)
+        fill(store, 10)
+        with store.read() as session:
+            assert [item.body["n"] for item in read_log(session)] == list(range(10))
+            assert [item.id for item in read_log(session, LogModel.group_id == 7, after=8)] == [
+                9,
+                10,
+            ]
+
+
+class TestVerifyChain:
+    def test_counts_a_sound_log(self, store) -> None:
+        fill(store, 5)
+        with store.read() as session:
+            assert verify_chain(session) == 5
+
+    @pytest.mark.parametrize(
+        ("statement", "row"),
+        [
+            ("UPDATE log SET actor = 'eve' WHERE id = 3", 3),
+            ("UPDATE log SET group_id = 9 WHERE id = 3", 3),
+            ("UPDATE log SET at = '2031' WHERE id = 5", 5),
+            ("UPDATE log SET body = (SELECT body FROM log WHERE id = 1) WHERE id = 3", 3),
+            ("DELETE FROM log WHERE id = 2", 3),
+            ("DELETE FROM log WHERE id = 1", 2),
+        ],
+    )
+    def test_names_the_first_row_that_is_not_what_was_written(
+        self, store, statement: str, row: int
+    ) -> None:
+        fill(store, 5)
+        with store.write() as session:
+            for verb in ("update", "delete"):
+                session.execute(text(f"DROP TRIGGER log_refuses_{verb}"))
+            session.execute(text(statement))
+        with store.read() as session, pytest.raises(StorageError, match=f"row {row} of the log"):
+            verify_chain(session)

@@ -1,0 +1,208 @@
+from __future__ import annotations
+
+import struct
+import threading
+import zipfile
+import zlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.errors import ImageError, NotFoundError, TooLargeError
+from app.soccer.group import Media
+from app.store.archives import Archives
+from app.store.media import content_type, media_facts, read_frame
+
+# Left half dark, right half bright: a flip is seen.
+PICTURE = np.concatenate(
+    [np.full((90, 80, 3), 20, np.uint8), np.full((90, 80, 3), 230, np.uint8)], axis=1
+)
+PNG = cv2.imencode(".png", PICTURE)[1].tobytes()
+
+
+def decoded(data: bytes) -> np.ndarray:
+    return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+
+
+def bomb(width: int, height: int) -> bytes:
+    """A whole PNG of few bytes that declares many pixels."""
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        whole = kind + body
+        return struct.pack(">I", len(body)) + whole + struct.pack(">I", zlib.crc32(whole))
+
+    header = struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0)
+    rows = zlib.compress(bytes((width // 8 + 2) * 16))
+    return (
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
+    )
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "7.png"
+    path.write_bytes(PNG)
+    return path
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Path:
+    path = tmp_path / "Frames-v3.zip"
+    with zipfile.ZipFile(path, "w") as target:
+        target.writestr("v3_frames/7.png", PNG)
+    return path
+
+
+class TestReadFrame:
+    def test_a_file_comes_as_it_is(self, file, settings) -> None:
+        data = read_frame(Media(str(file)), None, False, settings)
+        assert data == PNG
+        assert content_type(data) == "image/png"
+
+    def test_a_member_of_an_archive_is_read_in_place(self, archive, settings) -> None:
+        media = Media(str(archive), "v3_frames/7.png")
+        assert read_frame(media, None, False, settings) == PNG
+        assert not settings.cache.exists()
+
+    def test_is_made_small_and_cached(self, archive, settings) -> None:
+        media = Media(str(archive), "v3_frames/7.png")
+        data = read_frame(media, 40, False, settings)
+        assert decoded(data).shape == (22, 40, 3)
+        assert content_type(data) == "image/jpeg"
+        (cached,) = (path for path in settings.cache.rglob("*") if path.is_file())
+        assert cached.read_bytes() == data
+        cached.write_bytes(b"from the cache")
+        assert read_frame(media, 40, False, settings) == b"from the cache"
+
+    def test_another_file_in_its_place_is_another_picture(self, file, settings) -> None:
+        first = read_frame(Media(str(file)), 40, False, settings)
+        file.write_bytes(cv2.imencode(".png", 255 - PICTURE)[1].tobytes())
+        assert read_frame(Media(str(file)), 40, False, settings) != first
+
+    def test_is_never_enlarged(self, file, settings) -> None:
+        assert decoded(read_frame(Media(str(file)), 4000, False, settings)).shape == (90, 160, 3)
+
+    def test_a_mirrored_camera_is_turned_right(self, file, settings) -> None:
+        plain = decoded(read_frame(Media(str(file)), 40, False, settings))
+        turned = decoded(read_frame(Media(str(file)), 40, True, settings))
+        assert plain[:, 5].mean() < 60 < 200 < turned[:, 5].mean()
+
+    def test_a_full_disk_costs_the_cache_and_no_picture(self, file, settings) -> None:
+        settings.home.mkdir()
+        settings.cache.write_text("a file where the cache should be")
+        assert decoded(read_frame(Media(str(file)), 40, False, settings)).shape[1] == 40
+
+    def test_a_frame_of_a_video(self, tmp_path, settings) -> None:
+        path = tmp_path / "cam1.avi"
+        video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 25, (160, 96))
+        for level in (10, 90, 200):
+            video.write(np.full((96, 160, 3), level, np.uint8))
+        video.release()
+        data = read_frame(Media(str(path), frame=2), None, False, settings)
+        assert decoded(data).mean() == pytest.approx(200, abs=6)
+        with pytest.raises(NotFoundError, match="no frame 7"):
+            read_frame(Media(str(path), frame=7), None, False, settings)
+
+    @pytest.mark.parametrize("width", [None, 40])
+    def test_a_bomb_is_refused_before_it_is_decoded(
+        self, tmp_path, settings, monkeypatch, width
+    ) -> None:
+        path = tmp_path / "bomb.png"
+        path.write_bytes(bomb(16_000, 16_000))
+        monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("decoded"))
+        with pytest.raises(TooLargeError, match="16000 x 16000"):
+            read_frame(Media(str(path)), width, False, settings)
+
+    @pytest.mark.parametrize("width", [None, 40])
+    @pytest.mark.parametrize("data", [b"", b"hello", b"<svg/>", PNG[:60], b"\xff\xd8\xff\xe0" * 9])
+    def test_what_is_no_image_is_said(self, tmp_path, settings, data, width) -> None:
+        path = tmp_path / "x.png"
+        path.write_bytes(data)
+        with pytest.raises(ImageError):
+            read_frame(Media(str(path)), width, False, settings)
+
+    def test_what_is_too_many_bytes_is_not_read(self, file, archive, settings) -> None:
+        small = settings.model_copy(update={"max_file_bytes": 50})
+        for media in (Media(str(file)), Media(str(archive), "v3_frames/7.png")):
+            with pytest.raises(TooLargeError, match="larger than 50 bytes"):
+                read_frame(media, None, False, small)
+
+    @pytest.mark.parametrize("width", [None, 40])
+    def test_what_is_gone_is_named_without_its_folder(
+        self, tmp_path, archive, settings, width
+    ) -> None:
+        for media in (
+            Media(str(tmp_path / "gone.png")),
+            Media(str(tmp_path / "gone.zip"), "7.png"),
+            Media(str(archive), "gone.png"),
+            Media(str(tmp_path / "gone.mp4"), frame=3),
+            Media(str(tmp_path)),
+        ):
+            with pytest.raises(NotFoundError) as caught:
+                read_frame(media, width, False, settings)
+            assert str(tmp_path) not in caught.value.message
+
+    def test_a_truncated_archive_is_said(self, archive, settings) -> None:
+        archive.write_bytes(archive.read_bytes()[:-30])
+        with pytest.raises(ImageError, match="no complete zip"):
+            read_frame(Media(str(archive), "v3_frames/7.png"), None, False, settings)
+
+    def test_a_damaged_member_is_said(self, archive, settings) -> None:
+        data = bytearray(archive.read_bytes())
+        data[80] ^= 0xFF
+        archive.write_bytes(data)
+        with pytest.raises(ImageError, match="cannot be read"):
+            read_frame(Media(str(archive), "v3_frames/7.png"), None, False, settings)
+
+
+class TestMediaFacts:
+    def test_an_archive_knows_size_and_checksum(self, file, archive) -> None:
+        assert media_facts(Media(str(archive), "v3_frames/7.png")) == {
+            "bytes": len(PNG),
+            "crc32": zlib.crc32(PNG),
+        }
+        assert media_facts(Media(str(file))) == {"bytes": len(PNG)}
+
+    def test_what_is_gone_has_none(self, tmp_path, archive) -> None:
+        assert media_facts(Media(str(tmp_path / "gone.png"))) == {}
+        assert media_facts(Media(str(archive), "gone.png")) == {}
+
+
+class TestArchives:
+    def test_few_stay_open_and_all_are_read(self, tmp_path) -> None:
+        archives = Archives(most=2)
+        paths = []
+        for number in range(5):
+            path = tmp_path / f"{number}.zip"
+            with zipfile.ZipFile(path, "w") as target:
+                target.writestr("a", str(number))
+            paths.append(path)
+        for _ in range(2):
+            read = [archives.read(path, "a", 10) for path in paths]
+            assert read == [b"0", b"1", b"2", b"3", b"4"]
+        assert len(archives._open) == 2
+        archives.close()
+        assert not archives._open
+
+    def test_many_threads_read_at_once(self, tmp_path) -> None:
+        path = tmp_path / "a.zip"
+        bodies = {str(number): bytes([number]) * 50_000 for number in range(8)}
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as target:
+            for name, body in bodies.items():
+                target.writestr(name, body)
+        archives, wrong = Archives(), []
+
+        def work() -> None:
+            wrong.extend(
+                name for name, body in bodies.items() if archives.read(path, name, 10**6) != body
+            )
+
+        threads = [threading.Thread(target=work) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert wrong == []
+        archives.close()

@@ -1,0 +1,212 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pysqlite3.dbapi2 as sqlite
+import pytest
+from sqlalchemy import text
+
+from app.config import Settings
+from app.errors import InputError, StorageError
+from app.store.migrate import SCHEMA_REVISION, migrate
+from app.store.session import PRAGMAS, Store, ping
+
+INSERT = "INSERT INTO dataset (name, created, policy, policy_hash) VALUES ('{}', '', '', '')"
+
+
+def names(store: Store) -> list[str]:
+    with store.read() as session:
+        return list(session.scalars(text("SELECT name FROM dataset ORDER BY id")))
+
+
+def add(store: Store, name: str) -> None:
+    with store.write() as session:
+        session.execute(text(INSERT.format(name)))
+
+
+class TestOpen:
+    def test_an_empty_home_is_migrated_and_private(self, settings: Settings) -> None:
+        store = Store.open(settings)
+        assert names(store) == []
+        assert settings.home.stat().st_mode & 0o777 == 0o700
+        store.close()
+
+    @pytest.mark.parametrize("name", PRAGMAS)
+    def test_every_connection_keeps_the_promises(self, store: Store, name: str) -> None:
+        with store.read() as one, store.read() as two, store.write() as three:
+            for session in (one, two, three):
+                answer = session.execute(text(f"PRAGMA {name}")).scalar()
+                assert answer == PRAGMAS[name][1]
+
+    def test_a_weaker_promise_is_noticed(self, settings: Settings, monkeypatch) -> None:
+        # The planted fault: what is set is weaker than what must be answered.
+        monkeypatch.setitem(PRAGMAS, "synchronous", ("NORMAL", 2))
+        with pytest.raises(StorageError, match="synchronous"):
+            Store.open(settings)
+
+    def test_a_newer_schema_is_refused(self, store: Store, settings: Settings) -> None:
+        with store.write() as session:
+            session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+        for attempt in (Store.open, migrate):
+            with pytest.raises(StorageError, match="newer version"):
+                attempt(settings)
+
+    def test_an_older_schema_asks_for_a_migration(
+        self, store: Store, settings: Settings, monkeypatch
+    ) -> None:
+        monkeypatch.setattr("app.store.session.SCHEMA_REVISION", "0002")
+        with pytest.raises(StorageError, match="older version") as caught:
+            Store.open(settings)
+        assert caught.value.hint == "Run touchline migrate."
+
+    def test_a_file_that_is_no_database_is_named(self, settings: Settings) -> None:
+        settings.home.mkdir()
+        (settings.home / "touchline.db").write_bytes(b"certainly not a database\n" * 100)
+        with pytest.raises(StorageError, match=r"touchline\.db is damaged"):
+            Store.open(settings)
+
+    def test_other_databases_are_refused(self, settings: Settings) -> None:
+        other = settings.model_copy(update={"database_url": "postgresql://localhost/x"})
+        with pytest.raises(InputError, match="SQLite"):
+            Store.open(other)
+
+
+class TestWrite:
+    def test_is_kept_when_the_block_ends_and_not_otherwise(self, store: Store) -> None:
+        add(store, "kept")
+        with pytest.raises(KeyError), store.write() as session:
+            session.execute(text(INSERT.format("lost")))
+            raise KeyError
+        assert names(store) == ["kept"]
+
+    def test_begins_immediately(self, store: Store, settings: Settings) -> None:
+        other = sqlite.connect(str(settings.home / "touchline.db"), timeout=0)
+        with store.write(), pytest.raises(sqlite.OperationalError, match="locked"):
+            other.execute("BEGIN IMMEDIATE")
+        other.execute("BEGIN IMMEDIATE")
+        other.close()
+
+    def test_reading_does_not_lock(self, store: Store) -> None:
+        with store.read() as session:
+            session.execute(text("SELECT 1"))
+            add(store, "beside")
+            # One snapshot from begin to end.
+            assert session.execute(text("SELECT count(*) FROM dataset")).scalar() in (0, 1)
+
+    def test_a_reader_keeps_its_snapshot(self, store: Store) -> None:
+        with store.read() as session:
+            before = session.execute(text("SELECT count(*) FROM dataset")).scalar()
+            add(store, "later")
+            assert session.execute(text("SELECT count(*) FROM dataset")).scalar() == before
+
+    def test_threads_take_turns(self, store: Store) -> None:
+        def work(number: int) -> None:
+            for step in range(5):
+                add(store, f"{number}-{step}")
+
+        threads = [threading.Thread(target=work, args=(number,)) for number in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert len(names(store)) == 20
+
+    def test_a_full_disk_is_a_storage_error_and_reads_go_on(self, store: Store) -> None:
+        add(store, "before")
+        with store.read() as session:
+            pages = session.execute(text("PRAGMA page_count")).scalar_one()
+        with pytest.raises(StorageError, match="disk is full"), store.write() as session:
+            session.execute(text(f"PRAGMA max_page_count = {pages}"))
+            for number in range(5000):
+                session.execute(text(INSERT.format(f"x{number}" * 20)))
+        assert names(store) == ["before"]
+
+    def test_a_busy_database_is_a_storage_error(self, store: Store, settings: Settings) -> None:
+        other = sqlite.connect(str(settings.home / "touchline.db"), isolation_level=None)
+        other.execute("BEGIN IMMEDIATE")
+        busy = pytest.raises(StorageError, match="another process is writing")
+        with busy, store.read() as session:
+            session.execute(text("PRAGMA busy_timeout = 1"))
+            session.execute(text("DELETE FROM dataset"))
+        other.execute("ROLLBACK")
+        other.close()
+
+    def test_what_was_acknowledged_survives_a_killed_process(self, store, settings) -> None:
+        script = (
+            "import os, sys; from pathlib import Path; from app.config import Settings;"
+            "from app.store.session import Store; from sqlalchemy import text\n"
+            "store = Store.open(Settings(home=Path(sys.argv[1])))\n"
+            "with store.write() as session:\n"
+            f"    session.execute(text({INSERT.format('acknowledged')!r}))\n"
+            "print('saved', flush=True)\n"
+            "writing = store.write().__enter__()\n"
+            f"writing.execute(text({INSERT.format('lost')!r}))\n"
+            "os.kill(os.getpid(), 9)\n"
+        )
+        root = Path(__file__).parents[3]
+        done = subprocess.run(
+            [sys.executable, "-c", script, str(settings.home)],
+            capture_output=True,
+            text=True,
+            cwd=root,
+            check=False,
+        )
+        assert (done.stdout, done.returncode) == ("saved\n", -9)
+        assert names(store) == ["acknowledged"]
+
+
+ROWS = (
+    "INSERT INTO log (id, at, actor, kind, body, hash) VALUES (1, '', '', '', '', '')",
+    "INSERT INTO calibration (key, body) VALUES ('k', '')",
+)
+
+
+class TestAppendOnly:
+    @pytest.mark.parametrize(
+        "statement",
+        [
+            "UPDATE log SET actor = 'eve'",
+            "DELETE FROM log",
+            "INSERT OR REPLACE INTO log (id, at, actor, kind, body, hash)"
+            " VALUES (1, '', 'eve', '', '', '')",
+            "UPDATE calibration SET body = 'x'",
+        ],
+    )
+    def test_history_cannot_be_rewritten(self, store: Store, statement: str) -> None:
+        with store.write() as session:
+            for row in ROWS:
+                session.execute(text(row))
+        with pytest.raises(Exception, match="never changed"), store.write() as session:
+            session.execute(text(statement))
+        with store.read() as session:
+            assert session.execute(text("SELECT actor FROM log")).scalar() == ""
+
+    def test_every_table_that_must_not_change_has_its_triggers(self, store: Store) -> None:
+        with store.read() as session:
+            triggers = set(
+                session.scalars(text("SELECT name FROM sqlite_master WHERE type = 'trigger'"))
+            )
+        assert triggers == {
+            *(f"{name}_refuses_update" for name in ("log", "verdict", "solution", "calibration")),
+            *(
+                f"{name}_refuses_{verb}"
+                for name in ("log", "verdict")
+                for verb in ("delete", "insert")
+            ),
+        }
+
+
+class TestPing:
+    def test_answers_while_the_database_does(self, store: Store, settings: Settings) -> None:
+        ping(store)
+        store.close()
+        (settings.home / "touchline.db").write_bytes(b"x" * 4096)
+        with pytest.raises(StorageError):
+            ping(store)
+
+
+def test_the_schema_is_known() -> None:
+    assert SCHEMA_REVISION == "0001"

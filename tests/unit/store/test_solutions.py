@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+from sqlalchemy import insert, text
+
+from app.soccer.frames import Box, ImagePoint
+from app.soccer.solution import (
+    Ball3D,
+    BallFit,
+    Calibration,
+    Finding,
+    Fix,
+    Gate,
+    MarkingFit,
+    Pair,
+    Solution,
+    Suspect,
+    ViewSolution,
+)
+from app.store import value_codec
+from app.store.models import DatasetModel, GroupModel
+from app.store.solutions import (
+    SolutionKey,
+    encode_solution,
+    insert_solutions,
+    read_calibrations,
+    read_solutions,
+    read_summary,
+)
+from app.store.summary import summarize
+
+THIRD = 1 / 3
+KEY = SolutionKey(1, "inputs", "policy")
+
+
+@pytest.fixture
+def solution(camera) -> Solution:
+    """A solution with one of everything."""
+    point = ImagePoint(THIRD, -2.5)
+    calibration = Calibration(
+        source="lines",
+        camera=camera,
+        jac=(0.9, 0.95, 1.0),
+        error_px=0.1 + 0.2,
+        markings=(
+            MarkingFit("Middle line", "tp", (0.5, THIRD), (point, point), (point,) * 3),
+            MarkingFit("Side line top", "fn", used=False),
+        ),
+        suspects=(Suspect("Circle left", None, 0.5, 12.5),),
+        covariance=tuple(float(value) for value in range(64)),
+        unobservable=("focal length",),
+    )
+    fit = BallFit(point, 3.5, 0.25, 14.5, Box(1, 2, 3, 4), 0.1, None, 1.25, 80.0)
+    none = BallFit(None, None, None, None, None, None, None, None, None)
+    failed = Calibration(source="lines", camera=None, reason="no lines")
+    pair = Pair("7.png", "cam1", (1.0, 2.0, -0.5), (3.5, 2.0), 40.0, 75.0, True)
+    return Solution(
+        views=(
+            ViewSolution("7.png", calibration, "key-a", True, None, fit),
+            ViewSolution("cam1", failed, "key-b", False, "calibratable", none),
+            ViewSolution("cam2", calibration, "key-a", False, "ball"),
+        ),
+        pairs=(pair, replace(pair, valid=False, failed="baseline")),
+        ball=Ball3D((1.0, 2.0, -0.5), (0.1,) * 9, 0.3, 75.0, ("7.png",)),
+        gates=(
+            Gate("jac", True, 0.9, 0.75, 0.15, "worst 0.90 · A", "7.png"),
+            Gate("reprojection", False, 30.0, 22.0, -8.0, "30 px · B", "cam1"),
+            Gate("sigma", False, 3.0, 0.5, -2.5, "3 m", active=False),
+        ),
+        findings=(
+            Finding("low_parallax", "3 degrees", number=3.0, threshold=5.0),
+            Finding("bad_point", "off", "7.png", "Middle line", fix=Fix("drop_point", index=2)),
+            Finding("bad_point", "off too", "7.png"),
+        ),
+        policy_hash="policy",
+    )
+
+
+@pytest.fixture
+def with_group(store):
+    """A database with the row of one group."""
+    values = {"created": "", "policy": "{}", "policy_hash": "", "name": "d", "id": 1}
+    group = dict.fromkeys(
+        ("key", "match", "split", "label", "changed", "inputs_hash", "source_hash"), ""
+    )
+    numbers = {"pitch_length": 105.0, "pitch_width": 68.0, "revision": 1, "number": 1}
+    with store.write() as session:
+        session.execute(insert(DatasetModel), [values])
+        session.execute(insert(GroupModel), [{**group, **numbers, "id": 1, "dataset_id": 1}])
+    return store
+
+
+class TestRoundTrip:
+    def test_a_solution_comes_back_to_the_last_bit(self, with_group, group, solution) -> None:
+        with with_group.write() as session:
+            insert_solutions(session, [(KEY, encode_solution(group, solution))])
+        with with_group.read() as session:
+            assert read_solutions(session, [KEY]) == {1: solution}
+
+    def test_only_under_its_own_key(self, with_group, group, solution) -> None:
+        with with_group.write() as session:
+            insert_solutions(session, [(KEY, encode_solution(group, solution))])
+        with with_group.read() as session:
+            for other in (
+                replace(KEY, inputs_hash="x"),
+                replace(KEY, policy_hash="x"),
+                replace(KEY, solver_version="x"),
+                replace(KEY, group_id=2),
+            ):
+                assert read_solutions(session, [other]) == {}
+
+    def test_calibrations_are_kept_once_and_inserting_again_changes_nothing(
+        self, with_group, group, solution
+    ) -> None:
+        for _ in range(2):
+            with with_group.write() as session:
+                insert_solutions(session, [(KEY, encode_solution(group, solution))])
+        with with_group.read() as session:
+            counts = [
+                session.execute(text(f"SELECT count(*) FROM {name}")).scalar()
+                for name in ("solution", "calibration")
+            ]
+            assert counts == [1, 2]
+            assert read_calibrations(session, ["key-a", "x"]) == {
+                "key-a": solution.views[0].calibration
+            }
+
+    def test_known_calibrations_are_not_encoded_again(self, group, solution) -> None:
+        encoded = encode_solution(group, solution, known={"key-a"})
+        assert set(encoded.calibrations) == {"key-b"}
+
+
+class TestValueCodec:
+    def test_numbers_that_are_not_finite_come_back(self) -> None:
+        ball = Ball3D((math.inf, -math.inf, 1.0), (math.inf,) * 9, math.inf, 0.5, ())
+        text_ = value_codec.dumps(value_codec.to_json(ball))
+        assert value_codec.from_json(Ball3D, json.loads(text_)) == ball
+
+    def test_a_field_that_is_new_has_its_default(self) -> None:
+        value = value_codec.to_json(Finding("low_parallax", "3 degrees"))
+        del value["fix"], value["confidence"]
+        assert value_codec.from_json(Finding, value) == Finding("low_parallax", "3 degrees")
+
+    def test_what_has_no_codec_is_our_own_mistake(self) -> None:
+        with pytest.raises(TypeError, match="no codec"):
+            value_codec.to_json({"a": 1})
+
+
+class TestSummary:
+    def test_names_the_first_failing_gate_with_its_margin(self, group, solution) -> None:
+        found = summarize(group, solution)
+        assert (found.passes, found.gate, found.gate_view) == (False, "reprojection", "cam1")
+        assert found.margin == -8.0
+
+    def test_value_is_the_smallest_share_of_a_threshold(self, group, solution) -> None:
+        assert summarize(group, solution).value == pytest.approx(0.15 / 0.75)
+
+    def test_numbers_come_from_the_ball_and_the_views_behind_it(self, group, solution) -> None:
+        found = summarize(group, solution)
+        assert (found.error_px, found.error_percent, found.size_ratio) == (3.5, 0.25, 1.25)
+        assert (found.sigma_m, found.parallax_degrees, found.height_m) == (0.3, 75.0, 0.5)
+        assert found.min_jac == 0.9
+        assert found.findings == ("low_parallax", "bad_point")
+
+    def test_without_a_ball_the_best_pair_speaks(self, group, solution) -> None:
+        found = summarize(group, replace(solution, ball=None))
+        diagonal = group.views[0].size.diagonal
+        assert found.error_px == 3.5
+        assert found.error_percent == pytest.approx(350 / diagonal)
+        assert found.parallax_degrees == 75.0
+        assert found.height_m is None
+
+    def test_a_group_without_anything_has_no_numbers(self, group) -> None:
+        found = summarize(group, Solution((), (), None, ()))
+        assert found.passes
+        assert (found.value, found.margin, found.error_px, found.min_jac) == (None,) * 4
+
+    def test_comes_back_from_its_text(self, group, solution) -> None:
+        encoded = encode_solution(group, solution)
+        assert read_summary(encoded.summary) == summarize(group, solution)
