@@ -1,0 +1,236 @@
+"""Edits: values that know how to make the next group, and the edit that leads back.
+
+They know neither session, user nor solver.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from app.errors import InputError, NotFoundError
+from app.soccer.annotation import BallAnnotation, Lines, make_lines
+from app.soccer.frames import ImagePoint
+from app.soccer.group import Group, Station, View
+from app.soccer.pitch import canonical_marking
+
+CALIBRATIONS = ("given", "lines")
+MAX_POINTS = 1000
+"""Most points of one marking."""
+MAX_COORDINATE = 1e6
+"""Pixels; farther out nothing can be meant."""
+
+LineChanges = Mapping[str, tuple[ImagePoint, ...] | None]
+"""New points by marking; None or no points deletes the marking, absent ones stay."""
+
+
+class Edit(Protocol):
+    """A change of one group."""
+
+    def apply(self, group: Group) -> Group:
+        """The next group.
+
+        Raises:
+            InputError: The edit does not fit the group or says something impossible.
+            NotFoundError: The group has no such view.
+        """
+
+    def inverse(self, group: Group) -> Edit:
+        """The edit that leads from ``apply(group)`` back to ``group``."""
+
+
+class StationEdit(Protocol):
+    """A change of one station."""
+
+    def apply(self, station: Station) -> Station:
+        """The next station; raises InputError as ``Edit.apply`` does."""
+
+    def inverse(self, station: Station) -> StationEdit:
+        """The edit that leads from ``apply(station)`` back to ``station``."""
+
+
+@dataclass(frozen=True)
+class SetStationLines:
+    """Draw, move or delete markings as one camera sees them."""
+
+    lines: LineChanges
+
+    def apply(self, station: Station) -> Station:
+        """The station with these markings."""
+        lines = dict(station.lines)
+        for name, points in self.lines.items():
+            marking = canonical_marking(name)
+            if points:
+                lines[marking] = _checked_points(marking, points)
+            else:
+                lines.pop(marking, None)
+        return replace(station, lines=make_lines(lines))
+
+    def inverse(self, station: Station) -> SetStationLines:
+        """Each changed marking as it was before."""
+        return SetStationLines(_before(station.lines, self.lines))
+
+
+@dataclass(frozen=True)
+class SetStationCalibration:
+    """Choose which calibration of a station counts: ``given`` or ``lines``.
+
+    ``given`` without a given camera is no contradiction: the lines count then.
+    """
+
+    calibration: str
+
+    def apply(self, station: Station) -> Station:
+        """The station with that choice."""
+        if self.calibration not in CALIBRATIONS:
+            raise InputError('the calibration is "given" or "lines"', pointer="/calibration")
+        return replace(station, calibration=self.calibration)
+
+    def inverse(self, station: Station) -> SetStationCalibration:
+        """The choice as it was."""
+        return SetStationCalibration(station.calibration)
+
+
+@dataclass(frozen=True)
+class SetLines:
+    """Draw, move or delete markings of one view."""
+
+    view: str
+    lines: LineChanges
+
+    def apply(self, group: Group) -> Group:
+        """The group with these markings in the view (and in others that share its station)."""
+        view = need_view(group, self.view)
+        return with_station(group, view, SetStationLines(self.lines).apply(view.station))
+
+    def inverse(self, group: Group) -> SetLines:
+        """Each changed marking as it was before."""
+        lines = need_view(group, self.view).station.lines
+        return SetLines(self.view, _before(lines, self.lines))
+
+
+@dataclass(frozen=True)
+class SetCalibrationSource:
+    """Choose which calibration of a view counts: ``given`` or ``lines``."""
+
+    view: str
+    calibration: str
+
+    def apply(self, group: Group) -> Group:
+        """The group with that choice."""
+        view = need_view(group, self.view)
+        station = SetStationCalibration(self.calibration).apply(view.station)
+        return with_station(group, view, station)
+
+    def inverse(self, group: Group) -> SetCalibrationSource:
+        """The choice as it was."""
+        return SetCalibrationSource(self.view, need_view(group, self.view).station.calibration)
+
+
+@dataclass(frozen=True)
+class SetBalls:
+    """Replace all balls of a view."""
+
+    view: str
+    balls: tuple[BallAnnotation, ...]
+
+    def apply(self, group: Group) -> Group:
+        """The group with these balls in the view."""
+        for ball in self.balls:
+            _check_ball(ball)
+        return group.with_view(replace(need_view(group, self.view), balls=self.balls))
+
+    def inverse(self, group: Group) -> SetBalls:
+        """The balls as they were."""
+        return SetBalls(self.view, need_view(group, self.view).balls)
+
+
+@dataclass(frozen=True)
+class SetBall:
+    """Say which one ball a view shows; None: no ball is annotated."""
+
+    view: str
+    ball: BallAnnotation | None
+
+    def apply(self, group: Group) -> Group:
+        """The group with this ball in the view."""
+        return self._all().apply(group)
+
+    def inverse(self, group: Group) -> SetBalls:
+        """The balls as they were."""
+        return self._all().inverse(group)
+
+    def _all(self) -> SetBalls:
+        return SetBalls(self.view, () if self.ball is None else (self.ball,))
+
+
+@dataclass(frozen=True)
+class IncludeView:
+    """Leave a view out of its group, or take it in again."""
+
+    view: str
+    included: bool
+
+    def apply(self, group: Group) -> Group:
+        """The group with or without the view."""
+        return group.with_view(replace(need_view(group, self.view), included=self.included))
+
+    def inverse(self, group: Group) -> IncludeView:
+        """The view as it was."""
+        return IncludeView(self.view, need_view(group, self.view).included)
+
+
+STATION_EDITS = (SetLines, SetCalibrationSource)
+"""Edits of a view that belong to its station when that is shared."""
+
+
+def need_view(group: Group, key: str) -> View:
+    """The view of that key.
+
+    Raises:
+        NotFoundError: There is none.
+    """
+    view = group.view(key)
+    if view is None:
+        raise NotFoundError(f"group {group.key} has no view {key}")
+    return view
+
+
+def with_station(group: Group, view: View, station: Station) -> Group:
+    """The group with a view's station replaced, in each view that shares it."""
+    for other in group.views:
+        same = other.key == view.key
+        if same or (station.shared and other.station.key == station.key):
+            group = group.with_view(replace(other, station=station))
+    return group
+
+
+def _before(lines: Lines, changes: LineChanges) -> LineChanges:
+    names = map(canonical_marking, changes)
+    return {name: tuple(lines[name]) if name in lines else None for name in names}
+
+
+def _checked_points(marking: str, points: tuple[ImagePoint, ...]) -> tuple[ImagePoint, ...]:
+    if len(points) > MAX_POINTS:
+        raise InputError(f"{marking} has more than {MAX_POINTS} points")
+    for index, point in enumerate(points):
+        if not all(math.isfinite(value) and abs(value) <= MAX_COORDINATE for value in point):
+            pointer = f"/lines/{marking.replace('~', '~0').replace('/', '~1')}/{index}"
+            raise InputError(f"point {index + 1} of {marking} is nowhere", pointer=pointer)
+    return points
+
+
+def _check_ball(ball: BallAnnotation) -> None:
+    if ball.box is not None and ball.point is not None:
+        raise InputError("a ball has a box or a point, not both", pointer="/point")
+    if ball.box is None and ball.point is None and not ball.out_of_view:
+        raise InputError("a ball needs a box or a point unless it is out of view")
+    numbers: list[float] = list(ball.point or ())
+    if ball.box is not None:
+        numbers += [ball.box.x, ball.box.y, ball.box.width, ball.box.height]
+        if not (ball.box.width > 0 and ball.box.height > 0):
+            raise InputError("a ball's box must be wider and higher than nothing", pointer="/box")
+    if not all(math.isfinite(value) and abs(value) <= MAX_COORDINATE for value in numbers):
+        raise InputError("the ball is nowhere", pointer="/box" if ball.box else "/point")

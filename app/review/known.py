@@ -1,0 +1,29 @@
+"""Known calibrations: what the solver need not work out again, looked up by the solver's key."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from sqlalchemy.orm import Session
+
+from app.soccer.group import Group
+from app.soccer.policy import Policy
+from app.soccer.solution import Calibration
+from app.solving.calibrate import calibration_key
+from app.store.solutions import read_calibrations
+
+
+def calibration_keys(groups: Iterable[Group], policy: Policy) -> set[str]:
+    """Keys of the calibrations that groups need under a policy."""
+    return {
+        calibration_key(view.station, group.pitch, policy.calibration)
+        for group in groups
+        for view in group.views
+    }
+
+
+def known_calibrations(
+    session: Session, groups: Iterable[Group], policy: Policy
+) -> dict[str, Calibration]:
+    """Those of the calibrations that groups need which are kept already."""
+    return read_calibrations(session, calibration_keys(groups, policy))

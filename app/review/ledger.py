@@ -1,0 +1,155 @@
+"""Ledger: everything that was said, as values, whether it comes from the log or the tables.
+
+``replay.replay`` makes one from the log, ``read_ledger`` one from the tables; they are equal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.soccer.annotation import Extras
+from app.soccer.frames import ImageSize
+from app.soccer.group import Group, Station, View
+from app.soccer.policy import Policy
+from app.store.codecs import extras_from_json, parse, policy_from_json, unpack
+from app.store.digest import group_inputs_hash
+from app.store.groups import StoredGroup, read_groups, read_stations
+from app.store.models import (
+    DatasetModel,
+    GroupModel,
+    ImportFindingModel,
+    SpareFrameModel,
+    StationModel,
+    VerdictModel,
+)
+
+_BATCH = 500
+_ELSEWHERE = Station("", ImageSize(0, 0))
+"""Stands in a view for the station that is kept under its id."""
+
+
+@dataclass
+class StationRecord:
+    """A station with its count of revisions and what its dataset last brought."""
+
+    dataset_id: int
+    station: Station
+    revision: int
+    source_digest: str
+
+
+@dataclass
+class ViewRecord:
+    """A view without its station, which ``station_id`` names."""
+
+    id: int
+    station_id: int
+    view: View
+    source_digest: str
+
+
+@dataclass
+class GroupRecord:
+    """A group without its views, which follow in order."""
+
+    dataset_id: int
+    number: int
+    revision: int
+    changed: str
+    source_hash: str
+    head: Group
+    views: list[ViewRecord]
+
+
+@dataclass
+class Ledger:
+    """The present state of what was said, by the ids of the database.
+
+    Attributes:
+        verdicts: By group, oldest first, as logged.
+        spare: By dataset, camera and frame.
+        noticed: What imports noticed: (group or None, station or None, view, sentence).
+    """
+
+    datasets: dict[int, tuple[str, Policy]] = field(default_factory=dict)
+    stations: dict[int, StationRecord] = field(default_factory=dict)
+    groups: dict[int, GroupRecord] = field(default_factory=dict)
+    verdicts: dict[int, list[dict[str, Any]]] = field(default_factory=dict)
+    spare: dict[tuple[int, str, str], Extras] = field(default_factory=dict)
+    noticed: set[tuple[int | None, int | None, str | None, str]] = field(default_factory=set)
+
+    def group(self, group_id: int) -> Group:
+        """A group whole, with the stations as they are now."""
+        record = self.groups[group_id]
+        views = (
+            replace(item.view, station=self.stations[item.station_id].station)
+            for item in record.views
+        )
+        return replace(record.head, views=tuple(views))
+
+    def inputs_hash(self, group_id: int) -> str:
+        """Of all that solving the group reads."""
+        return group_inputs_hash(self.group(group_id))
+
+
+def without_station(view: View) -> View:
+    """A view as a record holds it."""
+    return replace(view, station=_ELSEWHERE)
+
+
+def read_ledger(session: Session) -> Ledger:
+    """The ledger as the tables have it."""
+    ledger = Ledger()
+    for row in session.execute(select(DatasetModel.id, DatasetModel.name, DatasetModel.policy)):
+        ledger.datasets[row.id] = (row.name, policy_from_json(parse(row.policy)))
+    for stored in read_stations(session, session.scalars(select(StationModel.id)).all()).values():
+        ledger.stations[stored.id] = StationRecord(
+            stored.dataset_id, stored.station, stored.revision, stored.source_digest
+        )
+    ids = session.scalars(select(GroupModel.id).order_by(GroupModel.id)).all()
+    for start in range(0, len(ids), _BATCH):
+        for item in read_groups(session, ids[start : start + _BATCH]).values():
+            ledger.groups[item.id] = _group_record(item)
+    _read_verdicts(session, ledger)
+    _read_rest(session, ledger)
+    return ledger
+
+
+def _group_record(stored: StoredGroup) -> GroupRecord:
+    views = [
+        ViewRecord(
+            stored.view_ids[view.key],
+            stored.stations[view.key].id,
+            without_station(view),
+            stored.view_digests[view.key][1],
+        )
+        for view in stored.group.views
+    ]
+    return GroupRecord(
+        dataset_id=stored.dataset_id,
+        number=stored.number,
+        revision=stored.revision,
+        changed=stored.changed,
+        source_hash=stored.source_hash,
+        head=replace(stored.group, views=()),
+        views=views,
+    )
+
+
+def _read_verdicts(session: Session, ledger: Ledger) -> None:
+    columns = [item for item in VerdictModel.__table__.columns if item.name != "id"]
+    for row in session.execute(select(*columns).order_by(VerdictModel.id)):
+        values = dict(row._mapping)
+        ledger.verdicts.setdefault(values.pop("group_id"), []).append(values)
+
+
+def _read_rest(session: Session, ledger: Ledger) -> None:
+    for spare in session.execute(select(*SpareFrameModel.__table__.columns)):
+        place = (spare.dataset_id, spare.camera, spare.frame)
+        ledger.spare[place] = extras_from_json(unpack(spare.extras))
+    for row in session.execute(select(*ImportFindingModel.__table__.columns)):
+        ledger.noticed.add((row.group_id, row.station_id, row.view, row.sentence))

@@ -1,0 +1,247 @@
+"""Query: the text in the queue's box, parsed into fixed fields and operators.
+
+    status:unreviewed jac<0.95 sigma>0.5 finding:low_parallax match:"league/2015" sort:value-desc
+
+Terms must all hold; ``field:a,b`` means either; ``-field:a`` means not; a bare word is looked
+for in key and label. There are no patterns: text is compared, never interpreted.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from sqlalchemy import ColumnElement, and_, not_, or_
+from sqlalchemy.orm import InstrumentedAttribute
+
+from app.errors import InputError
+from app.soccer.solution import FINDING_KINDS, GATES
+from app.store.models import QueueModel
+
+MAX_LENGTH = 1000
+MAX_TERMS = 30
+
+NUMBERS: dict[str, InstrumentedAttribute[Any]] = {
+    "jac": QueueModel.min_jac,
+    "jac05": QueueModel.min_jac,
+    "error": QueueModel.error_px,
+    "error_percent": QueueModel.error_percent,
+    "sigma": QueueModel.sigma_m,
+    "parallax": QueueModel.parallax_degrees,
+    "ratio": QueueModel.size_ratio,
+    "size_ratio": QueueModel.size_ratio,
+    "height": QueueModel.height_m,
+    "margin": QueueModel.margin,
+    "value": QueueModel.value,
+    "views": QueueModel.views,
+    "number": QueueModel.number,
+}
+"""Fields that compare with < <= > >= = and with :, which is =."""
+
+STATUSES = ("unreviewed", "accepted", "rejected", "deferred")
+FLAGS: dict[str, InstrumentedAttribute[Any]] = {
+    "stale": QueueModel.stale,
+    "solved": QueueModel.solved,
+    "passes": QueueModel.passes,
+    "fixed": QueueModel.fixed,
+}
+"""Fields that are ``yes`` or ``no``."""
+EXACT: dict[str, InstrumentedAttribute[Any]] = {
+    "split": QueueModel.split,
+    "key": QueueModel.key,
+    "reviewer": QueueModel.reviewer,
+    "reason": QueueModel.reason,
+}
+"""Fields whose whole text must be the same."""
+
+SORTS: dict[str, InstrumentedAttribute[Any]] = {
+    "number": QueueModel.number,
+    "value": QueueModel.value,
+    "sigma": QueueModel.sigma_m,
+    "jac": QueueModel.min_jac,
+    "error": QueueModel.error_px,
+    "parallax": QueueModel.parallax_degrees,
+    "newest": QueueModel.changed,
+}
+
+_TERM = re.compile(
+    r"""\s*(?P<minus>-)?
+        (?:(?P<field>[a-z_0-9]+)(?P<op><=|>=|<|>|=|:))?
+        (?:"(?P<quoted>[^"]*)"|(?P<plain>[^\s"]+))(?=\s|$)""",
+    re.VERBOSE,
+)
+
+
+@dataclass(frozen=True)
+class Query:
+    """A parsed query: conditions on ``QueueModel``, and a sort."""
+
+    conditions: tuple[ColumnElement[bool], ...] = field(default=())
+    sort: str = "number"
+    descending: bool = False
+
+
+@dataclass(frozen=True)
+class _Term:
+    field: str
+    op: str
+    value: str
+    pointer: str
+
+
+def parse_query(text: str) -> Query:
+    """Parse a query.
+
+    Raises:
+        InputError: With a pointer ``/q/<position>`` to the term that cannot be understood.
+    """
+    conditions: list[ColumnElement[bool]] = []
+    sort, descending = "number", False
+    for negative, term in _terms(text):
+        if term.field == "sort":
+            sort, descending = _sort(term)
+        else:
+            condition = _condition(term)
+            conditions.append(not_(condition) if negative else condition)
+    return Query(tuple(conditions), sort, descending)
+
+
+def _terms(text: str) -> Iterator[tuple[bool, _Term]]:
+    if len(text) > MAX_LENGTH:
+        raise InputError(f"a query has at most {MAX_LENGTH} characters", pointer="/q")
+    place, count = 0, 0
+    while text[place:].strip():
+        pointer = f"/q/{place + len(text[place:]) - len(text[place:].lstrip())}"
+        found = _TERM.match(text, place)
+        count += 1
+        if found is None or count > MAX_TERMS:
+            problem = "the query has too many terms" if found else "a quote is not closed"
+            raise InputError(problem, pointer=pointer)
+        value = found["plain"] if found["quoted"] is None else found["quoted"]
+        yield bool(found["minus"]), _Term(found["field"] or "", found["op"] or ":", value, pointer)
+        place = found.end()
+
+
+def _sort(term: _Term) -> tuple[str, bool]:
+    name = term.value.removesuffix("-desc")
+    if name not in SORTS:
+        raise InputError(
+            f'the queue cannot be sorted by "{term.value}"',
+            hint=f"Sorts: {', '.join(SORTS)}, each also with -desc.",
+            pointer=term.pointer,
+        )
+    return name, term.value.endswith("-desc")
+
+
+def _condition(term: _Term) -> ColumnElement[bool]:
+    if term.field in NUMBERS:
+        return _number(term)
+    if term.op not in (":", "="):
+        raise InputError(f'"{term.field}" is text: it compares with : alone', pointer=term.pointer)
+    if term.field in FLAGS:
+        return FLAGS[term.field].is_(_choice(term, term.value, ("yes", "no")) == "yes")
+    test = _TESTS.get(term.field)
+    if test is None:
+        fields = sorted({*NUMBERS, *FLAGS, *_TESTS, "sort"} - {""})
+        raise InputError(
+            f'the queue has no field "{term.field}"',
+            hint=f"Fields: {', '.join(fields)}.",
+            pointer=term.pointer,
+        )
+    # A bare word may hold commas; a field's value is a list of choices.
+    values = [term.value] if term.field == "" else term.value.split(",")
+    return or_(*(test(term, value) for value in values))
+
+
+def _number(term: _Term) -> ColumnElement[bool]:
+    column = NUMBERS[term.field]
+    if term.value == "none":
+        return column.is_(None)
+    try:
+        value = float(term.value)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(
+            f'"{term.value}" is not a number',
+            hint=f"For example {term.field}<1.5, or {term.field}:none.",
+            pointer=term.pointer,
+        )
+    compared: dict[str, ColumnElement[bool]] = {
+        "<": column < value,
+        "<=": column <= value,
+        ">": column > value,
+        ">=": column >= value,
+        "=": column == value,
+        ":": column == value,
+    }
+    return compared[term.op]
+
+
+def _choice(term: _Term, value: str, choices: tuple[str, ...]) -> str:
+    if value not in choices:
+        raise InputError(
+            f'{term.field} cannot be "{value}"',
+            hint=f"It is one of {', '.join(choices)}.",
+            pointer=term.pointer,
+        )
+    return value
+
+
+def _listed(column: InstrumentedAttribute[str], value: str) -> ColumnElement[bool]:
+    return column.contains(f",{value},", autoescape=True)
+
+
+def _status(term: _Term, value: str) -> ColumnElement[bool]:
+    return QueueModel.status == _choice(term, value, STATUSES)
+
+
+def _finding(term: _Term, value: str) -> ColumnElement[bool]:
+    if value in ("any", "none"):
+        return QueueModel.findings != "" if value == "any" else QueueModel.findings == ""
+    return _listed(QueueModel.findings, _choice(term, value, FINDING_KINDS))
+
+
+def _gate(term: _Term, value: str) -> ColumnElement[bool]:
+    """The first failing gate; ``none`` for groups that pass."""
+    if value == "none":
+        return QueueModel.passes.is_(True)
+    return QueueModel.gate == _choice(term, value, GATES)
+
+
+def _view(_term: _Term, value: str) -> ColumnElement[bool]:
+    """A view's key (``cam3``, ``7_1.png``), or how many views there are."""
+    if value.isascii() and value.isdigit():
+        return QueueModel.views == int(value[:9])
+    return _listed(QueueModel.view_keys, value)
+
+
+def _match(_term: _Term, value: str) -> ColumnElement[bool]:
+    return QueueModel.match.contains(value, autoescape=True)
+
+
+def _text(_term: _Term, value: str) -> ColumnElement[bool]:
+    return or_(
+        QueueModel.label.contains(value, autoescape=True),
+        QueueModel.key.contains(value, autoescape=True),
+    )
+
+
+def _exact(term: _Term, value: str) -> ColumnElement[bool]:
+    column = EXACT[term.field]
+    return and_(column.is_not(None), column == value)
+
+
+_TESTS: dict[str, Callable[[_Term, str], ColumnElement[bool]]] = {
+    "status": _status,
+    "finding": _finding,
+    "gate": _gate,
+    "view": _view,
+    "match": _match,
+    "label": _text,
+    "": _text,
+    **dict.fromkeys(EXACT, _exact),
+}

@@ -1,0 +1,182 @@
+"""Queue: pages of groups by query, and where a group stands among them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from sqlalchemy import ColumnElement, func, select
+from sqlalchemy.orm import Session
+
+from app.errors import InputError, NotFoundError
+from app.review.order import Order
+from app.review.query import Query, parse_query
+from app.store.models import QueueModel
+from app.store.session import Store
+
+MAX_PAGE = 500
+_NEIGHBOURS = 5
+
+
+@dataclass(frozen=True)
+class GroupRow:
+    """One group in a list; numbers are None where there is none, all while it is not solved.
+
+    Attributes:
+        gate: The first failing gate with its view and sentence, None when the group passes.
+        main_view: Id of the main view, None when it has no frame to show.
+        findings: Kinds.
+    """
+
+    id: int
+    number: int
+    key: str
+    label: str
+    match: str
+    split: str
+    changed: str
+    views: int
+    main_view: int | None
+    status: str
+    stale: bool
+    fixed: bool
+    reason: str | None
+    reviewer: str | None
+    solved: bool
+    passes: bool | None
+    gate: str | None
+    gate_view: str | None
+    gate_sentence: str | None
+    margin: float | None
+    value: float | None
+    min_jac: float | None
+    error_px: float | None
+    error_percent: float | None
+    sigma_m: float | None
+    parallax_degrees: float | None
+    size_ratio: float | None
+    height_m: float | None
+    findings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Page:
+    """Groups in order; ``next`` is the cursor of the page after, None at the end."""
+
+    items: list[GroupRow]
+    next: str | None
+    total: int
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Where a group stands among those that match.
+
+    Attributes:
+        index: From 0; None when the group itself does not match (any more).
+        previous: Ids before it, the nearest first; ``next`` likewise after it.
+    """
+
+    index: int | None
+    total: int
+    previous: tuple[int, ...]
+    next: tuple[int, ...]
+
+
+def list_groups(
+    store: Store, dataset_id: int, query: str = "", limit: int = 50, cursor: str | None = None
+) -> Page:
+    """A page of the groups that match.
+
+    Args:
+        store: The database.
+        dataset_id: The dataset.
+        query: As ``query.parse_query`` reads it.
+        limit: Most groups of the page, 1 to 500.
+        cursor: ``next`` of the page before, for the same query.
+
+    Raises:
+        InputError: The query, the limit or the cursor cannot be understood.
+    """
+    parsed = parse_query(query)
+    if not 1 <= limit <= MAX_PAGE:
+        raise InputError(f"a page has 1 to {MAX_PAGE} groups", pointer="/limit")
+    where = _where(dataset_id, parsed)
+    order = Order(parsed)
+    with store.read() as session:
+        total = _count(session, where)
+        if cursor is not None:
+            where = [*where, order.after(order.decode(cursor))]
+        rows = session.execute(
+            select(*_COLUMNS, *order.keys).where(*where).order_by(*order.ascending).limit(limit + 1)
+        ).all()
+    more = len(rows) > limit
+    items = [_row(row) for row in rows[:limit]]
+    return Page(items, order.encode(rows[limit - 1]) if more else None, total)
+
+
+def matching_ids(session: Session, dataset_id: int, query: str = "") -> list[int]:
+    """Ids of all groups that match, in order."""
+    parsed = parse_query(query)
+    statement = select(QueueModel.group_id).where(*_where(dataset_id, parsed))
+    return list(session.scalars(statement.order_by(*Order(parsed).ascending)))
+
+
+def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
+    """Where a group stands in a query's order, and up to five groups on either side.
+
+    A group that does not match (it was just accepted, say) still has a place in the order.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    parsed = parse_query(query)
+    order = Order(parsed)
+    with store.read() as session:
+        here = session.execute(
+            select(QueueModel.dataset_id, *order.keys).where(QueueModel.group_id == group_id)
+        ).one_or_none()
+        if here is None:
+            raise NotFoundError(f"there is no group {group_id}")
+        where = _where(here.dataset_id, parsed)
+        values = [here[index + 1] for index in range(len(order.keys))]
+        before, after = order.before(values), order.after(values)
+        return Neighbours(
+            index=_count(session, [*where, before])
+            if _count(session, [*where, QueueModel.group_id == group_id])
+            else None,
+            total=_count(session, where),
+            previous=_ids(session, [*where, before], order.backwards),
+            next=_ids(session, [*where, after], order.ascending),
+        )
+
+
+def _where(dataset_id: int, query: Query) -> list[ColumnElement[bool]]:
+    return [QueueModel.dataset_id == dataset_id, *query.conditions]
+
+
+def _count(session: Session, where: Sequence[ColumnElement[bool]]) -> int:
+    statement = select(func.count()).select_from(QueueModel).where(*where)
+    return int(session.execute(statement).scalar_one())
+
+
+def _ids(
+    session: Session, where: Sequence[ColumnElement[bool]], order: Sequence[ColumnElement[Any]]
+) -> tuple[int, ...]:
+    statement = select(QueueModel.group_id).where(*where).order_by(*order).limit(_NEIGHBOURS)
+    return tuple(session.scalars(statement))
+
+
+_STORED = [item.name for item in fields(GroupRow) if item.name not in ("id", "findings")]
+_COLUMNS = [
+    QueueModel.group_id,
+    QueueModel.findings,
+    *(getattr(QueueModel, name) for name in _STORED),
+]
+
+
+def _row(row: Any) -> GroupRow:
+    kinds = tuple(row.findings.strip(",").split(",")) if row.findings else ()
+    values = {name: getattr(row, name) for name in _STORED}
+    return GroupRow(id=row.group_id, findings=kinds, **values)

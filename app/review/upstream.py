@@ -1,0 +1,107 @@
+"""Upstream: what becomes of a stored group (or station) when its dataset is imported again.
+
+What nobody edited follows; what a person edited stays and is named in a finding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from app.soccer.group import Group, Station, View
+from app.store.digest import station_digest, view_digest
+from app.store.groups import StoredGroup, StoredStation, keeps_station
+
+KIND = "upstream_changed"
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Something a person edited and the dataset changed too: the person's version stayed."""
+
+    view: str | None
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A group after its dataset changed.
+
+    ``base`` is the group as it would be had nobody edited it.
+    """
+
+    group: Group
+    base: Group
+    kept: tuple[Kept, ...]
+
+
+@dataclass(frozen=True)
+class FollowedStation:
+    """A station after its dataset changed; ``base`` as in ``Followed``."""
+
+    station: Station
+    base: Station
+    kept: Kept | None
+
+
+def follow_group(stored: StoredGroup, incoming: Group) -> Followed:
+    """The stored group brought up to the incoming one, but for what a person edited.
+
+    Shared stations are the incoming group's own; they are followed once, elsewhere.
+    """
+    views: list[View] = []
+    bases: list[View] = []
+    kept: list[Kept] = []
+    for view in incoming.views:
+        result, base, noticed = _follow_view(stored, view)
+        views.append(result)
+        bases.append(base)
+        kept.extend(noticed)
+    for view in stored.group.views:
+        if incoming.view(view.key) is None and stored.is_edited(view.key):
+            views.append(view)
+            bases.append(view)
+            sentence = f"{view.key} is gone from the dataset; a person had edited it, so it stays"
+            kept.append(Kept(view.key, sentence))
+    return Followed(
+        replace(incoming, views=tuple(views)), replace(incoming, views=tuple(bases)), tuple(kept)
+    )
+
+
+def follow_station(stored: StoredStation, incoming: Station) -> FollowedStation:
+    """The stored station brought up to the incoming one, unless a person edited it.
+
+    A calibration that was imported on its own stays when the dataset brings none.
+    """
+    if incoming.given is None and stored.station.given is not None:
+        incoming = replace(incoming, given=stored.station.given)
+    if not stored.edited:
+        return FollowedStation(incoming, incoming, None)
+    kept = None
+    if station_digest(incoming) not in (stored.digest, stored.source_digest):
+        sentence = f"the dataset has new lines or a new camera for {incoming.key}; edits stay"
+        kept = Kept(None, sentence)
+    said = stored.station
+    # What no edit can touch follows all the same.
+    station = replace(incoming, lines=said.lines, given=said.given, calibration=said.calibration)
+    return FollowedStation(station, incoming, kept)
+
+
+def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[Kept]]:
+    old = stored.group.view(view.key)
+    if old is None or not keeps_station(stored, view):
+        return view, view, []
+    kept: list[Kept] = []
+    result = base = view
+    if view.key in stored.edited_views:
+        result = replace(view, balls=old.balls, included=old.included)
+        # Neither what it said before nor what the person says.
+        if view_digest(view) not in stored.view_digests[view.key]:
+            sentence = f"the dataset has another ball in {view.key}; the edited one stays"
+            kept.append(Kept(view.key, sentence))
+    if not view.station.shared:
+        followed = follow_station(stored.stations[view.key], view.station)
+        result = replace(result, station=followed.station)
+        base = replace(base, station=followed.base)
+        if followed.kept is not None:
+            kept.append(Kept(view.key, followed.kept.sentence))
+    return result, base, kept

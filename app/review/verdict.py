@@ -1,0 +1,135 @@
+"""Verdicts: accept, reject with a reason, defer, or take it back; everyone's are kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy import insert
+from sqlalchemy.orm import Session
+
+from app.errors import InputError
+from app.review.idempotency import Request, is_repeated, remember
+from app.review.solver import Solver
+from app.review.state import GroupState, read_state, require_etag
+from app.review.submit import load, solved
+from app.solving.solve import solve
+from app.store.clock import now
+from app.store.group_rows import next_id
+from app.store.log import Entry, append
+from app.store.models import VerdictModel
+from app.store.queue import refresh_queue
+from app.store.session import Store
+
+STATES = ("unreviewed", "accepted", "rejected", "deferred")
+REASONS = (
+    "bad_field_lines",
+    "sides_confused",
+    "not_same_instant",
+    "ball_not_visible",
+    "bad_calibration",
+    "duplicate_view",
+    "other",
+)
+"""Why a group is rejected; ``other`` needs a note."""
+MAX_NOTE = 2000
+
+
+@dataclass(frozen=True)
+class _Verdict:
+    state: str
+    reason: str | None
+    note: str | None
+
+
+def set_verdict(
+    store: Store,
+    group_id: int,
+    state: str,
+    reason: str | None = None,
+    note: str | None = None,
+    *,
+    if_match: str,
+    actor: str,
+    idempotency_key: str | None = None,
+    solver: Solver = solve,
+) -> GroupState:
+    """Save a person's verdict on a group as it is; the newest of all people's counts.
+
+    Accepting a group that fails a gate overrides the policy: it needs a note, which goes into
+    the export.
+
+    Raises:
+        InputError: Unknown state or reason, or a note is missing.
+        StaleRevisionError: The group is not what the person saw.
+    """
+    verdict = _checked(state, reason, note)
+    request = Request(idempotency_key, actor, ["verdict", group_id, state, reason, note])
+    # Accepting weighs the gates, so they must be known.
+    seen = solved(store, group_id, solver=solver) if state == "accepted" else load(store, group_id)
+    override = _override(seen, verdict)
+    with store.write() as session:
+        if not is_repeated(session, request):
+            current = read_state(session, group_id)
+            require_etag(current.etag, if_match, f"group {current.key}")
+            # The override was judged on what the person saw, and that has not changed.
+            require_etag(current.etag, seen.etag, f"group {current.key}")
+            _save(session, current, verdict, override, request)
+    return load(store, group_id)
+
+
+def _checked(state: str, reason: str | None, note: str | None) -> _Verdict:
+    note = (note or "").strip() or None
+    if state not in STATES:
+        raise InputError(f'"{state}" is no verdict; {", ".join(STATES)} are', pointer="/state")
+    if note is not None and len(note) > MAX_NOTE:
+        raise InputError(f"a note has at most {MAX_NOTE} characters", pointer="/note")
+    if state != "rejected" and reason is not None:
+        raise InputError("only a rejection has a reason", pointer="/reason")
+    if state == "rejected" and reason not in REASONS:
+        known = ", ".join(REASONS)
+        raise InputError(f"a rejection needs a reason: {known}", pointer="/reason")
+    if reason == "other" and note is None:
+        raise InputError('the reason "other" needs a note', pointer="/note")
+    return _Verdict(state, reason, note)
+
+
+def _override(state: GroupState, verdict: _Verdict) -> str | None:
+    """The gate that an acceptance overrides, or None."""
+    if verdict.state != "accepted" or state.solution is None or state.solution.passes:
+        return None
+    gate = state.solution.first_failing
+    if verdict.note is None:
+        sentence = gate.sentence if gate is not None else "it fails"
+        raise InputError(
+            f"this group fails a gate ({sentence}); accepting it needs a note that says why",
+            hint="The note goes into the export as the reason of the override.",
+            pointer="/note",
+        )
+    return gate.name if gate is not None else "unknown"
+
+
+def _save(
+    session: Session,
+    state: GroupState,
+    verdict: _Verdict,
+    override: str | None,
+    request: Request,
+) -> None:
+    at = now()
+    values = {
+        "actor": request.actor,
+        "at": at,
+        "state": verdict.state,
+        "reason": verdict.reason,
+        "note": verdict.note,
+        "inputs_hash": state.stored.inputs_hash,
+        "policy_hash": state.policy.hash,
+        "fixed": state.stored.edited,
+        "override": override,
+    }
+    row = {**values, "id": next_id(session, VerdictModel), "group_id": state.id}
+    session.execute(insert(VerdictModel), [row])
+    entry = Entry("verdict", request.actor, at, values, state.dataset_id, state.id)
+    (log_id,) = append(session, [entry])
+    remember(session, request, log_id, at)
+    refresh_queue(session, [state.id])

@@ -1,0 +1,184 @@
+"""A small dataset with known cameras: two broadcast views, and three static cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pysqlite3.dbapi2 as sqlite
+import pytest
+
+from app.config import Settings
+from app.geometry.camera import Camera
+from app.review.datasets import get_dataset
+from app.review.ingest import ingest
+from app.review.queue import list_groups
+from app.review.recompute import solve_dataset
+from app.review.state import GroupState
+from app.review.submit import load
+from app.soccer.annotation import BallAnnotation, Extras, make_lines
+from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.group import Group, Media, Station, View
+from app.soccer.pitch import MARKINGS, Pitch
+from app.store.session import Store
+
+SIZE = ImageSize(1280, 720)
+MATCH = "north_league/2030-2031/2030-08-17 - 18-00 Alder Town 3 - 1 Birch Rovers"
+
+MakeGroup = Callable[..., Group]
+
+
+def aimed(position: tuple[float, float, float], target: tuple[float, float, float]) -> Camera:
+    """A camera at a place, looking at another, without roll."""
+    forward = np.subtract(target, position)
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross([0.0, 0.0, 1.0], forward)
+    right /= np.linalg.norm(right)
+    rotation = np.array([right, np.cross(forward, right), forward])
+    return Camera(
+        rotation=rotation,
+        position=np.array(position),
+        focal_length=(1500.0, 1500.0),
+        principal_point=(639.5, 359.5),
+    )
+
+
+MAIN = aimed((2.0, 62.0, -18.0), (5.0, 0.0, 0.0))
+BEHIND = aimed((75.0, 10.0, -12.0), (5.0, 0.0, 0.0))
+OPPOSITE = aimed((-10.0, -60.0, -15.0), (5.0, 0.0, 0.0))
+
+
+def seen(camera: Camera, point: tuple[float, float, float]) -> ImagePoint:
+    """Where a camera sees a point."""
+    x, y = camera.project(np.array([point]))[0]
+    return ImagePoint(float(x), float(y))
+
+
+def drawn(camera: Camera) -> dict[str, list[ImagePoint]]:
+    """Every marking that a camera sees, a few points each."""
+    lines: dict[str, list[ImagePoint]] = {}
+    for marking in MARKINGS:
+        pixels = camera.project(Pitch().sample(marking, 0.9, 0.2))
+        inside = [
+            ImagePoint(float(x), float(y))
+            for x, y in pixels
+            if 0 <= x < SIZE.width and 0 <= y < SIZE.height
+        ]
+        if inside:
+            lines[marking] = inside[:: max(len(inside) // 6, 1)]
+    return lines
+
+
+@pytest.fixture
+def make_group() -> MakeGroup:
+    """Makes a broadcast group: main camera and a replay, both with given cameras and lines."""
+
+    def make(
+        number: int = 7,
+        ball: tuple[float, float, float] = (5.0, 2.0, -0.5),
+        shift: float = 0.0,
+        split: str = "train",
+    ) -> Group:
+        views = []
+        for name, camera in ((f"{number}.png", MAIN), (f"{number}_1.png", BEHIND)):
+            center = seen(camera, ball)
+            offset = shift if camera is BEHIND else 0.0
+            box = Box.square(ImagePoint(center.x, center.y + offset), 14.0)
+            station = Station(
+                f"{MATCH}/{name}", SIZE, lines=make_lines(drawn(camera)), given=camera
+            )
+            extras = Extras(
+                boxes=({"class": "Player team left", "ID": "7", "points": {"x1": 1, "y1": 2}},),
+                metadata={"gameTime": "1 - 12:41", "position": 761000},
+            )
+            media = Media(f"/frames/{number}.zip", name)
+            views.append(View(name, station, (BallAnnotation(box=box),), media, extras=extras))
+        return Group(
+            f"{MATCH}/{number}.png",
+            tuple(views),
+            match=MATCH,
+            split=split,
+            label=f"Alder Town 3 – 1 Birch Rovers · {number}:00",
+        )
+
+    return make
+
+
+@pytest.fixture
+def make_static() -> MakeGroup:
+    """Makes a group of static cameras that all groups of the kind share."""
+    stations = {
+        f"cam{number}": Station(
+            f"cam{number}", SIZE, shared=True, lines=make_lines(drawn(camera)), given=camera
+        )
+        for number, camera in enumerate((MAIN, BEHIND, OPPOSITE), 1)
+    }
+
+    def make(frame: int = 10, ball: tuple[float, float, float] = (5.0, 2.0, -0.5)) -> Group:
+        views = tuple(
+            View(key, station, (BallAnnotation(point=seen(station.given, ball)),))
+            for key, station in stations.items()
+            if station.given is not None
+        )
+        return Group(str(frame), views, match="issia", label=f"Frame {frame}")
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def only_store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
+    """One store for all tests: what it has compiled once serves them all."""
+    store = Store.open(Settings(home=tmp_path_factory.mktemp("home")))
+    yield store
+    store.close()
+
+
+@pytest.fixture(scope="session")
+def empty(only_store: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The database as it was before any test."""
+    copy = tmp_path_factory.mktemp("empty") / "touchline.db"
+    _copy(only_store.settings.home / "touchline.db", copy)
+    return copy
+
+
+@pytest.fixture
+def store(only_store: Store, empty: Path) -> Store:
+    """An empty database: a real file, put back before each test."""
+    _copy(empty, only_store.settings.home / "touchline.db")
+    return only_store
+
+
+def _copy(source: Path, target: Path) -> None:
+    with closing(sqlite.connect(str(source))) as one, closing(sqlite.connect(str(target))) as two:
+        one.backup(two)
+
+
+Fill = Callable[..., list[int]]
+
+
+@pytest.fixture
+def fill(store: Store) -> Fill:
+    """Ingests groups into the dataset "demo", solves them, and returns all ids in order."""
+
+    def run(*groups: Group, solved: bool = True) -> list[int]:
+        ingest(store, "demo", groups, source="test", actor="ann")
+        if solved:
+            solve_dataset(store, "demo")
+        page = list_groups(store, get_dataset(store, "demo").id, limit=500)
+        return [row.id for row in page.items]
+
+    return run
+
+
+@pytest.fixture
+def state(store: Store, fill: Fill, make_group: MakeGroup) -> GroupState:
+    """A solved group that passes."""
+    return load(store, fill(make_group())[0])
+
+
+@pytest.fixture
+def opposite() -> Camera:
+    """A camera on the far side of the pitch."""
+    return OPPOSITE

@@ -1,0 +1,171 @@
+from __future__ import annotations
+
+import csv
+import json
+import zipfile
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.errors import InputError, NotFoundError
+from app.review.edit import SetBall
+from app.review.export import FORMATS, export
+from app.review.submit import load, submit
+from app.review.verdict import set_verdict
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box
+from app.soccer.group import Media
+
+
+def judge(store, group_id, state, reason=None, note=None):
+    etag = load(store, group_id).etag
+    return set_verdict(store, group_id, state, reason, note, if_match=etag, actor="ann")
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with (folder / "SNv3D.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def files(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+@pytest.fixture
+def three(fill, make_group):
+    """Two groups that pass and one that fails."""
+    return fill(make_group(7), make_group(8), make_group(9, shift=80.0))
+
+
+class TestExport:
+    def test_accepted_groups_go_out_and_others_stay(self, store, three, tmp_path) -> None:
+        judge(store, three[0], "accepted")
+        judge(store, three[1], "rejected", "bad_calibration")
+        report = export(store, "demo", "soccernet-v3d", tmp_path / "out")
+        assert {row["main_action"] for row in table(report.out)} == {"7"}
+        assert (report.counts["groups"], report.left_out) == (1, {})
+
+    def test_a_failing_group_goes_out_with_the_reason_of_its_override(
+        self, store, three, tmp_path
+    ) -> None:
+        judge(store, three[2], "accepted", note="seen on video")
+        report = export(store, "demo", "soccernet-v3d", tmp_path / "out")
+        assert {row["main_action"] for row in table(report.out)} == {"9"}
+        export(store, "demo", "soccernet-v3d", tmp_path / "all", everything=True)
+        verdicts = {row["main_action"]: row["verdict"] for row in table(tmp_path / "all")}
+        assert verdicts["9"] == "accepted: overrides reprojection: seen on video"
+        assert verdicts["7"] == "unreviewed"
+
+    def test_what_changed_after_its_verdict_is_left_out_and_counted(
+        self, store, three, tmp_path
+    ) -> None:
+        judge(store, three[0], "accepted")
+        state = judge(store, three[1], "accepted")
+        ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
+        submit(store, three[1], SetBall("8.png", ball), if_match=state.etag, actor="ben")
+        report = export(store, "demo", "soccernet-v3d", tmp_path / "out")
+        assert {row["main_action"] for row in table(report.out)} == {"7"}
+        assert report.left_out == {"stale": 1}
+
+    @pytest.mark.parametrize("out", ["out", "out.zip"])
+    def test_nothing_to_export_leaves_no_file(self, store, three, tmp_path, out: str) -> None:
+        with pytest.raises(InputError, match="nobody has accepted"):
+            export(store, "demo", "soccernet-v3d", tmp_path / out)
+        assert not (tmp_path / out).exists()
+
+    def test_an_empty_dataset_has_nothing_either(self, store, fill, tmp_path) -> None:
+        fill()
+        with pytest.raises(InputError, match="holds no groups"):
+            export(store, "demo", "cameras", tmp_path / "out", everything=True)
+
+    def test_the_manifest_says_what_it_is(self, store, three, tmp_path) -> None:
+        state = judge(store, three[0], "accepted")
+        export(store, "demo", "soccernet-v3d", tmp_path / "out.zip", boxes="exact")
+        manifest = json.loads(files(tmp_path / "out.zip")["manifest.json"])
+        assert (manifest["dataset"], manifest["version"]) == ("demo", None)
+        assert manifest["date"] == state.verdict.at
+        assert manifest["settings"]["policy_hash"] == state.policy.hash
+        assert manifest["settings"]["boxes"] == "exact"
+        assert "soccer-net.org" in manifest["licence"]
+        assert {item["path"] for item in manifest["files"]} >= {"SNv3D.csv", "SNv3D-train.txt"}
+
+    def test_the_same_state_makes_the_same_bytes(self, store, three, tmp_path) -> None:
+        for name in ("a.zip", "b.zip"):
+            export(store, "demo", "soccernet-v3d", tmp_path / name, everything=True)
+        assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+
+    @pytest.mark.parametrize("form", [name for name in FORMATS if name != "issia-3d"])
+    def test_every_format_of_broadcast_groups(self, store, three, tmp_path, form: str) -> None:
+        report = export(store, "demo", form, tmp_path / "out.zip", everything=True)
+        assert report.counts["groups"] == 3
+        assert len(files(tmp_path / "out.zip")) > 1
+
+    def test_static_cameras_go_out_as_issia_3d(self, store, fill, make_static, tmp_path) -> None:
+        fill(make_static(10), make_static(11))
+        calls: list[tuple[int, int]] = []
+        report = export(
+            store,
+            "demo",
+            "issia-3d",
+            tmp_path / "out",
+            everything=True,
+            progress=lambda done, total: calls.append((done, total)),
+        )
+        assert report.counts == {"groups": 2, "balls": 2}
+        assert calls == [(1, 2), (2, 2)]
+        assert (tmp_path / "out/issia_calibration.json").is_file()
+
+    def test_groups_that_do_not_fit_the_format_leave_no_file(self, store, three, tmp_path) -> None:
+        with pytest.raises(InputError, match="not from ISSIA"):
+            export(store, "demo", "issia-3d", tmp_path / "out", everything=True)
+        assert list(tmp_path.glob("*out*")) == []
+
+    @pytest.mark.parametrize(
+        "options", [{"format": "xml"}, {"boxes": "round"}, {"images": "all"}, {"images": "link"}]
+    )
+    def test_unknown_options_are_refused(self, store, three, tmp_path, options) -> None:
+        values = {"format": "cameras", **options}
+        with pytest.raises(InputError):
+            export(store, "demo", values.pop("format"), tmp_path / "out.zip", **values)
+
+    def test_an_unknown_dataset_is_not_found(self, store, tmp_path) -> None:
+        with pytest.raises(NotFoundError):
+            export(store, "nothing", "cameras", tmp_path / "out")
+
+
+class TestImages:
+    @pytest.fixture
+    def framed(self, fill, make_group, tmp_path):
+        """A group whose first view has a frame in a zip and whose second has none."""
+        picture = np.full((72, 128, 3), 90, dtype=np.uint8)
+        data = cv2.imencode(".png", picture)[1].tobytes()
+        path = tmp_path / "Frames-v3.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("7.png", data)
+        group = make_group(7)
+        view = replace(group.views[0], media=Media(str(path), "7.png"))
+        return fill(group.with_view(view)), data
+
+    def test_frames_are_copied_and_missing_ones_named(self, store, framed, tmp_path) -> None:
+        _, data = framed
+        report = export(
+            store, "demo", "soccernet-v3", tmp_path / "out", everything=True, images="copy"
+        )
+        (copied,) = (tmp_path / "out").rglob("7.png")
+        assert copied.read_bytes() == data
+        assert copied.parent.name == "Frames-v3"
+        assert len(report.missing_images) == 1
+        assert "7_1.png" in report.missing_images[0]
+
+    def test_the_manifest_knows_frames_that_are_not_copied(self, store, framed, tmp_path) -> None:
+        _, data = framed
+        export(store, "demo", "soccernet-v3", tmp_path / "out", everything=True)
+        manifest = json.loads((tmp_path / "out/manifest.json").read_text())
+        (item,) = manifest["media"]
+        assert (item["view"], item["bytes"]) == ("7.png", len(data))
+        assert item["crc32"] == zlib.crc32(data)

@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.errors import InputError
+from app.review.query import NUMBERS, SORTS, parse_query
+
+
+def pointer(text: str) -> str | None:
+    with pytest.raises(InputError) as caught:
+        parse_query(text)
+    assert "\n" not in caught.value.message
+    return caught.value.pointer
+
+
+class TestParseQuery:
+    def test_nothing_asks_for_everything_by_number(self) -> None:
+        query = parse_query("  ")
+        assert (query.conditions, query.sort, query.descending) == ((), "number", False)
+
+    def test_the_example_of_the_manual(self) -> None:
+        query = parse_query(
+            "status:unreviewed jac<0.95 sigma>0.5 finding:low_parallax split:train view:2 "
+            'gate:reprojection match:"Alder Town" sort:value-desc'
+        )
+        assert len(query.conditions) == 8
+        assert (query.sort, query.descending) == ("value", True)
+
+    @pytest.mark.parametrize("name", SORTS)
+    def test_every_sort_goes_both_ways(self, name: str) -> None:
+        assert parse_query(f"sort:{name}").sort == name
+        assert parse_query(f"sort:{name}-desc").descending
+
+    @pytest.mark.parametrize("name", NUMBERS)
+    @pytest.mark.parametrize("op", ["<", "<=", ">", ">=", "=", ":"])
+    def test_every_number_compares(self, name: str, op: str) -> None:
+        assert len(parse_query(f"{name}{op}1.5").conditions) == 1
+
+    @pytest.mark.parametrize(
+        ("text", "where"),
+        [
+            ("colour:red", "/q/0"),
+            ("status:unreviewed jac<high", "/q/18"),
+            ("status:maybe", "/q/0"),
+            ("finding:ghosts", "/q/0"),
+            ("gate:none,heaven", "/q/0"),
+            ("split<train", "/q/0"),
+            ("sort:label", "/q/0"),
+            ("jac<nan", "/q/0"),
+            ("passes:maybe", "/q/0"),
+            ('match:"open', "/q/0"),
+            ("a " * 31, "/q/60"),
+            ("x" * 1001, "/q"),
+        ],
+    )
+    def test_what_cannot_be_understood_is_pointed_at(self, text: str, where: str) -> None:
+        assert pointer(text) == where
+
+    def test_unknown_fields_are_answered_with_the_known_ones(self) -> None:
+        with pytest.raises(InputError) as caught:
+            parse_query("colour:red")
+        assert "sigma" in str(caught.value.hint)
+
+    @given(st.text(max_size=80))
+    def test_any_text_is_a_query_or_an_input_error(self, text: str) -> None:
+        try:
+            parse_query(text)
+        except InputError as error:
+            assert error.pointer is not None
+            assert error.pointer.startswith("/q")
