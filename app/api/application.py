@@ -1,0 +1,89 @@
+"""The application: settings in, an ASGI application out."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from fastapi import FastAPI
+
+from app.api.deps import Services
+from app.api.errors import install_handlers
+from app.api.openapi import describe
+from app.api.pages import STATIC, Site, install_pages
+from app.api.routers import datasets, exports, findings, groups, health, pitch, stations, views
+from app.api.security.bodies import MAX_JSON_BYTES, JsonBodies
+from app.api.security.failures import Failures
+from app.api.security.headers import SecurityHeaders
+from app.api.security.origin import KnownHosts, SameOrigin
+from app.api.security.requests import HeadAsGet, OneRange
+from app.config import Settings
+
+PREFIX = "/api/v1"
+ROUTERS = (datasets, groups, views, stations, findings, exports, pitch)
+
+
+def create_app(settings: Settings, *, static: Path = STATIC) -> FastAPI:
+    """The whole service over one home.
+
+    The database must exist in the present schema (``touchline migrate``); it is opened here, so
+    that a fault shows at start and not at the first request.
+
+    Args:
+        settings: Where things live and how much is allowed.
+        static: Folder of the browser application.
+
+    Raises:
+        StorageError: The database cannot be used.
+    """
+    services = Services.open(settings)
+    site = Site(static)
+    app = FastAPI(
+        title="Touchline",
+        version=software_version(),
+        summary="Multi-view soccer frames into a trusted 3D ball dataset.",
+        openapi_url=f"{PREFIX}/openapi.json",
+        # Both pages load scripts from elsewhere, which the content policy refuses.
+        docs_url=None,
+        redoc_url=None,
+        redirect_slashes=False,
+        lifespan=_lifespan,
+    )
+    app.state.services = services
+    install_handlers(app)
+    for router in ROUTERS:
+        app.include_router(router.router, prefix=PREFIX)
+    app.include_router(health.router)
+    install_pages(app, site)
+    describe(app)
+    _add_middleware(app, settings, site)
+    return app
+
+
+def software_version() -> str:
+    """Version of the installed package."""
+    try:
+        return version("touchline")
+    except PackageNotFoundError:
+        return "0"
+
+
+def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
+    """The first one added is the innermost."""
+    app.add_middleware(OneRange)
+    app.add_middleware(HeadAsGet)
+    app.add_middleware(JsonBodies, max_bytes=min(MAX_JSON_BYTES, settings.max_upload_bytes))
+    app.add_middleware(SameOrigin)
+    app.add_middleware(KnownHosts, allowed=settings.allowed_hosts)
+    health.install_metrics(app)
+    app.add_middleware(Failures)
+    app.add_middleware(SecurityHeaders, policy=site.policy)
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    app.state.services.start()
+    yield
+    app.state.services.close()

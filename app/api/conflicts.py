@@ -1,0 +1,28 @@
+"""A change that came too late is answered with the state as it is now."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from pydantic import BaseModel
+
+from app.api.errors import StaleStateError
+from app.errors import StaleRevisionError
+
+
+@contextmanager
+def current_state(load: Callable[[], BaseModel]) -> Iterator[None]:
+    """Turn a ``StaleRevisionError`` into one that carries the present document.
+
+    Args:
+        load: Reads the present document; called only when it is needed.
+    """
+    try:
+        yield
+    except StaleRevisionError as error:
+        # By way of JSON: a number without end travels as null there.
+        document: dict[str, Any] = json.loads(load().model_dump_json())
+        raise StaleStateError(error, document) from error

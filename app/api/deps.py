@@ -1,0 +1,138 @@
+"""What routes are given: the store, who acts, and the preconditions of a change."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Header, Path, Query, Request
+
+from app.api.errors import PreconditionRequiredError
+from app.api.export_folder import ExportFolder
+from app.api.recompute import Recompute
+from app.config import Settings
+from app.errors import InputError
+from app.review.datasets import list_datasets
+from app.store.session import Store
+
+LOCAL_USER = "local"
+"""Who acts in single-user mode."""
+MAX_ID = 2**63 - 1
+_STRONG_ETAG = re.compile(r'"[\x21\x23-\x7e]*"')
+_KEY = re.compile(r"[\x21-\x7e]{1,200}")
+
+
+@dataclass(frozen=True)
+class Services:
+    """What lives as long as the application."""
+
+    settings: Settings
+    store: Store
+    exports: ExportFolder
+    recompute: Recompute
+
+    @staticmethod
+    def open(settings: Settings) -> Services:
+        """Open everything over one home."""
+        store = Store.open(settings)
+        return Services(settings, store, ExportFolder(settings.exports), Recompute(store))
+
+    def start(self) -> None:
+        """Take up the solving that an earlier run left undone."""
+        for dataset in list_datasets(self.store):
+            if dataset.solved < dataset.groups:
+                self.recompute.request(dataset.name)
+
+    def close(self) -> None:
+        """Let the running work end and close the database."""
+        self.recompute.close()
+        self.store.close()
+
+
+def get_services(request: Request) -> Services:
+    """The services of the application that answers."""
+    services: Services = request.app.state.services
+    return services
+
+
+def get_store(services: Annotated[Services, Depends(get_services)]) -> Store:
+    """The database."""
+    return services.store
+
+
+def get_actor() -> str:
+    """Who acts; the single user of a local server until there are accounts."""
+    return LOCAL_USER
+
+
+def require_if_match(
+    if_match: Annotated[
+        str | None,
+        Header(
+            alias="If-Match",
+            description="The ETag of the state that the change builds on. Required: 428 without "
+            "it, 412 with the present state when somebody else was faster. `*` is refused.",
+            examples=['"9f2c61d0a4"'],
+        ),
+    ] = None,
+) -> str:
+    """The one strong ETag that a change builds on.
+
+    Raises:
+        PreconditionRequiredError: There is none.
+        InputError: It is ``*``, weak, a list or no ETag.
+    """
+    if if_match is None:
+        raise PreconditionRequiredError(
+            "a change must name the state that it builds on",
+            hint="Send the ETag of the last answer as If-Match.",
+        )
+    if not _STRONG_ETAG.fullmatch(if_match.strip()):
+        raise InputError(
+            "If-Match must be one strong ETag, in its quotes",
+            hint='Send the "etag" of the document as it is; * and W/ are refused.',
+        )
+    return if_match.strip()
+
+
+def get_idempotency_key(
+    idempotency_key: Annotated[
+        str | None,
+        Header(
+            alias="Idempotency-Key",
+            description="Any text of up to 200 visible characters. The same key with the same "
+            "request gives the first answer again; with another request, 422.",
+        ),
+    ] = None,
+) -> str | None:
+    """The caller's name for this request, so that sending it twice does it once."""
+    if idempotency_key is not None and not _KEY.fullmatch(idempotency_key):
+        raise InputError("Idempotency-Key must be 1 to 200 visible ASCII characters")
+    return idempotency_key
+
+
+AppServices = Annotated[Services, Depends(get_services)]
+AppStore = Annotated[Store, Depends(get_store)]
+Actor = Annotated[str, Depends(get_actor)]
+IfMatch = Annotated[str, Depends(require_if_match)]
+IdempotencyKey = Annotated[str | None, Depends(get_idempotency_key)]
+Id = Annotated[int, Path(ge=1, le=MAX_ID)]
+DatasetQuery = Annotated[
+    str, Query(alias="dataset", max_length=200, description="Name or id of the dataset.")
+]
+QueryText = Annotated[
+    str,
+    Query(
+        alias="q",
+        max_length=1000,
+        description="Filters and order, as in the browser: "
+        "`status:unreviewed jac<0.95 sigma>0.5 finding:low_parallax sort:value`.",
+    ),
+]
+
+
+def etag_matches(request: Request, etag: str) -> bool:
+    """Whether If-None-Match says that the caller already has this state."""
+    sent = request.headers.get("if-none-match", "")
+    return etag in [tag.strip().removeprefix("W/") for tag in sent.split(",")]

@@ -1,0 +1,160 @@
+"""Which HTTP status belongs to which error, and nothing else knows."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Sequence
+from typing import Any
+
+import structlog
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from sqlalchemy.exc import DBAPIError
+from starlette.exceptions import HTTPException
+
+from app.api.problem import TITLES, make_problem, problem_response
+from app.api.schemas.problem import FieldProblem
+from app.errors import (
+    ConflictError,
+    GeometryError,
+    IdempotencyError,
+    ImageError,
+    InputError,
+    NotFoundError,
+    ReviewError,
+    SharedStationError,
+    StaleRevisionError,
+    StorageError,
+    TooLargeError,
+)
+
+log = structlog.get_logger("touchline.api")
+
+STATUSES: tuple[tuple[type[ReviewError], int], ...] = (
+    (TooLargeError, 413),
+    (ImageError, 422),
+    (InputError, 400),
+    (NotFoundError, 404),
+    (StaleRevisionError, 412),
+    (IdempotencyError, 422),
+    (ConflictError, 409),
+    (GeometryError, 422),
+    (StorageError, 507),
+)
+"""The first branch that fits decides."""
+RETRY_SECONDS = "5"
+
+
+class PreconditionRequiredError(ReviewError):
+    """A change without If-Match: it could overwrite what its sender never saw."""
+
+
+class BusyError(ReviewError):
+    """The one place for this kind of work is taken."""
+
+
+class StaleStateError(ReviewError):
+    """A ``StaleRevisionError`` together with the state as it is now.
+
+    Args:
+        current: The document that a reader would get now.
+    """
+
+    def __init__(self, error: StaleRevisionError, current: dict[str, Any]):
+        super().__init__(error.message, hint=error.hint)
+        self.current = current
+        self.etag = error.current_etag
+
+
+def status_of(error: ReviewError) -> int:
+    """The HTTP status of an error of the tree."""
+    special = {PreconditionRequiredError: 428, StaleStateError: 412, BusyError: 429}
+    if type(error) in special:
+        return special[type(error)]
+    if isinstance(error, StorageError) and not _is_full(error):
+        return 503
+    return next((status for kind, status in STATUSES if isinstance(error, kind)), 500)
+
+
+def _is_full(error: StorageError) -> bool:
+    """Whether the disk is full, rather than the database busy or damaged."""
+    cause = error.__cause__
+    name = str(getattr(getattr(cause, "orig", None), "sqlite_errorname", ""))
+    return name.startswith("SQLITE_FULL") or getattr(cause, "errno", None) == errno.ENOSPC
+
+
+def install_handlers(app: FastAPI) -> None:
+    """Make the application answer every known error with a problem."""
+    app.add_exception_handler(ReviewError, _review_error)
+    app.add_exception_handler(RequestValidationError, _validation_error)
+    app.add_exception_handler(HTTPException, _http_exception)
+    app.add_exception_handler(DBAPIError, _database_error)
+
+
+async def _review_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, ReviewError)
+    status = status_of(error)
+    problem = make_problem(
+        status,
+        error.message,
+        hint=error.hint,
+        pointer=error.pointer,
+        station=error.station if isinstance(error, SharedStationError) else None,
+        current=error.current if isinstance(error, StaleStateError) else None,
+    )
+    headers = {"Retry-After": RETRY_SECONDS} if status == 429 else {}
+    if isinstance(error, StaleStateError):
+        headers["ETag"] = error.etag
+    if isinstance(error, StorageError):
+        headers["Retry-After"] = RETRY_SECONDS
+    if status >= 500:
+        log.error("request refused", instance=problem.instance, error=str(error))
+    return problem_response(problem, headers)
+
+
+async def _validation_error(request: Request, error: Exception) -> Response:
+    """422 with a pointer for each field; 404 where the id in the path cannot be one."""
+    assert isinstance(error, RequestValidationError)
+    details = error.errors()
+    if any(detail["loc"][0] == "path" for detail in details):
+        return problem_response(make_problem(404, "nothing has such an id"))
+    errors = [
+        FieldProblem(pointer=_pointer(detail["loc"]), detail=_sentence(detail["msg"]))
+        for detail in details[:20]
+    ]
+    first = errors[0]
+    place = f"{first.pointer}: " if first.pointer else ""
+    problem = make_problem(422, f"{place}{first.detail}", pointer=first.pointer, errors=errors)
+    return problem_response(problem)
+
+
+def _sentence(message: str) -> str:
+    """Pydantic's message without the prefix that it gives to our own validators."""
+    text = message.removeprefix("Value error, ")
+    return text[:1].lower() + text[1:]
+
+
+def _pointer(location: Sequence[int | str]) -> str:
+    """JSON pointer (RFC 6901) of the place; the first part says body, query or header."""
+    parts = [part for part in location[1:] if part != "[key]"]
+    escaped = (str(part).replace("~", "~0").replace("/", "~1") for part in parts)
+    return "".join(f"/{part}" for part in escaped)
+
+
+async def _http_exception(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    detail = {
+        404: "there is nothing at this address",
+        405: f"{request.method} is not possible here",
+    }.get(error.status_code, TITLES.get(error.status_code, ("", "the request failed"))[1])
+    problem = make_problem(error.status_code, detail)
+    return problem_response(problem, error.headers)
+
+
+async def _database_error(request: Request, error: Exception) -> Response:
+    """The database was busy or failed; the transaction is rolled back and nothing is saved."""
+    problem = make_problem(
+        503, "the database did not take the request", hint="Nothing was saved. Try again."
+    )
+    log.error("database error", instance=problem.instance, exc_info=error)
+    return problem_response(problem, {"Retry-After": RETRY_SECONDS})

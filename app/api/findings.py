@@ -1,0 +1,81 @@
+"""Findings of a whole dataset, group by group."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from sqlalchemy import ColumnElement, func, select
+
+from app.review.datasets import get_dataset
+from app.review.state import GroupState, read_states
+from app.soccer.solution import Finding
+from app.store.models import QueueModel
+from app.store.session import Store
+
+BATCH = 100
+
+
+@dataclass(frozen=True)
+class GroupFindings:
+    """What was found in one group."""
+
+    group_id: int
+    number: int
+    group: str
+    findings: tuple[Finding, ...]
+
+    @property
+    def values(self) -> list[dict[str, Any]]:
+        """The findings as plain values, each with the key of the group."""
+        return [
+            {"kind": finding.kind, "group": self.group, **asdict(finding)}
+            for finding in self.findings
+        ]
+
+
+def count_groups(store: Store, dataset_id: int, kind: str | None) -> int:
+    """How many groups of a dataset have findings (of a kind)."""
+    statement = select(func.count()).select_from(QueueModel).where(*_where(dataset_id, kind))
+    with store.read() as session:
+        return int(session.execute(statement).scalar_one())
+
+
+def read_findings(
+    store: Store, dataset_id: int, *, after: int = 0, limit: int, kind: str | None = None
+) -> list[GroupFindings]:
+    """Findings of up to ``limit`` groups, by number of the group, from the one after ``after``."""
+    statement = (
+        select(QueueModel.group_id)
+        .where(*_where(dataset_id, kind), QueueModel.number > after)
+        .order_by(QueueModel.number)
+        .limit(limit)
+    )
+    with store.read() as session:
+        states = read_states(session, list(session.scalars(statement)))
+    return [_group_findings(state, kind) for state in states]
+
+
+def finding_values(store: Store, dataset: str) -> Iterator[dict[str, Any]]:
+    """Every finding of a dataset as plain values, in batches, so that memory does not grow."""
+    found = get_dataset(store, dataset)
+    after = 0
+    while groups := read_findings(store, found.id, after=after, limit=BATCH):
+        after = groups[-1].number
+        for group in groups:
+            yield from group.values
+
+
+def _where(dataset_id: int, kind: str | None) -> list[ColumnElement[bool]]:
+    pattern = "," if kind is None else f",{kind},"
+    return [
+        QueueModel.dataset_id == dataset_id,
+        QueueModel.findings.contains(pattern, autoescape=True),
+    ]
+
+
+def _group_findings(state: GroupState, kind: str | None) -> GroupFindings:
+    found = state.solution.findings if state.solution is not None else ()
+    chosen = tuple(item for item in found if kind is None or item.kind == kind)
+    return GroupFindings(state.id, state.number, state.key, chosen)

@@ -1,0 +1,140 @@
+"""The browser application: one index.html for every page, and the modules below /static."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from fastapi import APIRouter, FastAPI, Request, Response
+from starlette.exceptions import HTTPException
+from starlette.responses import FileResponse
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from app.api.security.headers import content_security_policy
+
+STATIC = Path(__file__).resolve().parents[2] / "static"
+PAGES = (
+    "/",
+    "/groups",
+    "/review",
+    "/review/{group}",
+    "/datasets",
+    "/datasets/{dataset}",
+    "/datasets/{dataset}/yield",
+    "/datasets/{dataset}/evaluation",
+    "/exports",
+    "/findings",
+    "/help",
+)
+"""Addresses that the browser's own router understands."""
+MEDIA_TYPES = {
+    ".css": "text/css; charset=utf-8",
+    ".ico": "image/x-icon",
+    ".js": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".map": "application/json",
+    ".mjs": "text/javascript; charset=utf-8",
+    ".png": "image/png",
+    ".svg": "image/svg+xml",
+    ".wasm": "application/wasm",
+    ".webp": "image/webp",
+    ".woff2": "font/woff2",
+}
+"""What is served, and as what; the machine's own table of types has no say."""
+LIBRARY_TYPES = frozenset({".css", ".js", ".json", ".map", ".mjs", ".wasm", ".woff2"})
+"""Libraries bring pages and pictures of their own, which are not ours to serve."""
+_INLINE_SCRIPT = re.compile(rb"<script\b(?P<attributes>[^>]*)>(?P<text>.*?)</script>", re.S | re.I)
+
+
+def script_hashes(html: bytes) -> tuple[str, ...]:
+    """CSP sources of the import maps in a page; no other inline script is admitted."""
+    return tuple(
+        "sha256-" + base64.b64encode(hashlib.sha256(found["text"]).digest()).decode()
+        for found in _INLINE_SCRIPT.finditer(html)
+        if b"importmap" in found["attributes"] and b"src=" not in found["attributes"]
+    )
+
+
+@dataclass(frozen=True)
+class IndexPage:
+    """One reading of index.html."""
+
+    html: bytes
+    etag: str
+    policy: str
+
+    @staticmethod
+    def make(html: bytes) -> IndexPage:
+        """The page of those bytes, with the policy that admits its import map."""
+        etag = f'"{hashlib.sha256(html).hexdigest()[:32]}"'
+        return IndexPage(html, etag, content_security_policy(script_hashes(html)))
+
+
+class Site:
+    """The folder of the browser application; index.html is read again when it has changed."""
+
+    def __init__(self, folder: Path = STATIC):
+        self.folder = folder
+        self._version: tuple[int, int] | None = None
+        self._page: IndexPage | None = None
+        self.index()
+
+    def index(self) -> IndexPage | None:
+        """The page as it is on disk now; None where the application is not installed."""
+        try:
+            status = (self.folder / "index.html").stat()
+            version = (status.st_mtime_ns, status.st_size)
+            if version != self._version:
+                self._page = IndexPage.make((self.folder / "index.html").read_bytes())
+                self._version = version
+        except OSError:
+            self._version = self._page = None
+        return self._page
+
+    def policy(self) -> str:
+        """The Content-Security-Policy of every response."""
+        return self._page.policy if self._page else content_security_policy()
+
+
+class Modules(StaticFiles):
+    """Files below /static: by known types alone, nothing hidden, always revalidated."""
+
+    async def check_config(self) -> None:
+        """A folder that is missing has no files; that is no reason to fail."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        if scope["method"] not in ("GET", "HEAD"):
+            raise HTTPException(status_code=405, headers={"Allow": "GET, HEAD"})
+        parts = Path(path).parts
+        allowed = LIBRARY_TYPES if "node_modules" in parts else MEDIA_TYPES.keys()
+        hidden = any(part.startswith(".") for part in parts)
+        if hidden or "\\" in path or Path(path).suffix.lower() not in allowed:
+            raise HTTPException(status_code=404)
+        response = await super().get_response(path, scope)
+        response.headers["Cache-Control"] = "no-cache"
+        if isinstance(response, FileResponse):
+            response.headers["Content-Type"] = MEDIA_TYPES[Path(path).suffix.lower()]
+        return response
+
+
+def install_pages(app: FastAPI, site: Site) -> None:
+    """Serve the pages and the modules of the browser application."""
+    router = APIRouter(include_in_schema=False)
+
+    def page(request: Request) -> Response:
+        index = site.index()
+        if index is None:
+            raise HTTPException(status_code=404)
+        headers = {"ETag": index.etag, "Cache-Control": "no-cache"}
+        if index.etag in request.headers.get("if-none-match", ""):
+            return Response(status_code=304, headers=headers)
+        return Response(index.html, media_type="text/html", headers=headers)
+
+    for path in PAGES:
+        router.add_api_route(path, page, methods=["GET", "HEAD"])
+    app.include_router(router)
+    app.mount("/static", Modules(directory=site.folder, check_dir=False), name="static")

@@ -1,0 +1,92 @@
+"""From a problem to an HTTP answer, and to its place in the OpenAPI document."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Mapping
+from typing import Any
+
+from starlette.responses import Response
+
+from app.api.schemas.problem import MEDIA_TYPE, FieldProblem, Problem
+
+TITLES: Mapping[int, tuple[str, str]] = {
+    400: ("bad-request", "The request cannot be used"),
+    403: ("forbidden", "Another site sent this request"),
+    404: ("not-found", "There is no such thing"),
+    405: ("method-not-allowed", "This resource does not do that"),
+    409: ("conflict", "The request does not fit the present state"),
+    412: ("stale", "Somebody else changed it first"),
+    413: ("too-large", "The request is too large"),
+    415: ("unsupported-media-type", "The body has the wrong type"),
+    416: ("range", "That part of the file does not exist"),
+    422: ("invalid", "The request is not valid"),
+    428: ("precondition-required", "If-Match is required"),
+    429: ("busy", "The server is busy with another request of this kind"),
+    500: ("internal", "The server made a mistake"),
+    503: ("unavailable", "The service is not ready"),
+    507: ("storage", "The server cannot store it"),
+}
+
+
+Responses = dict[int | str, dict[str, Any]]
+"""Answers of a route, by status, as the framework takes them."""
+
+
+def new_instance() -> str:
+    """Id of one occurrence of a problem."""
+    return uuid.uuid4().urn
+
+
+def make_problem(
+    status: int,
+    detail: str,
+    *,
+    hint: str | None = None,
+    pointer: str | None = None,
+    errors: list[FieldProblem] | None = None,
+    station: int | None = None,
+    current: Any = None,
+    instance: str | None = None,
+) -> Problem:
+    """A problem of that status, its kind and title filled in."""
+    kind, title = TITLES.get(status, ("http", "The request failed"))
+    return Problem(
+        type=f"urn:touchline:problem:{kind}",
+        title=title,
+        status=status,
+        detail=detail,
+        hint=hint,
+        pointer=pointer,
+        instance=instance or new_instance(),
+        errors=errors,
+        station=station,
+        current=current,
+    )
+
+
+def problem_response(problem: Problem, headers: Mapping[str, str] | None = None) -> Response:
+    """The answer that carries a problem; members that do not apply are left out."""
+    optional = {"errors", "station", "current"}
+    absent = {name for name in optional if getattr(problem, name) is None}
+    return Response(
+        problem.model_dump_json(exclude=absent),
+        status_code=problem.status,
+        media_type=MEDIA_TYPE,
+        headers={"Cache-Control": "no-store", **(headers or {})},
+    )
+
+
+def responses(*statuses: int) -> Responses:
+    """The ``responses`` of a route that may answer with these statuses, besides the common ones.
+
+    Every route can meet a bad request (400), a Host or Origin that is not ours (403), a busy
+    database (503); routes with a path or parameters can be asked for what is not there.
+    """
+    return {
+        status: {
+            "description": TITLES[status][1],
+            "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
+        }
+        for status in sorted({400, 422, 500, 503, *statuses})
+    }

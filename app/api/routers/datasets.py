@@ -1,0 +1,36 @@
+"""Datasets: what there is, how far it is, and how its numbers are spread."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path
+
+from app.api.deps import AppStore, QueryText
+from app.api.problem import responses
+from app.api.schemas.dataset import DatasetDocument, DatasetList, SummaryDocument
+from app.review import datasets as review
+from app.review.progress import summary
+
+router = APIRouter(prefix="/datasets", tags=["datasets"])
+
+DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
+
+
+@router.get("", operation_id="listDatasets", responses=responses())
+def list_datasets(store: AppStore) -> DatasetList:
+    """Every dataset with its progress."""
+    return DatasetList(items=[DatasetDocument.of(item) for item in review.list_datasets(store)])
+
+
+@router.get("/{dataset}", operation_id="getDataset", responses=responses(404))
+def get_dataset(dataset: DatasetPath, store: AppStore) -> DatasetDocument:
+    """One dataset by name or id."""
+    return DatasetDocument.of(review.get_dataset(store, dataset))
+
+
+@router.get("/{dataset}/summary", operation_id="getSummary", responses=responses(404))
+def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") -> SummaryDocument:
+    """Progress and histograms over the groups that a query matches."""
+    found = review.get_dataset(store, dataset)
+    return SummaryDocument.of(summary(store, found.id, query))

@@ -1,0 +1,47 @@
+"""Findings: what a person should look at, over a whole dataset."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query
+
+from app.api.deps import AppStore, DatasetQuery
+from app.api.findings import count_groups, read_findings
+from app.api.problem import responses
+from app.api.schemas.queue import FindingList, FindingRow
+from app.errors import InputError
+from app.review.datasets import get_dataset
+from app.soccer.solution import FINDING_KINDS
+
+router = APIRouter(prefix="/findings", tags=["findings"])
+
+Kind = Literal[FINDING_KINDS]  # type: ignore[valid-type]
+MAX_GROUPS = 200
+
+
+@router.get("", operation_id="listFindings", responses=responses(404))
+def list_findings(
+    store: AppStore,
+    dataset: DatasetQuery,
+    kind: Annotated[Kind | None, Query(description="Only these.")] = None,
+    limit: Annotated[int, Query(ge=1, le=MAX_GROUPS, description="Groups a page.")] = 50,
+    cursor: Annotated[
+        str | None, Query(max_length=20, description="`next` of the page before.")
+    ] = None,
+) -> FindingList:
+    """Findings by number of the group; `total` counts the groups that have some."""
+    found = get_dataset(store, dataset)
+    after = _number(cursor)
+    groups = read_findings(store, found.id, after=after, limit=limit, kind=kind)
+    rows = [FindingRow.of(group.group_id, values) for group in groups for values in group.values]
+    following = str(groups[-1].number) if len(groups) == limit else None
+    return FindingList(items=rows, next=following, total=count_groups(store, found.id, kind))
+
+
+def _number(cursor: str | None) -> int:
+    if cursor is None:
+        return 0
+    if not (cursor.isascii() and cursor.isdigit() and len(cursor) <= 18):
+        raise InputError("the cursor is none of ours", pointer="/cursor")
+    return int(cursor)

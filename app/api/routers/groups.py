@@ -1,0 +1,190 @@
+"""Groups: lists, the whole document, what-if, undo, verdict and history."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from app.api.conflicts import current_state
+from app.api.deps import (
+    Actor,
+    AppStore,
+    DatasetQuery,
+    Id,
+    IdempotencyKey,
+    IfMatch,
+    QueryText,
+    etag_matches,
+)
+from app.api.edits import preview_edits
+from app.api.problem import Responses, responses
+from app.api.schemas.group import GroupDocument
+from app.api.schemas.preview import PreviewDocument, PreviewRequest
+from app.api.schemas.queue import GroupPage, GroupRow, History, LogEntryDocument, Neighbours
+from app.api.schemas.solution import SolutionDocument
+from app.api.schemas.verdict import VerdictEdit
+from app.errors import InputError, NotFoundError
+from app.review import queue, submit
+from app.review.datasets import get_dataset
+from app.review.state import GroupState
+from app.review.verdict import set_verdict
+from app.store.session import Store
+
+router = APIRouter(prefix="/groups", tags=["groups"])
+
+MAX_LIMIT = 500
+ETAG = {"ETag": {"description": "The group's state.", "schema": {"type": "string"}}}
+CHANGED: Responses = {200: {"headers": ETAG, "description": "The whole group as it is now."}}
+CONFLICTS = (404, 409, 412, 413, 415, 428)
+
+
+def answer(state: GroupState, response: Response) -> GroupDocument:
+    """The document of a group, its ETag in the header."""
+    response.headers["ETag"] = state.etag
+    response.headers["Cache-Control"] = "private, no-cache"
+    return GroupDocument.of(state)
+
+
+def load_document(store: Store, group_id: int) -> GroupDocument:
+    """The document of a group as it is now."""
+    return GroupDocument.of(with_solution(store, submit.load(store, group_id)))
+
+
+def with_solution(store: Store, state: GroupState) -> GroupState:
+    """The state with its solution, computed where that is still to do; reading saves nothing."""
+    if state.solution is not None:
+        return state
+    return replace(state, solution=submit.preview(store, state.id, []))
+
+
+@router.get("", operation_id="listGroups", responses=responses(404))
+def list_groups(
+    store: AppStore,
+    dataset: DatasetQuery,
+    query: QueryText = "",
+    limit: Annotated[int, Query(ge=1, le=MAX_LIMIT)] = 50,
+    cursor: Annotated[
+        str | None, Query(max_length=500, description="`next` of the page before.")
+    ] = None,
+) -> GroupPage:
+    """Groups that match a query, a page at a time."""
+    found = get_dataset(store, dataset)
+    try:
+        page = queue.list_groups(store, found.id, query, limit, cursor)
+    except (OverflowError, UnicodeEncodeError) as error:
+        # A forged cursor can hold what the database cannot.
+        raise InputError("the cursor is none of ours", pointer="/cursor") from error
+    return GroupPage(
+        items=[GroupRow.of(row) for row in page.items], next=page.next, total=page.total
+    )
+
+
+@router.get(
+    "/{group}",
+    operation_id="getGroup",
+    response_model=GroupDocument,
+    responses={**responses(404), 200: {"headers": ETAG}, 304: {"description": "Not changed."}},
+)
+def get_group(
+    group: Id, store: AppStore, request: Request, response: Response
+) -> GroupDocument | Response:
+    """One group, complete: annotations, solution, verdict."""
+    state = submit.load(store, group)
+    if etag_matches(request, state.etag):
+        return Response(status_code=304, headers={"ETag": state.etag})
+    return answer(with_solution(store, state), response)
+
+
+@router.get("/{group}/solution", operation_id="getSolution", responses=responses(404))
+def get_solution(group: Id, store: AppStore) -> SolutionDocument:
+    """The solution of a group."""
+    solution = with_solution(store, submit.load(store, group)).solution
+    if solution is None:
+        raise NotFoundError(f"group {group} has no solution")
+    return SolutionDocument.of(solution)
+
+
+@router.get("/{group}/neighbours", operation_id="getNeighbours", responses=responses(404))
+def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> Neighbours:
+    """Where the group stands among those that match, and up to five before and after."""
+    found = queue.neighbours(store, group, query)
+    return Neighbours(
+        index=found.index, total=found.total, previous=list(found.previous), next=list(found.next)
+    )
+
+
+@router.get("/{group}/history", operation_id="getHistory", responses=responses(404))
+def get_history(group: Id, store: AppStore) -> History:
+    """Everything that was said about the group, oldest first."""
+    return History(items=[LogEntryDocument.of(entry) for entry in submit.history(store, group)])
+
+
+@router.post(
+    "/{group}/preview", operation_id="previewGroup", responses=responses(404, 409, 413, 415)
+)
+def preview_group(group: Id, changes: PreviewRequest, store: AppStore) -> PreviewDocument:
+    """What the solution would be; nothing is saved."""
+    state = submit.load(store, group)
+    solution = submit.preview(store, group, preview_edits(state, changes))
+    return PreviewDocument(solution=SolutionDocument.of(solution))
+
+
+@router.post("/{group}/undo", operation_id="undo", responses={**responses(*CONFLICTS), **CHANGED})
+def undo(
+    group: Id,
+    store: AppStore,
+    actor: Actor,
+    if_match: IfMatch,
+    key: IdempotencyKey,
+    response: Response,
+) -> GroupDocument:
+    """Take the last edit back; 409 when there is none."""
+    with current_state(lambda: load_document(store, group)):
+        state = submit.undo(store, group, if_match=if_match, actor=actor, idempotency_key=key)
+    return answer(state, response)
+
+
+@router.post("/{group}/redo", operation_id="redo", responses={**responses(*CONFLICTS), **CHANGED})
+def redo(
+    group: Id,
+    store: AppStore,
+    actor: Actor,
+    if_match: IfMatch,
+    key: IdempotencyKey,
+    response: Response,
+) -> GroupDocument:
+    """Do again what was undone last; 409 when there is nothing."""
+    with current_state(lambda: load_document(store, group)):
+        state = submit.redo(store, group, if_match=if_match, actor=actor, idempotency_key=key)
+    return answer(state, response)
+
+
+@router.put(
+    "/{group}/verdict",
+    operation_id="setVerdict",
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
+def put_verdict(
+    group: Id,
+    verdict: VerdictEdit,
+    store: AppStore,
+    actor: Actor,
+    if_match: IfMatch,
+    key: IdempotencyKey,
+    response: Response,
+) -> GroupDocument:
+    """Accept, reject with a reason, defer, or take a verdict back."""
+    with current_state(lambda: load_document(store, group)):
+        state = set_verdict(
+            store,
+            group,
+            verdict.state,
+            verdict.reason,
+            verdict.note,
+            if_match=if_match,
+            actor=actor,
+            idempotency_key=key,
+        )
+    return answer(state, response)

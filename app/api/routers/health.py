@@ -1,0 +1,48 @@
+"""Health, readiness and metrics, for whoever runs the service."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, FastAPI, Request, Response
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
+from prometheus_fastapi_instrumentator import Instrumentator
+
+from app.api.deps import AppStore
+from app.api.problem import responses
+from app.api.schemas.health import Health, Readiness
+from app.store.session import ping
+
+router = APIRouter(tags=["health"])
+
+
+@router.get("/healthz", operation_id="getHealth", responses=responses())
+def get_health(request: Request) -> Health:
+    """Whether the process answers."""
+    return Health(status="ok", version=request.app.version)
+
+
+@router.get("/readyz", operation_id="getReadiness", responses=responses())
+def get_readiness(store: AppStore) -> Readiness:
+    """Whether the database answers; 503 while it does not."""
+    ping(store)
+    return Readiness(status="ready")
+
+
+@router.get(
+    "/metrics",
+    operation_id="getMetrics",
+    response_class=Response,
+    responses={**responses(), 200: {"content": {CONTENT_TYPE_LATEST: {}}}},
+)
+def get_metrics(request: Request) -> Response:
+    """Counts and durations of requests, in Prometheus' text format."""
+    registry: CollectorRegistry = request.app.state.metrics
+    return Response(generate_latest(registry), media_type=CONTENT_TYPE_LATEST)
+
+
+def install_metrics(app: FastAPI) -> None:
+    """Count requests by route, each application for itself."""
+    app.state.metrics = CollectorRegistry()
+    instrumentator = Instrumentator(
+        registry=app.state.metrics, excluded_handlers=["/metrics", "/healthz", "/readyz"]
+    )
+    instrumentator.instrument(app)

@@ -1,0 +1,181 @@
+"""Stations: the lines of static cameras, edited once for every view that shares them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from app.api.conflicts import current_state
+from app.api.deps import (
+    MAX_ID,
+    Actor,
+    AppServices,
+    AppStore,
+    Id,
+    IdempotencyKey,
+    IfMatch,
+    Services,
+)
+from app.api.problem import Responses, responses
+from app.api.routers.groups import CHANGED, CONFLICTS, answer, load_document
+from app.api.schemas.annotation import LinesEdit
+from app.api.schemas.group import GroupDocument
+from app.api.schemas.station import StationDetail
+from app.api.schemas.view import StationEdit
+from app.errors import NotFoundError
+from app.review.edit import SetStationCalibration, SetStationLines
+from app.review.stations import (
+    StationState,
+    load_station,
+    redo_station,
+    submit_station,
+    undo_station,
+)
+from app.review.submit import solved
+
+router = APIRouter(prefix="/stations", tags=["stations"])
+
+GroupOfStation = Annotated[
+    int | None,
+    Query(
+        ge=1,
+        le=MAX_ID,
+        description="The group to answer with; default: the first that the station takes part in.",
+    ),
+]
+STATION_CHANGED: Responses = {**responses(*CONFLICTS), **CHANGED}
+
+
+@router.get(
+    "/{station}",
+    operation_id="getStation",
+    responses={
+        **responses(404),
+        200: {"headers": {"ETag": {"description": "The station's.", "schema": {"type": "string"}}}},
+    },
+)
+def get_station(station: Id, store: AppStore, response: Response) -> StationDetail:
+    """A station with its lines and its own ETag."""
+    state = load_station(store, station)
+    response.headers["ETag"] = state.etag
+    return StationDetail.of(state)
+
+
+@router.patch("/{station}/lines", operation_id="setStationLines", responses=STATION_CHANGED)
+def patch_lines(
+    station: Id,
+    lines: LinesEdit,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    key: IdempotencyKey,
+    response: Response,
+    group: GroupOfStation = None,
+) -> GroupDocument:
+    """Change the lines of a static camera; If-Match takes the station's ETag.
+
+    The group that is answered is solved at once, the others in the background.
+    """
+    edit = SetStationLines(lines.points())
+    return _change(
+        services,
+        station,
+        group,
+        lambda: submit_station(
+            services.store, station, edit, if_match=if_match, actor=actor, idempotency_key=key
+        ),
+        response,
+    )
+
+
+@router.patch("/{station}", operation_id="changeStation", responses=STATION_CHANGED)
+def patch_station(
+    station: Id,
+    change: StationEdit,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    key: IdempotencyKey,
+    response: Response,
+    group: GroupOfStation = None,
+) -> GroupDocument:
+    """Choose whether the given calibration counts or the lines; If-Match as for lines."""
+    edit = SetStationCalibration(change.calibration)
+    return _change(
+        services,
+        station,
+        group,
+        lambda: submit_station(
+            services.store, station, edit, if_match=if_match, actor=actor, idempotency_key=key
+        ),
+        response,
+    )
+
+
+@router.post("/{station}/undo", operation_id="undoStation", responses=STATION_CHANGED)
+def undo(
+    station: Id,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    response: Response,
+    group: GroupOfStation = None,
+) -> GroupDocument:
+    """Take the last edit of a static camera back; 409 when there is none."""
+    return _change(
+        services,
+        station,
+        group,
+        lambda: undo_station(services.store, station, if_match=if_match, actor=actor),
+        response,
+    )
+
+
+@router.post("/{station}/redo", operation_id="redoStation", responses=STATION_CHANGED)
+def redo(
+    station: Id,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    response: Response,
+    group: GroupOfStation = None,
+) -> GroupDocument:
+    """Do again what was undone last; 409 when there is nothing."""
+    return _change(
+        services,
+        station,
+        group,
+        lambda: redo_station(services.store, station, if_match=if_match, actor=actor),
+        response,
+    )
+
+
+def _change(
+    services: Services,
+    station: int,
+    group: int | None,
+    change: Callable[[], StationState],
+    response: Response,
+) -> GroupDocument:
+    """Change a station, solve the group in view at once, and queue the others."""
+    store = services.store
+    shown = _shown_group(load_station(store, station), group)
+    with current_state(lambda: load_document(store, shown)):
+        state = change()
+    document = answer(solved(store, shown), response)
+    services.recompute.request(state.dataset)
+    return document
+
+
+def _shown_group(state: StationState, group: int | None) -> int:
+    """The group to answer with.
+
+    Raises:
+        NotFoundError: The station takes part in no such group.
+    """
+    chosen = group if group is not None else next(iter(state.groups), None)
+    if chosen is None or chosen not in state.groups:
+        raise NotFoundError(f"camera {state.station.key} takes part in no such group")
+    return chosen

@@ -1,0 +1,151 @@
+"""Views: their lines, their ball, whether they take part, and their frame."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Query, Request, Response
+
+from app.api.conflicts import current_state
+from app.api.deps import (
+    Actor,
+    AppServices,
+    AppStore,
+    Id,
+    IdempotencyKey,
+    IfMatch,
+    etag_matches,
+)
+from app.api.lookup import find_view
+from app.api.problem import Responses, responses
+from app.api.routers.groups import CHANGED, CONFLICTS, answer, load_document
+from app.api.schemas.annotation import BallEdit, LinesEdit
+from app.api.schemas.group import GroupDocument
+from app.api.schemas.view import ViewEdit
+from app.errors import NotFoundError
+from app.review.edit import Edit, IncludeView, SetBall, SetCalibrationSource, SetLines
+from app.review.submit import submit
+from app.store.media import content_type, read_frame
+from app.store.session import Store
+
+router = APIRouter(prefix="/views", tags=["views"])
+
+WIDTH_STEP = 16
+"""Asked widths are rounded up to a multiple, so that few sizes fill the cache."""
+MIN_WIDTH, MAX_WIDTH = 16, 4096
+SECONDS = 3600
+IMAGES: Responses = {
+    200: {
+        "description": "The frame as JPEG, PNG or WebP.",
+        "content": {
+            kind: {"schema": {"type": "string", "format": "binary"}}
+            for kind in ("image/jpeg", "image/png", "image/webp")
+        },
+        "headers": {"ETag": {"description": "Of these bytes.", "schema": {"type": "string"}}},
+    },
+    304: {"description": "Not changed."},
+}
+
+
+@router.patch(
+    "/{view}/lines", operation_id="setViewLines", responses={**responses(*CONFLICTS), **CHANGED}
+)
+def patch_lines(
+    view: Id,
+    lines: LinesEdit,
+    store: AppStore,
+    actor: Actor,
+    if_match: IfMatch,
+    key: IdempotencyKey,
+    response: Response,
+) -> GroupDocument:
+    """Draw, move or delete markings; 409 names the station when the camera is static."""
+    found = find_view(store, view)
+    edit = SetLines(found.key, lines.points())
+    return _submit(store, found.group_id, edit, if_match, actor, key, response)
+
+
+@router.patch(
+    "/{view}/ball", operation_id="setViewBall", responses={**responses(*CONFLICTS), **CHANGED}
+)
+def patch_ball(
+    view: Id,
+    ball: Annotated[BallEdit | None, Body(description="null: no ball is annotated.")],
+    store: AppStore,
+    actor: Actor,
+    if_match: IfMatch,
+    key: IdempotencyKey,
+    response: Response,
+) -> GroupDocument:
+    """Say where the ball is in this view, that it is out of view, or that there is none."""
+    found = find_view(store, view)
+    edit = SetBall(found.key, None if ball is None else ball.ball())
+    return _submit(store, found.group_id, edit, if_match, actor, key, response)
+
+
+@router.patch("/{view}", operation_id="changeView", responses={**responses(*CONFLICTS), **CHANGED})
+def patch_view(
+    view: Id,
+    change: ViewEdit,
+    store: AppStore,
+    actor: Actor,
+    if_match: IfMatch,
+    key: IdempotencyKey,
+    response: Response,
+) -> GroupDocument:
+    """Leave the view out of its group or take it in again, or choose its calibration."""
+    found = find_view(store, view)
+    edit: Edit = IncludeView(found.key, change.included)
+    if "calibration" in change.model_fields_set:
+        edit = SetCalibrationSource(found.key, change.calibration)
+    return _submit(store, found.group_id, edit, if_match, actor, key, response)
+
+
+def _submit(
+    store: Store,
+    group: int,
+    edit: Edit,
+    if_match: str,
+    actor: str,
+    key: str | None,
+    response: Response,
+) -> GroupDocument:
+    with current_state(lambda: load_document(store, group)):
+        state = submit(store, group, edit, if_match=if_match, actor=actor, idempotency_key=key)
+    return answer(state, response)
+
+
+@router.get(
+    "/{view}/image",
+    operation_id="getImage",
+    response_class=Response,
+    responses={**responses(404, 413), **IMAGES},
+)
+def get_image(
+    view: Id,
+    services: AppServices,
+    request: Request,
+    width: Annotated[
+        int | None,
+        Query(ge=1, le=100_000, description="Wanted width in pixels; never enlarged."),
+    ] = None,
+) -> Response:
+    """The frame of a view, scaled down when a width is given."""
+    found = find_view(services.store, view)
+    if found.media is None:
+        raise NotFoundError("this view has no frame", hint="Its dataset came with labels alone.")
+    content = read_frame(found.media, clamp_width(width), found.flipped, services.settings)
+    etag = f'"{hashlib.sha256(content).hexdigest()[:32]}"'
+    headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
+    if etag_matches(request, etag):
+        return Response(status_code=304, headers=headers)
+    return Response(content, media_type=content_type(content), headers=headers)
+
+
+def clamp_width(width: int | None) -> int | None:
+    """The width that is made for a width that is asked for."""
+    if width is None:
+        return None
+    stepped = -(-width // WIDTH_STEP) * WIDTH_STEP
+    return min(max(stepped, MIN_WIDTH), MAX_WIDTH)

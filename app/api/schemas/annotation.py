@@ -1,0 +1,160 @@
+"""Annotations as they travel: points of lines and boxes of balls, and the edits of both."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    WithJsonSchema,
+    model_validator,
+)
+
+from app.errors import UnknownMarkingError
+from app.soccer.annotation import BallAnnotation, Lines
+from app.soccer.frames import Box, ImagePoint
+from app.soccer.pitch import MARKINGS, canonical_marking
+
+MAX_POINTS = 1000
+MAX_PIXEL = 100_000.0
+"""Annotated points may lie outside the image, but not that far."""
+
+
+def _known(name: str) -> str:
+    try:
+        return canonical_marking(name)
+    except UnknownMarkingError as error:
+        raise ValueError(error.message) from None
+
+
+def _distinct(lines: Any) -> Any:
+    if isinstance(lines, dict):
+        names = [name.strip() for name in lines if isinstance(name, str)]
+        if len(set(names)) < len(names):
+            raise ValueError("a marking is named twice")
+    return lines
+
+
+Marking = Annotated[
+    str, AfterValidator(_known), WithJsonSchema({"type": "string", "enum": list(MARKINGS)})
+]
+"""One of the 26 names; spaces at the ends do not matter."""
+Pixel = Annotated[float, Field(ge=-MAX_PIXEL, le=MAX_PIXEL, allow_inf_nan=False, strict=True)]
+Length = Annotated[float, Field(gt=0, le=MAX_PIXEL, allow_inf_nan=False, strict=True)]
+BoxNumbers = tuple[Pixel, Pixel, Length, Length]
+"""x, y of the top-left corner, width, height; pixels of the annotated size."""
+PointNumbers = tuple[Pixel, Pixel]
+
+
+class Point(BaseModel):
+    """A point of an image, pixels of the annotated size, (0, 0) the centre of the first pixel."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    x: Pixel
+    y: Pixel
+
+
+LineEdits = Annotated[
+    dict[Marking, Annotated[list[Point], Field(max_length=MAX_POINTS)] | None],
+    BeforeValidator(_distinct),
+]
+
+
+class LinesEdit(BaseModel):
+    """New points for some markings: null or no points delete one, absent ones stay."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"lines": {"Middle line": [{"x": 640.5, "y": 120.0}, {"x": 655.0, "y": 700.0}]}},
+                {"lines": {"Circle central": None}},
+            ]
+        },
+    )
+
+    lines: LineEdits
+
+    def points(self) -> dict[str, tuple[ImagePoint, ...] | None]:
+        """The edit in values of the pitch's vocabulary."""
+        return points_of(self.lines)
+
+
+def points_of(lines: dict[str, list[Point] | None]) -> dict[str, tuple[ImagePoint, ...] | None]:
+    """Line edits as values."""
+    return {
+        marking: None if points is None else tuple(ImagePoint(p.x, p.y) for p in points)
+        for marking, points in lines.items()
+    }
+
+
+class BallEdit(BaseModel):
+    """The ball of a view: its box, or its centre alone, or that it is out of view."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [{"box": [801.5, 322.0, 14.0, 14.5]}, {"point": [808.5, 329.0]}]
+        },
+    )
+
+    box: BoxNumbers | None = None
+    point: PointNumbers | None = None
+    occluded: StrictBool = False
+    out_of_view: StrictBool = False
+
+    @model_validator(mode="after")
+    def _one_place(self) -> BallEdit:
+        if not self.model_fields_set:
+            raise ValueError("give a box, a point, out_of_view, or null for no ball")
+        if self.box is not None and self.point is not None:
+            raise ValueError("give a box or a point, not both")
+        return self
+
+    def ball(self) -> BallAnnotation | None:
+        """The annotation; None when it says that there is no ball."""
+        if self.box is None and self.point is None and not self.out_of_view:
+            return None
+        return BallAnnotation(
+            box=None if self.box is None else Box(*self.box),
+            point=None if self.point is None else ImagePoint(*self.point),
+            occluded=self.occluded,
+            out_of_view=self.out_of_view,
+        )
+
+
+class Ball(BaseModel):
+    """One ball as annotated."""
+
+    box: BoxNumbers | None
+    point: PointNumbers | None
+    occluded: bool
+    out_of_view: bool
+
+    @staticmethod
+    def of(ball: BallAnnotation) -> Ball:
+        """The document of an annotation."""
+        box, point = ball.box, ball.point
+        return Ball.model_construct(
+            box=None if box is None else (box.x, box.y, box.width, box.height),
+            point=None if point is None else (point.x, point.y),
+            occluded=ball.occluded,
+            out_of_view=ball.out_of_view,
+        )
+
+
+LineDocuments = dict[str, list[Point]]
+
+
+def lines_document(lines: Lines) -> LineDocuments:
+    """Lines as they travel."""
+    return {
+        marking: [Point.model_construct(x=point.x, y=point.y) for point in points]
+        for marking, points in lines.items()
+    }

@@ -1,0 +1,194 @@
+"""The group document: one instant with all its views, its solution and its verdict."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from string import ascii_uppercase
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field
+
+from app.api.schemas.annotation import Ball, LineDocuments, lines_document
+from app.api.schemas.policy import PolicyDocument
+from app.api.schemas.solution import SolutionDocument
+from app.review.state import GroupState, VerdictState
+from app.soccer.group import Group, View
+
+State = Literal["unreviewed", "accepted", "rejected", "deferred"]
+
+
+class DatasetName(BaseModel):
+    """The dataset that a group belongs to."""
+
+    id: int
+    name: str
+
+
+class PitchSize(BaseModel):
+    """Length and width of the pitch, metres."""
+
+    length: float
+    width: float
+
+
+class VerdictDocument(BaseModel):
+    """What people decided; `stale` when the group changed afterwards."""
+
+    state: State
+    reason: str | None
+    note: str | None
+    by: str | None
+    at: datetime | None
+    stale: bool
+    fixed: bool = Field(description="Edited by a person before it was accepted.")
+    override: str | None = Field(description="The gate that it was accepted against.")
+
+    @staticmethod
+    def of(verdict: VerdictState) -> VerdictDocument:
+        """The document of a verdict."""
+        return VerdictDocument.model_validate(
+            {
+                "state": verdict.state,
+                "reason": verdict.reason,
+                "note": verdict.note,
+                "by": verdict.actor,
+                "at": verdict.at,
+                "stale": verdict.stale,
+                "fixed": verdict.fixed,
+                "override": verdict.override,
+            }
+        )
+
+
+class StationDocument(BaseModel):
+    """The camera station of a view; a shared one is a static camera."""
+
+    id: int
+    key: str
+    shared: bool
+    calibration: Literal["given", "lines"] = Field(
+        description="Which calibration counts when both exist."
+    )
+    has_given: bool
+    etag: str = Field(description="For If-Match on `/stations/{id}/lines`.")
+
+
+class ViewDocument(BaseModel):
+    """One image of the instant, as annotated."""
+
+    id: int
+    key: str
+    letter: str
+    label: str
+    width: int
+    height: int
+    included: bool
+    station: StationDocument
+    lines: LineDocuments
+    balls: list[Ball]
+    image: str | None = Field(description="Address of the frame, where there is one.")
+
+
+class GroupDocument(BaseModel):
+    """A group, complete: what people said and what follows from it."""
+
+    id: int
+    number: int = Field(description="Place in the dataset, from 1.")
+    dataset: DatasetName
+    key: str
+    label: str
+    match: str
+    split: str
+    pitch: PitchSize
+    revision: int
+    etag: str = Field(description="The ETag header again, quotes included.")
+    can_undo: bool
+    can_redo: bool
+    verdict: VerdictDocument
+    verdicts: list[VerdictDocument] = Field(description="The last verdict of every person.")
+    policy: PolicyDocument
+    views: list[ViewDocument]
+    solution: SolutionDocument | None
+
+    @staticmethod
+    def of(state: GroupState) -> GroupDocument:
+        """The document of a group's state."""
+        group = state.group
+        return GroupDocument.model_construct(
+            id=state.id,
+            number=state.number,
+            dataset=DatasetName(id=state.dataset_id, name=state.dataset),
+            key=group.key,
+            label=group.label or group.key,
+            match=group.match,
+            split=group.split,
+            pitch=PitchSize(length=group.pitch.length, width=group.pitch.width),
+            revision=state.revision,
+            etag=state.etag,
+            can_undo=state.can_undo,
+            can_redo=state.can_redo,
+            verdict=VerdictDocument.of(state.verdict),
+            verdicts=[VerdictDocument.of(verdict) for verdict in state.verdicts],
+            policy=PolicyDocument.of(state.policy),
+            views=[
+                _view(state, view, index, label)
+                for index, (view, label) in enumerate(
+                    zip(group.views, view_labels(group), strict=True)
+                )
+            ],
+            solution=None if state.solution is None else SolutionDocument.of(state.solution),
+        )
+
+
+def view_labels(group: Group) -> list[str]:
+    """What people call the views: the camera's number, or the main camera and its replays."""
+    labels = []
+    for index, view in enumerate(group.views):
+        camera = view.station.key.removeprefix("cam") if view.station.shared else ""
+        if camera.isdigit():
+            labels.append(f"Camera {camera}")
+        elif index == 0:
+            labels.append("Main camera")
+        else:
+            labels.append(f"Replay {index}")
+    return labels
+
+
+def letter(index: int) -> str:
+    """A, B, ... for the views in their order."""
+    return ascii_uppercase[index] if index < len(ascii_uppercase) else str(index + 1)
+
+
+def image_address(view_id: int) -> str:
+    """Where the frame of a view is served."""
+    return f"/api/v1/views/{view_id}/image"
+
+
+def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument:
+    view_id = state.view_ids[view.key]
+    return ViewDocument.model_construct(
+        id=view_id,
+        key=view.key,
+        letter=letter(index),
+        label=label,
+        width=view.size.width,
+        height=view.size.height,
+        included=view.included,
+        station=_station(state, view),
+        lines=lines_document(view.station.lines),
+        balls=[Ball.of(ball) for ball in view.balls],
+        image=None if view.media is None else image_address(view_id),
+    )
+
+
+def _station(state: GroupState, view: View) -> StationDocument:
+    station = view.station
+    values: dict[str, Any] = {
+        "id": state.station_ids[station.key],
+        "key": station.key,
+        "shared": station.shared,
+        "calibration": station.calibration,
+        "has_given": station.given is not None,
+        "etag": state.station_etags[station.key],
+    }
+    return StationDocument.model_construct(**values)

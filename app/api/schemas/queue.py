@@ -1,0 +1,148 @@
+"""Pages of groups: rows, neighbours, findings."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+
+from pydantic import BaseModel, Field
+
+from app.api.schemas.group import State, image_address
+from app.api.schemas.solution import FailingGate, FixDocument
+from app.review.queue import GroupRow as QueueRow
+from app.store.log import LogEntry
+
+THUMBNAIL_WIDTH = 208
+TOLD_KINDS = frozenset({"edit", "undo", "redo", "verdict"})
+
+
+def thumbnail_address(view_id: int | None) -> str | None:
+    """Where the small picture of a group's main view is served."""
+    if view_id is None:
+        return None
+    return f"{image_address(view_id)}?width={THUMBNAIL_WIDTH}"
+
+
+class GroupRow(BaseModel):
+    """One group in a list."""
+
+    id: int
+    number: int
+    key: str
+    label: str
+    match: str
+    split: str
+    status: State
+    stale: bool
+    passes: bool | None = Field(description="null while it is not solved.")
+    first_failing: FailingGate | None
+    margin: float | None
+    min_jac: float | None
+    error_px: float | None
+    error_percent: float | None
+    sigma_m: float | None
+    parallax_degrees: float | None
+    size_ratio: float | None
+    height_m: float | None
+    views: int
+    findings: list[str]
+    reviewer: str | None
+    fixed: bool
+    changed: datetime
+    thumbnail: str | None
+
+    @staticmethod
+    def of(row: QueueRow) -> GroupRow:
+        """The document of a row of the queue."""
+        values: dict[str, Any] = {name: getattr(row, name) for name in _SAME}
+        failing = None
+        if row.gate is not None:
+            failing = FailingGate(
+                gate=row.gate, view=row.gate_view, sentence=row.gate_sentence or row.gate
+            )
+        return GroupRow.model_construct(
+            **values,
+            label=row.label or row.key,
+            changed=datetime.fromisoformat(row.changed),
+            first_failing=failing,
+            findings=list(row.findings),
+            thumbnail=thumbnail_address(row.main_view),
+        )
+
+
+_SAME = tuple(
+    name
+    for name in GroupRow.model_fields
+    if name not in ("label", "changed", "first_failing", "findings", "thumbnail")
+)
+
+
+class GroupPage(BaseModel):
+    """Groups that match, in order; `next` is the cursor of the page after this one."""
+
+    items: list[GroupRow]
+    next: str | None
+    total: int = Field(description="How many match in all.")
+
+
+class Neighbours(BaseModel):
+    """Where a group stands among those that match, and what comes before and after it."""
+
+    index: int | None = Field(description="From 0; null when the group does not match.")
+    total: int
+    previous: list[int]
+    next: list[int]
+
+
+class FindingRow(BaseModel):
+    """A finding and where it was found; `group` is the group's key."""
+
+    kind: str
+    group: str
+    group_id: int
+    view: str | None
+    marking: str | None
+    suggested: str | None
+    number: float | None
+    threshold: float | None
+    confidence: float | None
+    sentence: str
+    fix: FixDocument | None
+
+    @staticmethod
+    def of(group_id: int, values: dict[str, Any]) -> FindingRow:
+        """The row of a finding in a group."""
+        return FindingRow.model_validate({**values, "group_id": group_id})
+
+
+class FindingList(BaseModel):
+    """Findings of a dataset, by number of the group."""
+
+    items: list[FindingRow]
+    next: str | None
+    total: int = Field(description="How many groups have findings.")
+
+
+class LogEntryDocument(BaseModel):
+    """One entry of a group's history."""
+
+    id: int
+    at: datetime
+    actor: str
+    kind: str
+    body: dict[str, Any] | None = Field(
+        description="What was said; null for imports, which the group itself tells."
+    )
+
+    @staticmethod
+    def of(entry: LogEntry) -> LogEntryDocument:
+        """The document of an entry."""
+        told = entry.kind in TOLD_KINDS and isinstance(entry.body, dict)
+        values = {name: getattr(entry, name) for name in ("id", "at", "actor", "kind")}
+        return LogEntryDocument.model_validate({**values, "body": entry.body if told else None})
+
+
+class History(BaseModel):
+    """What people and imports did to a group, oldest first."""
+
+    items: list[LogEntryDocument]

@@ -1,0 +1,54 @@
+"""A static camera as it travels."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field
+
+from app.api.schemas.annotation import LineDocuments, lines_document
+from app.api.schemas.group import DatasetName
+from app.review.stations import StationState
+
+
+class StationDetail(BaseModel):
+    """A camera station: the lines that all its views share."""
+
+    id: int
+    dataset: DatasetName
+    key: str
+    shared: bool
+    width: int
+    height: int
+    calibration: Literal["given", "lines"]
+    has_given: bool
+    flipped: bool
+    lines: LineDocuments
+    groups: int = Field(description="How many groups it takes part in.")
+    revision: int
+    etag: str
+    can_undo: bool
+    can_redo: bool
+
+    @staticmethod
+    def of(state: StationState) -> StationDetail:
+        """The document of a station's state."""
+        station = state.station
+        values: dict[str, Any] = {
+            "id": state.id,
+            "dataset": DatasetName(id=state.dataset_id, name=state.dataset),
+            "key": station.key,
+            "shared": station.shared,
+            "width": station.size.width,
+            "height": station.size.height,
+            "calibration": station.calibration,
+            "has_given": station.given is not None,
+            "flipped": station.flipped,
+            "lines": lines_document(station.lines),
+            "groups": len(state.groups),
+            "revision": state.revision,
+            "etag": state.etag,
+            "can_undo": state.can_undo,
+            "can_redo": state.can_redo,
+        }
+        return StationDetail.model_construct(**values)

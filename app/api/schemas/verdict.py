@@ -1,0 +1,42 @@
+"""The verdict that somebody sends."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.api.schemas.group import State
+
+Reason = Literal[
+    "bad_field_lines",
+    "sides_confused",
+    "not_same_instant",
+    "ball_not_visible",
+    "bad_calibration",
+    "duplicate_view",
+    "other",
+]
+
+
+class VerdictEdit(BaseModel):
+    """Accept, reject with a reason, defer, or take a verdict back.
+
+    A rejection needs a reason; `other` needs a note, and so does accepting a group that fails a
+    gate.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"state": "accepted"},
+                {"state": "rejected", "reason": "bad_field_lines"},
+                {"state": "rejected", "reason": "other", "note": "wrong match"},
+            ]
+        },
+    )
+
+    state: State
+    reason: Reason | None = None
+    note: Annotated[str, Field(max_length=2000)] | None = None

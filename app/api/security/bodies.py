@@ -1,0 +1,155 @@
+"""Request bodies: JSON alone, capped while they arrive, and plain enough for every reader."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from typing import NoReturn
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.api.problem import make_problem, problem_response
+from app.api.security.origin import SAFE_METHODS
+
+MAX_JSON_BYTES = 2 * 1024 * 1024
+"""A group with every line of six views is below 50 kB."""
+MAX_DEPTH = 16
+_TOO_DEEP = f"the body is nested more than {MAX_DEPTH} levels deep"
+_STRINGS = re.compile(rb'"(?:[^"\\]|\\.)*"')
+_BRACKETS = re.compile(rb"[\[\]{}]")
+_SURROGATE = re.compile(rb"\\u[dD][89abAB]")
+
+
+class BodyError(Exception):
+    """A body that is refused, and the status that says so."""
+
+    def __init__(self, status: int, detail: str, hint: str | None = None):
+        super().__init__(detail)
+        self.status, self.detail, self.hint = status, detail, hint
+
+
+def check_json(body: bytes) -> None:
+    """Raise ``BodyError`` unless the bytes are JSON as RFC 8259 has it, finite and flat enough.
+
+    Python's reader also takes NaN, Infinity, 1e999, other encodings and lone surrogates; none of
+    these survives a way through a database or another program.
+    """
+    try:
+        text = body.decode("utf-8")
+    except UnicodeDecodeError:
+        raise BodyError(400, "the body is not UTF-8 text") from None
+    try:
+        value = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
+    except RecursionError:
+        raise BodyError(400, _TOO_DEEP) from None
+    except ValueError as error:
+        place = f" at character {error.pos}" if isinstance(error, json.JSONDecodeError) else ""
+        raise BodyError(400, f"the body is not JSON{place}") from None
+    # Only now: on text that is not JSON the pattern for strings would not be linear.
+    if _depth(body) > MAX_DEPTH:
+        raise BodyError(400, _TOO_DEEP)
+    if _SURROGATE.search(body):
+        _refuse_lone_surrogates(value)
+
+
+def _depth(body: bytes) -> int:
+    deepest = level = 0
+    for bracket in _BRACKETS.findall(_STRINGS.sub(b"", body)):
+        level += 1 if bracket in (b"[", b"{") else -1
+        deepest = max(deepest, level)
+    return deepest
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise BodyError(400, f"{name} is not a number in JSON")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise BodyError(400, "a number in the body is too large")
+    return value
+
+
+def _refuse_lone_surrogates(value: object) -> None:
+    try:
+        json.dumps(value, ensure_ascii=False).encode("utf-8")
+    except UnicodeEncodeError:
+        raise BodyError(400, "a text in the body is not valid Unicode") from None
+
+
+class JsonBodies:
+    """Reads the body of a request that changes something, up to a cap, and checks it.
+
+    An honest Content-Length is refused before a byte is read; a dishonest or chunked one is cut
+    off as soon as the cap is passed.
+    """
+
+    def __init__(self, app: ASGIApp, max_bytes: int = MAX_JSON_BYTES):
+        self.app = app
+        self.max_bytes = max_bytes
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http" or scope["method"] in SAFE_METHODS:
+            await self.app(scope, receive, send)
+            return
+        try:
+            body = await self._read(Headers(scope=scope), receive)
+            if body is None:
+                return
+            if body:
+                require_json_type(Headers(scope=scope).getlist("content-type"))
+                check_json(body)
+        except BodyError as error:
+            problem = make_problem(error.status, error.detail, hint=error.hint)
+            # The rest of the body is unread: the connection cannot carry another request.
+            headers = {"Connection": "close"} if error.status == 413 else None
+            await problem_response(problem, headers)(scope, receive, send)
+            return
+        await self.app(scope, _replay(body, receive), send)
+
+    async def _read(self, headers: Headers, receive: Receive) -> bytes | None:
+        declared = headers.get("content-length", "0")
+        if not declared.isascii() or not declared.isdigit():
+            raise BodyError(400, "Content-Length is not a number")
+        if len(declared) > 18 or int(declared) > self.max_bytes:
+            raise self._too_large()
+        body = bytearray()
+        more = True
+        while more:
+            message = await receive()
+            if message["type"] == "http.disconnect":
+                return None
+            body += message.get("body", b"")
+            more = message.get("more_body", False)
+            if len(body) > self.max_bytes:
+                raise self._too_large()
+        return bytes(body)
+
+    def _too_large(self) -> BodyError:
+        return BodyError(413, f"a request body may have at most {self.max_bytes} bytes")
+
+
+def require_json_type(types: list[str]) -> None:
+    """Raise ``BodyError`` (415) unless the Content-Type is JSON in UTF-8."""
+    kind, *parameters = [part.strip().lower() for part in "".join(types).split(";")]
+    charsets = [item.partition("=")[2].strip('"') for item in parameters if "charset" in item]
+    if len(types) != 1 or kind != "application/json" or any(c != "utf-8" for c in charsets):
+        raise BodyError(
+            415, "a request body must be JSON", hint="Send Content-Type: application/json."
+        )
+
+
+def _replay(body: bytes, receive: Receive) -> Receive:
+    sent = False
+
+    async def replay() -> Message:
+        nonlocal sent
+        if sent:
+            return await receive()
+        sent = True
+        return {"type": "http.request", "body": body, "more_body": False}
+
+    return replay

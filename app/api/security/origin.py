@@ -1,0 +1,78 @@
+"""Whom the server listens to: the Host that was meant, and the Origin that sent the request."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from app.api.problem import make_problem, problem_response
+
+SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+_ORIGIN = re.compile(r"(https?)://([^/?#@\\\s]+)")
+
+
+def host_name(host: str) -> str:
+    """The name in a Host header, without the port, in lower case; brackets of IPv6 stay."""
+    host = host.strip().lower()
+    if host.startswith("["):
+        return host[: host.find("]") + 1]
+    return host.partition(":")[0]
+
+
+def same_origin(origin: str, host: str, scheme: str) -> bool:
+    """Whether an Origin header names the very host (and port) that the request was sent to."""
+    match = _ORIGIN.fullmatch(origin.lower())
+    return match is not None and _with_port(match[2], match[1]) == _with_port(host, scheme)
+
+
+def _with_port(host: str, scheme: str) -> str:
+    default = {"http": ":80", "https": ":443"}[scheme]
+    host = host.strip().lower()
+    return host if host.rpartition(":")[2].isdigit() and not host.endswith("]") else host + default
+
+
+class KnownHosts:
+    """Refuses a request whose Host is none of ours, so that DNS rebinding reaches nothing."""
+
+    def __init__(self, app: ASGIApp, allowed: Iterable[str]):
+        self.app = app
+        self.allowed = frozenset(name.lower() for name in allowed)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http":
+            hosts = Headers(scope=scope).getlist("host")
+            if len(hosts) != 1 or host_name(hosts[0]) not in self.allowed:
+                problem = make_problem(
+                    400,
+                    "this server does not answer to that Host",
+                    hint="TOUCHLINE_ALLOWED_HOSTS lists the names it answers to.",
+                )
+                await problem_response(problem)(scope, receive, send)
+                return
+        await self.app(scope, receive, send)
+
+
+class SameOrigin:
+    """Refuses a request that changes something and comes from another site's page."""
+
+    def __init__(self, app: ASGIApp):
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http" and not self._is_ours(scope):
+            problem = make_problem(403, "requests from pages of another site are refused")
+            await problem_response(problem)(scope, receive, send)
+            return
+        await self.app(scope, receive, send)
+
+    def _is_ours(self, scope: Scope) -> bool:
+        if scope["method"] in SAFE_METHODS:
+            return True
+        headers, scheme = Headers(scope=scope), scope.get("scheme", "http")
+        if headers.get("sec-fetch-site", "none") not in ("same-origin", "none"):
+            return False
+        host = headers.get("host", "")
+        return all(same_origin(origin, host, scheme) for origin in headers.getlist("origin"))

@@ -1,0 +1,61 @@
+"""Requests brought into the one form that the routes expect: HEAD as GET, one Range or none."""
+
+from __future__ import annotations
+
+import re
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.api.problem import make_problem, problem_response
+
+_ONE_RANGE = re.compile(rb"bytes=(\d{1,18}-\d{0,18}|-\d{1,18})")
+
+
+class HeadAsGet:
+    """Answers HEAD wherever GET is answered, with the same headers and no body."""
+
+    def __init__(self, app: ASGIApp):
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            await self.app(scope, receive, send)
+            return
+
+        async def send_without_body(message: Message) -> None:
+            if message["type"] == "http.response.body":
+                message = {**message, "body": b""}
+            await send(message)
+
+        await self.app({**scope, "method": "GET"}, receive, send_without_body)
+
+
+class OneRange:
+    """Lets one Range through; many small ones would cost more than the whole file."""
+
+    def __init__(self, app: ASGIApp):
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http" or "range" not in Headers(scope=scope):
+            await self.app(scope, receive, send)
+            return
+        ranges = [value for name, value in scope["headers"] if name == b"range"]
+        if len(ranges) != 1 or not _ONE_RANGE.fullmatch(ranges[0]):
+            rest = [(name, value) for name, value in scope["headers"] if name != b"range"]
+            await self.app({**scope, "headers": rest}, receive, send)
+            return
+        refused = False
+
+        async def send_or_refuse(message: Message) -> None:
+            nonlocal refused
+            if message["type"] == "http.response.start" and message["status"] == 416:
+                refused = True
+                size = Headers(raw=message["headers"]).get("content-range", "bytes */*")
+                problem = make_problem(416, "the file ends before that range begins")
+                await problem_response(problem, {"Content-Range": size})(scope, receive, send)
+            elif not refused:
+                await send(message)
+
+        await self.app(scope, receive, send_or_refuse)

@@ -1,0 +1,154 @@
+"""Small applications around the parts of the REST interface."""
+
+from __future__ import annotations
+
+import shutil
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fastapi import FastAPI
+from starlette.types import ASGIApp
+
+from app.api.application import create_app
+from app.config import Settings
+from app.geometry.camera import Camera
+from app.review.ingest import ingest
+from app.review.recompute import solve_dataset
+from app.soccer.annotation import BallAnnotation, Lines, make_lines
+from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.group import Group, Media, Station, View
+from app.soccer.pitch import MARKINGS, Pitch
+from app.store.session import Store
+
+with warnings.catch_warnings():
+    # It would rather use another HTTP client than the one that is installed.
+    warnings.simplefilter("ignore")
+    from starlette.testclient import TestClient
+
+BASE = "http://127.0.0.1:8000"
+INDEX = b"""<!doctype html>
+<title>Touchline</title>
+<script type="importmap">{"imports": {"preact": "/static/node_modules/preact/a.mjs"}}</script>
+<script type="module" src="/static/main.js"></script>
+"""
+
+
+@pytest.fixture
+def client_of() -> Callable[[ASGIApp], TestClient]:
+    """A client that talks to an application as a browser on the same machine does."""
+    return lambda app: TestClient(app, base_url=BASE, raise_server_exceptions=False)
+
+
+@pytest.fixture
+def static_folder(tmp_path: Path) -> Path:
+    """A browser application of a few files."""
+    folder = tmp_path / "static"
+    (folder / "node_modules" / "preact").mkdir(parents=True)
+    (folder / "index.html").write_bytes(INDEX)
+    (folder / "main.js").write_text("export const one = 1;\n")
+    (folder / "logo.svg").write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
+    (folder / ".npmrc").write_text("omit=dev\n")
+    (folder / "node_modules" / "preact" / "a.mjs").write_text("export {};\n")
+    (folder / "node_modules" / "preact" / "demo.html").write_text("<script>1</script>")
+    (folder / "node_modules" / "preact" / "x.svg").write_text("<svg/>")
+    (tmp_path / "secret.js").write_text("secret")
+    return folder
+
+
+@pytest.fixture
+def plain_app() -> FastAPI:
+    """An application without routes of its own."""
+    return FastAPI(docs_url=None, redoc_url=None)
+
+
+CAMERAS = {
+    "7.png": ((5.0, 62.0, -18.0), (8.0, 0.0, 0.0), 1500.0),
+    "7_1.png": ((75.0, 6.0, -9.0), (30.0, 0.0, 0.0), 1600.0),
+}
+"""Position, a point looked at, focal length in pixels."""
+BALL = (21.0, -4.0, -1.5)
+SIZE = ImageSize(1280, 720)
+
+
+def look_at(position: tuple[float, ...], target: tuple[float, ...], focal: float) -> Camera:
+    """A camera without roll."""
+    forward = np.subtract(target, position)
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, -1.0])
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(forward, right), forward])
+    return Camera(rotation, np.array(position), (focal, focal), (639.5, 359.5))
+
+
+def lines_of(camera: Camera) -> Lines:
+    """Every marking that lies in the picture, as somebody would click it."""
+    lines = {}
+    for marking in MARKINGS:
+        pixels = camera.project(Pitch().sample(marking, 0.9, 0.2))
+        inside = (pixels > 0).all(axis=1) & (pixels < [SIZE.width, SIZE.height]).all(axis=1)
+        seen = pixels[inside]
+        if len(seen) >= 4:
+            lines[marking] = seen[np.linspace(0, len(seen) - 1, 5).astype(int)].tolist()
+    return make_lines(lines)
+
+
+def view_of(key: str, media: Media | None = None) -> View:
+    """A view with its lines and a ball box that fits."""
+    camera = look_at(*CAMERAS[key])
+    x, y = camera.project(np.array([BALL]))[0]
+    depth = camera.pitch_to_camera(np.array([BALL]))[0, 2]
+    diameter = 0.226 * CAMERAS[key][2] / depth
+    ball = BallAnnotation(box=Box.square(ImagePoint(float(x), float(y)), float(diameter)))
+    return View(key, Station(key, SIZE, lines=lines_of(camera)), (ball,), media)
+
+
+@pytest.fixture(scope="session")
+def group() -> Group:
+    """Two views of one instant, all of it consistent."""
+    match = "league/2015-2016/2015-08-08 - 14-00 Home 3 - 1 Away"
+    views = (view_of("7.png"), view_of("7_1.png"))
+    return Group(f"{match}/7.png", views, match, split="train", label="Home 3 - 1 Away, 12:41")
+
+
+@pytest.fixture(scope="session")
+def static_group() -> Group:
+    """The same from two static cameras."""
+    views = []
+    for key, name in (("7.png", "cam3"), ("7_1.png", "cam4")):
+        view = view_of(key)
+        views.append(replace(view, key=name, station=replace(view.station, key=name, shared=True)))
+    return Group("1200", tuple(views), "issia", label="Frame 1200")
+
+
+@pytest.fixture(scope="session")
+def prepared_home(
+    tmp_path_factory: pytest.TempPathFactory, group: Group, static_group: Group
+) -> Path:
+    """A home with the datasets ``broadcast`` and ``static``, both solved."""
+    home = tmp_path_factory.mktemp("prepared") / "home"
+    store = Store.open(Settings(home=home))
+    for name, chosen in (("broadcast", group), ("static", static_group)):
+        more = [chosen, *(replace(chosen, key=f"{chosen.key}{n}") for n in range(2))]
+        ingest(store, name, more, source="test", actor="local")
+        solve_dataset(store, name)
+    store.close()
+    return home
+
+
+@pytest.fixture
+def app(prepared_home: Path, static_folder: Path, tmp_path: Path) -> Iterator[FastAPI]:
+    """The whole application over a home of its own."""
+    shutil.copytree(prepared_home, tmp_path / "home")
+    app = create_app(Settings(home=tmp_path / "home"), static=static_folder)
+    yield app
+    app.state.services.close()
+
+
+@pytest.fixture
+def api(app: FastAPI, client_of) -> TestClient:
+    """A client of the whole application."""
+    return client_of(app)

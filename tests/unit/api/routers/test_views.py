@@ -1,0 +1,149 @@
+"""Views over HTTP: lines, ball, inclusion."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from app.api.routers.views import MAX_WIDTH, MIN_WIDTH, clamp_width
+
+API = "/api/v1"
+
+
+@pytest.fixture
+def document(api) -> dict[str, Any]:
+    """A group of two broadcast views."""
+    row = api.get(f"{API}/groups", params={"dataset": "broadcast"}).json()["items"][0]
+    return api.get(f"{API}/groups/{row['id']}").json()
+
+
+def patch(api, document: dict[str, Any], what: str, body: Any, view: int = 0) -> Any:
+    path = f"{API}/views/{document['views'][view]['id']}{what}"
+    # json=None would send no body at all.
+    headers = {"If-Match": document["etag"], "Content-Type": "application/json"}
+    return api.patch(path, content=json.dumps(body), headers=headers)
+
+
+class TestLines:
+    def test_absent_markings_stay_and_null_deletes(self, api, document) -> None:
+        lines = document["views"][0]["lines"]
+        first, second, *_ = lines
+        moved = [{"x": point["x"] + 1.0, "y": point["y"]} for point in lines[first]]
+        after = patch(api, document, "/lines", {"lines": {first: moved, second: None}}).json()
+        assert after["views"][0]["lines"] == {
+            name: moved if name == first else points
+            for name, points in lines.items()
+            if name != second
+        }
+        assert after["can_undo"] is True
+
+    def test_a_name_with_spaces_around_it_is_the_same_name(self, api, document) -> None:
+        name = next(iter(document["views"][0]["lines"]))
+        after = patch(api, document, "/lines", {"lines": {f"{name} ": None}}).json()
+        assert name not in after["views"][0]["lines"]
+
+    @pytest.mark.parametrize(
+        "body",
+        [
+            {},
+            {"lines": {"Middle line": [{"x": "1", "y": 2}]}},
+            {"lines": {"Middle line": [{"x": True, "y": 2}]}},
+            {"lines": {"Middle line": [{"x": 1e6, "y": 2}]}},
+            {"lines": {"Middle line": [{"x": 1, "y": 2, "z": 3}]}},
+            {"lines": {"Middle line": [[1, 2]]}},
+            {"lines": {"Middle line": [{"x": 1, "y": 2}] * 1001}},
+            {"lines": {"Line unknown": None}},
+            {"lines": {"Middle line": None, "Middle line ": None}},
+            {"lines": {}, "more": 1},
+            {"lines": {"Middle line": [{"x": 10**400, "y": 2}]}},
+        ],
+        ids=str,
+    )
+    def test_a_body_of_another_shape_is_422_and_changes_nothing(self, api, document, body) -> None:
+        assert patch(api, document, "/lines", body).status_code == 422
+        assert api.get(f"{API}/groups/{document['id']}").json() == document
+
+
+class TestBall:
+    def test_a_box_replaces_the_ball(self, api, document) -> None:
+        body = {"box": [600.25, 300.5, 12, 13], "occluded": True}
+        after = patch(api, document, "/ball", body).json()
+        assert after["views"][0]["balls"] == [
+            {"box": [600.25, 300.5, 12.0, 13.0], "point": None, "occluded": True}
+            | {"out_of_view": False}
+        ]
+
+    def test_a_point_is_a_ball_too(self, api, document) -> None:
+        after = patch(api, document, "/ball", {"point": [600.5, 300.5]}).json()
+        assert after["views"][0]["balls"][0]["point"] == [600.5, 300.5]
+
+    @pytest.mark.parametrize("body", [None, {"box": None}, {"point": None, "occluded": False}])
+    def test_null_means_that_there_is_none(self, api, document, body) -> None:
+        after = patch(api, document, "/ball", body).json()
+        assert after["views"][0]["balls"] == []
+        assert after["solution"]["ball"] is None
+
+    @pytest.mark.parametrize(
+        "body",
+        [
+            {},
+            {"box": [1, 2, 3]},
+            {"box": [1, 2, 0, 3]},
+            {"box": [1, 2, -3, 3]},
+            {"box": [1, 2, 3, 4], "point": [1, 2]},
+            {"box": [1, 2, 3, "4"]},
+            {"point": [1e9, 1]},
+            {"out_of_view": "yes"},
+            [1, 2, 3, 4],
+        ],
+        ids=str,
+    )
+    def test_a_body_of_another_shape_is_422(self, api, document, body) -> None:
+        assert patch(api, document, "/ball", body).status_code == 422
+
+
+class TestView:
+    def test_a_view_can_be_left_out_and_taken_in_again(self, api, document) -> None:
+        without = patch(api, document, "", {"included": False}).json()
+        assert without["views"][0]["included"] is False
+        assert without["solution"]["passes"] is False
+        again = patch(api, without, "", {"included": True}).json()
+        assert again["solution"]["passes"] is True
+
+    def test_which_calibration_counts_can_be_switched(self, api, document) -> None:
+        after = patch(api, document, "", {"calibration": "lines"}).json()
+        assert after["views"][0]["station"]["calibration"] == "lines"
+
+    @pytest.mark.parametrize(
+        "body",
+        [{}, {"included": None}, {"included": 1}, {"included": True, "calibration": "given"}],
+    )
+    def test_one_thing_at_a_time(self, api, document, body) -> None:
+        assert patch(api, document, "", body).status_code == 422
+
+
+class TestPreconditions:
+    def test_two_views_of_one_group_cannot_be_edited_past_each_other(self, api, document) -> None:
+        assert patch(api, document, "/ball", None, view=0).status_code == 200
+        late = patch(api, document, "/ball", None, view=1)
+        assert late.status_code == 412
+        assert late.json()["current"]["views"][0]["balls"] == []
+        assert late.json()["current"]["views"][1]["balls"] != []
+
+    def test_a_view_that_is_not_there_is_404(self, api) -> None:
+        headers = {"If-Match": '"a"'}
+        body = {"out_of_view": True}
+        assert api.patch(f"{API}/views/999/ball", json=body, headers=headers).status_code == 404
+
+    def test_labels_alone_have_no_frame(self, api, document) -> None:
+        assert document["views"][0]["image"] is None
+        assert api.get(f"{API}/views/{document['views'][0]['id']}/image").status_code == 404
+
+
+class TestClampWidth:
+    def test_widths_are_rounded_up_to_few_sizes(self) -> None:
+        assert {clamp_width(width) for width in range(200, 210)} == {208, 224}
+        assert clamp_width(None) is None
+        assert (clamp_width(1), clamp_width(10**5)) == (MIN_WIDTH, MAX_WIDTH)

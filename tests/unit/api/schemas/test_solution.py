@@ -1,0 +1,45 @@
+"""Solutions as they travel."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from app.api.schemas.solution import SolutionDocument
+from app.soccer.group import Group
+from app.soccer.policy import PAPER
+from app.soccer.solution import Solution
+from app.solving.solve import solve
+
+
+@pytest.fixture(scope="module")
+def solution(group: Group) -> Solution:
+    return solve(group, PAPER)
+
+
+class TestSolutionDocument:
+    def test_what_travels_is_what_was_computed(self, solution: Solution) -> None:
+        document = json.loads(SolutionDocument.of(solution).model_dump_json())
+        assert document["passes"] is True
+        assert document["first_failing"] is None
+        assert document["ball"]["point"] == list(solution.ball.point)
+        assert document["ball"]["height_m"] == -solution.ball.point[2]
+        assert [gate["name"] for gate in document["gates"]] == [g.name for g in solution.gates]
+        assert document["pairs"][0]["errors_px"] == list(solution.pairs[0].errors_px)
+
+    def test_jac_is_named_by_its_threshold(self, solution: Solution) -> None:
+        view = SolutionDocument.of(solution).views[0]
+        assert list(view.calibration.jac) == ["0.5", "1", "2"]
+
+    def test_the_document_fits_its_own_schema(self, solution: Solution) -> None:
+        text = SolutionDocument.of(solution).model_dump_json()
+        again = SolutionDocument.model_validate_json(text)
+        assert again.model_dump_json() == text
+
+    def test_a_number_that_is_not_finite_travels_as_null(self, solution: Solution) -> None:
+        endless = replace(solution, ball=replace(solution.ball, sigma_m=float("inf")))
+        text = SolutionDocument.of(endless).model_dump_json()
+        assert json.loads(text)["ball"]["sigma_m"] is None
+        assert SolutionDocument.model_validate_json(text).ball.sigma_m is None

@@ -1,0 +1,165 @@
+"""Request bodies: JSON alone, capped while they arrive."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.api.security.bodies import MAX_DEPTH, BodyError, JsonBodies, check_json, require_json_type
+
+JSON = [(b"content-type", b"application/json")]
+
+
+def refusal(body: bytes) -> str:
+    with pytest.raises(BodyError) as caught:
+        check_json(body)
+    assert caught.value.status == 400
+    return caught.value.detail
+
+
+class TestCheckJson:
+    @settings(deadline=None, derandomize=True)
+    @given(
+        st.recursive(
+            st.none()
+            | st.booleans()
+            | st.integers(-(2**70), 2**70)
+            | st.floats(allow_nan=False, allow_infinity=False)
+            | st.text(st.characters(exclude_categories=["Cs"])),
+            lambda inner: (
+                st.lists(inner, max_size=3)
+                | st.dictionaries(st.text('ab"[]{}\\', max_size=4), inner, max_size=3)
+            ),
+            max_leaves=10,
+        )
+    )
+    def test_takes_every_json_value_that_is_flat_enough(self, value: Any) -> None:
+        check_json(json.dumps(value).encode())
+
+    @pytest.mark.parametrize("word", [b"NaN", b"Infinity", b"-Infinity"])
+    def test_constants_of_javascript_are_no_numbers(self, word: bytes) -> None:
+        assert "not a number" in refusal(b'{"x": [' + word + b"]}")
+
+    def test_a_number_that_overflows_is_refused(self) -> None:
+        assert "too large" in refusal(b"[1e999]")
+
+    def test_an_integer_of_five_thousand_digits_is_refused(self) -> None:
+        assert "not JSON" in refusal(b"1" * 5000)
+
+    def test_one_level_too_deep_is_refused(self) -> None:
+        check_json(b"[" * MAX_DEPTH + b"]" * MAX_DEPTH)
+        assert "levels" in refusal(b"[" * (MAX_DEPTH + 1) + b"]" * (MAX_DEPTH + 1))
+
+    def test_brackets_inside_of_texts_do_not_count(self) -> None:
+        check_json(json.dumps(["[" * 100, '"' + "{" * 100]).encode())
+
+    def test_two_million_brackets_are_refused_at_once(self) -> None:
+        start = time.process_time()
+        assert "levels" in refusal(b"[" * 2_000_000)
+        assert time.process_time() - start < 0.5
+
+    def test_two_million_quotes_are_refused_at_once(self) -> None:
+        start = time.process_time()
+        refusal(b'\\"' * 1_000_000)
+        refusal(b'"' + b'\\"' * 1_000_000)
+        assert time.process_time() - start < 0.5
+
+    def test_another_encoding_is_refused(self) -> None:
+        assert "UTF-8" in refusal('{"a": "ä"}'.encode("latin-1"))
+        refusal('{"a": 1}'.encode("utf-16"))
+
+    def test_half_of_a_surrogate_pair_is_refused(self) -> None:
+        check_json(rb'"\ud83d\ude00"')
+        assert "Unicode" in refusal(rb'{"note": "\ud800"}')
+
+    def test_the_place_of_a_mistake_is_told(self) -> None:
+        assert refusal(b'{"a": }').endswith("at character 6")
+
+
+class TestRequireJsonType:
+    @pytest.mark.parametrize("kind", ["application/json", "Application/JSON; charset=UTF-8"])
+    def test_json_in_utf_8_is_what_it_takes(self, kind: str) -> None:
+        require_json_type([kind])
+
+    @pytest.mark.parametrize(
+        "kinds",
+        [
+            [],
+            ["text/plain"],
+            ["application/x-www-form-urlencoded"],
+            ["multipart/form-data; boundary=x"],
+            ["application/json; charset=utf-16"],
+            ["text/plain; application/json"],
+            ["application/json", "text/plain"],
+            [""],
+        ],
+    )
+    def test_everything_else_is_415(self, kinds: list[str]) -> None:
+        with pytest.raises(BodyError) as caught:
+            require_json_type(kinds)
+        assert caught.value.status == 415
+
+
+class Exchange:
+    """One request against ``JsonBodies``, chunk by chunk."""
+
+    def __init__(self, chunks: list[bytes], headers: list[tuple[bytes, bytes]], method: str):
+        self.chunks = chunks
+        self.taken = 0
+        self.reached: bytes | None = None
+        self.status = 0
+        self.scope = {"type": "http", "method": method, "headers": headers, "path": "/"}
+
+    async def receive(self) -> dict[str, Any]:
+        chunk = self.chunks[self.taken]
+        self.taken += 1
+        more = self.taken < len(self.chunks)
+        return {"type": "http.request", "body": chunk, "more_body": more}
+
+    async def send(self, message: dict[str, Any]) -> None:
+        self.status = message.get("status", self.status)
+
+    async def app(self, scope: Any, receive: Any, send: Any) -> None:
+        self.reached = (await receive())["body"]
+        self.status = 204
+
+    def run(self, max_bytes: int) -> Exchange:
+        asyncio.run(JsonBodies(self.app, max_bytes)(self.scope, self.receive, self.send))
+        return self
+
+
+class TestJsonBodies:
+    def test_the_body_arrives_whole_behind_it(self) -> None:
+        done = Exchange([b'{"a"', b": 1}"], JSON, "PATCH").run(100)
+        assert (done.status, done.reached) == (204, b'{"a": 1}')
+
+    def test_a_body_of_the_very_cap_passes_and_one_byte_more_does_not(self) -> None:
+        assert Exchange([b'"' + b"a" * 8 + b'"'], JSON, "POST").run(10).status == 204
+        assert Exchange([b'"' + b"a" * 9 + b'"'], JSON, "POST").run(10).status == 413
+
+    def test_an_honest_length_is_refused_before_a_byte_is_read(self) -> None:
+        headers = [*JSON, (b"content-length", b"11")]
+        done = Exchange([b"a" * 11], headers, "POST").run(10)
+        assert (done.status, done.taken) == (413, 0)
+
+    def test_a_chunked_body_is_cut_off_at_the_cap(self) -> None:
+        done = Exchange([b"a" * 4] * 1000, JSON, "POST").run(10)
+        assert (done.status, done.taken) == (413, 3)
+
+    def test_a_length_that_is_no_number_is_refused(self) -> None:
+        for length in (b"-1", b"1e9", "²".encode("latin-1"), b"9" * 30):
+            headers = [*JSON, (b"content-length", length)]
+            assert Exchange([b"1"], headers, "POST").run(10).status in (400, 413)
+
+    def test_a_request_without_a_body_needs_no_type(self) -> None:
+        assert Exchange([b""], [], "POST").run(10).status == 204
+
+    def test_a_body_of_another_type_never_arrives(self) -> None:
+        done = Exchange([b"a=1"], [(b"content-type", b"text/plain")], "POST").run(10)
+        assert (done.status, done.reached) == (415, None)

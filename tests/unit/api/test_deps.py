@@ -1,0 +1,34 @@
+"""Preconditions of a change."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.api.deps import get_idempotency_key, require_if_match
+from app.api.errors import PreconditionRequiredError
+from app.errors import InputError
+
+
+class TestRequireIfMatch:
+    def test_a_strong_etag_is_taken_as_it_is(self) -> None:
+        assert require_if_match(' "9f2c-61d0" ') == '"9f2c-61d0"'
+
+    def test_without_one_there_is_no_change(self) -> None:
+        with pytest.raises(PreconditionRequiredError):
+            require_if_match(None)
+
+    @pytest.mark.parametrize("tag", ["*", "", "abc", 'W/"a"', '"a", "b"', '"a', '"a"b"', '"ä"'])
+    def test_everything_else_is_refused(self, tag: str) -> None:
+        with pytest.raises(InputError):
+            require_if_match(tag)
+
+
+class TestGetIdempotencyKey:
+    def test_may_be_absent(self) -> None:
+        assert get_idempotency_key(None) is None
+        assert get_idempotency_key("a-1") == "a-1"
+
+    @pytest.mark.parametrize("key", ["", "a b", "ä", "a" * 201, "a\n"])
+    def test_must_be_short_and_visible(self, key: str) -> None:
+        with pytest.raises(InputError):
+            get_idempotency_key(key)

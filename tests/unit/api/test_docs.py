@@ -1,0 +1,52 @@
+"""docs/api.md shows what the service says."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.api.schemas.group import GroupDocument
+from app.api.schemas.problem import Problem
+
+PAGE = (Path(__file__).parents[3] / "docs" / "api.md").read_text(encoding="utf-8")
+PROBLEM, GROUP = re.findall(r"```json\n(.*?)```", PAGE, re.S)
+
+
+def names(value: Any) -> Any:
+    """The shape of a document: names of members, without their values."""
+    if isinstance(value, dict):
+        return {name: names(item) for name, item in value.items()}
+    return None
+
+
+class TestGroup:
+    def test_is_a_complete_document(self) -> None:
+        shown = json.loads(GROUP)
+        again = json.loads(GroupDocument.model_validate_json(GROUP).model_dump_json())
+        assert names(again) == names(shown)
+        for part in ("views", "gates", "pairs"):
+            for kept, said in zip(again["solution"][part], shown["solution"][part], strict=True):
+                assert names(kept) == names(said)
+
+    def test_has_everything_that_the_schema_has(self) -> None:
+        shown = json.loads(GROUP)
+        assert set(shown) == set(GroupDocument.model_fields)
+
+
+class TestProblem:
+    def test_is_one(self) -> None:
+        assert Problem.model_validate_json(PROBLEM).status == 422
+
+
+class TestAddresses:
+    @pytest.mark.parametrize(
+        "address", sorted(set(re.findall(r"\$api(/[a-z]+(?:/[\w{}]+)*)", PAGE)))
+    )
+    def test_every_address_in_the_examples_exists(self, app, address: str) -> None:
+        wanted = re.sub(r"/(\d+|sample|[0-9a-f]{32})(?=/|$)", "/{}", f"/api/v1{address}")
+        known = {re.sub(r"{\w+}", "{}", path) for path in app.openapi()["paths"]}
+        assert wanted in known

@@ -1,0 +1,160 @@
+"""Which status belongs to which error, and what the problem says."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import pytest
+from fastapi import FastAPI, Path, Query
+from sqlalchemy.exc import OperationalError
+
+from app.api.errors import (
+    BusyError,
+    PreconditionRequiredError,
+    StaleStateError,
+    install_handlers,
+    status_of,
+)
+from app.api.schemas.annotation import LinesEdit
+from app.errors import (
+    ConflictError,
+    DatasetFormatError,
+    DegenerateGeometryError,
+    IdempotencyError,
+    ImageError,
+    InputError,
+    NoConvergenceError,
+    NotFoundError,
+    ReviewError,
+    SharedStationError,
+    StaleRevisionError,
+    StorageError,
+    TooLargeError,
+    UnknownMarkingError,
+    UnsafePathError,
+)
+
+
+class RefusalError(Exception):
+    """Stands for the driver's error inside of SQLAlchemy's."""
+
+    sqlite_errorname = "SQLITE_FULL"
+
+
+def full_disk() -> StorageError:
+    error = StorageError("the disk is full")
+    error.__cause__ = OperationalError("INSERT", {}, RefusalError())
+    return error
+
+
+STALE = StaleRevisionError("changed", base_etag='"a"', current_etag='"b"')
+CASES: list[tuple[ReviewError, int]] = [
+    (InputError("x"), 400),
+    (UnknownMarkingError("x"), 400),
+    (DatasetFormatError("a", "b", "c", "d"), 400),
+    (UnsafePathError("x"), 400),
+    (TooLargeError("x"), 413),
+    (ImageError("x"), 422),
+    (NotFoundError("x"), 404),
+    (ConflictError("x"), 409),
+    (SharedStationError("cam3", 7, "cam3"), 409),
+    (STALE, 412),
+    (StaleStateError(STALE, {}), 412),
+    (IdempotencyError("x"), 422),
+    (PreconditionRequiredError("x"), 428),
+    (BusyError("x"), 429),
+    (DegenerateGeometryError("x"), 422),
+    (NoConvergenceError("x"), 422),
+    (StorageError("x"), 503),
+    (full_disk(), 507),
+]
+
+
+class TestStatusOf:
+    @pytest.mark.parametrize(("error", "status"), CASES, ids=lambda v: str(v)[:20])
+    def test_each_branch_of_the_tree_has_its_status(self, error: ReviewError, status: int) -> None:
+        assert status_of(error) == status
+
+
+@pytest.fixture
+def client(plain_app: FastAPI, client_of):
+    @plain_app.get("/raise/{index}")
+    def fail(index: int) -> None:
+        raise CASES[index][0]
+
+    @plain_app.get("/database")
+    def database() -> None:
+        raise OperationalError("SELECT secret", {}, Exception("locked"))
+
+    @plain_app.patch("/lines/{view}")
+    def lines(
+        view: Annotated[int, Path(ge=1)], edit: LinesEdit, limit: Annotated[int, Query(le=5)] = 1
+    ) -> None: ...
+
+    install_handlers(plain_app)
+    return client_of(plain_app)
+
+
+class TestReviewErrors:
+    @pytest.mark.parametrize("index", range(len(CASES)))
+    def test_the_answer_is_a_problem_with_its_sentence_and_an_id(self, client, index: int) -> None:
+        error, status = CASES[index]
+        answer = client.get(f"/raise/{index}")
+        problem = answer.json()
+        assert answer.status_code == problem["status"] == status
+        assert answer.headers["content-type"] == "application/problem+json"
+        assert (problem["detail"], problem["hint"]) == (error.message, error.hint)
+        assert problem["instance"].startswith("urn:uuid:")
+
+    def test_a_conflict_carries_the_present_state(self, client) -> None:
+        index = next(i for i, (error, _) in enumerate(CASES) if type(error) is StaleStateError)
+        answer = client.get(f"/raise/{index}")
+        assert (answer.json()["current"], answer.headers["etag"]) == ({}, '"b"')
+
+    def test_a_static_view_names_its_station(self, client) -> None:
+        index = next(i for i, (e, _) in enumerate(CASES) if isinstance(e, SharedStationError))
+        assert client.get(f"/raise/{index}").json()["station"] == 7
+
+    def test_what_may_pass_says_when_to_ask_again(self, client) -> None:
+        for index, (_, status) in enumerate(CASES):
+            sent = "retry-after" in client.get(f"/raise/{index}").headers
+            assert sent == (status in (429, 503, 507))
+
+    def test_a_busy_database_shows_no_sql(self, client) -> None:
+        answer = client.get("/database")
+        assert answer.status_code == 503
+        assert "SELECT" not in answer.text
+
+
+class TestValidationErrors:
+    def problem(self, client, body: object, path: str = "/lines/1"):
+        answer = client.patch(path, json=body)
+        assert answer.headers["content-type"] == "application/problem+json"
+        assert answer.status_code == 422
+        return answer.json()
+
+    def test_the_pointer_leads_to_the_field(self, client) -> None:
+        problem = self.problem(client, {"lines": {"Middle line": [{"x": 1.0}]}})
+        assert problem["pointer"] == "/lines/Middle line/0/y"
+        assert problem["detail"].startswith("/lines/Middle line/0/y: field required")
+
+    def test_an_unknown_marking_is_named(self, client) -> None:
+        problem = self.problem(client, {"lines": {"Midfield/line": None}})
+        assert problem["pointer"] == "/lines/Midfield~1line"
+        assert '"Midfield/line" is not a pitch marking' in problem["detail"]
+
+    def test_every_field_is_listed(self, client) -> None:
+        problem = self.problem(client, {"lines": {"Middle line": [{}]}, "more": 1})
+        pointers = {error["pointer"] for error in problem["errors"]}
+        assert pointers == {"/lines/Middle line/0/x", "/lines/Middle line/0/y", "/more"}
+
+    def test_what_was_sent_is_not_echoed(self, client) -> None:
+        assert "<script>" not in str(self.problem(client, {"lines": "<script>"}))
+
+    def test_a_parameter_is_named(self, client) -> None:
+        problem = self.problem(client, {"lines": {}}, "/lines/1?limit=9")
+        assert problem["pointer"] == "/limit"
+
+    @pytest.mark.parametrize("view", ["0", "x", "-1", "1.5"])
+    def test_an_id_that_cannot_be_one_is_not_found(self, client, view: str) -> None:
+        assert client.patch(f"/lines/{view}", json={"lines": {}}).status_code == 404
