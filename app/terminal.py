@@ -1,0 +1,121 @@
+"""The terminal: progress and complaints on stderr, results on stdout."""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+Progress = Callable[..., None]
+"""Called with how many are done and, where it is known, how many there are."""
+MIN_SECONDS = 0.1
+"""A bar that moves more often costs more than it shows."""
+
+
+@contextmanager
+def show_progress(what: str) -> Iterator[Progress]:
+    """A bar on stderr while something runs; without a terminal, nothing."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task(what, total=None)
+        last = 0.0
+
+        def progress(done: int, total: int | None = None) -> None:
+            nonlocal last
+            if done == total or time.monotonic() - last > MIN_SECONDS:
+                last = time.monotonic()
+                bar.update(task, completed=done, total=total)
+
+        yield progress
+
+
+def complain(message: str, hint: str | None = None) -> None:
+    """One sentence on stderr, and what to do about it."""
+    print(message, file=sys.stderr)  # noqa: T201
+    if hint:
+        print(hint, file=sys.stderr)  # noqa: T201
+
+
+def say(line: str) -> None:
+    """A line of the result, at once."""
+    print(line, flush=True)  # noqa: T201
+
+
+def print_json(value: Any) -> None:
+    """One JSON document on stdout."""
+    say(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def print_values(values: Mapping[str, Any], as_json: bool) -> None:
+    """A result by name, as a table or as JSON."""
+    if as_json:
+        print_json(values)
+        return
+    width = max((len(name) for name in values), default=0)
+    for name, value in values.items():
+        say(f"{name.replace('_', ' '):{width}}  {_text(value)}")
+
+
+def print_import(values: Mapping[str, Any], as_json: bool) -> None:
+    """What an import did, and every problem that it met with its place."""
+    if as_json:
+        print_json(values)
+        return
+    problems = values["problems"]
+    hidden = {"problems", "remarks", "more_problems"}
+    shown = {name: value for name, value in values.items() if name not in hidden}
+    print_values({**shown, "problems": len(problems) + values["more_problems"]}, False)
+    for problem in problems:
+        place = ", ".join(problem[part] for part in ("file", "record", "field") if problem[part])
+        say(f"  {place}: {problem['problem']}")
+    for remark in values["remarks"]:
+        say(f"  {remark}")
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_text(item)}" for name, item in value.items()) or "none"
+    if isinstance(value, (list, tuple)):
+        return str(len(value))
+    return "none" if value is None else str(value)
+
+
+def log_to_stderr() -> None:
+    """Keep what is logged apart from what is printed."""
+    import structlog
+
+    structlog.configure(
+        processors=[
+            structlog.contextvars.merge_contextvars,
+            structlog.processors.add_log_level,
+            structlog.processors.TimeStamper(fmt="iso", utc=True),
+            structlog.processors.format_exc_info,
+            structlog.processors.KeyValueRenderer(key_order=["timestamp", "level", "event"]),
+        ],
+        logger_factory=structlog.WriteLoggerFactory(file=sys.stderr),
+        cache_logger_on_first_use=True,
+    )
+    logging.basicConfig(stream=sys.stderr, level=logging.WARNING)

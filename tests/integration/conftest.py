@@ -1,0 +1,168 @@
+"""A home with real data, filled by the command line, and a real server over it."""
+
+from __future__ import annotations
+
+import http.client
+import io
+import os
+import subprocess
+import sys
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from struct import pack
+from urllib.parse import urlsplit
+
+import cv2
+import httpx
+import numpy as np
+import pytest
+
+from app.datasets.soccernet_v3 import write_soccernet_v3
+from app.sample.scene import Scene
+from app.sample.scenes import make_scenes
+
+COMMAND = "from app.cli import main; main()"
+
+
+@dataclass(frozen=True)
+class Raw:
+    """An answer to a request that was sent as it stands, without a client's tidying."""
+
+    status: int
+    headers: dict[str, str]
+    body: bytes
+
+
+@pytest.fixture(scope="session")
+def scenes() -> list[Scene]:
+    """Four groups without planted faults."""
+    return make_scenes(groups=4, seed=3, faults=False)
+
+
+@pytest.fixture(scope="session")
+def tree(tmp_path_factory: pytest.TempPathFactory, scenes: list[Scene]) -> Path:
+    """The scenes in SoccerNet-v3 layout, a Frames-v3.zip for each match."""
+    root = tmp_path_factory.mktemp("soccernet")
+    write_soccernet_v3(root, [scene.group for scene in scenes])
+    for scene in scenes:
+        path = root / scene.group.match / "Frames-v3.zip"
+        with zipfile.ZipFile(path, "a") as frames:
+            for index, view in enumerate(scene.group.views):
+                frames.writestr(view.key, picture(index, view.size.width, view.size.height))
+    return root
+
+
+@pytest.fixture(scope="session")
+def spoiled_tree(tmp_path_factory: pytest.TempPathFactory, scenes: list[Scene]) -> Path:
+    """One group: its first frame is no image, its second a bomb."""
+    root = tmp_path_factory.mktemp("spoiled")
+    group = scenes[0].group
+    write_soccernet_v3(root, [group])
+    for view, content in zip(group.views, (b"GIF89a<script>", bomb(16_000)), strict=False):
+        (root / group.match / view.key).write_bytes(content)
+    return root
+
+
+def picture(shade: int, width: int, height: int) -> bytes:
+    """A plain frame as PNG."""
+    image = np.full((height, width, 3), (40, 120 + 20 * shade, 50), np.uint8)
+    return cv2.imencode(".png", image)[1].tobytes()
+
+
+def bomb(side: int) -> bytes:
+    """A black PNG of that side, a thousand times smaller than its pixels."""
+    packer = zlib.compressobj(1)
+    row = b"\0" * (side + 1)
+    data = b"".join(packer.compress(row) for _ in range(side)) + packer.flush()
+    header = pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
+    parts = ((b"IHDR", header), (b"IDAT", data), (b"IEND", b""))
+    out = io.BytesIO(b"\x89PNG\r\n\x1a\n")
+    out.seek(0, io.SEEK_END)
+    for kind, content in parts:
+        out.write(pack(">I", len(content)) + kind + content)
+        out.write(pack(">I", zlib.crc32(kind + content)))
+    return out.getvalue()
+
+
+@pytest.fixture(scope="session")
+def touchline(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run a command of the command line in the home of this session."""
+    home = tmp_path_factory.mktemp("home")
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-c", COMMAND, *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, env=environment(home))
+
+    run.home = home  # type: ignore[attr-defined]
+    return run
+
+
+def environment(home: Path) -> dict[str, str]:
+    """The environment of a command: this one's, with that home alone."""
+    kept = {name: text for name, text in os.environ.items() if not name.startswith("TOUCHLINE_")}
+    return {**kept, "TOUCHLINE_HOME": str(home)}
+
+
+@pytest.fixture(scope="session")
+def address(touchline, tree: Path, spoiled_tree: Path) -> Iterator[str]:
+    """Address of a server over a home with the datasets ``small`` (solved) and ``spoiled``."""
+    for arguments in (
+        ("import", "soccernet-v3", tree, "--dataset", "small"),
+        ("import", "soccernet-v3", spoiled_tree, "--dataset", "spoiled"),
+        ("solve", "--dataset", "small", "--workers", "1"),
+    ):
+        done = touchline(*arguments)
+        assert done.returncode == 0, done.stderr
+    server = subprocess.Popen(
+        [sys.executable, "-c", COMMAND, "serve", "--port", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(touchline.home),
+    )
+    try:
+        line = server.stdout.readline()
+        assert line.startswith("Touchline is at http://127.0.0.1:"), server.stderr.read()
+        yield line.split()[-1]
+    finally:
+        server.terminate()
+        _, errors = server.communicate(timeout=20)
+    assert "Traceback" not in errors, errors
+
+
+@pytest.fixture(scope="session")
+def client(address: str) -> Iterator[httpx.Client]:
+    """A client of the server."""
+    with httpx.Client(base_url=address, timeout=30) as client:
+        yield client
+
+
+@pytest.fixture(scope="session")
+def raw(address: str) -> Callable[..., Raw]:
+    """Send a request without any tidying of its target or headers."""
+    where = urlsplit(address)
+
+    def send(
+        method: str, target: str, headers: dict[str, str] | None = None, body: bytes | None = None
+    ) -> Raw:
+        connection = http.client.HTTPConnection(where.hostname, where.port, timeout=20)
+        try:
+            sent = {"Host": where.netloc, **(headers or {})}
+            connection.putrequest(method, target, skip_host=True, skip_accept_encoding=True)
+            if body is not None:
+                sent.setdefault("Content-Length", str(len(body)))
+            for name, value in sent.items():
+                connection.putheader(name, value)
+            connection.endheaders(body)
+            answer = connection.getresponse()
+            lowered = {name.lower(): value for name, value in answer.getheaders()}
+            return Raw(answer.status, lowered, answer.read())
+        finally:
+            connection.close()
+
+    return send

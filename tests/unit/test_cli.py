@@ -1,0 +1,247 @@
+"""The command line: what is parsed, what is printed, which code comes back."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import socket
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.cli import main
+from app.datasets.sn_calibration import lines_to_json
+from app.sample.scenes import make_scenes
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Run a command in a home of its own: exit code, stdout, stderr."""
+    for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
+
+    def command(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["touchline", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return command
+
+
+@pytest.fixture
+def line_files(tmp_path: Path) -> Path:
+    """Two sn-calibration files; the second has a marking that does not exist."""
+    folder = tmp_path / "lines"
+    folder.mkdir()
+    points = [{"x": 0.2, "y": 0.3}, {"x": 0.8, "y": 0.35}]
+    (folder / "00001.json").write_text(json.dumps({"Side line top": points}))
+    lines = {"Side line top": points, "Midfield stripe": points}
+    (folder / "00002.json").write_text(json.dumps(lines))
+    (folder / "00003.json").write_text("{")
+    return folder
+
+
+class TestHelp:
+    def test_comes_within_a_second(self) -> None:
+        # Processor time: a busy machine is no fault of ours.
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        command = "import sys; sys.argv = ['touchline', '--help']; from app.cli import main; main()"
+        done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 1.0
+        assert done.returncode == 0
+        for name in ("serve", "import", "solve", "findings", "export", "calibrate", "score"):
+            assert name in done.stdout
+
+    def test_an_unknown_command_is_wrong_usage(self, run: Run) -> None:
+        assert run("fly")[0] == 2
+
+
+class TestImport:
+    def test_tells_what_came_in_and_every_problem_with_its_place(
+        self, run: Run, line_files: Path
+    ) -> None:
+        code, out, _ = run("import", "sn-calibration", line_files, "--dataset", "sn", "--json")
+        report = json.loads(out)
+        assert code == 0
+        assert (report["new"], report["changed"], report["unchanged"]) == (2, 0, 0)
+        places = {(Path(item["file"]).name, item["record"]) for item in report["problems"]}
+        assert places >= {("00003.json", None)}
+        assert any("Midfield stripe" in str(item) for item in report["problems"])
+
+    def test_doing_it_again_changes_nothing(self, run: Run, line_files: Path) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "sn")
+        code, out, _ = run("import", "sn-calibration", line_files, "--dataset", "sn", "--json")
+        report = json.loads(out)
+        assert code == 0
+        assert (report["new"], report["changed"], report["unchanged"]) == (0, 0, 2)
+
+    def test_the_table_names_the_files(self, run: Run, line_files: Path) -> None:
+        code, out, _ = run("import", "sn-calibration", line_files, "--dataset", "sn")
+        assert code == 0
+        assert "00003.json: " in out.replace(", ", ": ")
+
+    def test_nothing_to_import_is_a_failure(self, run: Run, tmp_path: Path) -> None:
+        (tmp_path / "empty").mkdir()
+        code, _, err = run("import", "soccernet-v3", tmp_path / "empty", "--dataset", "x")
+        assert code == 1
+        assert "nothing could be imported" in err
+
+    @pytest.mark.parametrize(
+        "wrong",
+        [
+            ("cinema", "{lines}", "--dataset", "x"),
+            ("sn-calibration", "{lines}/nowhere", "--dataset", "x"),
+            ("sn-calibration", "{lines}"),
+            ("sn-calibration", "{lines}", "--dataset", "x", "--size", "960"),
+            ("issia", "{lines}", "--dataset", "x", "--flip", "two"),
+            ("issia", "{lines}", "--dataset", "x", "--frame-offset", "1=a"),
+        ],
+    )
+    def test_wrong_usage_is_told_apart(
+        self, run: Run, line_files: Path, wrong: tuple[str, ...]
+    ) -> None:
+        code, _, err = run("import", *(part.format(lines=line_files) for part in wrong))
+        assert code == 2
+        assert err
+
+    def test_a_name_that_files_cannot_have_is_one_sentence(
+        self, run: Run, line_files: Path
+    ) -> None:
+        code, out, err = run("import", "sn-calibration", line_files, "--dataset", "../x")
+        assert (code, out) == (1, "")
+        assert "cannot be the name of a dataset" in err
+        assert "Traceback" not in err
+
+
+class TestSolve:
+    def test_solves_what_is_missing_and_then_nothing(self, run: Run, line_files: Path) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "sn")
+        _, out, _ = run("solve", "--dataset", "sn", "--workers", "1", "--json")
+        assert json.loads(out)["solved"] == 2
+        code, out, _ = run("solve", "--dataset", "sn", "--workers", "1", "--json")
+        assert (code, json.loads(out)["total"]) == (0, 0)
+
+    def test_an_unknown_dataset_is_one_sentence(self, run: Run) -> None:
+        code, out, err = run("solve", "--dataset", "nothing")
+        assert (code, out) == (1, "")
+        assert 'there is no dataset "nothing"' in err
+
+
+class TestFindings:
+    def test_are_a_list_of_plain_values(self, run: Run, line_files: Path) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "sn")
+        run("solve", "--dataset", "sn", "--workers", "1")
+        code, out, _ = run("findings", "--dataset", "sn", "--json")
+        found = json.loads(out)
+        assert code == 0
+        assert {item["kind"] for item in found} >= {"under_constrained"}
+        keys = {"kind", "group", "view", "marking", "suggested", "number", "threshold"}
+        assert all(keys | {"confidence", "sentence", "fix"} == set(item) for item in found)
+        assert "under_constrained" in run("findings", "--dataset", "sn")[1]
+
+
+class TestExport:
+    def test_nothing_to_export_is_one_sentence_and_no_file(
+        self, run: Run, line_files: Path, tmp_path: Path
+    ) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "sn")
+        out = tmp_path / "out.zip"
+        code, _, err = run("export", "--dataset", "sn", "--format", "cameras", out)
+        assert (code, out.exists()) == (1, False)
+        assert len(err.strip().splitlines()) <= 2
+
+    def test_all_groups_go_into_a_zip(self, run: Run, line_files: Path, tmp_path: Path) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "sn")
+        out = tmp_path / "out.zip"
+        code, _, err = run("export", "--dataset", "sn", "--format", "sn-calibration", "--all", out)
+        assert (code, out.exists()) == (0, True), err
+
+    def test_an_unknown_format_is_wrong_usage(self, run: Run, tmp_path: Path) -> None:
+        assert run("export", "--dataset", "sn", "--format", "doc", tmp_path / "out")[0] == 2
+
+
+class TestMigrate:
+    def test_says_where_the_schema_is(self, run: Run, tmp_path: Path) -> None:
+        code, out, _ = run("migrate")
+        assert code == 0
+        assert out.startswith("schema ")
+        assert (tmp_path / "home" / "touchline.db").exists()
+
+
+class TestServe:
+    @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "example.org", "::"])
+    def test_an_address_that_others_reach_is_refused(self, run: Run, host: str) -> None:
+        code, out, err = run("serve", "--host", host)
+        assert (code, out) == (2, "")
+        assert "TOUCHLINE_ALLOWED_HOSTS" in err
+
+    def test_a_port_in_use_is_one_sentence(self, run: Run) -> None:
+        with socket.create_server(("127.0.0.1", 0)) as taken:
+            code, _, err = run("serve", "--port", taken.getsockname()[1])
+        assert code == 1
+        assert "is already in use" in err
+
+    def test_a_setting_that_cannot_be_is_named(
+        self, run: Run, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("TOUCHLINE_PORT", "high")
+        code, _, err = run("serve")
+        assert code == 2
+        assert "TOUCHLINE_PORT" in err
+
+
+class TestCalibrateAndScore:
+    def test_line_files_become_cameras_and_a_score(self, run: Run, tmp_path: Path) -> None:
+        lines, out = tmp_path / "lines", tmp_path / "cameras"
+        lines.mkdir()
+        group = make_scenes(groups=1, seed=3, faults=False)[0].group
+        for view in group.views:
+            text = json.dumps(lines_to_json(view.station.lines, view.size))
+            (lines / f"{Path(view.key).stem}.json").write_text(text)
+        options = ("--size", "1280x720", "--json")
+        code, told, _ = run("calibrate", lines, out, *options, "--workers", "1")
+        summary = json.loads(told)
+        assert (code, summary["frames"], summary["calibrated"]) == (0, 2, 2)
+        assert summary == json.loads((out / "calibrate.json").read_text())
+        code, told, _ = run("score", lines, out, *options)
+        table = json.loads(told)
+        assert (code, table["completeness"]) == (0, 1.0)
+        assert table["jac_1"] > 0.9
+
+    def test_no_line_file_is_one_sentence(self, run: Run, tmp_path: Path) -> None:
+        (tmp_path / "empty").mkdir()
+        code, _, err = run("calibrate", tmp_path / "empty", tmp_path / "out", "--workers", "1")
+        assert code == 1
+        assert "Traceback" not in err
+
+
+class TestSample:
+    def test_writes_a_tree_that_can_be_imported(self, run: Run, tmp_path: Path) -> None:
+        out = tmp_path / "tree"
+        code, told, _ = run("sample", out, "--groups", 3, "--labels-only", "--json")
+        assert (code, json.loads(told)["groups"]) == (0, 3)
+        assert (out / "truth.json").is_file()
+        code, told, _ = run("import", "soccernet-v3", out, "--dataset", "s", "--json")
+        assert (code, json.loads(told)["new"]) == (0, 3)
+
+    def test_fills_a_dataset_once(self, run: Run, tmp_path: Path) -> None:
+        command = ("sample", "--groups", 2, "--labels-only", "--dataset", "s", "--workers", "1")
+        assert run(*command)[0] == 0
+        assert (tmp_path / "home" / "sample" / "truth.json").is_file()
+        code, told, _ = run(*command)
+        assert (code, told) == (0, "")
+        _, told, _ = run("solve", "--dataset", "s", "--workers", "1", "--json")
+        assert json.loads(told)["total"] == 0
+
+    def test_needs_to_know_where_to(self, run: Run) -> None:
+        assert run("sample")[0] == 2
