@@ -24,9 +24,7 @@ static/node_modules/.ready: static/package-lock.json .venv/ready
 	@touch $@
 
 run: setup
-	@$(BIN)/touchline migrate >/dev/null
-	@$(BIN)/python -m app.sample.ensure
-	@$(BIN)/touchline serve
+	@$(BIN)/touchline serve --sample
 
 test: setup chromium
 	$(BIN)/python -m pytest
