@@ -1,0 +1,33 @@
+// @ts-check
+/** An answer of the server that says what is wrong, in its own sentence. */
+
+export class ApiError extends Error {
+	/**
+	 * @param {number} status HTTP status; 0 when the server was not reached
+	 * @param {any} body problem JSON, or null
+	 */
+	constructor(status, body) {
+		super(sentenceOf(status, body));
+		this.name = 'ApiError';
+		this.status = status;
+		/** What to do about it, when the server says so. @type {string | null} */
+		this.hint = body?.hint ?? null;
+		/** Which field of the request is at fault. @type {string | null} */
+		this.pointer = body?.pointer ?? null;
+		/** The state as it is now, when somebody else was first. @type {any} */
+		this.current = body?.current ?? null;
+	}
+
+	/** Whether somebody else changed the group first. */
+	get isConflict() {
+		return this.status === 412;
+	}
+}
+
+/** @param {number} status @param {any} body */
+function sentenceOf(status, body) {
+	if (status === 0) return 'The server cannot be reached. Is it still running?';
+	if (typeof body?.detail === 'string') return body.detail;
+	if (typeof body?.title === 'string') return body.title;
+	return `The server answered ${status} without saying why.`;
+}

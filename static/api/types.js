@@ -1,0 +1,260 @@
+// @ts-check
+/**
+ * The JSON of the server, as types (docs/api.md). Nothing runs here.
+ *
+ * Pixels are pixels of the annotated size; points of the pitch are metres, z down.
+ */
+
+/**
+ * @typedef {object} CameraJson
+ * @property {number} pan_degrees
+ * @property {number} tilt_degrees
+ * @property {number} roll_degrees
+ * @property {number} x_focal_length
+ * @property {number} y_focal_length
+ * @property {[number, number]} principal_point
+ * @property {[number, number, number]} position_meters
+ * @property {number} [skew]
+ * @property {number[]} [radial_distortion]
+ * @property {number[]} [tangential_distortion]
+ * @property {number[]} [thin_prism_distortion]
+ */
+
+/** @typedef {{x: number, y: number}} PointJson */
+/** @typedef {[number, number]} PairJson */
+/** @typedef {[number, number, number, number]} BoxJson   x, y, width, height */
+/** @typedef {{[marking: string]: PointJson[]}} LinesJson */
+
+/**
+ * @typedef {object} BallJson
+ * @property {BoxJson | null} box
+ * @property {PairJson | null} point
+ * @property {boolean} occluded
+ * @property {boolean} out_of_view
+ */
+
+/**
+ * @typedef {object} StationJson
+ * @property {number} id
+ * @property {string} key
+ * @property {boolean} shared
+ * @property {string} calibration
+ * @property {boolean} has_given
+ * @property {string} [etag]
+ */
+
+/**
+ * @typedef {object} ViewJson
+ * @property {number} id
+ * @property {string} key
+ * @property {string} letter
+ * @property {string} label
+ * @property {number} width
+ * @property {number} height
+ * @property {boolean} included
+ * @property {StationJson} station
+ * @property {LinesJson} lines
+ * @property {BallJson[]} balls
+ * @property {string | null} image
+ */
+
+/**
+ * @typedef {object} MarkingFitJson
+ * @property {string} marking
+ * @property {'tp' | 'fp' | 'fn'} outcome
+ * @property {boolean} used
+ * @property {number | null} largest_px
+ * @property {number[]} distances_px
+ * @property {PairJson[]} nearest
+ * @property {PairJson[]} polyline
+ */
+
+/**
+ * @typedef {object} CalibrationJson
+ * @property {string} source
+ * @property {CameraJson | null} camera
+ * @property {string | null} reason
+ * @property {{[gamma: string]: number} | null} jac
+ * @property {number | null} error_px
+ * @property {string[]} unobservable
+ * @property {MarkingFitJson[]} markings
+ */
+
+/**
+ * @typedef {object} BallFitJson
+ * @property {PairJson | null} reprojected
+ * @property {number | null} error_px
+ * @property {number | null} error_percent
+ * @property {number | null} optimized_diameter_px
+ * @property {BoxJson | null} optimized_box
+ * @property {number | null} optimized_error_m
+ * @property {BoxJson | null} exact_box
+ * @property {number | null} size_ratio
+ * @property {number | null} depth_m
+ */
+
+/**
+ * @typedef {object} ViewSolutionJson
+ * @property {string} view
+ * @property {boolean} included
+ * @property {string | null} failed
+ * @property {CalibrationJson} calibration
+ * @property {BallFitJson | null} ball
+ */
+
+/**
+ * @typedef {object} PairSolutionJson
+ * @property {string} a
+ * @property {string} b
+ * @property {[number, number, number]} point
+ * @property {PairJson} errors_px
+ * @property {number} baseline_m
+ * @property {number} parallax_degrees
+ * @property {boolean} valid
+ * @property {string | null} failed
+ */
+
+/**
+ * @typedef {object} GateJson
+ * @property {string} name
+ * @property {boolean} passed
+ * @property {boolean} active
+ * @property {number | null} value
+ * @property {number | null} threshold
+ * @property {number | null} margin
+ * @property {string} sentence
+ * @property {string | null} view
+ */
+
+/** @typedef {{gate: string, view: string | null, sentence: string}} FailingJson */
+
+/**
+ * @typedef {object} FixJson
+ * @property {string} action
+ * @property {string | null} view
+ * @property {string | null} marking
+ * @property {string | null} to
+ * @property {number | null} index
+ */
+
+/**
+ * @typedef {object} FindingJson
+ * @property {string} kind
+ * @property {string} sentence
+ * @property {string | null} view
+ * @property {string | null} marking
+ * @property {string | null} suggested
+ * @property {number | null} number
+ * @property {number | null} threshold
+ * @property {number | null} confidence
+ * @property {FixJson | null} fix
+ */
+
+/**
+ * @typedef {object} Ball3DJson
+ * @property {[number, number, number]} point
+ * @property {number} height_m
+ * @property {number} sigma_m
+ * @property {number[]} covariance
+ * @property {number} parallax_degrees
+ * @property {string[]} views
+ */
+
+/**
+ * @typedef {object} SolutionJson
+ * @property {boolean} passes
+ * @property {FailingJson | null} first_failing
+ * @property {GateJson[]} gates
+ * @property {ViewSolutionJson[]} views
+ * @property {PairSolutionJson[]} pairs
+ * @property {Ball3DJson | null} ball
+ * @property {FindingJson[]} findings
+ */
+
+/**
+ * @typedef {object} VerdictJson
+ * @property {string} state
+ * @property {string | null} reason
+ * @property {string | null} note
+ * @property {string | null} by
+ * @property {string | null} at
+ * @property {boolean} stale
+ * @property {boolean} fixed
+ */
+
+/**
+ * @typedef {object} PolicyJson
+ * @property {string} name
+ * @property {number} tau_percent
+ * @property {number} min_jac
+ * @property {number} jac_gamma_percent
+ * @property {number} min_baseline_m
+ * @property {number} ball_diameter_m
+ */
+
+/**
+ * @typedef {object} GroupDocument
+ * @property {number} id
+ * @property {number} number
+ * @property {{id: number, name: string}} dataset
+ * @property {string} key
+ * @property {string} label
+ * @property {{length: number, width: number}} pitch
+ * @property {number} revision
+ * @property {string} etag
+ * @property {boolean} can_undo
+ * @property {boolean} can_redo
+ * @property {VerdictJson} verdict
+ * @property {PolicyJson} policy
+ * @property {ViewJson[]} views
+ * @property {SolutionJson | null} solution
+ */
+
+/**
+ * @typedef {object} GroupRow
+ * @property {number} id
+ * @property {number} number
+ * @property {string} key
+ * @property {string} label
+ * @property {string} status
+ * @property {boolean} stale
+ * @property {boolean | null} passes
+ * @property {FailingJson | null} first_failing
+ * @property {number | null} min_jac
+ * @property {number | null} error_px
+ * @property {number | null} sigma_m
+ * @property {number | null} parallax_degrees
+ * @property {number | null} size_ratio
+ * @property {number} views
+ * @property {string[]} findings
+ * @property {string | null} thumbnail
+ */
+
+/** @typedef {{items: GroupRow[], next: string | null, total: number}} GroupPage */
+/** @typedef {{index: number | null, total: number, previous: number[], next: number[]}} Neighbours */
+
+/**
+ * @typedef {object} DatasetJson
+ * @property {number} id
+ * @property {string} name
+ * @property {number} groups
+ * @property {number} solved
+ * @property {number} accepted
+ * @property {number} rejected
+ * @property {number} deferred
+ * @property {number} unreviewed
+ */
+
+/** @typedef {{low: number, high: number, counts: number[], log?: boolean}} Histogram */
+/** @typedef {{[key: string]: number}} Counts */
+
+/**
+ * @typedef {object} ExportJson
+ * @property {string | number} id
+ * @property {string} status
+ * @property {string | null} content
+ * @property {Counts | null} counts
+ * @property {string | null} [error]
+ */
+
+export {};

@@ -1,0 +1,65 @@
+// @ts-check
+/** Numbers and times as people read them. A missing number is a dash, never zero. */
+
+const NONE = '–';
+const MINUS = '−';
+
+/**
+ * @param {number | null | undefined} value
+ * @param {number} digits after the point
+ * @param {string} [unit]
+ * @returns {string}
+ */
+export function fixed(value, digits, unit = '') {
+	if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
+	const text = Math.abs(value).toFixed(digits);
+	const sign = value < 0 && Number(text) !== 0 ? MINUS : '';
+	return `${sign}${text}${unit}`;
+}
+
+/**
+ * Pixels in four characters: 7.3, 211, 1.7k. Far off is far off.
+ *
+ * @param {number | null | undefined} value
+ * @returns {string}
+ */
+export function pixels(value) {
+	const size = Math.abs(value ?? 0);
+	if (size >= 999.5) return fixed((value ?? 0) / 1000, size >= 9950 ? 0 : 1, 'k');
+	return fixed(value, size >= 99.95 ? 0 : 1);
+}
+
+/** Per cent in four characters: 0.06, 14.3, 113. @param {number | null | undefined} value */
+export function percent(value) {
+	const size = Math.abs(value ?? 0);
+	return fixed(value, size >= 99.95 ? 0 : size >= 9.995 ? 1 : 2);
+}
+
+/** 12764 -> "12,764". @param {number} value */
+export function count(value) {
+	return value.toLocaleString('en-GB');
+}
+
+/** "bad_field_lines" -> "bad field lines". @param {string} name */
+export function words(name) {
+	return name.replaceAll('_', ' ');
+}
+
+/** @param {string} text */
+export function capital(text) {
+	return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+/**
+ * @param {number} then milliseconds
+ * @param {number} now milliseconds
+ * @returns {string} "just now", "12 s ago", "3 min ago", "2 h ago", "4 d ago"
+ */
+export function ago(then, now) {
+	const seconds = Math.max(0, Math.round((now - then) / 1000));
+	if (seconds < 2) return 'just now';
+	if (seconds < 60) return `${seconds} s ago`;
+	if (seconds < 3600) return `${Math.floor(seconds / 60)} min ago`;
+	if (seconds < 86400) return `${Math.floor(seconds / 3600)} h ago`;
+	return `${Math.floor(seconds / 86400)} d ago`;
+}

@@ -1,0 +1,65 @@
+// @ts-check
+/** The address bar: which page is shown, and with which query. */
+
+import { computed, signal } from '@preact/signals';
+
+/** @typedef {{path: string, search: URLSearchParams}} Place */
+
+/** @returns {Place} */
+function here() {
+	return { path: location.pathname, search: new URLSearchParams(location.search) };
+}
+
+/** Where the person is. */
+export const place = signal(here());
+
+/** @typedef {{page: 'queue'} | {page: 'review', group: number | null} | {page: 'unknown'}} Page */
+
+/** Which page that is. */
+export const page = computed(/** @returns {Page} */ () => {
+	const { path } = place.value;
+	if (path === '/' || path === '/groups') return { page: 'queue' };
+	const review = /^\/review(?:\/(\d+))?\/?$/.exec(path);
+	if (review) return { page: 'review', group: review[1] ? Number(review[1]) : null };
+	return { page: 'unknown' };
+});
+
+/** @param {string} name @returns {string} */
+export function param(name) {
+	return place.value.search.get(name) ?? '';
+}
+
+/**
+ * An address with the given parameters; empty ones are left out.
+ *
+ * @param {string} path
+ * @param {Record<string, string>} values
+ */
+export function address(path, values) {
+	const search = new URLSearchParams();
+	for (const [name, value] of Object.entries(values)) if (value) search.set(name, value);
+	const text = search.toString();
+	return text ? `${path}?${text}` : path;
+}
+
+/** @param {string} url @param {{replace?: boolean}} [options] */
+export function navigate(url, { replace = false } = {}) {
+	if (replace) history.replaceState(null, '', url);
+	else history.pushState(null, '', url);
+	place.value = here();
+}
+
+/** Follow the back button, and links without loading the page again. */
+export function startRouter() {
+	addEventListener('popstate', () => { place.value = here(); });
+	// On the window: what a row or button does with the click comes first.
+	addEventListener('click', (event) => {
+		if (event.defaultPrevented || event.button !== 0) return;
+		if (event.metaKey || event.ctrlKey || event.shiftKey || event.altKey) return;
+		const link = event.target instanceof Element ? event.target.closest('a') : null;
+		if (!link || link.target || link.hasAttribute('download')) return;
+		if (link.origin !== location.origin || link.pathname.startsWith('/api/')) return;
+		event.preventDefault();
+		navigate(link.pathname + link.search);
+	});
+}

@@ -1,0 +1,95 @@
+// @ts-check
+/** Strokes that every overlay uses; places in image pixels, widths in CSS pixels. */
+
+import { toScreen } from '../geometry/viewport.js';
+import { colours } from '../lib/colours.js';
+
+/** @import {ImagePoint, Viewport} from '../geometry/viewport.js' */
+/** @typedef {{colour: string, width: number, dash?: number[], halo?: boolean, closed?: boolean}} Stroke */
+
+/**
+ * A line through image points.
+ *
+ * @param {CanvasRenderingContext2D} context @param {Viewport} viewport
+ * @param {ImagePoint[]} points @param {Stroke} stroke
+ */
+export function strokeLine(context, viewport, points, stroke) {
+	if (points.length < 2) return;
+	context.beginPath();
+	points.forEach((point, i) => {
+		const { x, y } = toScreen(viewport, point);
+		if (i === 0) context.moveTo(x, y);
+		else context.lineTo(x, y);
+	});
+	if (stroke.closed) context.closePath();
+	strokePath(context, stroke);
+}
+
+/** @param {CanvasRenderingContext2D} context @param {Stroke} stroke */
+function strokePath(context, { colour, width, dash = [], halo = true }) {
+	context.lineJoin = 'round';
+	context.lineCap = 'butt';
+	context.setLineDash([]);
+	if (halo) {
+		context.strokeStyle = colours.value.halo;
+		context.lineWidth = width + 2;
+		context.stroke();
+	}
+	context.setLineDash(dash);
+	context.strokeStyle = colour;
+	context.lineWidth = width;
+	context.stroke();
+	context.setLineDash([]);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context @param {Viewport} viewport
+ * @param {readonly [number, number, number, number]} box @param {Stroke} stroke
+ */
+export function strokeBox(context, viewport, [x, y, width, height], stroke) {
+	const corners = [
+		{ x, y }, { x: x + width, y }, { x: x + width, y: y + height }, { x, y: y + height },
+	];
+	strokeLine(context, viewport, corners, { ...stroke, closed: true });
+}
+
+/**
+ * A cross with an open middle, so that it hides nothing of what it points at.
+ *
+ * @param {CanvasRenderingContext2D} context @param {{x: number, y: number}} at CSS pixels
+ * @param {number} inner @param {number} outer @param {Stroke} stroke
+ */
+export function strokeCross(context, { x, y }, inner, outer, stroke) {
+	context.beginPath();
+	for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+		context.moveTo(x + dx * inner, y + dy * inner);
+		context.lineTo(x + dx * outer, y + dy * outer);
+	}
+	strokePath(context, stroke);
+}
+
+/** Width of what is drawn on, CSS pixels. @param {CanvasRenderingContext2D} context */
+export function widthOf(context) {
+	return context.canvas.width / devicePixelRatio;
+}
+
+/**
+ * A word beside a place, on a dark plate.
+ *
+ * @param {CanvasRenderingContext2D} context @param {string} text
+ * @param {{x: number, y: number}} at CSS pixels, left middle
+ * @param {string} colour
+ */
+export function label(context, text, { x, y }, colour) {
+	context.font = '12px Inter, system-ui, "DejaVu Sans", sans-serif';
+	context.textBaseline = 'middle';
+	const { width } = context.measureText(text);
+	const last = widthOf(context) - width - 10;
+	const left = Math.max(10, Math.min(x, last));
+	context.fillStyle = colours.value.plate;
+	context.beginPath();
+	context.roundRect(left - 5, y - 10, width + 10, 20, 5);
+	context.fill();
+	context.fillStyle = colour;
+	context.fillText(text, left, y + 0.5);
+}

@@ -1,0 +1,66 @@
+// @ts-check
+/** Annotated points and their residual whiskers. */
+
+import { gradeOfResidual } from '../geometry/residual.js';
+import { toScreen } from '../geometry/viewport.js';
+import { colours } from '../lib/colours.js';
+import { fixed } from '../lib/format.js';
+import { label, strokeLine } from './pen.js';
+
+/** @import {Scene} from './scene.js' */
+
+const RADIUS = 3.4;
+const SHORTEST_WHISKER = 2;
+
+/** From the projected line through the annotated point, `gain` times as long as it is. */
+/** @param {CanvasRenderingContext2D} context @param {Scene} scene */
+export function drawWhiskers(context, { picture, viewport, gain }) {
+	for (const { points } of picture.markings) {
+		for (const { point, nearest, distance } of points) {
+			if (!nearest || distance === null) continue;
+			if (distance * gain * viewport.scale < SHORTEST_WHISKER) continue;
+			const end = {
+				x: nearest.x + gain * (point.x - nearest.x),
+				y: nearest.y + gain * (point.y - nearest.y),
+			};
+			const grade = gradeOfResidual(distance, picture.gamma);
+			strokeLine(context, viewport, [nearest, end], {
+				colour: colours.value[grade], width: grade === 'ok' ? 1 : 1.75, halo: grade !== 'ok',
+			});
+		}
+	}
+}
+
+/** @param {CanvasRenderingContext2D} context @param {Scene} scene */
+export function drawPoints(context, { picture, viewport }) {
+	for (const { points, used, grade } of picture.markings) {
+		for (const { point } of points) {
+			const { x, y } = toScreen(viewport, point);
+			context.beginPath();
+			context.arc(x, y, RADIUS, 0, 2 * Math.PI);
+			context.fillStyle = used ? colours.value.point : colours.value.bad;
+			context.fill();
+			context.lineWidth = 1.6;
+			context.strokeStyle = grade === 'bad' ? colours.value.bad : colours.value.ink;
+			context.stroke();
+		}
+	}
+}
+
+/** The ring around the selected point, with its name and number. */
+/** @param {CanvasRenderingContext2D} context @param {Scene} scene */
+export function drawSelectedPoint(context, { picture, viewport, selected }) {
+	if (selected?.kind !== 'point' || selected.view !== picture.view.key) return;
+	const found = picture.markings.find(({ marking }) => marking === selected.marking);
+	const residual = found?.points[selected.index];
+	if (!residual) return;
+	const { x, y } = toScreen(viewport, residual.point);
+	context.beginPath();
+	context.arc(x, y, RADIUS + 4.5, 0, 2 * Math.PI);
+	context.lineWidth = 2;
+	context.strokeStyle = colours.value.selected;
+	context.stroke();
+	const number = residual.distance === null ? '' : ` · ${fixed(residual.distance, 1, ' px')}`;
+	const text = `${selected.marking} · point ${selected.index + 1}${number}`;
+	label(context, text, { x: x + 16, y: y - 14 }, colours.value.point);
+}

@@ -1,0 +1,93 @@
+// @ts-check
+/** What one panel shows: values only, so that drawing is a function of them. */
+
+import { ballOutline } from '../geometry/ball.js';
+import { cameraFromJson } from '../geometry/camera.js';
+import { epipolarSegment } from '../geometry/epipolar.js';
+import { ballCenter, ballOf, diagonal } from '../geometry/preview.js';
+import { residualsOf } from '../geometry/residual.js';
+
+/** @import {BallFitJson, GroupDocument, SolutionJson, ViewJson, ViewSolutionJson} from '../api/types.js' */
+/** @import {ImagePoint} from '../geometry/camera.js' */
+/** @import {MarkingResiduals} from '../geometry/residual.js' */
+/** @import {Viewport} from '../geometry/viewport.js' */
+/** @import {Selection} from '../state/workspace.js' */
+
+/** @typedef {{letter: string, points: ImagePoint[]}} Epipolar */
+/**
+ * @typedef {object} ViewPicture
+ * @property {ViewJson} view
+ * @property {ViewSolutionJson | null} solved
+ * @property {BallFitJson | null} ball the 3D ball seen in this view
+ * @property {number | null} apart when the view agrees with no other: its error in the best pair, px
+ * @property {number} gamma pixels
+ * @property {MarkingResiduals[]} markings
+ * @property {ImagePoint[]} outline of the 3D ball
+ * @property {Epipolar[]} epipolars rays of the other views' balls
+ */
+/**
+ * @typedef {object} Scene
+ * @property {ViewPicture} picture
+ * @property {Viewport} viewport
+ * @property {Selection | null} selected
+ * @property {boolean} hidden
+ * @property {boolean} projections
+ * @property {boolean} boxes
+ * @property {number} gain
+ * @property {boolean} rays
+ */
+
+/**
+ * Every view of a group, ready to draw.
+ *
+ * @param {GroupDocument} group as shown, edits included
+ * @param {SolutionJson | null} solution
+ * @param {GroupDocument | null} saved as the server knows it
+ * @returns {ViewPicture[]}
+ */
+export function picturesOf(group, solution, saved) {
+	const cameras = new Map((solution?.views ?? []).flatMap((solved) => (
+		solved.calibration.camera ? [[solved.view, cameraFromJson(solved.calibration.camera)]] : []
+	)));
+	return group.views.map((view) => {
+		const solved = solution?.views.find((candidate) => candidate.view === view.key) ?? null;
+		const camera = cameras.get(view.key);
+		const gamma = (group.policy.jac_gamma_percent / 100) * diagonal(view);
+		const point = solution?.ball?.point;
+		// The solution measured the saved lines; others are measured here.
+		const live = saved?.views.find(({ key }) => key === view.key)?.lines !== view.lines;
+		return {
+			view,
+			solved,
+			ball: solved?.ball ?? null,
+			apart: apartOf(view.key, solution),
+			gamma,
+			markings: residualsOf(view.lines, solved?.calibration.markings ?? [], gamma, live),
+			outline: camera && point ? ballOutline(camera, point, group.policy.ball_diameter_m) : [],
+			epipolars: camera ? epipolarsInto(group, view, cameras) : [],
+		};
+	});
+}
+
+/** @param {string} key @param {SolutionJson | null} solution @returns {number | null} */
+function apartOf(key, solution) {
+	const own = (solution?.pairs ?? []).filter(({ a, b }) => a === key || b === key);
+	if (own.length === 0 || own.some(({ valid }) => valid)) return null;
+	return Math.min(...own.map(({ errors_px }) => Math.max(...errors_px)));
+}
+
+/**
+ * @param {GroupDocument} group @param {ViewJson} into
+ * @param {Map<string, import('../geometry/camera.js').Camera>} cameras
+ * @returns {Epipolar[]}
+ */
+function epipolarsInto(group, into, cameras) {
+	const target = cameras.get(into.key);
+	return group.views.flatMap((from) => {
+		const source = cameras.get(from.key);
+		const ball = ballOf(from);
+		const center = ball && ballCenter(ball);
+		if (from.key === into.key || !source || !target || !center) return [];
+		return [{ letter: from.letter, points: epipolarSegment(source, center, target) }];
+	});
+}

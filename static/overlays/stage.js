@@ -1,0 +1,87 @@
+// @ts-check
+/** The canvas of one panel: the frame below, the overlays above, drawn from a Scene. */
+
+import Konva from 'konva/lib/Core.js';
+import { Image as KonvaImage } from 'konva/lib/shapes/Image.js';
+
+import { colours } from '../lib/colours.js';
+import { drawBall, drawEpipolars } from './ball.js';
+import { drawMarkings } from './markings.js';
+import { drawPoints, drawSelectedPoint, drawWhiskers } from './points.js';
+
+/** @import {Scene} from './scene.js' */
+
+/** Above this magnification pixels are shown as what they are. */
+const UNSMOOTHED_FROM = 3;
+
+export class ImageStage {
+	/** @param {HTMLDivElement} container */
+	constructor(container) {
+		this.stage = new Konva.Stage({ container, listening: false, width: 1, height: 1 });
+		this.below = new Konva.Layer({ listening: false });
+		this.above = new Konva.Layer({ listening: false });
+		this.picture = new KonvaImage({ image: undefined, listening: false });
+		/** @type {Scene | null} */
+		this.scene = null;
+		this.overlay = new Konva.Shape({
+			listening: false,
+			sceneFunc: (context) => {
+				if (this.scene && !this.scene.hidden) drawOverlays(context._context, this.scene);
+			},
+		});
+		this.below.add(this.picture);
+		this.above.add(this.overlay);
+		this.stage.add(this.below, this.above);
+	}
+
+	/** @param {number} width @param {number} height CSS pixels */
+	resize(width, height) {
+		if (this.stage.width() === width && this.stage.height() === height) return;
+		this.stage.size({ width, height });
+	}
+
+	/** @param {HTMLImageElement | null} image */
+	show(image) {
+		this.picture.image(image ?? undefined);
+		// Without a frame the markings stand on grass.
+		this.picture.fill(image ? '' : colours.value.field);
+		this.below.batchDraw();
+	}
+
+	/** @param {Scene} scene */
+	draw(scene) {
+		const { viewport, picture } = scene;
+		const moved = this.scene?.viewport !== viewport || this.scene?.picture.view !== picture.view;
+		this.scene = scene;
+		if (moved) {
+			// The frame may have more pixels than were annotated: it is scaled to their size.
+			this.picture.setAttrs({
+				image: this.picture.image(),
+				x: viewport.left,
+				y: viewport.top,
+				width: picture.view.width * viewport.scale,
+				height: picture.view.height * viewport.scale,
+			});
+			this.below.imageSmoothingEnabled(viewport.scale < UNSMOOTHED_FROM);
+			this.below.batchDraw();
+		}
+		this.above.batchDraw();
+	}
+
+	/** Free the canvases. */
+	destroy() {
+		this.stage.destroy();
+	}
+}
+
+/** @param {CanvasRenderingContext2D} context @param {Scene} scene */
+function drawOverlays(context, scene) {
+	context.save();
+	if (scene.projections) drawMarkings(context, scene);
+	if (scene.projections) drawWhiskers(context, scene);
+	if (scene.rays) drawEpipolars(context, scene);
+	drawPoints(context, scene);
+	drawBall(context, scene);
+	drawSelectedPoint(context, scene);
+	context.restore();
+}

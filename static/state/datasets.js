@@ -1,0 +1,43 @@
+// @ts-check
+/** The datasets, and which of them is meant. */
+
+import { computed, signal } from '@preact/signals';
+
+import { getDatasets } from '../api/client.js';
+import { ApiError } from '../api/problem.js';
+import { param } from '../lib/router.js';
+import { stored } from '../lib/storage.js';
+
+/** @import {DatasetJson} from '../api/types.js' */
+
+/** All datasets; null until they are known. */
+export const datasets = signal(/** @type {DatasetJson[] | null} */ (null));
+
+/** Why the list could not be read; null when it could. */
+export const failure = signal(/** @type {ApiError | null} */ (null));
+
+const remembered = stored('dataset', '');
+
+/** The dataset of the address bar, else the last one used, else the first. */
+export const dataset = computed(() => {
+	const all = datasets.value ?? [];
+	const named = param('dataset');
+	if (named) return all.find((one) => one.name === named) ?? null;
+	return all.find((one) => one.name === remembered.value) ?? all[0] ?? null;
+});
+
+/** Read the list again. */
+export async function loadDatasets() {
+	try {
+		datasets.value = (await getDatasets()).items;
+		failure.value = null;
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		failure.value = error;
+	}
+}
+
+/** @param {string} name */
+export function useDataset(name) {
+	remembered.value = name;
+}

@@ -1,0 +1,55 @@
+// @ts-check
+/** Groups as the server last gave them, and those that come next. */
+
+import { getGroup } from '../api/client.js';
+import { loadImage } from './images.js';
+
+/** @import {GroupDocument} from '../api/types.js' */
+
+const KEPT = 24;
+
+/** @type {Map<number, GroupDocument>} */
+const documents = new Map();
+/** @type {Map<number, Promise<GroupDocument>>} */
+const loading = new Map();
+
+/** @param {number} id @returns {GroupDocument | undefined} */
+export function known(id) {
+	return documents.get(id);
+}
+
+/** @param {GroupDocument} document */
+export function remember(document) {
+	documents.delete(document.id);
+	documents.set(document.id, document);
+	const oldest = documents.keys().next().value;
+	if (documents.size > KEPT && oldest !== undefined) documents.delete(oldest);
+}
+
+/** @param {number} id @returns {Promise<GroupDocument>} */
+export function load(id) {
+	const present = loading.get(id);
+	if (present) return present;
+	const request = getGroup(id).then((document) => {
+		remember(document);
+		return document;
+	}).finally(() => loading.delete(id));
+	loading.set(id, request);
+	return request;
+}
+
+/**
+ * Load groups and their frames before anybody asks; a failure shows when somebody does.
+ *
+ * @param {number[]} ids
+ */
+export async function prefetch(ids) {
+	for (const id of ids) {
+		try {
+			const document = known(id) ?? (await load(id));
+			await Promise.allSettled(document.views.map((view) => view.image && loadImage(view.image)));
+		} catch {
+			return;
+		}
+	}
+}

@@ -1,0 +1,171 @@
+// @ts-check
+/** Edits: values that say what a person changed, and how the group looks with it. */
+
+/** @import {BallJson, FixJson, GroupDocument, PointJson, ViewJson} from '../api/types.js' */
+
+/** @typedef {{kind: 'lines', view: string, lines: Record<string, PointJson[] | null>}} LinesEdit */
+/** @typedef {{kind: 'ball', view: string, ball: BallJson | null}} BallEdit */
+/** @typedef {{kind: 'include', view: string, included: boolean}} IncludeEdit */
+/** @typedef {LinesEdit | BallEdit | IncludeEdit} Edit */
+
+/**
+ * The group with the edit applied; its solution stays the old one.
+ *
+ * @param {GroupDocument} group @param {Edit} edit
+ * @returns {GroupDocument}
+ */
+export function applyEdit(group, edit) {
+	return {
+		...group,
+		views: group.views.map((view) => (view.key === edit.view ? editView(view, edit) : view)),
+	};
+}
+
+/** @param {ViewJson} view @param {Edit} edit @returns {ViewJson} */
+function editView(view, edit) {
+	if (edit.kind === 'include') return { ...view, included: edit.included };
+	if (edit.kind === 'ball') return { ...view, balls: edit.ball ? [edit.ball] : [] };
+	const lines = { ...view.lines };
+	for (const [marking, points] of Object.entries(edit.lines)) {
+		if (points) lines[marking] = points;
+		else delete lines[marking];
+	}
+	return { ...view, lines };
+}
+
+/**
+ * Where and what to send for an edit.
+ *
+ * @param {GroupDocument} group @param {Edit} edit
+ * @returns {{path: string, body: unknown, etag: string}}
+ */
+export function requestOf(group, edit) {
+	const view = viewOf(group, edit.view);
+	if (edit.kind === 'include') {
+		return { path: `/views/${view.id}`, body: { included: edit.included }, etag: group.etag };
+	}
+	if (edit.kind === 'ball') {
+		return { path: `/views/${view.id}/ball`, body: edit.ball && ballBody(edit.ball), etag: group.etag };
+	}
+	const body = { lines: edit.lines };
+	// The lines of a static camera belong to its station, which has a state of its own.
+	if (!view.station.shared) return { path: `/views/${view.id}/lines`, body, etag: group.etag };
+	const etag = view.station.etag ?? group.etag;
+	return { path: `/stations/${view.station.id}/lines?group=${group.id}`, body, etag };
+}
+
+/**
+ * The shared station that an edit changes, or null.
+ *
+ * @param {GroupDocument} group @param {Edit} edit
+ * @returns {number | null}
+ */
+export function stationOf(group, edit) {
+	const { station } = viewOf(group, edit.view);
+	return edit.kind === 'lines' && station.shared ? station.id : null;
+}
+
+/** @param {Edit} edit @returns {unknown} the body that asks what the edit would change */
+export function previewBody(edit) {
+	if (edit.kind === 'lines') return { views: { [edit.view]: { lines: edit.lines } } };
+	if (edit.kind === 'ball') {
+		return { views: { [edit.view]: { ball: edit.ball && ballBody(edit.ball) } } };
+	}
+	return { views: { [edit.view]: { included: edit.included } } };
+}
+
+/** @param {BallJson} ball */
+function ballBody(ball) {
+	const { box, point, occluded, out_of_view } = ball;
+	if (box) return { box, occluded, out_of_view };
+	return point ? { point, occluded, out_of_view } : { occluded, out_of_view };
+}
+
+/** @param {GroupDocument} group @param {string} key @returns {ViewJson} */
+export function viewOf(group, key) {
+	const view = group.views.find((candidate) => candidate.key === key);
+	if (!view) throw new RangeError(`no view ${key} in group ${group.id}`);
+	return view;
+}
+
+/** Whether the second edit says all that the first one says. @param {Edit} a @param {Edit} b */
+export function sameTarget(a, b) {
+	if (a.kind !== b.kind || a.view !== b.view) return false;
+	return a.kind !== 'lines' || b.kind !== 'lines'
+		|| Object.keys(a.lines).every((marking) => marking in b.lines);
+}
+
+/** What an edit did, in words. @param {GroupDocument} group @param {Edit} edit */
+export function describe(group, edit) {
+	const { letter } = viewOf(group, edit.view);
+	if (edit.kind === 'include') return edit.included ? `View ${letter} included` : `View ${letter} left out`;
+	if (edit.kind === 'ball') return `Ball of ${letter} changed`;
+	return `${Object.keys(edit.lines).join(', ')} of ${letter} changed`;
+}
+
+/**
+ * A line edit that puts one point somewhere else, or takes it away.
+ *
+ * @param {ViewJson} view @param {string} marking @param {number} index
+ * @param {PointJson | null} to null deletes; a marking without points goes
+ * @returns {LinesEdit}
+ */
+export function movePoint(view, marking, index, to) {
+	const points = (view.lines[marking] ?? []).slice();
+	if (to) points[index] = to;
+	else points.splice(index, 1);
+	return { kind: 'lines', view: view.key, lines: { [marking]: points.length ? points : null } };
+}
+
+const SIDES = /** @type {Record<string, string>} */ ({
+	left: 'right', right: 'left', top: 'bottom', bottom: 'top',
+});
+
+/** The marking that this one becomes when the pitch turns by 180 degrees. @param {string} marking */
+export function twinMarking(marking) {
+	const parts = marking.split(' ');
+	if (parts[0] === 'Goal' && parts[2] === 'post') {
+		// Both goals name their posts as seen from the pitch, so a half turn keeps the post.
+		return `Goal ${SIDES[parts[1]]} post ${parts[3]}`;
+	}
+	return parts.map((word) => SIDES[word] ?? word).join(' ');
+}
+
+/**
+ * The edit that carries out what a finding proposes.
+ *
+ * @param {GroupDocument} group @param {FixJson} fix
+ * @returns {Edit | null} null when only a person can do it
+ */
+export function editOfFix(group, fix) {
+	const view = group.views.find((candidate) => candidate.key === fix.view);
+	if (!view) return null;
+	if (fix.action === 'exclude_view') return { kind: 'include', view: view.key, included: false };
+	if (fix.action === 'swap_sides') return swapSides(view);
+	const points = fix.marking ? view.lines[fix.marking] : undefined;
+	if (fix.action === 'pick_ball' && fix.index !== null) return pickBall(view, fix.index);
+	if (!fix.marking || !points) return null;
+	if (fix.action === 'drop_marking') {
+		return { kind: 'lines', view: view.key, lines: { [fix.marking]: null } };
+	}
+	if (fix.action === 'drop_point' && fix.index !== null) {
+		return movePoint(view, fix.marking, fix.index, null);
+	}
+	if (fix.action !== 'relabel' || !fix.to) return null;
+	const merged = [...(view.lines[fix.to] ?? []), ...points];
+	return { kind: 'lines', view: view.key, lines: { [fix.marking]: null, [fix.to]: merged } };
+}
+
+/** @param {ViewJson} view @param {number} index @returns {BallEdit | null} */
+function pickBall(view, index) {
+	const ball = view.balls[index];
+	return ball ? { kind: 'ball', view: view.key, ball } : null;
+}
+
+/** @param {ViewJson} view @returns {LinesEdit} */
+function swapSides(view) {
+	/** @type {Record<string, PointJson[] | null>} */
+	const lines = Object.fromEntries(Object.keys(view.lines).map((marking) => [marking, null]));
+	for (const [marking, points] of Object.entries(view.lines)) lines[twinMarking(marking)] = points;
+	return { kind: 'lines', view: view.key, lines };
+}

@@ -1,0 +1,32 @@
+// @ts-check
+/** Frames as decoded images, the last few kept. */
+
+const KEPT = 32;
+
+/** @type {Map<string, Promise<HTMLImageElement>>} */
+const images = new Map();
+
+/**
+ * The image at an address; loading it again costs nothing as long as it is kept.
+ *
+ * @param {string} url
+ * @returns {Promise<HTMLImageElement>}
+ */
+export function loadImage(url) {
+	const kept = images.get(url);
+	const loading = kept ?? decode(url);
+	images.delete(url);
+	images.set(url, loading);
+	const oldest = images.keys().next().value;
+	if (images.size > KEPT && oldest !== undefined) images.delete(oldest);
+	if (!kept) loading.catch(() => images.delete(url));
+	return loading;
+}
+
+/** @param {string} url */
+async function decode(url) {
+	const image = new Image();
+	image.src = url;
+	await image.decode();
+	return image;
+}

@@ -1,0 +1,122 @@
+// @ts-check
+/** The pointer over a panel: takes hold of things, pans, zooms. */
+
+import { toImage } from '../geometry/viewport.js';
+import { dragOf } from './drags.js';
+import { hitTest } from './hit.js';
+
+/** @import {ViewJson} from '../api/types.js' */
+/** @import {ScreenPoint, Viewport} from '../geometry/viewport.js' */
+/** @import {Selection} from '../state/workspace.js' */
+/** @import {Drag} from './drags.js' */
+/** @import {Hit} from './hit.js' */
+
+/**
+ * @typedef {object} Panel what the pointer needs to know and to say
+ * @property {() => ViewJson} view
+ * @property {() => Viewport} viewport
+ * @property {() => Selection | null} selected
+ * @property {() => boolean} enabled whether things can be taken hold of
+ * @property {(hit: Hit | null) => void} select
+ * @property {(dx: number, dy: number) => void} pan
+ * @property {(at: ScreenPoint, factor: number) => void} zoom
+ */
+
+const CLICK = 3;
+
+/**
+ * Listen to an element until the returned function is called.
+ *
+ * @param {HTMLElement} element @param {Panel} panel
+ * @returns {() => void}
+ */
+export function attachPointer(element, panel) {
+	/** @type {{id: number, start: ScreenPoint, last: ScreenPoint, drag: Drag | null, moved: boolean} | null} */
+	let gesture = null;
+
+	/** @param {MouseEvent} event @returns {ScreenPoint} */
+	function at(event) {
+		const { left, top } = element.getBoundingClientRect();
+		return { x: event.clientX - left, y: event.clientY - top };
+	}
+
+	/** @param {ScreenPoint} place */
+	function hitAt(place) {
+		if (!panel.enabled()) return null;
+		return hitTest(panel.view(), panel.viewport(), place, panel.selected());
+	}
+
+	/** @param {PointerEvent} event */
+	function down(event) {
+		if (gesture || event.button > 1) return;
+		const start = at(event);
+		const hit = event.button === 0 ? hitAt(start) : null;
+		panel.select(hit);
+		const drag = hit && dragOf(panel.view(), hit, toImage(panel.viewport(), start));
+		gesture = { id: event.pointerId, start, last: start, drag, moved: false };
+		element.setPointerCapture(event.pointerId);
+		element.dataset.cursor = drag ? 'moving' : 'panning';
+	}
+
+	/** @param {PointerEvent} event */
+	function move(event) {
+		const place = at(event);
+		if (!gesture) {
+			element.dataset.cursor = hitAt(place) ? 'movable' : 'idle';
+			return;
+		}
+		if (event.pointerId !== gesture.id) return;
+		gesture.moved ||= Math.hypot(place.x - gesture.start.x, place.y - gesture.start.y) >= CLICK;
+		if (!gesture.moved) return;
+		if (gesture.drag) gesture.drag.move(toImage(panel.viewport(), place));
+		else panel.pan(place.x - gesture.last.x, place.y - gesture.last.y);
+		gesture.last = place;
+	}
+
+	/** @param {PointerEvent} event */
+	function up(event) {
+		if (event.pointerId !== gesture?.id) return;
+		const { drag, moved } = gesture;
+		gesture = null;
+		element.dataset.cursor = 'idle';
+		if (drag && moved) drag.end();
+	}
+
+	/** @param {PointerEvent} event */
+	function lost(event) {
+		if (event.pointerId !== gesture?.id) return;
+		gesture.drag?.cancel();
+		gesture = null;
+		element.dataset.cursor = 'idle';
+	}
+
+	/** @param {WheelEvent} event */
+	function wheel(event) {
+		event.preventDefault();
+		const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 20 : 1;
+		panel.zoom(at(event), Math.exp(-event.deltaY * lines * 0.0016));
+	}
+
+	/** Escape gives back what is held. @param {KeyboardEvent} event */
+	function key(event) {
+		if (event.key !== 'Escape' || !gesture?.drag) return;
+		event.stopPropagation();
+		gesture.drag.cancel();
+		gesture = null;
+	}
+
+	element.addEventListener('pointerdown', down);
+	element.addEventListener('pointermove', move);
+	element.addEventListener('pointerup', up);
+	element.addEventListener('pointercancel', lost);
+	element.addEventListener('wheel', wheel, { passive: false });
+	addEventListener('keydown', key, true);
+	return () => {
+		element.removeEventListener('pointerdown', down);
+		element.removeEventListener('pointermove', move);
+		element.removeEventListener('pointerup', up);
+		element.removeEventListener('pointercancel', lost);
+		element.removeEventListener('wheel', wheel);
+		removeEventListener('keydown', key, true);
+	};
+}

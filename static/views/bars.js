@@ -1,0 +1,38 @@
+// @ts-check
+/** Bars below the header: what went wrong, and whose edit counts. They block nothing. */
+
+import { html } from 'htm/preact';
+
+import { keepMine, takeTheirs } from '../state/conflict.js';
+import { conflict } from '../state/group.js';
+import { announced, dismiss, notice } from '../state/notice.js';
+
+export function NoticeBar() {
+	const present = notice.value;
+	if (!present) return null;
+	const { text, tone, action } = present;
+	return html`
+		<div class="bar" data-tone=${tone} role=${tone === 'bad' ? 'alert' : 'status'}>
+			<p>${text}</p>
+			${action ? html`<button class="button" type="button" onClick=${() => { dismiss(); action.run(); }}>${action.label}</button>` : null}
+			<button class="button" type="button" onClick=${dismiss}>Dismiss <kbd>Esc</kbd></button>
+		</div>
+	`;
+}
+
+export function ConflictBar() {
+	const present = conflict.value;
+	if (!present) return null;
+	return html`
+		<div class="bar" data-tone="warn" role="alert">
+			<p><strong>Somebody else changed this group first.</strong> ${present.sentence} Theirs is shown; yours is kept until you choose.</p>
+			<button class="button" type="button" onClick=${keepMine}>Keep mine</button>
+			<button class="button" type="button" onClick=${takeTheirs}>Take theirs</button>
+		</div>
+	`;
+}
+
+/** Says to screen readers what just happened. */
+export function Announcer() {
+	return html`<p class="hidden-text" role="status" aria-live="polite">${announced.value}</p>`;
+}

@@ -1,0 +1,113 @@
+// @ts-check
+/** Export: which format, which groups, and the file. */
+
+import { html } from 'htm/preact';
+import { useEffect, useRef, useState } from 'preact/hooks';
+
+import { count, words } from '../lib/format.js';
+import { dataset, loadDatasets } from '../state/datasets.js';
+import { download, FORMATS, makeExport } from '../state/exports.js';
+
+/** @import {DatasetJson, ExportJson} from '../api/types.js' */
+
+/** @param {{legend: string, name: string, options: {name: string, label: string, note: string}[]}} props */
+function Choice({ legend, name, options }) {
+	return html`
+		<fieldset class="choice">
+			<legend>${legend}</legend>
+			${options.map((option, i) => html`
+				<label key=${option.name}>
+					<input type="radio" name=${name} value=${option.name} defaultChecked=${i === 0} />
+					<span>${option.label}<small>${option.note}</small></span>
+				</label>`)}
+		</fieldset>
+	`;
+}
+
+/** @param {DatasetJson} one */
+function groupChoices(one) {
+	return [
+		{ name: 'accepted', label: `Accepted groups · ${count(one.accepted)}`, note: 'what people let pass' },
+		{ name: 'all', label: `All groups · ${count(one.groups)}`, note: 'with the verdict as a column where there is room' },
+	];
+}
+
+const BOXES = [
+	{ name: 'optimized', label: 'Optimised boxes', note: 'consistent with the 3D ball' },
+	{ name: 'annotated', label: 'Annotated boxes', note: 'as people drew them' },
+	{ name: 'exact', label: 'Exact outlines', note: 'tight around the ball’s image' },
+];
+
+/** @param {{made: ExportJson}} props */
+function Result({ made }) {
+	const counts = Object.entries(made.counts ?? {}).map(([name, n]) => `${count(n)} ${words(name)}`);
+	return html`
+		<p class="export__result" role="status">
+			Ready${counts.length ? `: ${counts.join(', ')}` : ''}.
+			<a href=${made.content} download>Download again</a>
+		</p>
+	`;
+}
+
+/** @param {{one: DatasetJson, onClose: () => void}} props */
+function ExportForm({ one, onClose }) {
+	const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
+	const [state, setState] = useState(
+		/** @type {{busy: boolean, made: ExportJson | null, error: string | null}} */
+		({ busy: false, made: null, error: null }),
+	);
+	useEffect(() => {
+		dialog.current?.showModal();
+		loadDatasets();
+	}, []);
+	/** @param {SubmitEvent} event */
+	async function send(event) {
+		event.preventDefault();
+		const form = new FormData(/** @type {HTMLFormElement} */ (event.currentTarget));
+		setState({ busy: true, made: null, error: null });
+		try {
+			const made = await makeExport({
+				dataset: one.name,
+				format: String(form.get('format')),
+				all: form.get('groups') === 'all',
+				boxes: String(form.get('boxes')),
+			});
+			setState({ busy: false, made, error: null });
+			if (made.content) download(made.content);
+		} catch (error) {
+			setState({ busy: false, made: null, error: error instanceof Error ? error.message : String(error) });
+		}
+	}
+	return html`
+		<dialog class="dialog" ref=${dialog} aria-labelledby="export-title" onClose=${onClose}>
+			<form onSubmit=${send}>
+				<header class="dialog__header">
+					<h2 id="export-title">Export ${one.name}</h2>
+					<button class="button" type="button" onClick=${() => dialog.current?.close()}>Close <kbd>Esc</kbd></button>
+				</header>
+				<div class="export">
+					<${Choice} legend="Format" name="format" options=${FORMATS} />
+					<div class="export__column">
+						<${Choice} legend="Groups" name="groups" options=${groupChoices(one)} />
+						<${Choice} legend="Ball boxes" name="boxes" options=${BOXES} />
+					</div>
+				</div>
+				${state.error ? html`<p class="export__error" role="alert">${state.error}</p>` : null}
+				${state.made ? html`<${Result} made=${state.made} />` : null}
+				<p class="dialog__buttons">
+					<button class="button button--primary" type="submit" aria-disabled=${state.busy}>${state.busy ? 'Exporting…' : 'Export'}</button>
+				</p>
+			</form>
+		</dialog>
+	`;
+}
+
+export function ExportButton() {
+	const [open, setOpen] = useState(false);
+	const one = dataset.value;
+	if (!one) return null;
+	return html`
+		<button class="button" type="button" onClick=${() => setOpen(true)}>Export…</button>
+		${open ? html`<${ExportForm} one=${one} onClose=${() => setOpen(false)} />` : null}
+	`;
+}

@@ -1,0 +1,93 @@
+// @ts-check
+/** Every marking of every view, the worst fit first, each with its straightened band. */
+
+import { html } from 'htm/preact';
+import { useCallback } from 'preact/hooks';
+
+import { Canvas } from '../lib/canvas.js';
+import { colours } from '../lib/colours.js';
+import { fixed, pixels } from '../lib/format.js';
+import { useSize } from '../lib/hooks.js';
+import { drawStrip } from '../overlays/line_strip.js';
+import { pixelsOf, useFrames } from '../state/frames.js';
+import { focusView, selected } from '../state/workspace.js';
+import { Letter } from './letter.js';
+
+/** @import {MarkingResiduals} from '../geometry/residual.js' */
+/** @import {ViewPicture} from '../overlays/scene.js' */
+
+const STRIP = 28;
+const ROW = 34;
+/** Drawing every strip of a large group would cost more than anybody reads. */
+const MOST = 14;
+
+/** @typedef {{picture: ViewPicture, marking: MarkingResiduals}} Row */
+
+/** @param {ViewPicture[]} pictures @returns {Row[]} */
+function rowsOf(pictures) {
+	const rows = pictures.flatMap((picture) => picture.markings
+		.filter(({ points }) => points.length > 0)
+		.map((marking) => ({ picture, marking })));
+	// Per cent of the diagonal, so that views of different sizes compare.
+	return rows.sort((a, b) => share(b) - share(a));
+}
+
+/** @param {Row} row */
+function share({ picture, marking }) {
+	return marking.largest === null ? Infinity : marking.largest / picture.gamma;
+}
+
+/** Select the worst point of a marking. @param {Row} row */
+function selectWorst({ picture, marking }) {
+	focusView(picture.view.letter);
+	const distances = marking.points.map(({ distance }) => distance ?? 0);
+	const index = distances.indexOf(Math.max(...distances));
+	selected.value = { kind: 'point', view: picture.view.key, marking: marking.marking, index };
+}
+
+/** @param {{row: Row, width: number, frame: HTMLImageElement | undefined}} props */
+function Strip({ row, width, frame }) {
+	const { picture, marking } = row;
+	const theme = colours.value;
+	const draw = useCallback((/** @type {CanvasRenderingContext2D} */ context) => {
+		const data = frame ? pixelsOf(frame) : null;
+		const scale = data ? data.width / picture.view.width : 1;
+		drawStrip(context, { width, height: STRIP }, marking, data, scale);
+	}, [marking, width, frame, theme]);
+	return html`
+		<li class="line-row">
+			<button type="button" onClick=${() => selectWorst(row)} title=${`Select the worst point of ${marking.marking}`}>
+				<${Letter} letter=${picture.view.letter} />
+				<span class="line-row__name">${marking.marking}</span>
+				${marking.polyline.length > 1
+					? html`<${Canvas} class="line-row__strip" width=${width} height=${STRIP} draw=${draw} name="" />`
+					: html`<span class="line-row__none">not in sight</span>`}
+				<span class="line-row__value" data-grade=${marking.grade}>${marking.largest === null ? fixed(null, 1) : `${pixels(marking.largest)} px`}</span>
+			</button>
+		</li>
+	`;
+}
+
+/** @param {{pictures: ViewPicture[]}} props */
+export function LineList({ pictures }) {
+	const [ref, size] = useSize();
+	const frames = useFrames(pictures.map(({ view }) => view));
+	const rows = rowsOf(pictures);
+	const narrow = size.width < 330;
+	const fitting = Math.max(1, Math.min(MOST, Math.floor(size.height / ROW)));
+	const shown = rows.slice(0, fitting);
+	const rest = rows[fitting];
+	return html`
+		<section class="card strip-card" aria-label="Lines, worst first">
+			<h2>Lines, ±12 px${rest ? html`<span class="card__aside">${narrow ? '+ ' : ''}${rows.length - fitting}${narrow ? '' : ' more'} up to ${pixels(rest.marking.largest)} px</span>` : null}</h2>
+			<ul class="line-list" ref=${ref} data-narrow=${narrow}>
+				${rows.length ? null : html`<li class="empty-note">No lines are annotated in this group.</li>`}
+				${size.width < 100 ? null : shown.map((row) => html`
+					<${Strip}
+						key=${`${row.picture.view.key} ${row.marking.marking}`} row=${row}
+						width=${Math.max(24, size.width - (narrow ? 190 : 232))} frame=${frames.get(row.picture.view.key)}
+					/>`)}
+			</ul>
+		</section>
+	`;
+}

@@ -1,0 +1,135 @@
+// @ts-check
+/** The pitch from above: cameras, their rays, the ball of each pair and of all. */
+
+import { html } from 'htm/preact';
+
+import { cameraFromJson, rayThrough } from '../geometry/camera.js';
+import { pitchMarkings } from '../geometry/pitch.js';
+import { ballCenter, ballOf } from '../geometry/preview.js';
+import { fixed } from '../lib/format.js';
+import { useSize } from '../lib/hooks.js';
+
+/** @import {GroupDocument, SolutionJson, ViewJson} from '../api/types.js' */
+/** @import {Camera, PitchPoint} from '../geometry/camera.js' */
+
+/** Metres beyond the pitch that are shown at most; cameras farther away stand at the edge. */
+const MARGIN = 52;
+
+/** How far a ray is drawn when it meets nothing, metres. */
+const RAY = 130;
+
+/** @typedef {{letter: string, x: number, y: number, ray: PitchPoint | null}} Stand */
+
+/** @param {GroupDocument} group @param {SolutionJson} solution @returns {Stand[]} */
+function stands(group, solution) {
+	return group.views.flatMap((view) => {
+		const json = solution.views.find((one) => one.view === view.key)?.calibration.camera;
+		if (!json) return [];
+		const [x, y] = json.position_meters;
+		return [{ letter: view.letter, x, y, ray: rayEnd(view, cameraFromJson(json), solution) }];
+	});
+}
+
+/**
+ * Where the ray of a view's ball ends: at the 3D ball, else on the grass.
+ *
+ * @param {ViewJson} view @param {Camera} camera @param {SolutionJson} solution
+ * @returns {PitchPoint | null}
+ */
+function rayEnd(view, camera, solution) {
+	if (solution.ball?.views.includes(view.key)) return solution.ball.point;
+	const ball = ballOf(view);
+	const center = ball && ballCenter(ball);
+	const ray = center && rayThrough(camera, center);
+	if (!ray) return null;
+	const toGrass = ray[2] > 0 ? -camera.C[2] / ray[2] : Infinity;
+	const t = Math.min(toGrass, RAY / Math.hypot(ray[0], ray[1]));
+	return [camera.C[0] + t * ray[0], camera.C[1] + t * ray[1], camera.C[2] + t * ray[2]];
+}
+
+/** The part of the ground that shows pitch and cameras. @param {GroupDocument} group @param {Stand[]} cameras */
+function frameOf(group, cameras) {
+	const [l, w] = [group.pitch.length / 2, group.pitch.width / 2];
+	const xs = [-l, l, ...cameras.map(({ x }) => Math.max(-l - MARGIN, Math.min(l + MARGIN, x)))];
+	const ys = [-w, w, ...cameras.map(({ y }) => Math.max(-w - MARGIN, Math.min(w + MARGIN, y)))];
+	const [left, top] = [Math.min(...xs) - 7, Math.min(...ys) - 7];
+	return { left, top, width: Math.max(...xs) + 7 - left, height: Math.max(...ys) + 7 - top };
+}
+
+/** @type {Map<string, string[]>} */
+const drawn = new Map();
+
+/** The lines of a pitch as paths, made once for each size. @param {number} length @param {number} width */
+function linesOf(length, width) {
+	const key = `${length} ${width}`;
+	const lines = drawn.get(key) ?? [...pitchMarkings(length, width).values()].map(path);
+	drawn.set(key, lines);
+	return lines;
+}
+
+/** @param {ReturnType<typeof frameOf>} frame @param {PitchPoint} point */
+function within({ left, top, width, height }, [x, y]) {
+	return x > left && x < left + width && y > top && y < top + height;
+}
+
+/** @param {PitchPoint[]} points */
+function path(points) {
+	return `M${points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join('L')}`;
+}
+
+/** @param {{group: GroupDocument, solution: SolutionJson}} props */
+function Drawing({ group, solution }) {
+	const [ref, size] = useSize();
+	const cameras = stands(group, solution);
+	const frame = frameOf(group, cameras);
+	// One unit of the drawing is a metre; marks keep their size on screen.
+	const pixel = Math.max(frame.width / Math.max(1, size.width), frame.height / Math.max(1, size.height));
+	const ball = solution.ball?.point;
+	const [l, w] = [group.pitch.length, group.pitch.width];
+	return html`
+		<div class="mini-pitch__drawing" ref=${ref}>
+			<svg viewBox=${`${frame.left} ${frame.top} ${frame.width} ${frame.height}`} role="img" aria-label="The pitch from above">
+				<rect class="mini-pitch__grass" x=${-l / 2} y=${-w / 2} width=${l} height=${w} rx=${pixel} />
+				${linesOf(l, w).map((line) => html`<path class="mini-pitch__line" d=${line} stroke-width=${pixel} />`)}
+				${cameras.map(({ letter, x, y, ray }) => (ray ? html`
+					<path class="mini-pitch__ray" data-letter=${letter} d=${path([[x, y, 0], ray])} stroke-width=${1.3 * pixel} />` : null))}
+				${solution.pairs.filter(({ point }) => within(frame, point)).map(({ point, valid }) => html`
+					<circle class="mini-pitch__pair" data-valid=${valid} cx=${point[0]} cy=${point[1]} r=${2.4 * pixel} stroke-width=${1.2 * pixel} />`)}
+				${cameras.map(({ letter, x, y }) => html`
+					<g class="mini-pitch__camera" data-letter=${letter}>
+						<circle cx=${x} cy=${y} r=${7 * pixel} />
+						<text x=${x} y=${y} dy=${3.6 * pixel} font-size=${10 * pixel}>${letter}</text>
+					</g>`)}
+				${ball ? html`<circle class="mini-pitch__ball" cx=${ball[0]} cy=${ball[1]} r=${3.4 * pixel} stroke-width=${1.5 * pixel} />` : null}
+			</svg>
+		</div>
+	`;
+}
+
+/** @param {{solution: SolutionJson}} props */
+function Numbers({ solution }) {
+	const { ball } = solution;
+	if (!ball) return html`<p class="mini-pitch__none">No valid pair: no 3D ball.</p>`;
+	const [x, y] = ball.point;
+	return html`
+		<dl class="mini-pitch__numbers">
+			<div><dt>x</dt><dd data-number="x">${fixed(x, 2, ' m')}</dd></div>
+			<div><dt>y</dt><dd data-number="y">${fixed(y, 2, ' m')}</dd></div>
+			<div><dt>height</dt><dd data-number="height">${fixed(ball.height_m, 2, ' m')}</dd></div>
+			<div><dt>σ</dt><dd data-number="sigma">${fixed(ball.sigma_m, 2, ' m')}</dd></div>
+			<div><dt title="Parallax: angle between the rays">β</dt><dd data-number="parallax">${fixed(ball.parallax_degrees, 1, '°')}</dd></div>
+		</dl>
+	`;
+}
+
+/** @param {{group: GroupDocument, solution: SolutionJson | null}} props */
+export function MiniPitch({ group, solution }) {
+	return html`
+		<section class="card strip-card mini-pitch" aria-label="Pitch">
+			<h2>Pitch</h2>
+			${solution ? html`
+				<${Drawing} group=${group} solution=${solution} />
+				<${Numbers} solution=${solution} />` : html`<p class="empty-note">Not solved yet.</p>`}
+		</section>
+	`;
+}

@@ -1,0 +1,58 @@
+// @ts-check
+/** The objects of a view as a list: what the canvas shows, for keyboards and screen readers. */
+
+import { html } from 'htm/preact';
+import { useEffect, useRef } from 'preact/hooks';
+
+import { ballOf } from '../geometry/preview.js';
+import { fixed, pixels } from '../lib/format.js';
+import { objectsOf, sameObject } from '../state/selection.js';
+import { editing, selected } from '../state/workspace.js';
+
+/** @import {ViewPicture} from '../overlays/scene.js' */
+/** @import {Selection} from '../state/workspace.js' */
+
+/**
+ * @param {ViewPicture} picture @param {Selection} object
+ * @returns {{name: string, point: string, number: string}}
+ */
+function wordsFor(picture, object) {
+	if (object.kind === 'ball') {
+		const box = ballOf(picture.view)?.box;
+		return { name: 'Ball', point: '', number: box ? `Ø ${fixed((box[2] + box[3]) / 2, 2)} px` : '' };
+	}
+	const found = picture.markings.find(({ marking }) => marking === object.marking);
+	const distance = found?.points[object.index]?.distance ?? null;
+	const number = distance === null ? '' : `${pixels(distance)} px`;
+	return { name: object.marking, point: `point ${object.index + 1}`, number };
+}
+
+/** @param {{picture: ViewPicture, object: Selection}} props */
+function ObjectButton({ picture, object }) {
+	const { name, point, number } = wordsFor(picture, object);
+	const select = () => { selected.value = object; };
+	return html`
+		<button type="button" aria-pressed=${sameObject(object, selected.value)} onFocus=${select} onClick=${select}>
+			<span>${name}</span><span>${point}</span><span>${number}</span>
+		</button>
+	`;
+}
+
+/** @param {{picture: ViewPicture}} props */
+export function ObjectList({ picture }) {
+	const list = useRef(/** @type {HTMLUListElement | null} */ (null));
+	const objects = objectsOf(picture.view);
+	useEffect(() => {
+		const at = list.current?.querySelector('[aria-pressed="true"]') ?? list.current?.querySelector('button');
+		if (at instanceof HTMLElement) at.focus();
+	}, []);
+	return html`
+		<ul class="object-list" ref=${list} aria-label=${`Objects of view ${picture.view.letter}`}>
+			${objects.length ? null : html`<li class="object-list__empty">Nothing is annotated here.</li>`}
+			${objects.map((object) => html`
+				<li key=${JSON.stringify(object)}><${ObjectButton} picture=${picture} object=${object} /></li>
+			`)}
+			<li><button type="button" onClick=${() => { editing.value = false; }}>Done</button></li>
+		</ul>
+	`;
+}

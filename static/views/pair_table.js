@@ -1,0 +1,46 @@
+// @ts-check
+/** Every pair of views: the ball of the two, and why the pair counts or not. */
+
+import { html } from 'htm/preact';
+
+import { fixed, pixels, words } from '../lib/format.js';
+import { Letter } from './letter.js';
+
+/** @import {GroupDocument, SolutionJson} from '../api/types.js' */
+
+/** @param {{group: GroupDocument, solution: SolutionJson}} props */
+export function PairTable({ group, solution }) {
+	if (solution.pairs.length === 0) return null;
+	/** @param {string} key */
+	const letter = (key) => group.views.find((view) => view.key === key)?.letter ?? '?';
+	return html`
+		<section class="card" aria-label="Pairs in numbers">
+			<h2>Pairs</h2>
+			<table class="numbers numbers--pairs">
+				<thead>
+					<tr>
+						<th scope="col">pair</th>
+						<th scope="col" title="Parallax angle">β</th>
+						<th scope="col" title="Distance of the cameras">base m</th>
+						<th scope="col" title="Reprojection error in both views">errors px</th>
+						<th scope="col"><span class="hidden-text">valid</span></th>
+					</tr>
+				</thead>
+				<tbody>
+					${solution.pairs.map((pair) => html`
+						<tr key=${`${pair.a} ${pair.b}`} data-valid=${pair.valid}>
+							<th scope="row"><span class="pair-letters"><${Letter} letter=${letter(pair.a)} /><${Letter} letter=${letter(pair.b)} /></span></th>
+							<td>${fixed(pair.parallax_degrees, 1, '°')}</td>
+							<td>${fixed(pair.baseline_m, 1)}</td>
+							<td data-number="pair-errors">${pixels(pair.errors_px[0])} · ${pixels(pair.errors_px[1])}</td>
+							<td class="pair-state" data-grade=${pair.valid ? 'ok' : 'bad'} title=${pair.valid ? 'valid' : words(pair.failed ?? '')}>
+								<span aria-hidden="true">${pair.valid ? '✓' : '✗'}</span>
+								<span class="hidden-text">${pair.valid ? 'valid' : words(pair.failed ?? 'not valid')}</span>
+							</td>
+						</tr>
+					`)}
+				</tbody>
+			</table>
+		</section>
+	`;
+}

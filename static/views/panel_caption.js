@@ -1,0 +1,30 @@
+// @ts-check
+/** What a panel shows, in words: letter, name, state, JaC, ball error. */
+
+import { html } from 'htm/preact';
+
+import { GLYPHS } from '../geometry/residual.js';
+import { pixels } from '../lib/format.js';
+import { errorOf, gradeOfView, jacOf } from './view_state.js';
+import { Letter } from './letter.js';
+
+/** @import {ViewPicture} from '../overlays/scene.js' */
+
+/** @param {{picture: ViewPicture}} props */
+export function PanelCaption({ picture }) {
+	const { view, solved } = picture;
+	const error = errorOf(picture);
+	const { grade, sentence } = gradeOfView(picture);
+	const jac = jacOf(solved);
+	return html`
+		<figcaption class="caption">
+			<${Letter} letter=${view.letter} />
+			<span class="caption__name">${view.label}</span>
+			<span class="caption__state" data-grade=${grade}>
+				<span aria-hidden="true">${GLYPHS[grade]}</span> ${sentence}
+				${jac !== null ? html`<span data-number="jac">JaC ${jac.toFixed(2)}</span>` : null}
+				${error.px === null ? null : html`<span data-number="error"> · ball ${pixels(error.px)} px</span>`}
+			</span>
+		</figcaption>
+	`;
+}

@@ -1,0 +1,52 @@
+// @ts-check
+/** When there is nothing to list: why, and what to do about it. */
+
+import { html } from 'htm/preact';
+
+import { capital } from '../lib/format.js';
+import { param } from '../lib/router.js';
+import { dataset, datasets, failure, loadDatasets } from '../state/datasets.js';
+import { queueAddress } from '../state/navigation.js';
+import { queue } from '../state/queue.js';
+
+/** @param {{q: string}} props */
+export function QueueEmpty({ q }) {
+	const error = failure.value ?? queue.value.error;
+	const name = dataset.value?.name ?? '';
+	if (error) {
+		return html`
+			<section class="card empty" role="alert">
+				<h2>${error.status === 400 || error.status === 422 ? 'The query cannot be read' : 'The queue cannot be shown'}</h2>
+				<p>${capital(error.message)}.</p>
+				${error.hint ? html`<p>${error.hint}</p>` : null}
+				<p>${failure.value
+					? html`<button class="button" type="button" onClick=${loadDatasets}>Try again</button>`
+					: html`<a class="button" href=${queueAddress(name, '')}>Show all groups</a>`}</p>
+			</section>
+		`;
+	}
+	if (datasets.value?.length === 0) {
+		return html`
+			<section class="card empty">
+				<h2>No dataset yet</h2>
+				<p>Make the sample dataset, or import your own, then load this page again:</p>
+				<pre>touchline sample OUT && touchline import soccernet-v3 OUT --dataset sample && touchline solve --dataset sample</pre>
+			</section>
+		`;
+	}
+	if (!dataset.value) {
+		return html`
+			<section class="card empty">
+				<h2>There is no dataset “${param('dataset')}”</h2>
+				<p><a class="button" href="/groups">Open the first dataset</a></p>
+			</section>
+		`;
+	}
+	return html`
+		<section class="card empty">
+			<h2>${q ? 'No group matches this query' : 'This dataset has no groups'}</h2>
+			${q ? html`<p>Take a word away, or start again.</p><p><a class="button" href=${queueAddress(name, '')}>Show all groups</a></p>`
+				: html`<p>Import groups into it with <code>touchline import</code>.</p>`}
+		</section>
+	`;
+}

@@ -1,0 +1,73 @@
+// @ts-check
+/** One group in the queue. */
+
+import { html } from 'htm/preact';
+
+import { fixed, pixels, words } from '../lib/format.js';
+import { navigate } from '../lib/router.js';
+import { reviewAddress } from '../state/navigation.js';
+import { activeRow } from '../state/queue.js';
+import { GATE_TITLES } from './gate_names.js';
+
+/** @import {GroupRow} from '../api/types.js' */
+
+const GLYPHS = /** @type {Record<string, string>} */ ({
+	unreviewed: '○', accepted: '✓', rejected: '✗', deferred: '…', flagged: '!', stale: '↻',
+});
+
+/** What the pill says: the verdict, or that an unreviewed group needs a look. @param {GroupRow} row */
+function statusOf(row) {
+	if (row.stale) return { status: 'stale', text: `${row.status}, stale` };
+	if (row.status === 'unreviewed' && row.findings.length > 0) return { status: 'flagged', text: 'flagged' };
+	return { status: row.status, text: row.status };
+}
+
+/** @param {GroupRow} row */
+function gateOf(row) {
+	if (row.passes === null) return { title: 'not solved yet', detail: '' };
+	if (!row.first_failing) return { title: 'passes', detail: '' };
+	const { gate, sentence } = row.first_failing;
+	return { title: GATE_TITLES[gate] ?? words(gate), detail: sentence };
+}
+
+/** @param {{row: GroupRow, q: string, active: boolean}} props */
+function Cells({ row, q, active }) {
+	const { status, text } = statusOf(row);
+	const { title, detail } = gateOf(row);
+	return html`
+		<div role="gridcell" class="queue-cell">
+			<span class="thumbnail">${row.thumbnail ? html`<img src=${row.thumbnail} alt="" loading="lazy" decoding="async" width="104" height="58" />` : 'no frame'}</span>
+		</div>
+		<div role="gridcell" class="queue-cell queue-cell--two">
+			<a href=${reviewAddress(row.id, q)} tabindex=${active ? 0 : -1}>${row.number}</a>
+			<span class="queue-cell__sub">${row.label}</span>
+		</div>
+		<div role="gridcell" class="queue-cell">
+			<span class="pill" data-status=${status}><span aria-hidden="true">${GLYPHS[status] ?? ''}</span> ${text}</span>
+		</div>
+		<div role="gridcell" class="queue-cell queue-cell--two" data-passes=${row.passes === true}>
+			<span>${title}</span><span class="queue-cell__sub">${detail}</span>
+		</div>
+		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.min_jac, 2)}</div>
+		<div role="gridcell" class="queue-cell" data-numeric="true">${pixels(row.error_px)}</div>
+		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.sigma_m, 2)}</div>
+		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.parallax_degrees, 0, '°')}</div>
+		<div role="gridcell" class="queue-cell" data-numeric="true">${row.views}</div>
+		<div role="gridcell" class="queue-cell"><span class="queue-cell__findings">${row.findings.map(words).join(', ')}</span></div>
+	`;
+}
+
+/** @param {{row: GroupRow | null, index: number, start: number, q: string, active: boolean}} props */
+export function QueueRow({ row, index, start, q, active }) {
+	return html`
+		<div
+			class="queue-row" role="row" aria-rowindex=${index + 2} aria-selected=${active} data-active=${active}
+			style=${{ transform: `translateY(${start}px)` }}
+			onFocusIn=${() => { activeRow.value = index; }}
+			onClick=${() => { if (row) navigate(reviewAddress(row.id, q)); }}
+		>
+			${row ? html`<${Cells} row=${row} q=${q} active=${active} />`
+				: html`<div role="gridcell" class="queue-cell queue-cell--waiting">…</div>`}
+		</div>
+	`;
+}

@@ -1,0 +1,36 @@
+// @ts-check
+/** The column beside the views: the result, its reasons, the verdict. */
+
+import { html } from 'htm/preact';
+
+import { Findings } from './findings.js';
+import { Gates } from './gates.js';
+import { PairTable } from './pair_table.js';
+import { VerdictButtons } from './verdict_buttons.js';
+import { VerdictCard } from './verdict_card.js';
+import { ViewTable } from './view_table.js';
+
+/** @import {GroupDocument, SolutionJson} from '../api/types.js' */
+/** @import {ViewPicture} from '../overlays/scene.js' */
+
+/**
+ * @param {{
+ *   group: GroupDocument, solution: SolutionJson | null, pictures: ViewPicture[], live: boolean
+ * }} props
+ */
+export function Rail({ group, solution, pictures, live }) {
+	return html`
+		<aside class="rail" aria-label="Numbers and verdict">
+			<div class="rail__scroll" tabindex="0" role="group" aria-label="Numbers">
+				<${VerdictCard} group=${group} solution=${solution} live=${live} />
+				${solution ? html`<${Gates} group=${group} solution=${solution} />` : null}
+				<${ViewTable} group=${group} pictures=${pictures} />
+				${solution ? html`
+					<${PairTable} group=${group} solution=${solution} />
+					<${Findings} group=${group} solution=${solution} />
+				` : null}
+			</div>
+			<${VerdictButtons} group=${group} />
+		</aside>
+	`;
+}

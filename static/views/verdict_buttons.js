@@ -1,0 +1,100 @@
+// @ts-check
+/** Accept, reject with a reason, defer: buttons, with what they ask beside them. */
+
+import { html } from 'htm/preact';
+import { useEffect, useRef } from 'preact/hooks';
+
+import { useKeys } from '../lib/hooks.js';
+import {
+	accept, answer, asking, askReason, cancelAsking, defer, lastReason, reject, REASONS,
+} from '../state/verdicts.js';
+
+/** @import {GroupDocument} from '../api/types.js' */
+
+const isAskingReason = () => asking.value === 'reason';
+
+/** @type {import('../lib/keys.js').Binding[]} */
+const REASON_KEYS = [
+	...REASONS.map(({ name, label }, i) => ({
+		keys: [String(i + 1)], label: `Reject: ${label.toLowerCase()}`, group: 'Verdict',
+		when: isAskingReason, run: () => reject(name),
+	})),
+	{
+		keys: ['x'], label: 'Reject with the last reason', group: 'Verdict',
+		when: () => isAskingReason() && lastReason.value !== null,
+		run: () => reject(lastReason.value ?? 'other'),
+	},
+];
+
+function ReasonList() {
+	useKeys(REASON_KEYS);
+	return html`
+		<section class="ask" aria-label="Why is it rejected?">
+			<p class="ask__title">Reject because <kbd>Esc</kbd></p>
+			<ol class="reasons">
+				${REASONS.map(({ name, label }, i) => html`
+					<li key=${name}>
+						<button type="button" data-last=${name === lastReason.value} onClick=${() => reject(name)}>
+							<kbd>${i + 1}</kbd> ${label} ${name === lastReason.value ? html`<kbd>X</kbd>` : null}
+						</button>
+					</li>
+				`)}
+			</ol>
+		</section>
+	`;
+}
+
+/** @param {{title: string, button: string}} props */
+function NoteForm({ title, button }) {
+	const field = useRef(/** @type {HTMLInputElement | null} */ (null));
+	useEffect(() => field.current?.focus(), []);
+	/** @param {SubmitEvent} event */
+	function send(event) {
+		event.preventDefault();
+		const note = field.current?.value.trim();
+		if (note) answer(note);
+		else field.current?.focus();
+	}
+	/** @param {KeyboardEvent} event */
+	function key(event) {
+		if (event.key === 'Escape') cancelAsking();
+	}
+	return html`
+		<form class="ask" onSubmit=${send} onKeyDown=${key}>
+			<label class="ask__title" for="verdict-note">${title}</label>
+			<input id="verdict-note" class="field" ref=${field} maxlength="500" autocomplete="off" required />
+			<p class="ask__buttons">
+				<button class="button button--primary" type="submit">${button} <kbd>Enter</kbd></button>
+				<button class="button" type="button" onClick=${cancelAsking}>Cancel <kbd>Esc</kbd></button>
+			</p>
+		</form>
+	`;
+}
+
+/** @param {{group: GroupDocument}} props */
+function Ask({ group }) {
+	if (asking.value === 'reason') return html`<${ReasonList} />`;
+	if (asking.value === 'note') return html`<${NoteForm} title="What is wrong with it?" button="Reject" />`;
+	if (asking.value !== 'override') return null;
+	const failing = group.solution?.first_failing;
+	const title = `Accept although ${failing ? `a gate fails (${failing.sentence})` : 'a gate fails'}? Say why.`;
+	return html`<${NoteForm} title=${title} button="Accept" />`;
+}
+
+/** @param {{group: GroupDocument}} props */
+export function VerdictButtons({ group }) {
+	const unsolved = group.solution === null;
+	return html`
+		<div class="verdicts">
+			<${Ask} group=${group} />
+			<div class="verdicts__buttons">
+				<button
+					class="button button--accept" type="button" onClick=${accept}
+					aria-disabled=${unsolved} title=${unsolved ? 'This group is not solved yet' : 'Accept and go on'}
+				>Accept <kbd>A</kbd></button>
+				<button class="button button--reject" type="button" aria-expanded=${asking.value === 'reason'} onClick=${askReason}>Reject <kbd>X</kbd></button>
+				<button class="button" type="button" onClick=${defer}>Defer <kbd>S</kbd></button>
+			</div>
+		</div>
+	`;
+}

@@ -1,0 +1,50 @@
+// @ts-check
+/** The state of one view as a grade and a few words. */
+
+import { diagonal } from '../geometry/preview.js';
+import { gradeBelow, gradeOfJac } from '../geometry/residual.js';
+
+/** @import {PolicyJson, ViewSolutionJson} from '../api/types.js' */
+/** @import {Grade} from '../geometry/residual.js' */
+/** @import {ViewPicture} from '../overlays/scene.js' */
+
+const FAILED = /** @type {Record<string, string>} */ ({
+	calibratable: 'not calibrated', jac: '', ball: 'no ball', reprojection: '', baseline: 'same place',
+});
+
+/** JaC at 0.5 %, or null when it was not measured. @param {ViewSolutionJson | null} solved */
+export function jacOf(solved) {
+	return solved?.calibration.jac?.['0.5'] ?? null;
+}
+
+/** @param {ViewPicture} picture @returns {{grade: Grade, sentence: string}} */
+export function gradeOfView({ view, solved, apart }) {
+	if (!view.included) return { grade: 'unseen', sentence: 'left out' };
+	if (!solved) return { grade: 'unseen', sentence: 'not solved' };
+	if (!solved.calibration.camera) return { grade: 'bad', sentence: 'not calibrated' };
+	const given = solved.calibration.source === 'given' && jacOf(solved) === null ? 'given' : '';
+	if (solved.failed) return { grade: 'bad', sentence: FAILED[solved.failed] ?? solved.failed };
+	if (apart !== null) return { grade: 'bad', sentence: given };
+	if (!solved.ball && !view.balls.length) return { grade: 'warn', sentence: 'no ball' };
+	return { grade: 'ok', sentence: given };
+}
+
+/**
+ * The ball's error in a view: to the 3D ball, or where the view agrees with no other, in its best
+ * pair.
+ *
+ * @param {ViewPicture} picture
+ * @returns {{px: number | null, percent: number | null}}
+ */
+export function errorOf({ view, ball, apart }) {
+	const px = apart ?? ball?.error_px ?? null;
+	return { px, percent: px === null ? null : (100 * px) / diagonal(view) };
+}
+
+/** @param {ViewPicture} picture @param {PolicyJson} policy */
+export function gradesOf(picture, policy) {
+	return {
+		jac: gradeOfJac(jacOf(picture.solved), policy.min_jac),
+		error: gradeBelow(errorOf(picture).percent, policy.tau_percent),
+	};
+}

@@ -1,0 +1,72 @@
+// @ts-check
+/** The views in numbers. */
+
+import { html } from 'htm/preact';
+
+import { gradeOfSize } from '../geometry/residual.js';
+import { fixed, percent, pixels } from '../lib/format.js';
+import { submit } from '../state/group.js';
+import { focused, focusView } from '../state/workspace.js';
+import { Letter } from './letter.js';
+import { errorOf, gradesOf, jacOf } from './view_state.js';
+
+/** @import {GroupDocument} from '../api/types.js' */
+/** @import {ViewPicture} from '../overlays/scene.js' */
+
+/** @param {ViewPicture} picture */
+function expected({ ball }) {
+	return ball?.optimized_diameter_px ?? null;
+}
+
+/** @param {{group: GroupDocument, pictures: ViewPicture[]}} props */
+export function ViewTable({ group, pictures }) {
+	return html`
+		<section class="card" aria-label="Views in numbers">
+			<h2>Views</h2>
+			<table class="numbers">
+				<thead>
+					<tr>
+						<th scope="col">view</th>
+						<th scope="col" title="Share of markings within 0.5 % of the diagonal">JaC</th>
+						<th scope="col" title="Ball, annotated to reprojected">px</th>
+						<th scope="col" title="The same in per cent of the diagonal">%</th>
+						<th scope="col" title="Diameter that fits the 3D ball, pixels">Ø px</th>
+						<th scope="col" title="Annotated over fitting diameter">ratio</th>
+						<th scope="col"><span class="hidden-text">included</span></th>
+					</tr>
+				</thead>
+				<tbody>
+					${pictures.map((picture) => html`<${ViewRow} key=${picture.view.key} group=${group} picture=${picture} />`)}
+				</tbody>
+			</table>
+		</section>
+	`;
+}
+
+/** @param {{group: GroupDocument, picture: ViewPicture}} props */
+function ViewRow({ group, picture }) {
+	const { view, solved, ball } = picture;
+	const grades = gradesOf(picture, group.policy);
+	const error = errorOf(picture);
+	return html`
+		<tr data-row=${view.letter} data-focused=${focused.value === view.letter}>
+			<th scope="row">
+				<button class="row-button" type="button" title=${view.label} onClick=${() => focusView(view.letter)}>
+					<${Letter} letter=${view.letter} /><span>${view.label}</span>
+				</button>
+			</th>
+			<td data-grade=${grades.jac} data-number="jac">${fixed(jacOf(solved), 2)}</td>
+			<td data-grade=${grades.error} data-number="error">${pixels(error.px)}</td>
+			<td data-grade=${grades.error}>${percent(error.percent)}</td>
+			<td>${pixels(expected(picture))}</td>
+			<td data-grade=${gradeOfSize(ball?.size_ratio)} data-number="ratio">${fixed(ball?.size_ratio, 2)}</td>
+			<td>
+				<input
+					type="checkbox" checked=${view.included}
+					aria-label=${`Include view ${view.letter}`} title="Use this view (Shift+digit)"
+					onChange=${() => submit({ kind: 'include', view: view.key, included: !view.included })}
+				/>
+			</td>
+		</tr>
+	`;
+}

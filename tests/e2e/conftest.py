@@ -1,0 +1,178 @@
+"""A real server over a small sample dataset, and a real browser in front of it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, sync_playwright
+
+ROOT = Path(__file__).resolve().parents[2]
+GROUPS = 14
+SIZE = {"width": 1440, "height": 900}
+START_SECONDS = 60.0
+
+
+def _chromium() -> str:
+    named = os.environ.get("TOUCHLINE_CHROMIUM")
+    found = named or next(
+        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+    )
+    if not found or not Path(found).exists():
+        pytest.fail(
+            "The browser tests need Chromium: install the system's package (for example "
+            "'apt-get install chromium') or name its program in TOUCHLINE_CHROMIUM.",
+            pytrace=False,
+        )
+    return found
+
+
+def _touchline(*arguments: str, home: Path) -> None:
+    command = [sys.executable, "-c", "from app.cli import main; main()", *arguments]
+    done = subprocess.run(
+        command, cwd=ROOT, env=_environment(home), capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, f"touchline {' '.join(arguments)}: {done.stderr}"
+
+
+def _environment(home: Path, port: int = 0) -> dict[str, str]:
+    return {**os.environ, "TOUCHLINE_HOME": str(home), "TOUCHLINE_PORT": str(port)}
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture(scope="session")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with the solved sample dataset."""
+    if not (ROOT / "static" / "node_modules" / "preact").is_dir():
+        pytest.fail(
+            "The browser's libraries are not installed: run 'npm ci' in static/ (make setup).",
+            pytrace=False,
+        )
+    folder = tmp_path_factory.mktemp("home")
+    sample = tmp_path_factory.mktemp("sample")
+    _touchline("migrate", home=folder)
+    _touchline("sample", "--groups", str(GROUPS), str(sample / "tree"), home=folder)
+    _touchline("import", "soccernet-v3", str(sample / "tree"), "--dataset", "sample", home=folder)
+    _touchline("solve", "--dataset", "sample", "--workers", "1", home=folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def server(home: Path) -> Iterator[str]:
+    """Address of a server over the home."""
+    port = _free_port()
+    address = f"http://127.0.0.1:{port}"
+    with (home / "server.log").open("wb") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-c", "from app.cli import main; main()", "serve"],
+            cwd=ROOT,
+            env=_environment(home, port),
+            stdout=log,
+            stderr=log,
+        )
+        try:
+            _wait_for(address, process, home / "server.log")
+            yield address
+        finally:
+            process.terminate()
+            process.wait(timeout=20)
+
+
+def _wait_for(address: str, process: subprocess.Popen[bytes], log: Path) -> None:
+    deadline = time.monotonic() + START_SECONDS
+    while time.monotonic() < deadline:
+        assert process.poll() is None, log.read_text()
+        try:
+            with urllib.request.urlopen(f"{address}/healthz", timeout=2):
+                return
+        except OSError:
+            time.sleep(0.1)
+    pytest.fail(f"the server did not start: {log.read_text()}")
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Chromium."""
+    with sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path=_chromium())
+        yield launched
+        launched.close()
+
+
+@dataclass
+class Console:
+    """What the page complained about; a test may say what it expects."""
+
+    messages: list[str] = field(default_factory=list)
+    expected: list[str] = field(default_factory=list)
+
+    def expect(self, part: str) -> None:
+        """Allow complaints that contain this text."""
+        self.expected.append(part)
+
+    @property
+    def unexpected(self) -> list[str]:
+        """Complaints that nobody allowed."""
+        return [
+            message
+            for message in self.messages
+            if not any(part in message for part in self.expected)
+        ]
+
+    def hear(self, message: ConsoleMessage) -> None:
+        """Keep errors and warnings."""
+        if message.type in ("error", "warning"):
+            self.messages.append(f"{message.type}: {message.text}")
+
+
+@pytest.fixture
+def console() -> Iterator[Console]:
+    """Fails the test when the page complained."""
+    heard = Console()
+    yield heard
+    assert heard.unexpected == []
+
+
+OpenPage = Callable[..., Page]
+
+
+@pytest.fixture
+def open_page(browser: Browser, server: str, console: Console) -> Iterator[OpenPage]:
+    """A function that opens a fresh window: ``open_page("/groups", scheme=...)``; None: blank."""
+    contexts: list[BrowserContext] = []
+
+    def open_one(
+        path: str | None, *, scheme: str = "dark", size: dict[str, int] | None = None
+    ) -> Page:
+        context = browser.new_context(
+            base_url=server,
+            viewport=size or SIZE,  # type: ignore[arg-type]
+            color_scheme=scheme,  # type: ignore[arg-type]
+            accept_downloads=True,
+        )
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(20_000)
+        page.on("console", console.hear)
+        page.on("pageerror", lambda error: console.messages.append(f"error: {error}"))
+        if path is not None:
+            page.goto(path)
+        return page
+
+    yield open_one
+    for context in contexts:
+        context.close()

@@ -1,0 +1,93 @@
+"""Everybody can use it: axe finds nothing serious, nothing is cut off, at any size and scheme."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page
+
+OpenPage = Callable[..., Page]
+
+AXE = Path(__file__).resolve().parents[2] / "static" / "node_modules" / "axe-core" / "axe.min.js"
+SIZES = [(1440, 900), (1100, 700), (1920, 1080)]
+PAGES = {"queue": "/groups", "review": "/review/1"}
+
+
+def serious(page: Page) -> list[str]:
+    """What axe calls serious or critical, with the first place of each."""
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    found: list[dict[str, Any]] = page.evaluate("async () => (await axe.run()).violations")
+    return [
+        f"{violation['id']}: {violation['nodes'][0]['html'][:160]} {violation['nodes'][0]['failureSummary'][:200]}"
+        for violation in found
+        if violation["impact"] in ("serious", "critical")
+    ]
+
+
+def shown(open_page: OpenPage, name: str, scheme: str, size: tuple[int, int]) -> Page:
+    """A page with everything on it."""
+    page = open_page(PAGES[name], scheme=scheme, size={"width": size[0], "height": size[1]})
+    waited = ".image-panel__stage[data-ready=true]" if name == "review" else ".queue-row a"
+    page.wait_for_selector(waited)
+    page.wait_for_load_state("networkidle")
+    return page
+
+
+CUT_OFF = """() => [...document.querySelectorAll('h1, h2, th, td, dd, dt, .button, .gates__value,'
+    + ' .line-row__value, .crop__caption, .caption__state, .pill, .verdict-card__text')]
+  .filter((element) => {
+    const box = element.getBoundingClientRect();
+    if (box.width === 0 || element.closest('.hidden-text') || element.closest('dialog')) return false;
+    const scroller = element.closest('.rail__scroll, .queue-table__rows');
+    const outside = box.right > innerWidth + 1 || box.left < -1
+      || (!scroller && box.bottom > innerHeight + 1);
+    return outside || element.scrollWidth > element.clientWidth + 1
+      && getComputedStyle(element).display !== 'inline';
+  })
+  .map((element) => `${element.className || element.tagName}: ${element.textContent.trim()}`)"""
+
+NESTED_SCROLLERS = """() => {
+  const scrolls = (element) => /auto|scroll/.test(getComputedStyle(element).overflowY)
+    && element.scrollHeight > element.clientHeight + 1;
+  return [...document.querySelectorAll('*')].filter(scrolls).filter((element) => {
+    for (let up = element.parentElement; up; up = up.parentElement) if (scrolls(up)) return true;
+    return false;
+  }).map((element) => element.className);
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+@pytest.mark.parametrize("name", list(PAGES))
+class TestAxe:
+    def test_finds_nothing_serious(self, open_page: OpenPage, name: str, scheme: str) -> None:
+        assert serious(shown(open_page, name, scheme, SIZES[0])) == []
+
+    def test_finds_nothing_serious_in_dialogs(
+        self, open_page: OpenPage, name: str, scheme: str
+    ) -> None:
+        page = shown(open_page, name, scheme, SIZES[0])
+        if name == "queue":
+            page.get_by_role("button", name="Export").first.click()
+        else:
+            page.keyboard.press("Enter")
+            page.keyboard.press("x")
+        page.wait_for_selector("dialog[open], .reasons")
+        assert serious(page) == []
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("name", list(PAGES))
+class TestLayout:
+    def test_cuts_nothing_off(self, open_page: OpenPage, name: str, size: tuple[int, int]) -> None:
+        page = shown(open_page, name, "dark", size)
+        assert page.evaluate(CUT_OFF) == []
+
+    def test_has_no_scroll_bar_inside_another(
+        self, open_page: OpenPage, name: str, size: tuple[int, int]
+    ) -> None:
+        page = shown(open_page, name, "dark", size)
+        assert page.evaluate(NESTED_SCROLLERS) == []
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")

@@ -1,0 +1,386 @@
+"""A reviewer at work: queue, edits, verdicts, export, in a real browser."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, Request, expect
+
+OpenPage = Callable[..., Page]
+Document = dict[str, Any]
+
+
+class Screen:
+    """The review screen of one group, with the places of things on it."""
+
+    def __init__(self, page: Page):
+        self.page = page
+
+    @property
+    def group(self) -> int:
+        """Number in the address."""
+        return int(self.page.url.split("/review/")[1].split("?")[0])
+
+    def document(self) -> Document:
+        """The group as the server has it."""
+        answer = self.page.request.get(f"/api/v1/groups/{self.group}")
+        assert answer.ok
+        document: Document = answer.json()
+        return document
+
+    def ready(self, letter: str = "A") -> None:
+        """Wait until a view shows its frame."""
+        stage = f'.image-panel[data-view="{letter}"] .image-panel__stage[data-ready="true"]'
+        self.page.wait_for_selector(stage)
+
+    def place(self, view: Document, x: float, y: float) -> tuple[float, float]:
+        """Where an image point stands in the window, while the image is shown whole."""
+        stage = self.page.locator(f'.image-panel[data-view="{view["letter"]}"] .image-panel__stage')
+        box = stage.bounding_box()
+        assert box is not None
+        scale = min(box["width"] / view["width"], box["height"] / view["height"])
+        left = box["x"] + (box["width"] - view["width"] * scale) / 2
+        top = box["y"] + (box["height"] - view["height"] * scale) / 2
+        return left + (x + 0.5) * scale, top + (y + 0.5) * scale
+
+    def drag(self, start: tuple[float, float], dx: float, dy: float, *, drop: bool = True) -> None:
+        """Move the pointer with the button held, in window pixels."""
+        mouse = self.page.mouse
+        mouse.move(*start)
+        mouse.down()
+        mouse.move(start[0] + dx, start[1] + dy, steps=5)
+        if drop:
+            mouse.up()
+
+    def number(self, letter: str, name: str) -> str:
+        """A number of the view table."""
+        return self.page.locator(f'[data-row="{letter}"] [data-number="{name}"]').inner_text()
+
+    def pitch(self, name: str) -> str:
+        """A number below the pitch."""
+        return self.page.locator(f'.mini-pitch [data-number="{name}"]').inner_text()
+
+    def press(self, *keys: str) -> None:
+        """Press keys one after the other."""
+        for key in keys:
+            self.page.keyboard.press(key)
+
+    def saved(self) -> None:
+        """Wait until the last write was answered."""
+        # The first edit of a server may have to wait for its compiled solver.
+        patient = expect(self.page.locator('.save[data-unsaved="0"]'))
+        patient.to_contain_text("Saved", timeout=60_000)
+
+
+def rows(page: Page) -> list[Document]:
+    """All groups of the sample dataset."""
+    answer = page.request.get("/api/v1/groups?dataset=sample&limit=100")
+    items: list[Document] = answer.json()["items"]
+    return items
+
+
+def passing(page: Page, place: int) -> int:
+    """A group that passes every gate and has three views or more, or the next best."""
+    good = [row for row in rows(page) if row["passes"] and not row["findings"]]
+    good.sort(key=lambda row: -row["views"])
+    return int(good[place]["id"])
+
+
+def interior_point(view: Document) -> tuple[str, int, Document]:
+    """An annotated point that can be dragged: well inside, away from every other and the ball."""
+    points = [
+        (marking, index, point)
+        for marking, line in view["lines"].items()
+        for index, point in enumerate(line)
+    ]
+    ball = view["balls"][0]["box"]
+    others = [point for _, _, point in points]
+    others.append({"x": ball[0] + ball[2] / 2, "y": ball[1] + ball[3] / 2})
+
+    def room(candidate: tuple[str, int, Document]) -> float:
+        own = candidate[2]
+        x, y = own["x"], own["y"]
+        edge = min(x, y - 60, view["width"] - 60 - x, view["height"] - y)
+        gaps = [
+            ((other["x"] - x) ** 2 + (other["y"] - y) ** 2) ** 0.5
+            for other in others
+            if other is not own
+        ]
+        return min(edge, *gaps)
+
+    return max(points, key=room)
+
+
+def submitted(page: Page) -> list[str]:
+    """Methods and paths of the writes that the page sends from now on."""
+    seen: list[str] = []
+
+    def hear(request: Request) -> None:
+        if request.method in ("PATCH", "PUT"):
+            seen.append(f"{request.method} {request.url}")
+
+    page.on("request", hear)
+    return seen
+
+
+@pytest.fixture
+def review(open_page: OpenPage) -> Callable[..., Screen]:
+    """A function that opens the review screen of a passing group."""
+
+    def open_group(place: int) -> Screen:
+        page = open_page(None)
+        page.goto(f"/review/{passing(page, place)}")
+        screen = Screen(page)
+        screen.ready()
+        return screen
+
+    return open_group
+
+
+class TestQueue:
+    def test_lists_every_group_and_opens_one_by_keyboard(self, open_page: OpenPage) -> None:
+        page = open_page("/groups")
+        expect(page.locator(".save")).to_contain_text("14 of 14 match")
+        expect(page.locator(".queue-row[data-active=true]")).to_have_attribute("aria-rowindex", "2")
+        page.keyboard.press("ArrowDown")
+        page.keyboard.press("ArrowDown")
+        page.keyboard.press("Enter")
+        page.wait_for_url("**/review/3")
+        expect(page.locator(".header__place")).to_contain_text("group 3 of 14")
+
+    def test_the_query_is_in_the_address_and_filters(self, open_page: OpenPage) -> None:
+        page = open_page("/groups")
+        expect(page.locator(".save")).to_contain_text("14 of 14 match")
+        page.keyboard.press("/")
+        page.keyboard.type("number<=5 sort:number-desc")
+        expect(page.locator(".save")).to_contain_text("5 of 14 match")
+        assert "q=number" in page.url
+        first = page.locator(".queue-row:not(.queue-row--head)").first
+        expect(first.locator("a")).to_have_text("5")
+
+    def test_a_query_that_cannot_be_read_says_why(self, open_page: OpenPage, console: Any) -> None:
+        console.expect("400")
+        console.expect("422")
+        page = open_page("/groups?q=nonsense%3A1")
+        expect(page.locator(".empty h2")).to_have_text("The query cannot be read")
+        page.get_by_text("Show all groups").click()
+        expect(page.locator(".save")).to_contain_text("14 of 14 match")
+
+    def test_nothing_found_offers_a_way_back(self, open_page: OpenPage) -> None:
+        page = open_page("/groups?q=number%3E9000")
+        expect(page.locator(".empty h2")).to_have_text("No group matches this query")
+
+    def test_a_histogram_brushes_the_query(self, open_page: OpenPage) -> None:
+        page = open_page("/groups")
+        box = page.locator(".histogram svg").first.bounding_box()
+        assert box is not None
+        page.mouse.move(box["x"] + 0.82 * box["width"], box["y"] + 20)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 0.99 * box["width"], box["y"] + 20, steps=4)
+        page.mouse.up()
+        expect(page.locator(".field--query")).to_have_value("jac>=0.8 jac<=1")
+
+
+class TestEditing:
+    def test_a_dragged_line_point_changes_the_numbers_and_undo_brings_them_back(
+        self, review: Callable[..., Screen]
+    ) -> None:
+        screen = review(0)
+        before = screen.document()
+        view = before["views"][0]
+        marking, index, point = interior_point(view)
+        jac = screen.number("A", "jac")
+        screen.drag(screen.place(view, point["x"], point["y"]), 4, 22)
+        screen.saved()
+        expect(screen.page.locator('[data-row="A"] [data-number="jac"]')).not_to_have_text(jac)
+        after = screen.document()
+        moved = after["views"][0]["lines"][marking][index]
+        assert abs(moved["x"] - point["x"]) > 1 and moved["y"] - point["y"] > 10
+        assert after["solution"]["views"][0]["calibration"]["jac"]["0.5"] < float(jac)
+        screen.press("Escape", "Control+z")
+        expect(screen.page.locator('[data-row="A"] [data-number="jac"]')).to_have_text(jac)
+        assert screen.document()["views"][0]["lines"] == view["lines"]
+        screen.press("Control+Shift+z")
+        expect(screen.page.locator('[data-row="A"] [data-number="jac"]')).not_to_have_text(jac)
+        screen.press("Control+z")
+        expect(screen.page.locator('[data-row="A"] [data-number="jac"]')).to_have_text(jac)
+
+    def test_a_dragged_ball_is_previewed_before_the_server_knows(
+        self, review: Callable[..., Screen]
+    ) -> None:
+        screen = review(1)
+        writes = submitted(screen.page)
+        view = screen.document()["views"][0]
+        x, y, width, height = view["balls"][0]["box"]
+        before = screen.pitch("x"), screen.pitch("y")
+        screen.drag(screen.place(view, x + width / 2, y + height / 2), 7, 3, drop=False)
+        expect(screen.page.locator('.mini-pitch [data-number="x"]')).not_to_have_text(before[0])
+        assert writes == []
+        shown = screen.pitch("x"), screen.pitch("y"), screen.number("A", "error")
+        screen.page.mouse.up()
+        screen.saved()
+        assert (screen.pitch("x"), screen.pitch("y"), screen.number("A", "error")) == shown
+        saved = screen.document()["solution"]["ball"]["point"]
+        assert f"{saved[0]:.2f}".replace("-", "−") in shown[0]
+        screen.press("Escape", "Control+z")
+        expect(screen.page.locator('.mini-pitch [data-number="x"]')).to_have_text(before[0])
+
+    def test_escape_gives_a_held_point_back(self, review: Callable[..., Screen]) -> None:
+        screen = review(1)
+        writes = submitted(screen.page)
+        view = screen.document()["views"][0]
+        _, _, point = interior_point(view)
+        screen.drag(screen.place(view, point["x"], point["y"]), 5, 30, drop=False)
+        screen.press("Escape")
+        screen.page.mouse.up()
+        screen.page.wait_for_timeout(300)
+        assert writes == []
+        assert screen.document()["views"][0]["lines"] == view["lines"]
+
+    def test_objects_are_reached_and_nudged_by_keyboard(
+        self, review: Callable[..., Screen]
+    ) -> None:
+        screen = review(1)
+        view = screen.document()["views"][0]
+        box = view["balls"][0]["box"]
+        screen.press("Enter")
+        expect(screen.page.locator(".object-list [aria-pressed=true]")).to_contain_text("Ball")
+        screen.press("ArrowRight", "Shift+ArrowRight", "Alt+ArrowDown", "]")
+        screen.saved()
+        moved = screen.document()["views"][0]["balls"][0]["box"]
+        assert moved == pytest.approx(
+            [box[0] + 6 - 0.125, box[1] + 0.1 - 0.125, box[2] + 0.25, box[3] + 0.25]
+        )
+        screen.press("Escape", "Control+z")
+        screen.saved()
+        assert screen.document()["views"][0]["balls"][0]["box"] == box
+
+    def test_a_view_is_left_out_and_taken_back(self, review: Callable[..., Screen]) -> None:
+        screen = review(0)
+        screen.press("Shift+2")
+        panel = screen.page.locator('.image-panel[data-view="B"]')
+        expect(panel).to_have_attribute("data-included", "false")
+        screen.saved()
+        assert screen.document()["views"][1]["included"] is False
+        screen.press("Shift+2")
+        expect(panel).to_have_attribute("data-included", "true")
+
+    def test_two_people_on_one_group_are_asked_whose_edit_counts(
+        self, review: Callable[..., Screen], console: Any
+    ) -> None:
+        console.expect("412")
+        screen = review(2)
+        document = screen.document()
+        view = document["views"][0]
+        x, y, width, height = view["balls"][0]["box"]
+        theirs = screen.page.request.patch(
+            f"/api/v1/views/{view['id']}/ball",
+            data={"box": [x + 1, y, width, height]},
+            headers={"If-Match": document["etag"]},
+        )
+        assert theirs.ok
+        screen.drag(screen.place(view, x + width / 2, y + height / 2), 6, 0)
+        bar = screen.page.locator(".bar", has_text="Somebody else changed this group first")
+        expect(bar).to_be_visible()
+        bar.get_by_text("Keep mine").click()
+        expect(bar).to_be_hidden()
+        screen.saved()
+        mine = screen.document()["views"][0]["balls"][0]["box"]
+        assert mine[0] - x > 3
+
+
+class TestVerdicts:
+    def test_a_reviewer_accepts_rejects_and_exports(
+        self, open_page: OpenPage, tmp_path: Path
+    ) -> None:
+        page = open_page(None)
+        first = passing(page, 3)
+        page.goto(f"/review/{first}")
+        screen = Screen(page)
+        screen.ready()
+        key = screen.document()["key"]
+        screen.press("a")
+        page.wait_for_url(lambda url: f"/review/{first}" not in url)
+        screen.saved()
+        second = screen.group
+        screen.press("x")
+        expect(page.locator(".reasons")).to_be_visible()
+        screen.press("1")
+        page.wait_for_url(lambda url: f"/review/{second}" not in url)
+        screen.saved()
+        verdicts = {row["id"]: row["status"] for row in rows(page)}
+        assert (verdicts[first], verdicts[second]) == ("accepted", "rejected")
+
+        page.get_by_role("link", name="Queue").click()
+        page.get_by_role("button", name="Export").first.click()
+        page.get_by_text("Accepted groups").click()
+        with page.expect_download() as download:
+            page.locator("dialog").get_by_role("button", name="Export", exact=True).click()
+        target = tmp_path / "export.zip"
+        download.value.save_as(target)
+        check_export(target, key)
+        expect(page.locator(".export__result")).to_contain_text("Ready")
+
+    def test_a_failing_group_is_accepted_only_with_a_reason(self, open_page: OpenPage) -> None:
+        page = open_page(None)
+        failing = next(row["id"] for row in rows(page) if not row["passes"])
+        page.goto(f"/review/{failing}")
+        screen = Screen(page)
+        screen.ready()
+        screen.press("a")
+        note = page.get_by_label("Say why.")
+        expect(note).to_be_focused()
+        page.keyboard.type("seen on video")
+        page.keyboard.press("Enter")
+        screen.saved()
+        row = next(row for row in rows(page) if row["id"] == failing)
+        assert row["status"] == "accepted"
+        document = page.request.get(f"/api/v1/groups/{failing}").json()
+        assert document["verdict"]["note"] == "seen on video"
+
+    def test_a_verdict_that_is_refused_puts_the_group_back(
+        self, review: Callable[..., Screen], console: Any
+    ) -> None:
+        console.expect("503")
+        screen = review(4)
+        group = screen.group
+        before = screen.document()["verdict"]["state"]
+        problem = {"type": "about:blank", "title": "Busy", "status": 503, "detail": "no room left"}
+        screen.page.route(
+            "**/verdict",
+            lambda route: route.fulfill(
+                status=503, content_type="application/problem+json", body=json.dumps(problem)
+            ),
+        )
+        screen.press("s")
+        expect(screen.page.get_by_role("alert")).to_contain_text("no room left")
+        assert screen.group == group
+        expect(screen.page.locator('.pill[data-status="deferred"]')).to_have_count(0)
+        assert screen.document()["verdict"]["state"] == before
+
+    def test_the_help_lists_the_keys(self, review: Callable[..., Screen]) -> None:
+        screen = review(0)
+        screen.press("?")
+        dialog = screen.page.get_by_role("dialog")
+        expect(dialog).to_contain_text("Accept and next")
+        screen.press("Escape")
+        expect(dialog).to_have_count(0)
+
+
+def check_export(path: Path, key: str) -> None:
+    """The zip holds the accepted group and a manifest that names every file."""
+    with zipfile.ZipFile(path) as archive:
+        names = set(archive.namelist())
+        assert "SNv3D.csv" in names and "manifest.json" in names
+        manifest = json.loads(archive.read("manifest.json"))
+        lines = list(csv.DictReader(io.StringIO(archive.read("SNv3D.csv").decode("utf-8-sig"))))
+    assert manifest["dataset"] == "sample"
+    found = {f"{row['league']}/{row['season']}/{row['match']}" for row in lines}
+    assert key.rsplit("/", 1)[0] in found

@@ -1,0 +1,91 @@
+import assert from 'node:assert/strict';
+import { describe, it } from 'node:test';
+
+import {
+	applyEdit, editOfFix, movePoint, previewBody, requestOf, sameTarget,
+} from '../../static/state/edits.js';
+
+const view = {
+	id: 31, key: '7.png', letter: 'A', label: 'Main camera', width: 1280, height: 720, included: true,
+	station: { id: 3, key: 'x', shared: false, etag: '"s"' }, image: null,
+	lines: { 'Middle line': [{ x: 1, y: 2 }, { x: 3, y: 4 }], 'Goal left post left': [{ x: 5, y: 6 }] },
+	balls: [{ box: [10, 10, 4, 4], point: null, occluded: false, out_of_view: false }],
+};
+const group = { id: 12, etag: '"g"', views: [view] };
+
+describe('movePoint', () => {
+	it('changes one point and no other value', () => {
+		const edit = movePoint(view, 'Middle line', 1, { x: 9, y: 9 });
+		const next = applyEdit(group, edit);
+		assert.deepEqual(next.views[0].lines['Middle line'], [{ x: 1, y: 2 }, { x: 9, y: 9 }]);
+		assert.deepEqual(view.lines['Middle line'][1], { x: 3, y: 4 });
+	});
+
+	it('takes the marking away with its last point', () => {
+		const edit = movePoint(view, 'Goal left post left', 0, null);
+		assert.deepEqual(edit.lines, { 'Goal left post left': null });
+		assert.ok(!('Goal left post left' in applyEdit(group, edit).views[0].lines));
+	});
+});
+
+describe('requestOf', () => {
+	it('sends lines of a broadcast view to the view, with the ETag of the group', () => {
+		const { path, etag } = requestOf(group, movePoint(view, 'Middle line', 0, { x: 0, y: 0 }));
+		assert.deepEqual([path, etag], ['/views/31/lines', '"g"']);
+	});
+
+	it('sends lines of a static camera to its station, with the station\'s ETag', () => {
+		const fixed = { ...group, views: [{ ...view, station: { ...view.station, shared: true } }] };
+		const { path, etag } = requestOf(fixed, movePoint(view, 'Middle line', 0, { x: 0, y: 0 }));
+		assert.deepEqual([path, etag], ['/stations/3/lines?group=12', '"s"']);
+	});
+
+	it('sends null for a ball that is taken away', () => {
+		assert.equal(requestOf(group, { kind: 'ball', view: '7.png', ball: null }).body, null);
+	});
+
+	it('sends a box without a point', () => {
+		const { body } = requestOf(group, { kind: 'ball', view: '7.png', ball: view.balls[0] });
+		assert.deepEqual(body, { box: [10, 10, 4, 4], occluded: false, out_of_view: false });
+	});
+});
+
+describe('previewBody', () => {
+	it('names the view by its key', () => {
+		const edit = { kind: 'include', view: '7.png', included: false };
+		assert.deepEqual(previewBody(edit), { views: { '7.png': { included: false } } });
+	});
+});
+
+describe('editOfFix', () => {
+	const fix = { action: 'relabel', view: '7.png', marking: 'Middle line', to: 'Side line top', index: null };
+
+	it('moves the points of a relabelled marking to the other name', () => {
+		const next = applyEdit(group, editOfFix(group, fix));
+		assert.equal(next.views[0].lines['Side line top'].length, 2);
+		assert.ok(!('Middle line' in next.views[0].lines));
+	});
+
+	it('swaps all sides, posts by goal', () => {
+		const next = applyEdit(group, editOfFix(group, { ...fix, action: 'swap_sides' }));
+		assert.deepEqual(Object.keys(next.views[0].lines).sort(), ['Goal right post left', 'Middle line']);
+	});
+
+	it('keeps the ball that was picked', () => {
+		const two = { ...group, views: [{ ...view, balls: [view.balls[0], { ...view.balls[0], box: [1, 1, 2, 2] }] }] };
+		const edit = editOfFix(two, { ...fix, action: 'pick_ball', index: 1 });
+		assert.deepEqual(applyEdit(two, edit).views[0].balls.map(({ box }) => box), [[1, 1, 2, 2]]);
+	});
+
+	it('has nothing to offer for a marking that is gone', () => {
+		assert.equal(editOfFix(group, { ...fix, marking: 'Circle left' }), null);
+	});
+});
+
+describe('sameTarget', () => {
+	it('tells two objects of one view apart', () => {
+		const line = movePoint(view, 'Middle line', 0, { x: 0, y: 0 });
+		assert.ok(sameTarget(line, movePoint(view, 'Middle line', 1, { x: 0, y: 0 })));
+		assert.ok(!sameTarget(line, { kind: 'ball', view: '7.png', ball: null }));
+	});
+});

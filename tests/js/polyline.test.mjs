@@ -1,0 +1,85 @@
+import assert from 'node:assert/strict';
+import { describe, it } from 'node:test';
+
+import { frames, lengthOf, nearestOn } from '../../static/geometry/polyline.js';
+import { DASHES, gradeOfJac, gradeOfResidual, residualsOf } from '../../static/geometry/residual.js';
+import { close } from './scene.mjs';
+
+const corner = [{ x: 0, y: 0 }, { x: 10, y: 0 }, { x: 10, y: 10 }];
+
+describe('nearestOn', () => {
+	it('is the foot of the perpendicular', () => {
+		const found = nearestOn(corner, { x: 4, y: 3 });
+		assert.deepEqual(found.point, { x: 4, y: 0 });
+		close([found.distance, found.along, found.side], [3, 4, 3]);
+	});
+
+	it('counts the length of the pieces before', () => {
+		close([nearestOn(corner, { x: 12, y: 5 }).along], [15]);
+	});
+
+	it('is the end for a point beyond it', () => {
+		const { distance, point } = nearestOn(corner, { x: -3, y: -4 });
+		assert.deepEqual([distance, point], [5, { x: 0, y: 0 }]);
+	});
+
+	it('does not exist on nothing', () => {
+		assert.equal(nearestOn([], { x: 0, y: 0 }), null);
+	});
+});
+
+describe('frames', () => {
+	it('stand at even distances with normals to the right of travel', () => {
+		const found = frames(corner, 5);
+		assert.deepEqual(found.map(({ point }) => [point.x, point.y]), [[0, 0], [5, 0], [10, 0], [10, 5], [10, 10]]);
+		close(Object.values(found[0].normal), [0, 1]);
+		close(Object.values(found[4].normal), [-1, 0]);
+	});
+
+	it('end at the end', () => {
+		close([lengthOf(corner)], [20]);
+		assert.deepEqual(frames([{ x: 1, y: 1 }, { x: 1, y: 1 }], 4), []);
+	});
+});
+
+describe('residualsOf', () => {
+	const fit = {
+		marking: 'Middle line', outcome: 'tp', used: true, largest_px: 3, distances_px: [3, 1],
+		nearest: [], polyline: [[0, 0], [10, 0]],
+	};
+	const lines = { 'Middle line': [{ x: 2, y: 4 }, { x: 5, y: 1 }] };
+
+	it('tells the distances of the server while nothing moves', () => {
+		assert.equal(residualsOf(lines, [fit], 8, false)[0].largest, 3);
+	});
+
+	it('measures against the old camera while something moves', () => {
+		assert.equal(residualsOf(lines, [fit], 8, true)[0].largest, 4);
+	});
+
+	it('puts the worst first and the unannotated last', () => {
+		const other = { ...fit, marking: 'Side line top', largest_px: null, distances_px: [], outcome: 'fp' };
+		const names = residualsOf(lines, [other, fit], 8, false).map(({ marking, grade }) => [marking, grade]);
+		assert.deepEqual(names, [['Middle line', 'ok'], ['Side line top', 'unseen']]);
+	});
+
+	it('grades what the camera cannot see as wrong', () => {
+		const lost = { ...fit, outcome: 'fn', distances_px: [], polyline: [] };
+		assert.equal(residualsOf(lines, [lost], 8, false)[0].grade, 'bad');
+	});
+});
+
+describe('grades', () => {
+	it('differ in dash as well as in colour', () => {
+		const dashes = new Set(Object.values(DASHES).map(String));
+		assert.equal(dashes.size, 4);
+	});
+
+	it('fail from gamma on and warn from half of it', () => {
+		assert.deepEqual([3.9, 4, 8].map((px) => gradeOfResidual(px, 8)), ['ok', 'warn', 'bad']);
+	});
+
+	it('do not let a JaC of exactly the limit pass', () => {
+		assert.equal(gradeOfJac(0.75, 0.75), 'bad');
+	});
+});

@@ -1,0 +1,60 @@
+import assert from 'node:assert/strict';
+import { describe, it } from 'node:test';
+
+import { cameraFromJson, project } from '../../static/geometry/camera.js';
+import { previewBall } from '../../static/geometry/preview.js';
+import { close, goalCamera, mainCamera } from './scene.mjs';
+
+const point = [30, -4, -1.5];
+const policy = { tau_percent: 1, min_baseline_m: 1, ball_diameter_m: 0.226 };
+
+function viewOf(key, json, shift = 0) {
+	const { x, y } = project(cameraFromJson(json), point);
+	return {
+		key, width: 960, height: 540, included: true, lines: {},
+		balls: [{ box: [x + shift - 5, y - 5, 10, 10], point: null, occluded: false, out_of_view: false }],
+	};
+}
+
+function solved(key, camera, failed = null) {
+	return { view: key, included: true, failed, calibration: { camera, markings: [] }, ball: null };
+}
+
+const solution = {
+	ball: { sigma_m: 0.2, covariance: [] }, pairs: [], gates: [], findings: [],
+	views: [solved('a', mainCamera), solved('b', goalCamera)],
+};
+
+describe('previewBall', () => {
+	it('finds the point that both views show', () => {
+		const group = { policy, views: [viewOf('a', mainCamera), viewOf('b', goalCamera)] };
+		const next = previewBall(group, solution);
+		close(next.ball.point, point, 1e-8);
+		assert.deepEqual(next.ball.views, ['a', 'b']);
+		assert.ok(next.views.every(({ ball }) => ball.error_px < 1e-6));
+	});
+
+	it('has no ball when the views do not meet', () => {
+		const group = { policy, views: [viewOf('a', mainCamera, 200), viewOf('b', goalCamera)] };
+		const next = previewBall(group, solution);
+		assert.equal(next.ball, null);
+		assert.equal(next.pairs[0].failed, 'reprojection');
+	});
+
+	it('does not let a view count that an earlier gate dropped', () => {
+		const group = { policy, views: [viewOf('a', mainCamera), viewOf('b', goalCamera)] };
+		const dropped = { ...solution, views: [solved('a', mainCamera, 'jac'), solution.views[1]] };
+		assert.equal(previewBall(group, dropped).pairs[0].failed, 'jac');
+	});
+
+	it('leaves out a view that a person left out', () => {
+		const group = { policy, views: [{ ...viewOf('a', mainCamera), included: false }, viewOf('b', goalCamera)] };
+		assert.deepEqual(previewBall(group, solution).pairs, []);
+	});
+
+	it('does not pick one of several balls', () => {
+		const a = viewOf('a', mainCamera);
+		const group = { policy, views: [{ ...a, balls: [...a.balls, ...a.balls] }, viewOf('b', goalCamera)] };
+		assert.deepEqual(previewBall(group, solution).pairs, []);
+	});
+});
