@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from threading import Thread
 from typing import Annotated
 
 from fastapi import Depends, Header, Path, Query, Request
@@ -14,6 +15,7 @@ from app.api.recompute import Recompute
 from app.config import Settings
 from app.errors import InputError
 from app.review.datasets import list_datasets
+from app.solving.warm import warm_up
 from app.store.session import Store
 
 LOCAL_USER = "local"
@@ -39,7 +41,8 @@ class Services:
         return Services(settings, store, ExportFolder(settings.exports), Recompute(store))
 
     def start(self) -> None:
-        """Take up the solving that an earlier run left undone."""
+        """Load the solver's kernels, and take up the solving that an earlier run left undone."""
+        Thread(target=warm_up, daemon=True).start()
         for dataset in list_datasets(self.store):
             if dataset.solved < dataset.groups:
                 self.recompute.request(dataset.name)

@@ -9,6 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+# Strict IEEE arithmetic, so that the same input gives the same bits; division by zero gives
+# infinity, as in numpy.
+compiled = njit(cache=True, error_model="numpy")
+
 SEGMENT = 0
 NEAR = 0.3
 """Metres in front of the camera at which curves are cut off."""
@@ -18,7 +22,7 @@ ARC_SAMPLES = 24
 ARC_STEPS = 4
 
 
-@njit(cache=True)
+@compiled
 def accumulate(
     parameters, kinds, shapes, pixels, curve, weight, mean, sigma, scale, half_diagonal,
     cost, gradient, information,
@@ -59,7 +63,7 @@ def accumulate(
         cost[b] = total
 
 
-@njit(cache=True)
+@compiled
 def residual_rows(parameters, kinds, shapes, pixels, curve, half_diagonal, offsets, jacobians):
     """Residuals and their Jacobian for one camera, written to ``offsets`` and ``jacobians``.
 
@@ -93,7 +97,7 @@ def residual_rows(parameters, kinds, shapes, pixels, curve, half_diagonal, offse
             jacobians[n] = 0.0
 
 
-@njit(cache=True)
+@compiled
 def unpack(parameters, half_diagonal):
     """Rotation row by row, position, focal length, kappa / half_diagonal^2 and its unit."""
     sp, cp = np.sin(parameters[0]), np.cos(parameters[0])
@@ -112,20 +116,20 @@ def unpack(parameters, half_diagonal):
     return camera
 
 
-@njit(cache=True)
+@compiled
 def radial_growth(u):
     """Radius as seen over ideal radius, for u = kappa (radius / half_diagonal)^2."""
     return 1 + u + 0.5 * u * u
 
 
-@njit(cache=True)
+@compiled
 def to_camera(camera, x, y, z):
     """Point of the pitch frame in the camera frame, metres."""
     dx, dy, dz = x - camera[9], y - camera[10], z - camera[11]
     return turn(camera, dx, dy, dz)
 
 
-@njit(cache=True)
+@compiled
 def turn(camera, dx, dy, dz):
     """Direction of the pitch frame in the camera frame."""
     return (
@@ -135,13 +139,13 @@ def turn(camera, dx, dy, dz):
     )
 
 
-@njit(cache=True)
+@compiled
 def depth(camera, place):
     """Depth of a place on a curve, metres."""
     return to_camera(camera, place[0], place[1], place[2])[2]
 
 
-@njit(cache=True)
+@compiled
 def ideal_pixel(camera, px, py):
     """The ideal pixel that appears at (px, py): Newton on the radius."""
     kappa = camera[13]
@@ -156,7 +160,7 @@ def ideal_pixel(camera, px, py):
     return px * share, py * share
 
 
-@njit(cache=True)
+@compiled
 def project_segment(camera, shape, ends):
     """Where along the segment the part in front of the camera begins and ends.
 
@@ -175,7 +179,7 @@ def project_segment(camera, shape, ends):
     return True
 
 
-@njit(cache=True)
+@compiled
 def nearest_on_segment(camera, shape, ends, pixel, place):
     """Writes the place of the segment nearest to the pixel and the segment's direction.
 
@@ -205,7 +209,7 @@ def nearest_on_segment(camera, shape, ends, pixel, place):
     return inside
 
 
-@njit(cache=True)
+@compiled
 def sample_arc(camera, shape, samples):
     """Writes the image of points along the arc (NaN behind); False where none is in front."""
     focal, kappa = camera[12], camera[13]
@@ -225,7 +229,7 @@ def sample_arc(camera, shape, samples):
     return seen
 
 
-@njit(cache=True)
+@compiled
 def nearest_on_arc(camera, shape, samples, pixel, place):
     """Writes the place of the arc nearest to the pixel and its tangent, starting at a chord."""
     step = (shape[4] - shape[3]) / ARC_SAMPLES
@@ -266,7 +270,7 @@ def nearest_on_arc(camera, shape, samples, pixel, place):
     return inside
 
 
-@njit(cache=True)
+@compiled
 def residual(camera, place, inside, pixel, offset, jacobian):
     """Writes the offset of one image point from one place of space, and its derivatives."""
     dx, dy, dz = place[0] - camera[9], place[1] - camera[10], place[2] - camera[11]
@@ -298,7 +302,7 @@ def residual(camera, place, inside, pixel, offset, jacobian):
         jacobian[1, k] = 0.0 if inside else -(gx * jx + gy * jy)
 
 
-@njit(cache=True)
+@compiled
 def projection_derivatives(camera, dx, dy, dz, derivatives):
     """Writes the derivatives of the seen pixel by the parameters, shape (2, 8).
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
+from app.geometry.damped_solve import solve_damped
 
 NormalEquations = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 """Maps parameters (B, n) to cost (B,), gradient (B, n) and J^T W J (B, n, n)."""
@@ -115,8 +116,7 @@ def covariance(information: FloatArray, variance: float = 1.0) -> FloatArray:
 
 
 def _damped_step(gradient: FloatArray, information: FloatArray, damping: FloatArray) -> FloatArray:
-    damped = information.copy()
-    diagonal = np.einsum("bii->bi", damped)
-    diagonal += damping[:, None] * diagonal + 1e-12
-    step = np.linalg.solve(damped, -gradient[:, :, None])[:, :, 0]
-    return np.asarray(step, dtype=np.float64)
+    """Solve (J^T W J + damping diag) step = -gradient for each start."""
+    step = np.empty_like(gradient)
+    solve_damped(gradient, information, damping, step)
+    return step

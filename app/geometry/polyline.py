@@ -3,8 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray, require_shape
+
+
+def inside_image(points: FloatArray, width: int, height: int) -> npt.NDArray[np.bool_]:
+    """Whether 0 <= x < width and 0 <= y < height, shape (N,); NaN is not inside."""
+    x, y = points.T
+    inside: npt.NDArray[np.bool_] = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    return inside
 
 
 def clip_polyline(points: FloatArray, width: int, height: int) -> FloatArray:
@@ -27,8 +35,7 @@ def clip_polyline(points: FloatArray, width: int, height: int) -> FloatArray:
     """
     points = require_shape(points, (None, 2), "points")
     points = points[~np.isnan(points[:, 0])]
-    inside = (points[:, 0] >= 0) & (points[:, 0] < width)
-    inside &= (points[:, 1] >= 0) & (points[:, 1] < height)
+    inside = inside_image(points, width, height)
     if not inside.any():
         return np.empty((0, 2))
     parts = []

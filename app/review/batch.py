@@ -28,6 +28,7 @@ from app.solving.calibrate import calibrate
 from app.solving.calibration_findings import calibration_findings
 from app.solving.leave_one_out import leave_one_out
 from app.solving.score import score, score_frame
+from app.solving.warm import warm_up
 
 CHUNK = 16
 """Frames that one process takes at a time."""
@@ -101,9 +102,7 @@ def calibrate_chunk(
     files: list[LineFile], size: ImageSize, policy: CalibrationPolicy, with_leave_one_out: bool
 ) -> list[CalibratedFrame]:
     """Calibrate some frames in this process, one after the other on one thread."""
-    calibrate(
-        files[0].lines, Pitch(), size, policy
-    )  # compiled kernels are loaded outside the clock
+    warm_up()
     return [_calibrate_file(file, size, policy, with_leave_one_out) for file in files]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.geometry.polyline import clip_polyline, distance_to_polyline
+from app.geometry.polyline import clip_polyline, distance_to_polyline, inside_image
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS, Pitch, twin_marking
@@ -44,20 +44,21 @@ def project_markings(camera: Camera, pitch: Pitch, size: ImageSize) -> dict[str,
     """The visible markings as clipped polylines, pixels, in the order of ``MARKINGS``."""
     samples, limits = _samples(pitch)
     pixels = camera.project(samples, folded=True)
-    visible = {}
-    for marking, first, last in limits:
-        polyline = clip_polyline(pixels[first:last], size.width, size.height)
-        if len(polyline):
-            visible[marking] = polyline
-    return visible
+    seen = inside_image(pixels, size.width, size.height)
+    return {
+        marking: clip_polyline(pixels[first:last], size.width, size.height)
+        for marking, first, last in limits
+        if seen[first:last].any()
+    }
 
 
 def measure_markings(projected: dict[str, FloatArray], lines: Lines) -> dict[str, ProjectedMarking]:
     """Each visible marking with the distances of its annotated points."""
     measured = {}
     for marking, polyline in projected.items():
-        points = np.array(lines.get(marking, ()), dtype=np.float64).reshape(-1, 2)
-        apart, nearest = distance_to_polyline(points, polyline)
+        apart, nearest = np.empty(0), np.empty((0, 2))
+        if lines.get(marking):
+            apart, nearest = distance_to_polyline(np.array(lines[marking]), polyline)
         measured[marking] = ProjectedMarking(polyline, apart, nearest)
     return measured
 

@@ -28,7 +28,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import CIRCLES
 from app.soccer.policy import CalibrationPolicy
 from app.solving.observations import Observations, principal_point
-from app.solving.starts import stand_starts
+from app.solving.starts import STANDS, stand_starts
 
 REFERENCE_DIAGONAL = float(np.hypot(960, 540))
 """Scales in pixels hold for 960 x 540 and grow with the diagonal."""
@@ -47,9 +47,10 @@ class Stage:
     tolerance: float
 
 
-SEARCH = Stage(starts=1000, steps=12, scale_px=30.0, tolerance=1e-3)
-NARROW = Stage(starts=8, steps=10, scale_px=8.0, tolerance=1e-4)
-FINAL = Stage(starts=3, steps=25, scale_px=0.0, tolerance=1e-6)
+SCOUT = Stage(starts=len(STANDS), steps=5, scale_px=30.0, tolerance=1e-3)
+SEARCH = Stage(starts=12, steps=8, scale_px=30.0, tolerance=1e-3)
+NARROW = Stage(starts=6, steps=10, scale_px=8.0, tolerance=1e-4)
+FINAL = Stage(starts=2, steps=25, scale_px=0.0, tolerance=1e-6)
 """Its scale is the policy's."""
 POOR_PX = 8.0
 """A fit is poor when a point lies farther than this from its marking, at 960 x 540."""
@@ -110,7 +111,8 @@ class ResectionProblem:
         """The best camera from the whole bank of stands."""
         thinned = observations.thinned(POINTS_PER_LINE, POINTS_PER_CIRCLE)
         starts = stand_starts(observations, self.size.diagonal)
-        searched = self._run(thinned, starts, SEARCH, damping=1e-2)
+        scouted = self._run(thinned, starts, SCOUT, damping=1e-2)
+        searched = self._run(thinned, best(scouted, SEARCH.starts), SEARCH)
         return self.refine(observations, best(searched, NARROW.starts))
 
     def refine(self, observations: Observations, starts: FloatArray) -> Resection:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
@@ -220,6 +220,15 @@ def policy_to_json(policy: Policy) -> Json:
 
 
 def policy_from_json(value: Mapping[str, Any]) -> Policy:
-    """Back from ``policy_to_json``; thresholds that are not named keep their default."""
-    calibration = CalibrationPolicy(**value.get("calibration", {}))
-    return Policy(**{**value, "calibration": calibration})
+    """Back from ``policy_to_json``.
+
+    Thresholds that are not named keep their default, and those that this version does not know
+    (a home that a newer one has used) say nothing to it.
+    """
+    calibration = CalibrationPolicy(**_known(CalibrationPolicy, value.get("calibration", {})))
+    return Policy(**{**_known(Policy, value), "calibration": calibration})
+
+
+def _known(kind: type[Policy | CalibrationPolicy], value: Mapping[str, Any]) -> dict[str, Any]:
+    names = {item.name for item in fields(kind)}
+    return {name: item for name, item in value.items() if name in names}

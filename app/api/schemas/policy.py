@@ -22,6 +22,7 @@ class PolicyDocument(BaseModel):
     max_sigma_m: float | None
     low_parallax_degrees: float
     click_sigma_px: float
+    box_sigma_share: float
     below_grass_m: float
     max_height_m: float
     outside_pitch_m: float

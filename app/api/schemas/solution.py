@@ -12,6 +12,7 @@ from app.soccer.solution import (
     GAMMAS_PERCENT,
     Ball3D,
     BallFit,
+    BestBall,
     Calibration,
     Finding,
     Gate,
@@ -149,6 +150,9 @@ class BallFitDocument(BaseModel):
     exact_box: XYWH | None
     size_ratio: float | None
     depth_m: float | None
+    depth_per_px_m: float | None = Field(
+        description="Metres of depth of the monocular ball for a pixel of diameter."
+    )
 
     @staticmethod
     def of(fit: BallFit) -> BallFitDocument:
@@ -163,6 +167,7 @@ class BallFitDocument(BaseModel):
             exact_box=_xywh(fit.exact_box),
             size_ratio=fit.size_ratio,
             depth_m=fit.depth_m,
+            depth_per_px_m=fit.depth_per_px_m,
         )
 
 
@@ -225,6 +230,33 @@ class Ball3DDocument(BaseModel):
             covariance=list(ball.covariance),
             parallax_degrees=ball.parallax_degrees,
             views=list(ball.views),
+        )
+
+
+class BestBallDocument(BaseModel):
+    """The maximum-likelihood ball over all views; pitch frame, metres, z down."""
+
+    point: XYZ
+    height_m: float = Field(description="Above the grass: -z.")
+    sigma_m: Measured
+    covariance: list[Measured] = Field(description="3 x 3, row by row, square metres.")
+    views: list[str]
+    contradicting: list[str] = Field(description="Views left out because they contradict.")
+    influence_m: dict[str, float] = Field(
+        description="How far the point moves without that view; empty with two views."
+    )
+
+    @staticmethod
+    def of(ball: BestBall) -> BestBallDocument:
+        """The document of a best ball."""
+        return BestBallDocument.model_construct(
+            point=ball.point,
+            height_m=height_above_grass(ball.point[2]),
+            sigma_m=ball.sigma_m,
+            covariance=list(ball.covariance),
+            views=list(ball.views),
+            contradicting=list(ball.contradicting),
+            influence_m=dict(ball.influence_m),
         )
 
 
@@ -298,7 +330,8 @@ class SolutionDocument(BaseModel):
     gates: list[GateDocument]
     views: list[ViewSolutionDocument]
     pairs: list[PairDocument]
-    ball: Ball3DDocument | None
+    ball: Ball3DDocument | None = Field(description="Mean of the valid pairs; exported.")
+    best_ball: BestBallDocument | None
     findings: list[FindingDocument]
 
     @staticmethod
@@ -313,6 +346,9 @@ class SolutionDocument(BaseModel):
             views=[ViewSolutionDocument.of(view) for view in solution.views],
             pairs=[PairDocument.of(pair) for pair in solution.pairs],
             ball=None if solution.ball is None else Ball3DDocument.of(solution.ball),
+            best_ball=None
+            if solution.best_ball is None
+            else BestBallDocument.of(solution.best_ball),
             findings=[FindingDocument.of(finding) for finding in solution.findings],
         )
 
