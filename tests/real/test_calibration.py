@@ -1,0 +1,73 @@
+"""Calibration and scoring on real SoccerNet lines and the peer's cameras."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.datasets.camera_json import read_cameras
+from app.datasets.report import Report
+from app.datasets.sn_calibration import read_line_files
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.solving.calibrate import calibrate
+from app.solving.score import score, score_frame
+
+DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", "../shared/data"))
+LINES = DATA / "sn22-dev" / "lines.zip"
+PEER = DATA / "sn22-dev" / "pnlcalib-predicted-cameras.zip"
+pytestmark = pytest.mark.skipif(not LINES.is_file(), reason=f"no real data in {DATA}")
+
+SIZE = ImageSize(960, 540)
+EVERY = 4
+"""One frame in four is enough to notice a loss; ``make bench`` takes them all."""
+
+
+@pytest.fixture(scope="module")
+def frames():
+    files = list(read_line_files(LINES, SIZE, Report()))
+    return {file.stem: file.lines for file in files[::EVERY]}
+
+
+@pytest.fixture(scope="module")
+def calibrations(frames):
+    policy = CalibrationPolicy()
+    return {stem: calibrate(lines, Pitch(), SIZE, policy) for stem, lines in frames.items()}
+
+
+class TestCalibrate:
+    def test_beats_the_peer_by_far(self, frames, calibrations):
+        total = score(
+            None if found.camera is None else score_frame(found.camera, frames[stem], Pitch(), SIZE)
+            for stem, found in calibrations.items()
+        )
+        assert total.completeness == 1.0
+        assert total.jac[0] > 0.94
+        assert total.share > 0.94
+
+    def test_wrong_labels_are_found_in_about_one_frame_in_twenty(self, calibrations):
+        share = np.mean([bool(found.suspects) for found in calibrations.values()])
+        assert 0.02 < share < 0.10
+
+    def test_cameras_stand_where_main_cameras_stand(self, calibrations):
+        positions = np.array([found.camera.position for found in calibrations.values()])
+        low, high = np.percentile(positions, [5, 95], axis=0)
+        assert (low > [-12, 38, -27]).all()
+        assert (high < [12, 100, -7]).all()
+
+
+class TestScore:
+    def test_gives_the_peer_the_numbers_of_the_public_evaluator(self, frames):
+        report = Report()
+        cameras = read_cameras(PEER, report)
+        total = score(
+            score_frame(cameras[stem], lines, Pitch(), SIZE) if stem in cameras else None
+            for stem, lines in frames.items()
+        )
+        assert report.problems == []
+        assert total.challenge == pytest.approx(0.786, abs=0.03)
+        assert total.jac[0] == pytest.approx(0.807, abs=0.03)

@@ -1,0 +1,88 @@
+"""The ISSIA set from files to export, against the facts that its README lists."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from app.config import Settings
+from app.datasets.issia import IssiaOptions, read_issia
+from app.datasets.report import Report
+from app.review.datasets import create_dataset
+from app.review.export import export
+from app.review.ingest import ingest
+from app.review.recompute import solve_dataset
+from app.soccer.policy import PAPER
+from app.soccer.solution import Solution
+from app.solving.solve import solve
+from app.store.session import Store
+
+DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", "../shared/data")) / "issia"
+pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real data in {DATA}")
+
+IMPOSSIBLE = (1492, 1493, 1494, 1495)
+REPAIRED = (423, 1763, 2045, 3013, 3017)
+
+
+@pytest.fixture(scope="module")
+def groups():
+    return list(read_issia(DATA, IssiaOptions(), Report()))
+
+
+@pytest.fixture(scope="module")
+def solutions(groups) -> dict[str, Solution]:
+    known = {}
+    solved = {}
+    for group in groups:
+        solution = solve(group, PAPER, known)
+        known |= {view.calibration_key: view.calibration for view in solution.views}
+        solved[group.key] = solution
+    return solved
+
+
+class TestSolve:
+    def test_as_many_frames_keep_a_ball_as_were_released(self, groups, solutions):
+        assert len(groups) == 2465
+        assert sum(len(group.views) >= 2 for group in groups) == 1801
+        assert 1685 <= sum(item.ball is not None for item in solutions.values()) <= 1692
+
+    @pytest.mark.parametrize("frame", IMPOSSIBLE)
+    def test_impossible_pairs_are_dropped(self, solutions, frame):
+        assert solutions[str(frame)].ball is None
+        assert solutions[str(frame)].first_failing.name == "reprojection"
+
+    @pytest.mark.parametrize("frame", REPAIRED)
+    def test_three_camera_frames_are_repaired_by_leaving_wrong_pairs_out(self, solutions, frame):
+        solution = solutions[str(frame)]
+        assert solution.passes
+        assert sum(pair.valid for pair in solution.pairs) == 1
+        assert "view_disagrees" in {finding.kind for finding in solution.findings}
+        assert "implausible_ball" not in {finding.kind for finding in solution.findings}
+
+    def test_the_ball_ten_metres_below_the_grass_carries_a_finding(self, solutions):
+        (finding,) = [
+            item for item in solutions["1200"].findings if item.kind == "implausible_ball"
+        ]
+        assert finding.number == pytest.approx(10.2, abs=0.2)
+
+
+class TestExport:
+    def test_every_annotated_frame_is_a_row_and_the_manifest_counts_them(self, groups, tmp_path):
+        few = [group for group in groups if len(group.views) >= 2][:40]
+        store = Store.open(Settings(home=tmp_path / "home"))
+        create_dataset(store, "issia", policy=PAPER, actor="test")
+        ingest(store, "issia", few, source=str(DATA), actor="test")
+        solve_dataset(store, "issia")
+        out = tmp_path / "out"
+        export(store, "issia", "issia-3d", out, everything=True)
+        with (out / "ISSIA-3D.csv").open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        assert [int(row["frame"]) for row in rows] == sorted(int(group.key) for group in few)
+        assert not any("nan" in cell for row in rows for cell in row.values())
+        manifest = json.loads((out / "manifest.json").read_text())
+        assert manifest["counts"]["groups"] == len(few)
+        store.close()
