@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,8 +69,13 @@ class IndexPage:
     policy: str
 
     @staticmethod
-    def make(html: bytes) -> IndexPage:
-        """The page of those bytes, with the policy that admits its import map."""
+    def make(html: bytes, version: str) -> IndexPage:
+        """The page of those bytes, with the policy that admits its import map.
+
+        Its modules are asked for below an address that names their version, so that browsers
+        keep them for good and a start costs no question per module.
+        """
+        html = html.replace(b'"/static/', f'"/assets/{version}/'.encode())
         etag = f'"{hashlib.sha256(html).hexdigest()[:32]}"'
         return IndexPage(html, etag, content_security_policy(script_hashes(html)))
 
@@ -79,21 +85,31 @@ class Site:
 
     def __init__(self, folder: Path = STATIC):
         self.folder = folder
-        self._version: tuple[int, int] | None = None
+        self._version: str | None = None
         self._page: IndexPage | None = None
         self.index()
 
     def index(self) -> IndexPage | None:
         """The page as it is on disk now; None where the application is not installed."""
         try:
-            status = (self.folder / "index.html").stat()
-            version = (status.st_mtime_ns, status.st_size)
+            version = self._folder_version()
             if version != self._version:
-                self._page = IndexPage.make((self.folder / "index.html").read_bytes())
+                html = (self.folder / "index.html").read_bytes()
+                self._page = IndexPage.make(html, version)
                 self._version = version
         except OSError:
             self._version = self._page = None
         return self._page
+
+    def _folder_version(self) -> str:
+        """Digest of the times and sizes of our own files and of the libraries' lock file."""
+        digest = hashlib.sha256()
+        for folder, folders, names in os.walk(self.folder):
+            folders[:] = sorted(name for name in folders if name != "node_modules")
+            for name in sorted(names):
+                status = Path(folder, name).stat()
+                digest.update(f"{folder}/{name} {status.st_mtime_ns} {status.st_size}\n".encode())
+        return digest.hexdigest()[:16]
 
     def policy(self) -> str:
         """The Content-Security-Policy of every response."""
@@ -101,7 +117,15 @@ class Site:
 
 
 class Modules(StaticFiles):
-    """Files below /static: by known types alone, nothing hidden, always revalidated."""
+    """Files of the application: by known types alone, nothing hidden.
+
+    Below /static they are always revalidated; below an address that names their version they
+    are kept for good.
+    """
+
+    def __init__(self, folder: Path, caching: str):
+        super().__init__(directory=folder, check_dir=False)
+        self._caching = caching
 
     async def check_config(self) -> None:
         """A folder that is missing has no files; that is no reason to fail."""
@@ -115,7 +139,7 @@ class Modules(StaticFiles):
         if hidden or "\\" in path or Path(path).suffix.lower() not in allowed:
             raise HTTPException(status_code=404)
         response = await super().get_response(path, scope)
-        response.headers["Cache-Control"] = "no-cache"
+        response.headers["Cache-Control"] = self._caching
         if isinstance(response, FileResponse):
             response.headers["Content-Type"] = MEDIA_TYPES[Path(path).suffix.lower()]
         return response
@@ -137,4 +161,6 @@ def install_pages(app: FastAPI, site: Site) -> None:
     for path in PAGES:
         router.add_api_route(path, page, methods=["GET", "HEAD"])
     app.include_router(router)
-    app.mount("/static", Modules(directory=site.folder, check_dir=False), name="static")
+    app.mount("/static", Modules(site.folder, "no-cache"), name="static")
+    kept = Modules(site.folder, "public, max-age=31536000, immutable")
+    app.mount("/assets/{version}", kept, name="assets")
