@@ -88,9 +88,12 @@ def _not_annotated(
     if calibration.jac is None or calibration.unobservable:
         return
     shortest = UNANNOTATED_PERCENT / 100 * size.diagonal
+    mislabelled = {suspect.suggested for suspect in calibration.suspects}
     for fit in calibration.markings:
+        if fit.outcome != "fp" or fit.distances_px or fit.marking in mislabelled:
+            continue
         length = _length(fit)
-        if fit.outcome == "fp" and not fit.distances_px and length > shortest:
+        if length > shortest:
             yield Finding(
                 "visible_not_annotated",
                 f"“{fit.marking}” should be seen over {length:.0f} px and is not annotated.",

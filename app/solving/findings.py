@@ -17,6 +17,23 @@ MAX_SIZE_RATIO = 2.0
 """A ball box may be so many times larger or smaller than the 3D point implies."""
 HIGH_SIGMA_M = 1.0
 
+_BY_WEIGHT = (
+    "sides_swapped",
+    "wrong_label",
+    "several_balls",
+    "not_synchronous",
+    "view_disagrees",
+    "implausible_ball",
+    "implausible_camera",
+    "under_constrained",
+    "bad_point",
+    "high_uncertainty",
+    "low_parallax",
+    "ball_size",
+    "visible_not_annotated",
+)
+"""What explains the most comes first."""
+
 
 def find(
     group: Group,
@@ -26,7 +43,7 @@ def find(
     ball: Ball3D | None,
     policy: Policy,
 ) -> tuple[Finding, ...]:
-    """All findings of a group: first of its views in their order, then of its ball."""
+    """All findings of a group, those that explain most first, then by view."""
     swaps = {swap.view: swap for swap in find_swaps(sights, policy)}
     found: list[Finding] = []
     for view, solved in zip(group.views, views, strict=True):
@@ -43,7 +60,7 @@ def find(
         found.extend(_low_parallax(ball, policy))
         found.extend(_high_uncertainty(ball))
         found.extend(_implausible_ball(ball, group.pitch, policy))
-    return tuple(found)
+    return tuple(sorted(found, key=lambda finding: _BY_WEIGHT.index(finding.kind)))
 
 
 def _several_balls(view: View) -> Iterator[Finding]:

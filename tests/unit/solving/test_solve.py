@@ -262,6 +262,14 @@ class TestCalibrationFindings:
             ("visible_not_annotated", "Side line top")
         ]
 
+    def test_a_mislabelled_marking_is_not_called_missing_too(self, clean):
+        station = clean.views[0].station
+        lines = dict(station.lines)
+        lines["Circle left"] = lines.pop("Circle right")
+        wrong = replace(clean.views[0], station=replace(station, lines=make_lines(lines)))
+        found = solve(group(wrong, *clean.views[1:]), PAPER).findings
+        assert [(item.kind, item.suggested) for item in found] == [("wrong_label", "Circle right")]
+
 
 class TestViewLetter:
     def test_counts_on_after_the_alphabet(self):
