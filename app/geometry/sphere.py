@@ -26,7 +26,7 @@ def position_from_diameter(
     Raises:
         DegenerateGeometryError: The diameter is not positive.
 
-    Source: the paper, eq. for p; method.md, section 4.
+    Source: SoccerNet-v3D (arXiv 2504.10106), 3D ball localisation from its diameter.
     """
     center = require_shape(center, (2,), "center")
     if not diameter_px > 0:
@@ -59,7 +59,7 @@ def optimal_diameter(
     Raises:
         DegenerateGeometryError: The point lies behind the camera.
 
-    Source: method.md, section 5.
+    Source: closed form of the box optimisation of SoccerNet-v3D (arXiv 2504.10106).
     """
     center = require_shape(center, (2,), "center")
     ideal = camera.pixel_to_ideal(center[None])[0]

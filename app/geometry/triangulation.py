@@ -16,7 +16,7 @@ def triangulate_pairs(
     """Points of space from two views each, by the homogeneous linear DLT on pixels.
 
     Neither pixels nor matrices are normalised: this is what ``cv2.triangulatePoints`` does, and
-    other estimators give other datasets (method.md, section 3).
+    other estimators give other datasets (docs/decisions/0007-triangulation-on-pixels.md).
 
     Args:
         P_a: Projection matrices of the first views, shape (N, 3, 4).

@@ -13,9 +13,11 @@ class CalibrationPolicy:
 
     robust_scale_px: float = 2.0
     """Scale of the soft-L1 loss at 960 x 540; grows with the diagonal."""
-    distortion_sigma: float = 0.02
-    """Standard deviation of the prior on kappa, the displacement at the image's corner as a
-    share of half the diagonal."""
+    distortion_mean: float = 0.025
+    """Mean of the prior on kappa, the displacement at the image's corner as a share of half the
+    diagonal: broadcast lenses show pincushion."""
+    distortion_sigma: float = 0.03
+    """Standard deviation of that prior."""
     check_labels: bool = True
     """Leave out markings that are found mislabelled."""
 

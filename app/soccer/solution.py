@@ -26,7 +26,7 @@ GATES = (
     "parallax",
     "sigma",
 )
-"""Names of the gates in the order in which they are judged (method.md, section 6)."""
+"""Names of the gates in the order in which they are judged."""
 
 FINDING_KINDS = (
     "wrong_label",

@@ -1,4 +1,4 @@
-"""Gates: what a group must pass to enter the dataset, in order (method.md, section 6).
+"""Gates: what a group must pass to enter the dataset, in order.
 
 The first two drop views; the others judge the group from the views that are left.
 """

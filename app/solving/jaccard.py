@@ -1,4 +1,4 @@
-"""JaC, the Jaccard index for camera calibration (method.md, section 2).
+"""JaC, the Jaccard index for camera calibration.
 
 Numbers equal those of the public sn-calibration evaluator: a marking that is annotated and
 visible counts as found when every annotated point lies closer than gamma to its projection.

@@ -73,17 +73,21 @@ class ResectionProblem:
     Attributes:
         size: Annotated size.
         robust_scale_px: Scale of the final soft-L1 loss at 960 x 540.
-        distortion_sigma: Standard deviation of the prior on kappa.
+        distortion_mean: Mean of the prior on kappa.
+        distortion_sigma: Its standard deviation.
     """
 
     size: ImageSize
     robust_scale_px: float
+    distortion_mean: float
     distortion_sigma: float
 
     @staticmethod
     def of(size: ImageSize, policy: CalibrationPolicy) -> ResectionProblem:
         """The problem of one image under a policy."""
-        return ResectionProblem(size, policy.robust_scale_px, policy.distortion_sigma)
+        return ResectionProblem(
+            size, policy.robust_scale_px, policy.distortion_mean, policy.distortion_sigma
+        )
 
     @property
     def unit(self) -> float:
@@ -144,12 +148,13 @@ class ResectionProblem:
         free = Prior(np.zeros(PARAMETERS), np.full(PARAMETERS, np.inf))
         free.sigma[KAPPA] = self.distortion_sigma
         scale = self.robust_scale_px * self.unit
+        # At a wider scale honest clicks weigh one, as the formula for the covariance has it.
         _, _, information = normal_equations(
             parameters[None],
             observations.curves,
             observations.sightings(),
             free,
-            scale,
+            4 * scale,
             self.size.diagonal / 2,
         )
         apart = self.distances(parameters, observations)
@@ -197,9 +202,9 @@ class ResectionProblem:
     def _prior(self) -> Prior:
         """Wide enough to decide nothing that a few points decide; it keeps the rest on earth."""
         focal = np.log(2000.0 * self.unit)
-        mean = np.array([0.0, np.radians(78), 0.0, 0.0, 0.0, -15.0, focal, 0.0])
-        sigma = np.array([np.inf, np.inf, np.radians(5), 300.0, 300.0, 60.0, 3.0, 1.0])
-        sigma[KAPPA] = self.distortion_sigma
+        mean = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -15.0, focal, self.distortion_mean])
+        level = np.radians(2)
+        sigma = np.array([np.inf, np.inf, level, 300.0, 300.0, 60.0, 3.0, self.distortion_sigma])
         return Prior(mean, sigma)
 
 

@@ -1,4 +1,4 @@
-"""Score: how well cameras fit the annotated lines of many frames (method.md, sections 2 and 9)."""
+"""Score: how well cameras fit the annotated lines of many frames."""
 
 from __future__ import annotations
 

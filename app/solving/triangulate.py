@@ -15,13 +15,14 @@ from app.geometry.resection import (
     parameters_from_camera,
     projection_jacobian,
 )
-from app.geometry.triangulation import parallax_angle, point_covariance, triangulate_pairs
+from app.geometry.triangulation import parallax_angle, triangulate_pairs
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D, Calibration, Pair
 
 CLICK_DIAGONAL = float(np.hypot(1920, 1080))
 """The policy's click sigma holds for 1920 x 1080 and grows with the diagonal."""
+_STEP_PX = 0.5
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Sight:
 def triangulate(sights: Sequence[Sight], policy: Policy) -> tuple[Pair, ...]:
     """Every pair of views with its point, whatever the gates say of it.
 
-    Source: method.md, section 3; the paper, section 3.2.
+    Source: SoccerNet-v3D (arXiv 2504.10106), triangulation of ball annotations.
     """
     couples = [
         (a, b) for a, b in combinations(sights, 2) if not np.array_equal(a.camera.P, b.camera.P)
@@ -83,7 +84,7 @@ def mean_ball(pairs: Sequence[Pair], sights: Sequence[Sight], policy: Policy) ->
     point = np.mean([pair.point for pair in valid], axis=0)
     used = {pair.a for pair in valid} | {pair.b for pair in valid}
     seen = {sight.view: sight for sight in sights if sight.view in used}
-    spread = ball_covariance(point, tuple(seen.values()), policy)
+    spread = mean_covariance(valid, seen, point, policy)
     return Ball3D(
         point=_triple(point),
         covariance=tuple(spread.ravel().tolist()),
@@ -93,12 +94,43 @@ def mean_ball(pairs: Sequence[Pair], sights: Sequence[Sight], policy: Policy) ->
     )
 
 
-def ball_covariance(point: FloatArray, sights: Sequence[Sight], policy: Policy) -> FloatArray:
-    """Covariance of the best point from these views, square metres, shape (3, 3)."""
-    return point_covariance(
-        [sight.camera.jacobian(point) for sight in sights],
-        [pixel_spread(sight, point, policy) for sight in sights],
-    )
+def mean_covariance(
+    pairs: Sequence[Pair], seen: Mapping[str, Sight], point: FloatArray, policy: Policy
+) -> FloatArray:
+    """Covariance of the mean of pairs, square metres, shape (3, 3).
+
+    The uncertainty of each view's pixel is carried through the estimator itself, by central
+    differences: pairs that share a view move together, and a pair of small parallax, which the
+    mean trusts like any other, makes the mean as uncertain as it is.
+
+    Source: Hartley & Zisserman, result 5.6.
+    """
+    ideal = {
+        view: sight.camera.undistort(np.array([sight.center]))[0] for view, sight in seen.items()
+    }
+    steps = [
+        (view, axis, sign) for view in seen for axis in (0, 1) for sign in (_STEP_PX, -_STEP_PX)
+    ]
+    pixels = {view: np.repeat(pixel[None], len(steps), axis=0) for view, pixel in ideal.items()}
+    for row, (view, axis, step) in enumerate(steps):
+        pixels[view][row, axis] += step
+    moved = np.mean(
+        [
+            triangulate_pairs(
+                np.repeat(seen[pair.a].camera.P[None], len(steps), axis=0),
+                np.repeat(seen[pair.b].camera.P[None], len(steps), axis=0),
+                pixels[pair.a],
+                pixels[pair.b],
+            )
+            for pair in pairs
+        ],
+        axis=0,
+    ).reshape(len(seen), 2, 2, 3)
+    slopes = (moved[:, :, 0] - moved[:, :, 1]) / (2 * _STEP_PX)
+    spread = np.zeros((3, 3))
+    for slope, sight in zip(slopes, seen.values(), strict=True):
+        spread += slope.T @ pixel_spread(sight, point, policy) @ slope
+    return spread
 
 
 def pixel_spread(sight: Sight, point: FloatArray, policy: Policy) -> FloatArray:

@@ -1,5 +1,5 @@
 // @ts-check
-/** The ball as a sphere: from one view, its consistent box, its outline (method.md 4, 5, 8). */
+/** The ball as a sphere: from one view, its consistent box, its outline. */
 
 import {
 	calibrationMatrix, idealToPixel, pitchToCamera, pixelToIdeal, rayThrough,
@@ -118,7 +118,7 @@ export function exactBox(camera, point, phi) {
  * Where lines of one direction touch the outline: the roots of the dual conic
  * `K (c c' - r^2 I) K'` on that row of K.
  *
- * Source: method.md section 8; Hartley & Zisserman, result 8.6.
+ * Source: Hartley & Zisserman, result 8.6.
  *
  * @param {number[]} row of K @param {number[]} center camera frame @param {number} r2
  * @returns {[number, number]}

@@ -1,5 +1,5 @@
 // @ts-check
-/** What the ball's numbers would be, at once: method.md 3 to 5 on the cameras of a solution. */
+/** What the ball's numbers would be, at once: the server's formulas on the cameras of a solution. */
 
 import { boxCenter, boxDiameter, exactBox, optimizedBall, squareBox } from './ball.js';
 import { cameraFromJson, project } from './camera.js';

@@ -1,5 +1,5 @@
 // @ts-check
-/** A point from two views, as method.md section 3 does it. */
+/** A point from two views, by the linear DLT on pixels, as the server does it. */
 
 import { MIN_DEPTH, pitchToCamera, project, projectionMatrix, undistortPixel } from './camera.js';
 import { apply, cross, dot, norm, smallestSingularVector, subtract, times } from './matrix.js';
@@ -9,7 +9,7 @@ import { apply, cross, dot, norm, smallestSingularVector, subtract, times } from
 /**
  * The point whose images are the two pixels: homogeneous linear DLT on pixel coordinates.
  *
- * Source: method.md section 3; Hartley & Zisserman, sec. 12.2. P is not normalised, because the
+ * Source: Hartley & Zisserman, sec. 12.2. P is not normalised, because the
  * released datasets follow from this estimator and from no other.
  *
  * @param {Camera} a @param {ImagePoint} pixelA as the image of a shows it

@@ -31,7 +31,7 @@ SEED = 20261121
 POLICIES = {
     "as given": CalibrationPolicy(check_labels=False),
     "checked": CalibrationPolicy(),
-    "checked, pinhole": CalibrationPolicy(distortion_sigma=1e-6),
+    "checked, pinhole": CalibrationPolicy(distortion_mean=0.0, distortion_sigma=1e-6),
 }
 PEER = [
     ["PnLCalib from lines, 1,454 frames *", 98.9, 80.0, 72.4, 77.4, 1.7, 9.5, 227.0, None],
