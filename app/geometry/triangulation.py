@@ -8,6 +8,7 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, require_shape
+from app.geometry.smallest_singular import smallest_singular_vectors
 
 
 def triangulate_pairs(
@@ -40,16 +41,13 @@ def triangulate_pairs(
         ("pixels_b", pixels_b, (count, 2)),
     ):
         require_shape(array, shape, name)
-    rows = np.stack(
-        [
-            pixels_a[:, :1] * P_a[:, 2] - P_a[:, 0],
-            pixels_a[:, 1:] * P_a[:, 2] - P_a[:, 1],
-            pixels_b[:, :1] * P_b[:, 2] - P_b[:, 0],
-            pixels_b[:, 1:] * P_b[:, 2] - P_b[:, 1],
-        ],
-        axis=1,
-    )
-    homogeneous = np.linalg.svd(rows)[2][:, -1]
+    rows = np.empty((count, 4, 4))
+    rows[:, 0] = pixels_a[:, :1] * P_a[:, 2] - P_a[:, 0]
+    rows[:, 1] = pixels_a[:, 1:] * P_a[:, 2] - P_a[:, 1]
+    rows[:, 2] = pixels_b[:, :1] * P_b[:, 2] - P_b[:, 0]
+    rows[:, 3] = pixels_b[:, 1:] * P_b[:, 2] - P_b[:, 1]
+    homogeneous = np.empty((count, 4))
+    smallest_singular_vectors(rows, homogeneous)
     if np.any(np.abs(homogeneous[:, 3]) < 1e-12):
         raise DegenerateGeometryError("two rays are parallel, they meet nowhere")
     points: FloatArray = homogeneous[:, :3] / homogeneous[:, 3:]

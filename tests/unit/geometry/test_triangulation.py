@@ -5,6 +5,7 @@ import pytest
 from app.errors import DegenerateGeometryError, ShapeError
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_looking
+from app.geometry.smallest_singular import smallest_singular_vectors
 from app.geometry.triangulation import parallax_angle, point_covariance, triangulate_pairs
 
 
@@ -33,6 +34,14 @@ class TestTriangulatePairs:
         expected = cv2.triangulatePoints(MAIN.P, REPLAY.P, a.T, b.T)
         found = triangulate_pairs(np.stack([MAIN.P] * 50), np.stack([REPLAY.P] * 50), a, b)
         assert np.allclose(found, (expected[:3] / expected[3]).T, atol=1e-6)
+
+    def test_equals_the_singular_value_decomposition_on_arbitrary_systems(self):
+        generator = np.random.default_rng(2)
+        systems = generator.normal(size=(200, 4, 4)) * generator.uniform(1, 1e6, (200, 4, 1))
+        found = np.empty((200, 4))
+        smallest_singular_vectors(systems, found)
+        expected = np.linalg.svd(systems)[2][:, -1]
+        assert np.allclose(np.abs((found * expected).sum(axis=1)), 1.0, atol=1e-12)
 
     def test_parallel_rays_meet_nowhere(self):
         aside = Camera(MAIN.rotation, MAIN.position + np.eye(3)[0], (1.0, 1.0), (0.0, 0.0))
