@@ -1,6 +1,6 @@
 # The two commands of the README are `run` and `test`; every target sets up what it needs.
 
-PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do command -v $$p >/dev/null 2>&1 && $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3; do command -v $$p >/dev/null 2>&1 && $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm

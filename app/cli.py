@@ -17,13 +17,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.errors import ReviewError
+from app.line_commands import commands as line_commands
 from app.options import (
+    Json,
+    Workers,
     parse_cameras,
     parse_frame_offset,
     parse_size,
     read_settings,
     require_local,
 )
+from app.pool import process_pool
 from app.terminal import (
     complain,
     log_to_stderr,
@@ -47,6 +51,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.add_typer(line_commands)
 
 
 class Format(StrEnum):
@@ -91,23 +96,11 @@ class Images(StrEnum):
     LINK = "link"
 
 
-class Labels(StrEnum):
-    """Whether calibration doubts the names of markings."""
-
-    CHECKED = "checked"
-    GIVEN = "given"
-
-
 SAMPLE = "sample"
 """Name of the sample dataset, and of its folder in the home."""
 SAMPLE_GROUPS, SAMPLE_SEED = 60, 20_260_101
 Existing = Annotated[Path, typer.Argument(exists=True, help="A folder or a file.")]
 Dataset = Annotated[str, typer.Option("--dataset", help="Name of the dataset.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout.")]
-Size = Annotated[str, typer.Option("--size", metavar="WxH", help="Size of the annotated images.")]
-Workers = Annotated[
-    int | None, typer.Option("--workers", min=1, help="Processes; default: all cores.")
-]
 
 
 @app.command()
@@ -242,53 +235,6 @@ def export(
 
 
 @app.command()
-def calibrate(
-    source: Annotated[Path, typer.Argument(metavar="IN", exists=True)],
-    out: Annotated[Path, typer.Argument(metavar="OUT")],
-    size: Size = "960x540",
-    labels: Annotated[Labels, typer.Option(help="checked leaves out wrong labels.")] = (
-        Labels.CHECKED
-    ),
-    leave_one_out: Annotated[
-        bool, typer.Option("--leave-one-out", help="Drop each marking in turn, too.")
-    ] = False,
-    workers: Workers = None,
-    json_: Json = False,
-) -> None:
-    """Calibrate line files (folder or zip) to camera files; needs no dataset."""
-    from app.review.batch import calibrate_files
-
-    pool = _pool(workers or read_settings().workers)
-    with pool as executor, show_progress("Calibrating") as progress:
-        result = calibrate_files(
-            source,
-            out,
-            size=parse_size(size),
-            labels=labels.value,
-            with_leave_one_out=leave_one_out,
-            executor=executor,
-            progress=progress,
-        )
-    print_values(result, json_)
-
-
-@app.command()
-def score(
-    lines: Annotated[Path, typer.Argument(metavar="LINES", exists=True)],
-    cameras: Annotated[Path, typer.Argument(metavar="CAMERAS", exists=True)],
-    size: Size = "960x540",
-    without: Annotated[
-        Path | None, typer.Option(exists=True, help="findings.json: leave those markings out.")
-    ] = None,
-    json_: Json = False,
-) -> None:
-    """Measure camera files against line files: JaC, completeness, errors."""
-    from app.review.batch import score_files
-
-    print_values(score_files(lines, cameras, size=parse_size(size), without=without), json_)
-
-
-@app.command()
 def sample(
     out: Annotated[
         Path | None, typer.Argument(help="Folder; with --dataset, by default one in the home.")
@@ -360,24 +306,8 @@ def _executor(workers: int) -> Iterator[Executor | None]:
     if workers == 1:
         yield None
         return
-    with _pool(workers) as pool:
+    with process_pool(workers) as pool:
         yield pool
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator[Executor]:
-    """Processes that solve; each starts anew, because forking a process with threads is unsafe."""
-    import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor
-
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as executor:
-        try:
-            yield executor
-        except BaseException:
-            # What waits is found again by the next run.
-            executor.shutdown(wait=False, cancel_futures=True)
-            raise
 
 
 def _write_sample(folder: Path, **options: Any) -> dict[str, Any]:

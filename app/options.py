@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import os
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
     from app.config import Settings
     from app.soccer.frames import ImageSize
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout.")]
+Size = Annotated[str, typer.Option("--size", metavar="WxH", help="Size of the annotated images.")]
+Workers = Annotated[
+    int | None, typer.Option("--workers", min=1, help="Processes; default: all cores.")
+]
 
 
 def read_settings(**given: object) -> Settings:

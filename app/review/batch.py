@@ -27,6 +27,7 @@ from app.soccer.solution import Finding
 from app.solving.calibrate import calibrate
 from app.solving.calibration_findings import calibration_findings
 from app.solving.leave_one_out import leave_one_out
+from app.solving.pitch_size import estimate_pitch
 from app.solving.score import score, score_frame
 from app.solving.warm import warm_up
 
@@ -144,6 +145,28 @@ def score_files(
         "error_median_px": total.error_median_px,
         "error_p95_px": total.error_p95_px,
         **_times(cameras),
+        "problems": [problem.message for problem in report.problems],
+    }
+
+
+def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
+    """Length and width of the pitch that the line files of one match show.
+
+    Raises:
+        InputError: There is no line file.
+        DegenerateGeometryError: They do not show enough of the pitch.
+    """
+    report = Report()
+    frames = [file.lines for file in read_line_files(source, size, report)]
+    if not frames:
+        raise _nothing(source, report)
+    found = estimate_pitch(frames, size, CalibrationPolicy())
+    return {
+        "length_m": found.pitch.length,
+        "width_m": found.pitch.width,
+        "length_sigma_m": found.length_sigma_m,
+        "width_sigma_m": found.width_sigma_m,
+        "frames": found.frames,
         "problems": [problem.message for problem in report.problems],
     }
 
