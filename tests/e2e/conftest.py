@@ -104,9 +104,9 @@ def _wait_for(address: str, process: subprocess.Popen[bytes], log: Path) -> None
     pytest.fail(f"the server did not start: {log.read_text()}")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """Chromium."""
+    """Chromium, for one module: while Playwright runs, no other test can run an event loop."""
     with sync_playwright() as playwright:
         launched = playwright.chromium.launch(executable_path=_chromium())
         yield launched
