@@ -31,6 +31,7 @@ from app.pool import process_pool
 from app.terminal import (
     complain,
     log_to_stderr,
+    print_export,
     print_import,
     print_json,
     print_values,
@@ -78,6 +79,13 @@ class Calibration(StrEnum):
 
     GIVEN = "given"
     LINES = "lines"
+
+
+class PolicyName(StrEnum):
+    """By which thresholds a dataset is judged."""
+
+    PAPER = "paper"
+    STRICT = "strict"
 
 
 class Boxes(StrEnum):
@@ -176,8 +184,17 @@ def import_(
 
 
 @app.command()
-def solve(dataset: Dataset, workers: Workers = None, json_: Json = False) -> None:
+def solve(
+    dataset: Dataset,
+    policy: Annotated[
+        PolicyName | None,
+        typer.Option(help="Judge the dataset by this policy from now on."),
+    ] = None,
+    workers: Workers = None,
+    json_: Json = False,
+) -> None:
     """Compute what is missing or out of date; can be interrupted at any time."""
+    from app.api.policies import choose_policy
     from app.review.recompute import solve_dataset
 
     settings = read_settings()
@@ -186,6 +203,8 @@ def solve(dataset: Dataset, workers: Workers = None, json_: Json = False) -> Non
         _executor(workers or settings.workers) as executor,
         show_progress("Solving") as progress,
     ):
+        if policy is not None:
+            choose_policy(store, dataset, policy.value)
         report = solve_dataset(store, dataset, executor, progress)
     print_values(vars(report), json_)
 
@@ -231,7 +250,7 @@ def export(
             images=images.value,
             progress=progress,
         )
-    print_values({**vars(report), "out": str(report.out)}, json_)
+    print_export({**vars(report), "out": str(report.out)}, json_)
 
 
 @app.command()
@@ -257,6 +276,7 @@ def sample(
     if out is None and dataset is None:
         raise typer.BadParameter("name a folder to write to, or a dataset to fill")
     if dataset is not None and _is_solved(settings, dataset):
+        print_values({**_progress_of(settings, dataset), "written": False}, json_)
         return
     folder = out or settings.home / SAMPLE
     report = _write_sample(
@@ -267,9 +287,10 @@ def sample(
         faults=not no_faults,
         workers=workers,
     )
-    print_values(report, json_)
     if dataset is not None:
         _fill(settings, dataset, folder, workers)
+        report = {**report, **_progress_of(settings, dataset), "written": True}
+    print_values(report, json_)
 
 
 @app.command()
@@ -320,11 +341,18 @@ def _write_sample(folder: Path, **options: Any) -> dict[str, Any]:
 
 def _is_solved(settings: Settings, dataset: str) -> bool:
     """Whether a dataset of that name is there, and complete."""
+    found = _progress_of(settings, dataset)
+    return bool(0 < found["groups"] == found["solved"])
+
+
+def _progress_of(settings: Settings, dataset: str) -> dict[str, Any]:
+    """Name, groups and solved groups of a dataset; one that is not there has none."""
     from app.review.datasets import list_datasets
 
     with _store(settings) as store:
         found = next((item for item in list_datasets(store) if item.name == dataset), None)
-    return found is not None and 0 < found.groups == found.solved
+    groups, solved = (found.groups, found.solved) if found else (0, 0)
+    return {"dataset": dataset, "groups": groups, "solved": solved}
 
 
 def _fill(settings: Settings, dataset: str, folder: Path, workers: int | None) -> None:

@@ -23,8 +23,6 @@ class Settings(BaseSettings):
     """The folder that holds the database, the media cache and the exports."""
     database_url: str | None = None
     """Another database than the SQLite file in ``home``."""
-    import_roots: list[Path] = []
-    """Folders that imports over REST may read; the command line may read anything."""
     host: str = "127.0.0.1"
     """Address the server listens on."""
     port: int = 8000

@@ -59,14 +59,19 @@ def score(
     cameras: Annotated[Path, typer.Argument(metavar="CAMERAS", exists=True)],
     size: Size = "960x540",
     without: Annotated[
-        Path | None, typer.Option(exists=True, help="findings.json: leave those markings out.")
+        Path | None,
+        typer.Option(exists=True, dir_okay=False, help="findings.json: leave those markings out."),
     ] = None,
     json_: Json = False,
 ) -> None:
     """Measure camera files against line files: JaC, completeness, errors."""
     from app.review.batch import score_files
 
-    print_values(score_files(lines, cameras, size=parse_size(size), without=without), json_)
+    with show_progress("Scoring") as progress:
+        result = score_files(
+            lines, cameras, size=parse_size(size), without=without, progress=progress
+        )
+    print_values(result, json_)
 
 
 @commands.command()

@@ -68,6 +68,7 @@ class Imported:
             "new": self.result.new,
             "changed": self.result.changed,
             "unchanged": self.result.unchanged,
+            "missing": self.result.missing,
             "findings": self.result.findings,
             "counts": dict(self.report.counts),
             "problems": [

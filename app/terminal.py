@@ -12,6 +12,8 @@ from typing import Any
 
 Progress = Callable[..., None]
 """Called with how many are done and, where it is known, how many there are."""
+MAX_MISSING = 20
+"""Missing images that are named in a table."""
 MIN_SECONDS = 0.1
 """A bar that moves more often costs more than it shows."""
 
@@ -93,7 +95,21 @@ def print_import(values: Mapping[str, Any], as_json: bool) -> None:
         say(f"  {remark}")
 
 
+def print_export(values: Mapping[str, Any], as_json: bool) -> None:
+    """What an export wrote, and the names of the first frames that it could not have."""
+    print_values(values, as_json)
+    if as_json:
+        return
+    missing = values["missing_images"]
+    for line in missing[:MAX_MISSING]:
+        say(f"  {line}")
+    if len(missing) > MAX_MISSING:
+        say(f"  and {len(missing) - MAX_MISSING} more; --json names them all")
+
+
 def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, dict):

@@ -14,7 +14,7 @@ Everything that the browser does goes through these addresses.
 
 * **State and ETag.** `PATCH`, `PUT`, undo and redo need `If-Match` with the ETag of the state that
   they build on: 428 without it, 412 (with the present document as `current`) when somebody else
-  was faster.
+  was faster. The policy of a dataset alone is replaced without.
 * **Problems.** Every answer that is not a success is `application/problem+json` (RFC 9457).
 * **Pages.** Lists take `limit` and `cursor`; `next` is the cursor of the next page, `total` says
   how many match.
@@ -22,7 +22,7 @@ Everything that the browser does goes through these addresses.
   the pitch frame, z down; degrees.
 """.strip()
 TAGS = {
-    "datasets": "What there is, how far it is, how its numbers are spread.",
+    "datasets": "What there is, how far it is, how its numbers are spread, what judges it.",
     "groups": "The views of one instant: the unit of review.",
     "views": "One image of an instant: its lines, its ball, its frame.",
     "stations": "Static cameras, whose lines many views share.",

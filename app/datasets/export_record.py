@@ -19,7 +19,8 @@ class ExportRecord:
 
     Attributes:
         solution: None for a group that was never solved (only in an export of everything).
-        verdict: ``accepted``, ``rejected``, ``deferred`` or ``unreviewed``.
+        verdict: ``accepted``, ``rejected``, ``deferred`` or ``unreviewed``; ``accepted (stale)``
+            where the group changed afterwards.
         reason: Why it was rejected, or why it was accepted against a gate.
     """
 

@@ -39,7 +39,7 @@ class Manifest:
         format: ``soccernet-v3d``, ``issia-3d`` ...
         counts: What the writer counted.
         settings: Policy and options of the export, plain JSON values.
-        licence: Licence text of the source, one of ``LICENCES``.
+        licence: Licence texts of all sources, of ``LICENCES``, one after another.
         media: Per frame that the dataset refers to: path, bytes and checksum.
     """
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any, TextIO
 
 from app.datasets.camera_json import camera_to_json
 from app.datasets.csv_text import Table, Value, plain_list
-from app.datasets.export_record import ExportRecord
+from app.datasets.export_record import ExportRecord, chosen_box
 from app.datasets.soccernet_record import GAME, IMAGE
 from app.datasets.soccernet_v3 import (
     LabelsWriter,
@@ -19,7 +20,7 @@ from app.datasets.soccernet_v3 import (
     split_key,
 )
 from app.soccer.frames import Box
-from app.soccer.group import View
+from app.soccer.group import Group, View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit
 
 LABELS = "Labels-v3D.json"
@@ -48,18 +49,25 @@ COLUMNS = (
 
 
 def write_soccernet_v3d(
-    root: Path, records: Iterable[ExportRecord], *, everything: bool = False
+    root: Path,
+    records: Iterable[ExportRecord],
+    *,
+    everything: bool = False,
+    boxes: str = "optimized",
 ) -> dict[str, int]:
     """Write the dataset's files below an existing folder.
 
-    ``ball_bbox`` is the annotated box; the optimised one is the square of side ``optimized_d``
-    around its centre. Ball values stand in the rows of views in a valid pair, or in all rows
+    ``ball_bbox`` is the annotated box whatever ``boxes`` says, because the optimised one is
+    defined by it: the square of side ``optimized_d`` around its centre. Labels-v3D.json holds the
+    chosen box of the ball in the views that the 3D ball comes from, the annotated one in all
+    others. Ball values stand in the rows of views in a valid pair, or in all rows
     with ``everything``, which also adds the column ``verdict``.
 
     Args:
         root: Existing folder.
         records: Groups of SoccerNet; one run of a match is in memory at a time.
         everything: Whether groups and views that failed a gate take part.
+        boxes: Ball box of Labels-v3D.json, one of ``BOX_KINDS``.
 
     Returns:
         Counts: ``groups``, ``views``, ``balls`` (rows with a 3D ball).
@@ -81,7 +89,8 @@ def write_soccernet_v3d(
             members = list(run)
             for record in members:
                 _add_rows(table, lists, record, everything, counts)
-            labels.write("/".join(match), _labels("/".join(match), members, everything))
+            name = "/".join(match)
+            labels.write(name, _labels(name, members, everything, boxes))
     return counts
 
 
@@ -132,8 +141,10 @@ def _jac(record: ExportRecord, view: View) -> tuple[float, ...] | None:
     return solved.calibration.jac if solved else None
 
 
-def _labels(match: str, records: list[ExportRecord], everything: bool) -> dict[str, Any]:
-    labels = labels_to_json(match, [record.group for record in records])
+def _labels(
+    match: str, records: list[ExportRecord], everything: bool, boxes: str
+) -> dict[str, Any]:
+    labels = labels_to_json(match, [_with_boxes(record, boxes) for record in records])
     for record in records:
         main, *replays = record.group.views
         for view in record.group.views:
@@ -147,6 +158,21 @@ def _labels(match: str, records: list[ExportRecord], everything: bool) -> dict[s
         if sum(map(record.is_calibrated, record.group.views)) > 1
     ]
     return labels
+
+
+def _with_boxes(record: ExportRecord, kind: str) -> Group:
+    """The group with the chosen ball box in the views that the 3D ball comes from."""
+    group = record.group
+    for view in group.views:
+        # A view that fell out says nothing about the ball: its fit can lie anywhere.
+        if view.ball is None or record.ball_fit(view, everything=False) is None:
+            continue
+        box = chosen_box(record, view, kind)
+        if box is not None and box != view.ball.box:
+            chosen = replace(view.ball, box=box, point=None)
+            balls = tuple(chosen if ball is view.ball else ball for ball in view.balls)
+            group = group.with_view(replace(view, balls=balls))
+    return group
 
 
 def _computed(record: ExportRecord, view: View, everything: bool) -> dict[str, Any]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from itertools import chain
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile, read_line_files
 from app.errors import DatasetFormatError, InputError
+from app.geometry.camera import Camera
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -82,7 +84,7 @@ def calibrate_files(
     report = Report()
     files = list(read_line_files(source, size, report))
     if not files:
-        raise _nothing(source, report)
+        raise _nothing(source, report, "line files")
     policy = CalibrationPolicy(check_labels=labels == "checked")
     chunks = [files[start : start + CHUNK] for start in range(0, len(files), CHUNK)]
     jobs = [
@@ -108,7 +110,12 @@ def calibrate_chunk(
 
 
 def score_files(
-    lines: Path, cameras: Path, *, size: ImageSize, without: Path | None = None
+    lines: Path,
+    cameras: Path,
+    *,
+    size: ImageSize,
+    without: Path | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> dict[str, Any]:
     """Measure camera files against line files.
 
@@ -117,12 +124,15 @@ def score_files(
         cameras: Folder or zip of ``camera_<stem>.json``.
         size: Size of the annotated images.
         without: ``findings.json``; markings that it calls mislabelled are left out.
+        progress: Called with frames done.
 
     Raises:
-        InputError: There is no line file.
+        InputError: There is no line file, or no camera at all.
     """
-    report = Report()
-    found = read_cameras(cameras, report)
+    report, camera_report = Report(), Report()
+    found = _by_frame(read_cameras(cameras, camera_report))
+    if not found:
+        raise _nothing(cameras, camera_report, "camera files")
     dropped = _wrong_labels(without) if without is not None else set()
     pitch = Pitch()
     scores = []
@@ -130,8 +140,12 @@ def score_files(
         kept = _without(file.lines, {marking for stem, marking in dropped if stem == file.stem})
         camera = found.get(file.stem)
         scores.append(None if camera is None else score_frame(camera, kept, pitch, size))
+        if progress is not None:
+            progress(len(scores))
     if not scores:
-        raise _nothing(lines, report)
+        raise _nothing(lines, report, "line files")
+    # A line file that cannot be read is a frame without a camera.
+    scores.extend([None] * (report.read - len(scores)))
     total = score(scores)
     return {
         "frames": total.frames,
@@ -145,7 +159,7 @@ def score_files(
         "error_median_px": total.error_median_px,
         "error_p95_px": total.error_p95_px,
         **_times(cameras),
-        "problems": [problem.message for problem in report.problems],
+        "problems": [item.message for item in (*report.problems, *camera_report.problems)],
     }
 
 
@@ -159,7 +173,7 @@ def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
     report = Report()
     frames = [file.lines for file in read_line_files(source, size, report)]
     if not frames:
-        raise _nothing(source, report)
+        raise _nothing(source, report, "line files")
     found = estimate_pitch(frames, size, CalibrationPolicy())
     return {
         "length_m": found.pitch.length,
@@ -214,7 +228,7 @@ def _summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> d
 def _write(
     out: Path, frames: list[CalibratedFrame], summary: dict[str, Any], with_leave_one_out: bool
 ) -> None:
-    texts = {f"camera_{frame.stem}.json": frame.camera for frame in frames if frame.camera}
+    texts = {_camera_file(frame.stem): frame.camera for frame in frames if frame.camera}
     findings = [
         {"frame": frame.stem, **asdict(finding)} for frame in frames for finding in frame.findings
     ]
@@ -241,11 +255,25 @@ def _own_files(out: Path) -> set[str]:
     """Files of an earlier run; none where no run ended, so nothing foreign is removed."""
     if not (out / "calibrate.json").is_file():
         return set()
-    names = {path.name for path in out.glob("camera_*.json")}
+    names = {str(path.relative_to(out)) for path in out.rglob("camera_*.json")}
     return names | ({"leave_one_out.json"} if (out / "leave_one_out.json").is_file() else set())
 
 
+def _camera_file(stem: str) -> str:
+    """Where a frame's camera goes: frames of the same name stay in their folders."""
+    place = PurePosixPath(stem)
+    return str(place.with_name(f"camera_{place.name}.json"))
+
+
+def _by_frame(cameras: Mapping[str, Camera]) -> dict[str, Camera]:
+    """Cameras by key, and by the bare name of the frame where only one has it."""
+    names = Counter(key.rsplit("/", 1)[-1] for key in cameras)
+    bare = {key.rsplit("/", 1)[-1]: camera for key, camera in cameras.items()}
+    return {**{name: bare[name] for name in bare if names[name] == 1}, **cameras}
+
+
 def _write_atomically(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     partial.write_text(text, encoding="utf-8")
     partial.replace(path)
@@ -268,15 +296,16 @@ def _times(cameras: Path) -> dict[str, Any]:
     """Milliseconds a frame from the ``calibrate.json`` beside the cameras, or null."""
     beside = cameras / "calibrate.json"
     value = read_json(beside.read_bytes(), str(beside)) if beside.is_file() else {}
-    return {name: value.get(name) for name in ("ms_median", "ms_p95")}
+    times = {"ms_median": None, "ms_p95": None}
+    if isinstance(value, dict):
+        times |= {name: value.get(name) for name in times}
+    return {name: time if isinstance(time, int | float) else None for name, time in times.items()}
 
 
-def _nothing(source: Path, report: Report) -> InputError:
+def _nothing(source: Path, report: Report, what: str) -> InputError:
     if report.problems:
         return report.problems[0]
-    return InputError(
-        f"{source} holds no line files", hint="A line file is a JSON file for one image."
-    )
+    return InputError(f"{source} holds no {what}")
 
 
 def _text(value: Any) -> str:

@@ -98,7 +98,8 @@ def export(
         format: One of ``FORMATS``.
         out: Folder, or file that ends in .zip; appears whole or not at all.
         everything: Every group, whatever its verdict.
-        boxes: ``optimized``, ``annotated`` or ``exact``.
+        boxes: ``optimized``, ``annotated`` or ``exact``; which ball box Labels-v3D.json holds. No
+            other format has a place for a chosen box, and its manifest names none.
         images: ``none``, ``copy`` or ``link`` (folders only).
         progress: Called as groups are written.
 
@@ -118,6 +119,7 @@ def export(
             frames = ExportImages(root, images, store.settings)
             run = _Run(session, ids, options, frames, progress)
             counts = run.write(root)
+            _require_content(found, format, counts)
             write_manifest(root, run.manifest(found, counts))
     return ExportReport(out, format, counts, left_out, tuple(frames.missing))
 
@@ -135,14 +137,16 @@ class _Run:
     ):
         self._session, self._ids, self._options = session, ids, options
         self._images, self._progress = images, progress
-        self._licence = UNKNOWN_LICENCE
+        self._licences: set[str] = set()
 
     def write(self, root: Path) -> dict[str, int]:
         """Write the format's files; returns its counts."""
         records, everything = self._records(), self._options.everything
         match self._options.format:
             case "soccernet-v3d":
-                return write_soccernet_v3d(root, records, everything=everything)
+                return write_soccernet_v3d(
+                    root, records, everything=everything, boxes=self._options.boxes
+                )
             case "issia-3d":
                 return write_issia_3d(root, records, everything=everything)
             case "cameras":
@@ -160,8 +164,8 @@ class _Run:
             "policy_hash": dataset.policy.hash,
             "solver_version": SOLVER_VERSION,
             "groups": "all" if self._options.everything else "accepted",
-            "boxes": self._options.boxes,
             "images": self._options.images,
+            **self._boxes(),
         }
         return Manifest(
             dataset=dataset.name,
@@ -169,15 +173,22 @@ class _Run:
             date=_newest(self._session, dataset.id),
             counts=counts,
             settings=settings,
-            licence=self._licence,
+            licence=" ".join(sorted(self._licences)) or UNKNOWN_LICENCE,
             media=tuple(self._images.media),
         )
+
+    def _boxes(self) -> dict[str, str]:
+        """Which ball box stands where, for the format that holds a chosen one."""
+        if self._options.format != "soccernet-v3d":
+            return {}
+        # optimized_d is defined around the centre of the annotated box.
+        return {"boxes": self._options.boxes, "ball_bbox": "annotated"}
 
     def _records(self) -> Iterator[ExportRecord]:
         for start in range(0, len(self._ids), _BATCH):
             batch = self._ids[start : start + _BATCH]
             for place, state in enumerate(read_states(self._session, batch), start + 1):
-                self._licence = LICENCES.get(_origin(state.group), UNKNOWN_LICENCE)
+                self._licences.add(LICENCES.get(_origin(state.group), UNKNOWN_LICENCE))
                 self._images.add(state.group)
                 yield _record(state)
                 if self._progress is not None:
@@ -188,9 +199,15 @@ def _record(state: GroupState) -> ExportRecord:
     return ExportRecord(
         group=state.group,
         solution=state.solution,
-        verdict=state.verdict.state,
+        verdict=_verdict(state.verdict),
         reason=_reason(state.verdict),
     )
+
+
+def _verdict(verdict: VerdictState) -> str:
+    """The verdict; an accepted group that changed since says so, as it is not accepted now."""
+    stale = verdict.stale and verdict.state == "accepted"
+    return f"{verdict.state} (stale)" if stale else verdict.state
 
 
 def _reason(verdict: VerdictState) -> str | None:
@@ -248,14 +265,19 @@ def _nothing(dataset: Dataset, left_out: Mapping[str, int], everything: bool) ->
         )
     if left_out:
         reasons = ", ".join(f"{count} {reason}" for reason, count in left_out.items())
-        return InputError(
-            f'no accepted group of "{dataset.name}" can be exported ({reasons})',
-            hint="Review stale groups again, solve unsolved ones, or export all.",
-        )
+        return InputError(f'no accepted group of "{dataset.name}" can be exported ({reasons})')
     return InputError(
-        f'nobody has accepted a group of "{dataset.name}" yet, so there is nothing to export',
-        hint="Accept groups first, or export all.",
+        f'nobody has accepted a group of "{dataset.name}" yet, so there is nothing to export'
     )
+
+
+def _require_content(dataset: Dataset, format: str, counts: Mapping[str, int]) -> None:  # noqa: A002
+    """Raises InputError where a format has no place for anything that the groups hold."""
+    count, what = _CONTENT.get(format, ("groups", "group"))
+    if not counts[count]:
+        raise InputError(
+            f'no group of "{dataset.name}" has a {what} for {format}, so there is nothing to export'
+        )
 
 
 def _newest(session: Session, dataset_id: int) -> str:
@@ -263,6 +285,13 @@ def _newest(session: Session, dataset_id: int) -> str:
     statement = select(func.max(LogModel.at)).where(LogModel.dataset_id == dataset_id)
     return str(session.execute(statement).scalar_one())
 
+
+_CONTENT = {
+    "cameras": ("cameras", "camera"),
+    "issia-3d": ("groups", "ball"),
+    "sn-calibration": ("frames", "frame"),
+}
+"""What a format consists of: the name of its count, and the word for one."""
 
 _CURRENT = not_(QueueModel.stale)
 _QUALIFIES = or_(QueueModel.passes.is_(True), QueueModel.override.is_not(None))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
-from sqlalchemy import delete, insert, select
+from sqlalchemy import delete, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.review.datasets import find_dataset, insert_dataset
@@ -20,8 +20,8 @@ from app.store.codecs import Json, group_head_to_json, view_to_json
 from app.store.digest import source_hash
 from app.store.group_rows import NewRows
 from app.store.groups import StoredGroup, read_groups, save_group
-from app.store.log import Entry, append
-from app.store.models import GroupModel, ImportFindingModel
+from app.store.log import Entry, append, read_log
+from app.store.models import GroupModel, ImportFindingModel, LogModel
 from app.store.queue import refresh_queue
 from app.store.session import Store
 
@@ -34,12 +34,20 @@ Progress = Callable[[int], None]
 
 @dataclass
 class IngestReport:
-    """What became of the groups; ``findings`` counts edits that a changed source met."""
+    """What became of the groups.
+
+    Attributes:
+        changed: Groups, and static cameras that many groups share.
+        findings: Edits that a changed source met.
+        missing: Groups that this source brought before and does not bring any more; they stay.
+        problems: What to tell about single groups, or about the missing ones.
+    """
 
     new: int = 0
     changed: int = 0
     unchanged: int = 0
     findings: int = 0
+    missing: int = 0
     problems: list[str] = field(default_factory=list)
 
 
@@ -59,7 +67,7 @@ def ingest(
     actor: str,
     progress: Progress | None = None,
 ) -> IngestReport:
-    """Bring groups into a dataset, which is made when there is none of that name.
+    """Bring groups into a dataset, which the first of them makes when there is none of that name.
 
     Killed anywhere and started again, it ends in the same state. What nobody edited follows a
     changed source; what a person edited stays and becomes a finding.
@@ -72,22 +80,51 @@ def ingest(
         actor: Who imports.
         progress: Called after each batch.
     """
-    report, seen = IngestReport(), set[str]()
-    origin = _Origin(ensure_dataset(store, dataset, actor), source, actor)
+    report, seen, done = IngestReport(), set[str](), 0
     sound = _sound(groups, seen, report)
     while batch := list(islice(sound, BATCH)):
         with store.write() as session:
+            origin = _Origin(_ensure_dataset(session, dataset, actor), source, actor)
             _ingest_batch(session, origin, batch, report)
+        done += len(batch)
         if progress is not None:
-            progress(report.new + report.changed + report.unchanged)
+            progress(done)
+    if done:
+        with store.read() as session:
+            _note_missing(session, origin, seen, report)
     return report
 
 
 def ensure_dataset(store: Store, dataset: str, actor: str) -> int:
     """Id of the dataset of that name, made with the default policy when there is none."""
     with store.write() as session:
-        row = find_dataset(session, dataset)
-        return insert_dataset(session, dataset, PAPER, actor) if row is None else int(row.id)
+        return _ensure_dataset(session, dataset, actor)
+
+
+def _ensure_dataset(session: Session, dataset: str, actor: str) -> int:
+    row = find_dataset(session, dataset)
+    return insert_dataset(session, dataset, PAPER, actor) if row is None else int(row.id)
+
+
+def _note_missing(
+    session: Session, origin: _Origin, seen: Collection[str], report: IngestReport
+) -> None:
+    """Count the groups that the same source brought last and that did not come this time."""
+    statement = select(GroupModel.id, GroupModel.key).where(
+        GroupModel.dataset_id == origin.dataset_id
+    )
+    absent = [row.id for row in session.execute(statement) if row.key not in seen]
+    for start in range(0, len(absent), BATCH):
+        newest = (
+            select(func.max(LogModel.id))
+            .where(LogModel.kind == "import", LogModel.group_id.in_(absent[start : start + BATCH]))
+            .group_by(LogModel.group_id)
+        )
+        entries = read_log(session, LogModel.id.in_(newest))
+        report.missing += sum(entry.body["source"] == origin.source for entry in entries)
+    if report.missing:
+        groups = "1 group" if report.missing == 1 else f"{report.missing} groups"
+        report.problems.append(f"{groups} of an earlier import did not come again; all stay")
 
 
 def _sound(groups: Iterable[Group], seen: set[str], report: IngestReport) -> Iterator[Group]:
@@ -115,6 +152,7 @@ def _ingest_batch(
     shared = SharedStations(session, origin.dataset_id, origin.source, origin.actor)
     for group in batch:
         shared.follow(view.station for view in group.views)
+    report.changed += shared.changed
     report.findings += shared.findings
     known = _known(session, origin.dataset_id, [group.key for group in batch])
     fresh: list[tuple[Group, str]] = []

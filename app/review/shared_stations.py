@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from sqlalchemy import delete, insert, select
 from sqlalchemy.orm import Session
@@ -10,7 +11,7 @@ from sqlalchemy.orm import Session
 from app.review.upstream import KIND, FollowedStation, follow_station
 from app.soccer.group import Station
 from app.store.clock import now
-from app.store.codecs import station_to_json
+from app.store.codecs import camera_from_json, station_from_json, station_to_json
 from app.store.digest import station_digest
 from app.store.group_rows import NewRows
 from app.store.groups import (
@@ -20,16 +21,19 @@ from app.store.groups import (
     save_station,
     stored_station,
 )
-from app.store.log import Entry, append
-from app.store.models import ImportFindingModel, StationModel
+from app.store.log import Entry, append, read_log
+from app.store.models import ImportFindingModel, LogModel, StationModel
 from app.store.queue import refresh_queue
 
 
 class SharedStations:
-    """The shared stations of a dataset within one write transaction."""
+    """The shared stations of a dataset within one write transaction.
+
+    ``changed`` counts those that were there and changed, ``findings`` edits that stayed.
+    """
 
     def __init__(self, session: Session, dataset_id: int, source: str, actor: str):
-        self.findings = 0
+        self.changed = self.findings = 0
         self.ids: dict[str, int] = {}
         """By key."""
         self._session, self._dataset_id = session, dataset_id
@@ -57,10 +61,26 @@ class SharedStations:
         if stored is None:
             self._insert(incoming)
             return
-        followed = follow_station(stored, incoming)
+        source = None if incoming.lines else self._source_of(stored)
+        followed = follow_station(stored, incoming, source)
         changed = followed.station != stored.station
         if changed or station_digest(followed.base) != stored.source_digest:
             self._save(stored, followed)
+            self.changed += 1
+
+    def _source_of(self, stored: StoredStation) -> Station | None:
+        """A station as its dataset last brought it; under an edit only the log remembers."""
+        if not stored.edited:
+            return stored.station
+        found = said = None
+        for entry in read_log(self._session, LogModel.station_id == stored.id):
+            if entry.kind == "station":
+                said = station_from_json(entry.body["base"] or entry.body["station"])
+            elif entry.kind == "camera" and said is not None:
+                said = replace(said, given=camera_from_json(entry.body["given"]))
+            if said is not None and station_digest(said) == stored.source_digest:
+                found = said
+        return found
 
     def _insert(self, station: Station) -> None:
         rows = NewRows(self._session, self._dataset_id)

@@ -40,8 +40,8 @@ def ingest_spare(
     People do not edit them, so they follow whatever the dataset brings.
     """
     report, items = IngestReport(), iter(frames)
-    dataset_id = ensure_dataset(store, dataset, actor)
     while batch := list(islice(items, BATCH)):
+        dataset_id = ensure_dataset(store, dataset, actor)
         with store.write() as session:
             _keep(session, dataset_id, batch, source, actor, report)
     return report

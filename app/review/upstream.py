@@ -67,11 +67,22 @@ def follow_group(stored: StoredGroup, incoming: Group) -> Followed:
     )
 
 
-def follow_station(stored: StoredStation, incoming: Station) -> FollowedStation:
+def follow_station(
+    stored: StoredStation, incoming: Station, source: Station | None = None
+) -> FollowedStation:
     """The stored station brought up to the incoming one, unless a person edited it.
 
-    A calibration that was imported on its own stays when the dataset brings none.
+    A calibration that was imported on its own stays when the dataset brings none. So do the
+    lines of a shared station, and which calibration counts: they come from files of their own,
+    which an import may leave out.
+
+    Args:
+        stored: The station as it is.
+        incoming: The station as the dataset brings it now.
+        source: The station as the dataset brought it before, where that is known.
     """
+    if incoming.shared and not incoming.lines and source is not None and source.lines:
+        incoming = replace(incoming, lines=source.lines, calibration=source.calibration)
     if incoming.given is None and stored.station.given is not None:
         incoming = replace(incoming, given=stored.station.given)
     if not stored.edited:

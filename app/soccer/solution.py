@@ -195,6 +195,10 @@ class BallFit:
     """Annotated diameter over optimised diameter; None for a point annotation."""
     depth_m: float | None
     """Distance of the ball along the optical axis."""
+    monocular: tuple[float, float, float] | None = None
+    """Where this view alone puts the ball, from its annotated box; None for a point."""
+    monocular_error_m: float | None = None
+    """Distance of that place from the triangulated ball."""
     depth_per_px_m: float | None = None
     """Metres that the monocular ball moves along the axis for one pixel of diameter."""
 

@@ -7,7 +7,7 @@ import numpy as np
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.geometry.sphere import optimal_diameter, tight_box
+from app.geometry.sphere import optimal_diameter, position_from_diameter, tight_box
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.solution import BallFit
@@ -37,6 +37,7 @@ def fit_ball(
     diameter, off_ray = _optimal(camera, center, point, diameter_m)
     annotated = ball.box.diameter if ball.box is not None else None
     depth = float(camera.pitch_to_camera(point[None])[0, 2])
+    alone = _monocular(camera, ball, diameter_m)
     return BallFit(
         reprojected=ImagePoint(float(pixel[0]), float(pixel[1])) if seen else None,
         error_px=error,
@@ -47,9 +48,20 @@ def fit_ball(
         exact_box=_exact_box(camera, point, diameter_m),
         size_ratio=annotated / diameter if annotated and diameter else None,
         depth_m=depth,
+        monocular=(float(alone[0]), float(alone[1]), float(alone[2]))
+        if alone is not None
+        else None,
+        monocular_error_m=float(np.linalg.norm(alone - point)) if alone is not None else None,
         # Depth times diameter is constant, so the slope is depth over diameter.
         depth_per_px_m=depth / diameter if diameter else None,
     )
+
+
+def _monocular(camera: Camera, ball: BallAnnotation, diameter_m: float) -> FloatArray | None:
+    if ball.box is None or ball.box.diameter <= 0:
+        return None
+    found = position_from_diameter(camera, np.array(ball.box.center), ball.box.diameter, diameter_m)
+    return found if np.isfinite(found).all() else None
 
 
 def _optimal(

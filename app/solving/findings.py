@@ -47,7 +47,13 @@ def find(
     swaps = {swap.view: swap for swap in find_swaps(sights, policy)}
     found: list[Finding] = []
     for view, solved in zip(group.views, views, strict=True):
-        found.extend(calibration_findings(solved.calibration, view.size, view.key))
+        said = calibration_findings(solved.calibration, view.size, view.key)
+        # A static camera would say in every frame what nobody annotated in any.
+        found.extend(
+            item
+            for item in said
+            if not (view.station.shared and item.kind == "visible_not_annotated")
+        )
         found.extend(_several_balls(view))
         if view.key in swaps:
             found.append(_sides_swapped(swaps[view.key]))

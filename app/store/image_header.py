@@ -29,25 +29,43 @@ class ImageHeader:
     height: int
 
 
-def read_header(data: bytes) -> ImageHeader:
+class _BrokenError(Exception):
+    """What is wrong with a header, to be said of the image that it belongs to."""
+
+
+def read_header(data: bytes, name: str = "the image") -> ImageHeader:
     """Kind and size of an image.
+
+    Args:
+        data: Its bytes.
+        name: How a complaint calls it.
 
     Raises:
         ImageError: Neither JPEG, PNG nor WebP, or its header is damaged.
     """
     try:
-        if data.startswith(b"\xff\xd8\xff"):
-            return ImageHeader(JPEG, *_jpeg_size(data))
-        if data.startswith(_PNG_START):
-            return ImageHeader(PNG, *_png_size(data))
-        if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
-            return ImageHeader(WEBP, *_webp_size(data))
+        header = _read(data)
     except (struct.error, IndexError) as error:
-        raise ImageError("the image is cut off within its header") from error
-    raise ImageError("the frame is no JPEG, PNG or WebP image")
+        raise ImageError(f"{name} is cut off within its header") from error
+    except _BrokenError as error:
+        raise ImageError(f"{name} {error}") from error
+    if header is None:
+        raise ImageError(f"{name} is no JPEG, PNG or WebP image")
+    return header
 
 
-def check_size(header: ImageHeader, settings: Settings) -> None:
+def _read(data: bytes) -> ImageHeader | None:
+    """Kind and size; None when the first bytes are those of no kind."""
+    if data.startswith(b"\xff\xd8\xff"):
+        return ImageHeader(JPEG, *_jpeg_size(data))
+    if data.startswith(_PNG_START):
+        return ImageHeader(PNG, *_png_size(data))
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        return ImageHeader(WEBP, *_webp_size(data))
+    return None
+
+
+def check_size(header: ImageHeader, settings: Settings, name: str = "the image") -> None:
     """Refuse an image that is too large to decode.
 
     Raises:
@@ -56,17 +74,17 @@ def check_size(header: ImageHeader, settings: Settings) -> None:
     """
     width, height = header.width, header.height
     if min(width, height) < 1:
-        raise ImageError(f"the image declares {width} x {height} pixels")
+        raise ImageError(f"{name} declares {width} x {height} pixels")
     if max(width, height) > settings.max_side or width * height > settings.max_pixels:
         raise TooLargeError(
-            f"the image declares {width} x {height} pixels; {settings.max_side} a side and "
+            f"{name} declares {width} x {height} pixels; {settings.max_side} a side and "
             f"{settings.max_pixels} in all are allowed"
         )
 
 
 def _png_size(data: bytes) -> tuple[int, int]:
     if data[12:16] != b"IHDR":
-        raise ImageError("the PNG does not begin with its header")
+        raise _BrokenError("is a PNG that does not begin with its header")
     width, height = struct.unpack(">II", data[16:24])
     return width, height
 
@@ -75,7 +93,7 @@ def _jpeg_size(data: bytes) -> tuple[int, int]:
     place = 2
     while True:
         if data[place] != 0xFF:
-            raise ImageError("the JPEG has no frame header")
+            raise _BrokenError("is a JPEG without a frame header")
         marker = data[place + 1]
         if marker == 0xFF:
             place += 1
@@ -85,11 +103,11 @@ def _jpeg_size(data: bytes) -> tuple[int, int]:
             height, width = struct.unpack(">HH", data[place + 5 : place + 9])
             return width, height
         elif marker in (0xD9, 0xDA):
-            raise ImageError("the JPEG has no frame header")
+            raise _BrokenError("is a JPEG without a frame header")
         else:
             (length,) = struct.unpack(">H", data[place + 2 : place + 4])
             if length < 2:
-                raise ImageError("the JPEG has a segment without a length")
+                raise _BrokenError("is a JPEG with a segment without a length")
             place += 2 + length
 
 
@@ -104,7 +122,7 @@ def _webp_size(data: bytes) -> tuple[int, int]:
     if chunk == b"VP8 ":
         width, height = struct.unpack("<HH", data[26:30])
         return width & 0x3FFF, height & 0x3FFF
-    raise ImageError("the WebP holds no image")
+    raise _BrokenError("is a WebP that holds no image")
 
 
 def _need(data: bytes, start: int, end: int) -> bytes:

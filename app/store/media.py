@@ -43,7 +43,7 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
         TooLargeError: It is larger than the limits, in bytes or in declared pixels.
     """
     if media.frame is None and width is None and not flipped:
-        return _checked(_source(media, settings), settings)
+        return _checked(_source(media, settings), settings, frame_name(media))
     place = settings.cache / "frames" / _cache_name(media, width, flipped)
     with contextlib.suppress(OSError):
         return place.read_bytes()
@@ -64,6 +64,14 @@ def content_type(data: bytes) -> str:
     return read_header(data).kind
 
 
+def frame_name(media: Media) -> str:
+    """How a complaint calls a frame: by its file and its place in it, without the folder."""
+    file = Path(media.path).name
+    if media.member is not None:
+        return f"frame {media.member} of {file}"
+    return f"frame {file}" if media.frame is None else f"frame {media.frame} of {file}"
+
+
 def media_facts(media: Media) -> dict[str, int]:
     """Size in bytes, and CRC-32 where an archive knows it; empty when the file is gone."""
     try:
@@ -75,16 +83,16 @@ def media_facts(media: Media) -> dict[str, int]:
     return {"bytes": size, "crc32": crc}
 
 
-def _checked(data: bytes, settings: Settings) -> bytes:
+def _checked(data: bytes, settings: Settings, name: str) -> bytes:
     """The bytes unchanged, once they were seen to decode."""
-    _pixels(data, settings)
+    _pixels(data, settings, name)
     return data
 
 
 def _decode(media: Media, settings: Settings) -> Any:
     if media.frame is not None:
         return _video_frame(Path(media.path), media.frame, settings)
-    return _pixels(_source(media, settings), settings)
+    return _pixels(_source(media, settings), settings, frame_name(media))
 
 
 def _source(media: Media, settings: Settings) -> bytes:
@@ -99,23 +107,23 @@ def _source(media: Media, settings: Settings) -> bytes:
         raise StorageError(f"{path.name} cannot be read") from error
 
 
-def _pixels(data: bytes, settings: Settings) -> Any:
-    header = read_header(data)
-    check_size(header, settings)
+def _pixels(data: bytes, settings: Settings, name: str) -> Any:
+    header = read_header(data, name)
+    check_size(header, settings, name)
     try:
         picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), _FLAGS)
     except cv2.error as error:
-        raise ImageError("the image is damaged") from error
+        raise ImageError(f"{name} is damaged") from error
     if picture is None:
-        raise ImageError("the image is damaged")
-    _require_declared(picture, header)
+        raise ImageError(f"{name} is damaged")
+    _require_declared(picture, header, name)
     return picture
 
 
-def _require_declared(picture: Any, header: ImageHeader) -> None:
+def _require_declared(picture: Any, header: ImageHeader, name: str) -> None:
     height, width = picture.shape[:2]
     if (width, height) != (header.width, header.height):
-        raise ImageError("the image is not of the size that its header declares")
+        raise ImageError(f"{name} is not of the size that its header declares")
 
 
 def _video_frame(path: Path, number: int, settings: Settings) -> Any:
@@ -125,7 +133,7 @@ def _video_frame(path: Path, number: int, settings: Settings) -> Any:
         if not video.isOpened():
             raise ImageError(f"{path.name} is no video that can be read")
         size = (video.get(cv2.CAP_PROP_FRAME_WIDTH), video.get(cv2.CAP_PROP_FRAME_HEIGHT))
-        check_size(ImageHeader("video", int(size[0]), int(size[1])), settings)
+        check_size(ImageHeader("video", int(size[0]), int(size[1])), settings, path.name)
         video.set(cv2.CAP_PROP_POS_FRAMES, number)
         done, picture = video.read()
     finally:

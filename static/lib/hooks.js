@@ -1,7 +1,7 @@
 // @ts-check
 /** Hooks that views share. */
 
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 
 import { bind } from './keys.js';
 
@@ -35,7 +35,8 @@ export function useSize() {
  * @param {readonly Binding[]} bindings the same array as long as nothing changed
  */
 export function useKeys(bindings) {
-	useEffect(() => bind(bindings), [bindings]);
+	// Before the next paint: whoever types X 1 in one go must not find the 1 unbound.
+	useLayoutEffect(() => bind(bindings), [bindings]);
 }
 
 /** The time, renewed so that "12 s ago" stays true. @param {number} interval ms */

@@ -1,6 +1,6 @@
 """``make bench``: what Touchline measures of itself, printed as tables.
 
-Accuracy is compared with the peer's published figures, speed with libraries in the same run.
+Accuracy is compared with published figures of PnLCalib, speed with libraries in the same run.
 Timings gate no test: machines are shared and noisy.
 """
 
@@ -13,7 +13,9 @@ from tests.bench.ball import bench_ball
 from tests.bench.calibration import bench_calibration
 from tests.bench.geometry import bench_geometry
 
-REAL_DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", "../shared/data"))
+REAL_DATA = Path(
+    os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data")
+)
 
 
 def main() -> None:

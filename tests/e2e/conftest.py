@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -16,6 +15,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, sync_playwright
 
+from tests.e2e.install_chromium import ADVICE, find_chromium
+
 ROOT = Path(__file__).resolve().parents[2]
 GROUPS = 14
 SIZE = {"width": 1440, "height": 900}
@@ -23,16 +24,9 @@ START_SECONDS = 60.0
 
 
 def _chromium() -> str:
-    named = os.environ.get("TOUCHLINE_CHROMIUM")
-    found = named or next(
-        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-    )
+    found = find_chromium()
     if not found or not Path(found).exists():
-        pytest.fail(
-            "The browser tests need Chromium: install the system's package (for example "
-            "'apt-get install chromium') or name its program in TOUCHLINE_CHROMIUM.",
-            pytrace=False,
-        )
+        pytest.fail(ADVICE, pytrace=False)
     return found
 
 

@@ -21,7 +21,10 @@ from app.soccer.solution import Solution
 from app.solving.solve import solve
 from app.store.session import Store
 
-DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", "../shared/data")) / "issia"
+DATA = (
+    Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
+    / "issia"
+)
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real data in {DATA}")
 
 IMPOSSIBLE = (1492, 1493, 1494, 1495)

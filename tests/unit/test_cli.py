@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import resource
 import socket
 import subprocess
@@ -131,6 +132,20 @@ class TestSolve:
         code, out, _ = run("solve", "--dataset", "sn", "--workers", "1", "--json")
         assert (code, json.loads(out)["total"]) == (0, 0)
 
+    def test_another_policy_solves_everything_once_more(self, run: Run, line_files: Path) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "sn")
+        command = ("solve", "--dataset", "sn", "--workers", "1", "--json")
+        totals = []
+        for policy in ((), ("--policy", "strict"), ("--policy", "strict"), (), ("--policy=paper",)):
+            code, out, err = run(*command, *policy)
+            assert code == 0, err
+            totals.append(json.loads(out)["total"])
+        # The solutions of the policy before are still there when it comes back.
+        assert totals == [2, 2, 0, 0, 0]
+
+    def test_a_policy_that_there_is_not_is_wrong_usage(self, run: Run) -> None:
+        assert run("solve", "--dataset", "sn", "--policy", "lenient")[0] == 2
+
     def test_an_unknown_dataset_is_one_sentence(self, run: Run) -> None:
         code, out, err = run("solve", "--dataset", "nothing")
         assert (code, out) == (1, "")
@@ -165,6 +180,20 @@ class TestExport:
         out = tmp_path / "out.zip"
         code, _, err = run("export", "--dataset", "sn", "--format", "sn-calibration", "--all", out)
         assert (code, out.exists()) == (0, True), err
+
+    def test_images_that_are_missing_are_named(self, run: Run, tmp_path: Path) -> None:
+        tree = tmp_path / "tree"
+        run("sample", tree, "--groups", 1, "--labels-only")
+        for labels in tree.rglob("Labels-v3.json"):
+            for name in json.loads(labels.read_text())["actions"]:
+                (labels.parent / name).write_bytes(b"GIF89a")
+        run("import", "soccernet-v3", tree, "--dataset", "s")
+        out = tmp_path / "out"
+        command = ("export", "--dataset", "s", "--format", "soccernet-v3", "--all", out)
+        code, told, err = run(*command, "--images", "copy")
+        assert code == 0, err
+        assert re.search(r"\n  .*, (\w+\.png): frame \1 is no JPEG, PNG or WebP image\n", told)
+        assert str(tree) not in told
 
     def test_an_unknown_format_is_wrong_usage(self, run: Run, tmp_path: Path) -> None:
         assert run("export", "--dataset", "sn", "--format", "doc", tmp_path / "out")[0] == 2
@@ -238,10 +267,18 @@ class TestSample:
         command = ("sample", "--groups", 2, "--labels-only", "--dataset", "s", "--workers", "1")
         assert run(*command)[0] == 0
         assert (tmp_path / "home" / "sample" / "truth.json").is_file()
-        code, told, _ = run(*command)
-        assert (code, told) == (0, "")
+        assert run(*command)[0] == 0
         _, told, _ = run("solve", "--dataset", "s", "--workers", "1", "--json")
         assert json.loads(told)["total"] == 0
+
+    def test_one_json_document_tells_whether_it_was_written_or_there(self, run: Run) -> None:
+        command = ("sample", "--groups", 2, "--labels-only", "--dataset", "s", "--workers", "1")
+        known = {"dataset": "s", "groups": 2, "solved": 2}
+        for written in (True, False):
+            code, told, _ = run(*command, "--json")
+            report = json.loads(told)
+            assert (code, report["written"]) == (0, written)
+            assert known.items() <= report.items()
 
     def test_needs_to_know_where_to(self, run: Run) -> None:
         assert run("sample")[0] == 2

@@ -1,4 +1,4 @@
-"""Datasets: what there is, how far it is, and how its numbers are spread."""
+"""Datasets: what there is, how far it is, how its numbers are spread, and what judges it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path
 
-from app.api.deps import AppStore, QueryText
+from app.api.deps import Actor, AppServices, AppStore, QueryText
+from app.api.policies import choose_policy
 from app.api.problem import responses
 from app.api.schemas.dataset import DatasetDocument, DatasetList, SummaryDocument
+from app.api.schemas.policy import PolicyEdit
 from app.review import datasets as review
 from app.review.progress import summary
 
@@ -34,3 +36,17 @@ def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") ->
     """Progress and histograms over the groups that a query matches."""
     found = review.get_dataset(store, dataset)
     return SummaryDocument.of(summary(store, found.id, query))
+
+
+@router.put("/{dataset}/policy", operation_id="setPolicy", responses=responses(404, 413, 415))
+def put_policy(
+    dataset: DatasetPath, policy: PolicyEdit, services: AppServices, actor: Actor
+) -> DatasetDocument:
+    """Judge the dataset by another policy.
+
+    Needs no If-Match: it replaces the whole policy, so the last one counts. What is left without
+    a solution is stale and solved in the background; `solved` of the dataset follows.
+    """
+    chosen = choose_policy(services.store, dataset, policy.name, actor=actor)
+    services.recompute.request(chosen.name)
+    return DatasetDocument.of(chosen)

@@ -17,13 +17,14 @@ from app.api.deps import (
     IfMatch,
     etag_matches,
 )
-from app.api.lookup import find_view
+from app.api.lookup import FoundView, find_view
 from app.api.problem import Responses, responses
 from app.api.routers.groups import CHANGED, CONFLICTS, answer, load_document
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import ViewEdit
-from app.errors import NotFoundError
+from app.config import Settings
+from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.edit import Edit, IncludeView, SetBall, SetCalibrationSource, SetLines
 from app.review.submit import submit
 from app.store.media import content_type, read_frame
@@ -35,6 +36,9 @@ WIDTH_STEP = 16
 """Asked widths are rounded up to a multiple, so that few sizes fill the cache."""
 MIN_WIDTH, MAX_WIDTH = 16, 4096
 SECONDS = 3600
+NO_FRAME_HINT = (
+    "The import's report says why; importing again after the files are mended attaches the frames."
+)
 IMAGES: Responses = {
     200: {
         "description": "The frame as JPEG, PNG or WebP.",
@@ -132,15 +136,24 @@ def get_image(
     ] = None,
 ) -> Response:
     """The frame of a view, scaled down when a width is given."""
-    found = find_view(services.store, view)
-    if found.media is None:
-        raise NotFoundError("this view has no frame", hint="Its dataset came with labels alone.")
-    content = read_frame(found.media, clamp_width(width), found.flipped, services.settings)
+    content = _frame(find_view(services.store, view), width, services.settings)
     etag = f'"{hashlib.sha256(content).hexdigest()[:32]}"'
     headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
     if etag_matches(request, etag):
         return Response(status_code=304, headers=headers)
     return Response(content, media_type=content_type(content), headers=headers)
+
+
+def _frame(view: FoundView, width: int | None, settings: Settings) -> bytes:
+    """The frame; what is wrong with it is said with the view that it belongs to."""
+    if view.media is None:
+        raise NotFoundError("this view has no frame that could be read", hint=NO_FRAME_HINT)
+    try:
+        return read_frame(view.media, clamp_width(width), view.flipped, settings)
+    except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
+        # The cause decides between a full disk and one that fails.
+        cause = error.__cause__ or error
+        raise type(error)(f"view {view.key}: {error.message}", hint=error.hint) from cause
 
 
 def clamp_width(width: int | None) -> int | None:

@@ -10,6 +10,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    JsonValue,
     StrictBool,
     WithJsonSchema,
     model_validator,
@@ -94,13 +95,47 @@ def points_of(lines: dict[str, list[Point] | None]) -> dict[str, tuple[ImagePoin
     }
 
 
+_NO_PLACE: dict[str, JsonValue] = {"type": "null"}
+_SEEN: dict[str, JsonValue] = {"const": False}
+
+
 class BallEdit(BaseModel):
     """The ball of a view: its box, or its centre alone, or that it is out of view."""
 
     model_config = ConfigDict(
         extra="forbid",
         json_schema_extra={
-            "examples": [{"box": [801.5, 322.0, 14.0, 14.5]}, {"point": [808.5, 329.0]}]
+            "examples": [
+                {"box": [801.5, 322.0, 14.0, 14.5]},
+                {"point": [808.5, 329.0]},
+                {"out_of_view": True},
+            ],
+            "oneOf": [
+                {
+                    "required": ["box"],
+                    "properties": {
+                        "box": {"type": "array"},
+                        "point": _NO_PLACE,
+                        "out_of_view": _SEEN,
+                    },
+                },
+                {
+                    "required": ["point"],
+                    "properties": {
+                        "box": _NO_PLACE,
+                        "point": {"type": "array"},
+                        "out_of_view": _SEEN,
+                    },
+                },
+                {
+                    "required": ["out_of_view"],
+                    "properties": {
+                        "box": _NO_PLACE,
+                        "point": _NO_PLACE,
+                        "out_of_view": {"const": True},
+                    },
+                },
+            ],
         },
     )
 
@@ -111,16 +146,20 @@ class BallEdit(BaseModel):
 
     @model_validator(mode="after")
     def _one_place(self) -> BallEdit:
-        if not self.model_fields_set:
-            raise ValueError("give a box, a point, out_of_view, or null for no ball")
-        if self.box is not None and self.point is not None:
+        placed = (self.box is not None) + (self.point is not None)
+        if placed == 2:
             raise ValueError("give a box or a point, not both")
+        if placed and self.out_of_view:
+            raise ValueError("a ball that is out of view has neither a box nor a point")
+        if not placed and not self.out_of_view:
+            raise ValueError(
+                "give a box, a point or out_of_view: true; null in place of the whole ball "
+                "says that there is none"
+            )
         return self
 
-    def ball(self) -> BallAnnotation | None:
-        """The annotation; None when it says that there is no ball."""
-        if self.box is None and self.point is None and not self.out_of_view:
-            return None
+    def ball(self) -> BallAnnotation:
+        """The annotation that it says."""
         return BallAnnotation(
             box=None if self.box is None else Box(*self.box),
             point=None if self.point is None else ImagePoint(*self.point),

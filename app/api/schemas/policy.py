@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, Field
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy
+
+
+class PolicyEdit(BaseModel):
+    """The policy that a dataset shall be judged by, by its name."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"name": "strict"}]})
+
+    name: Literal["paper", "strict"]
 
 
 class PolicyDocument(BaseModel):

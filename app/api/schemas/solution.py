@@ -150,6 +150,8 @@ class BallFitDocument(BaseModel):
     exact_box: XYWH | None
     size_ratio: float | None
     depth_m: float | None
+    monocular: XYZ | None = Field(description="Where this view alone puts the ball.")
+    monocular_error_m: float | None
     depth_per_px_m: float | None = Field(
         description="Metres of depth of the monocular ball for a pixel of diameter."
     )
@@ -167,6 +169,8 @@ class BallFitDocument(BaseModel):
             exact_box=_xywh(fit.exact_box),
             size_ratio=fit.size_ratio,
             depth_m=fit.depth_m,
+            monocular=fit.monocular,
+            monocular_error_m=fit.monocular_error_m,
             depth_per_px_m=fit.depth_per_px_m,
         )
 

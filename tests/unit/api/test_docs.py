@@ -10,7 +10,9 @@ from typing import Any
 import pytest
 
 from app.api.schemas.group import GroupDocument
+from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.problem import Problem
+from app.soccer.policy import PAPER
 
 PAGE = (Path(__file__).parents[3] / "docs" / "api.md").read_text(encoding="utf-8")
 PROBLEM, GROUP = re.findall(r"```json\n(.*?)```", PAGE, re.S)
@@ -36,6 +38,11 @@ class TestGroup:
         shown = json.loads(GROUP)
         assert set(shown) == set(GroupDocument.model_fields)
 
+    def test_its_policy_is_the_one_that_is_in_force(self) -> None:
+        shown = json.loads(GROUP)
+        assert shown["policy"] == PolicyDocument.of(PAPER).model_dump(mode="json")
+        assert shown["policy"]["hash"] == shown["solution"]["policy_hash"] == PAPER.hash
+
 
 class TestProblem:
     def test_is_one(self) -> None:
@@ -50,3 +57,6 @@ class TestAddresses:
         wanted = re.sub(r"/(\d+|sample|[0-9a-f]{32})(?=/|$)", "/{}", f"/api/v1{address}")
         known = {re.sub(r"{\w+}", "{}", path) for path in app.openapi()["paths"]}
         assert wanted in known
+
+    def test_the_policy_is_listed(self) -> None:
+        assert "PUT /datasets/{id}/policy" in PAGE

@@ -5,6 +5,7 @@ import csv
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,8 @@ from app.datasets.soccernet_v3 import read_soccernet_v3
 from app.datasets.soccernet_v3d import COLUMNS, write_soccernet_v3d
 from app.errors import InputError
 from app.geometry.camera import Camera
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box
 from app.soccer.group import Group
 
 Solved = Callable[..., ExportRecord]
@@ -117,7 +120,7 @@ class TestWriteSoccernetV3d:
         self, tmp_path: Path, solved: Solved, soccer_group: Make, match: str, report: Report
     ) -> None:
         group = soccer_group()
-        write_soccernet_v3d(tmp_path, [solved(group)])
+        write_soccernet_v3d(tmp_path, [solved(group)], boxes="annotated")
         path = tmp_path / match / "Labels-v3D.json"
         path.rename(path.with_name("Labels-v3.json"))
         (again,) = read_soccernet_v3(tmp_path, report)
@@ -125,6 +128,51 @@ class TestWriteSoccernetV3d:
             view.station.lines for view in group.views
         ]
         assert [view.balls for view in again.views] == [view.balls for view in group.views]
+
+    @pytest.mark.parametrize(
+        ("boxes", "points"),
+        [
+            ("annotated", [610.0, 300.0, 622.0, 311.0]),
+            ("optimized", [610.75, 300.25, 621.25, 310.75]),
+            ("exact", [610.5, 300.0, 621.1, 310.4]),
+        ],
+    )
+    @pytest.mark.parametrize("everything", [False, True])
+    def test_the_labels_hold_the_chosen_ball_box_of_views_that_take_part(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, match: str, boxes: str,
+        points: list[float], everything: bool,
+    ) -> None:  # fmt: skip
+        records = [solved(soccer_group(replays=2))]
+        write_soccernet_v3d(tmp_path, records, everything=everything, boxes=boxes)
+        labels = json.loads((tmp_path / match / "Labels-v3D.json").read_text())
+        images = labels["actions"] | labels["replays"]
+        found = {
+            name: [list(box["points"].values()) for box in image["bboxes"]]
+            for name, image in images.items()
+        }
+        annotated = [610.0, 300.0, 622.0, 311.0]
+        assert found == {
+            "7.png": [pytest.approx(points)],
+            "7_1.png": [pytest.approx(points)],
+            "7_2.png": [annotated],
+        }
+
+    def test_the_table_keeps_the_annotated_box(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        write_soccernet_v3d(tmp_path, [solved(soccer_group())], boxes="exact")
+        assert {row["ball_bbox"] for row in _rows(tmp_path)} == {"[610.0, 300.0, 12.0, 11.0]"}
+
+    def test_several_balls_stay_as_they_are(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, match: str
+    ) -> None:
+        group = soccer_group()
+        balls = (*group.views[0].balls, BallAnnotation(box=Box(10.0, 20.0, 8.0, 8.0)))
+        record = solved(group.with_view(replace(group.views[0], balls=balls)))
+        write_soccernet_v3d(tmp_path, [record])
+        labels = json.loads((tmp_path / match / "Labels-v3D.json").read_text())
+        corners = [box["points"]["x1"] for box in labels["actions"]["7.png"]["bboxes"]]
+        assert corners == [610.0, 10.0]
 
     def test_groups_of_other_datasets_are_refused(
         self, tmp_path: Path, solved: Solved, issia_group: Make

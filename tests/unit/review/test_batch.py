@@ -90,6 +90,17 @@ class TestCalibrateFiles:
         assert "broken" in {item["frame"] for item in summary["failed"]}
         assert "broken.json" in summary["problems"][0]
 
+    def test_frames_of_the_same_name_stay_in_their_folders(self, tmp_path):
+        source = tmp_path / "lines"
+        write(source / "train", same=click(MAIN, 0.5))
+        write(source / "valid", same=click(OPPOSITE, 0.5))
+        assert run(source, tmp_path / "out")["calibrated"] == 2
+        assert (tmp_path / "out" / "train" / "camera_same.json").is_file()
+        assert score_files(source, tmp_path / "out", size=SIZE)["calibrated"] == 2
+        (source / "valid" / "same.json").unlink()
+        run(source, tmp_path / "out")
+        assert not (tmp_path / "out" / "valid" / "camera_same.json").exists()
+
     def test_a_folder_without_line_files_is_refused(self, tmp_path):
         (tmp_path / "empty").mkdir()
         with pytest.raises(InputError, match="holds no line files"):
@@ -116,6 +127,23 @@ class TestScoreFiles:
     def test_cameras_of_others_have_no_times(self, lines, tmp_path):
         run(lines, tmp_path / "out")
         (tmp_path / "out" / "calibrate.json").unlink()
+        assert score_files(lines, tmp_path / "out", size=SIZE)["ms_median"] is None
+
+    def test_a_line_file_that_cannot_be_read_counts_as_a_frame(self, lines, tmp_path):
+        run(lines, tmp_path / "out")
+        (lines / "broken.json").write_text("[")
+        total = score_files(lines, tmp_path / "out", size=SIZE)
+        assert (total["frames"], len(total["problems"])) == (5, 1)
+
+    def test_a_folder_without_cameras_is_refused(self, lines, tmp_path):
+        (tmp_path / "empty").mkdir()
+        with pytest.raises(InputError, match="holds no camera files"):
+            score_files(lines, tmp_path / "empty", size=SIZE)
+
+    @pytest.mark.parametrize("text", ["[1]", '{"ms_median": "fast"}'])
+    def test_times_that_are_no_numbers_are_passed_over(self, lines, tmp_path, text):
+        run(lines, tmp_path / "out")
+        (tmp_path / "out" / "calibrate.json").write_text(text)
         assert score_files(lines, tmp_path / "out", size=SIZE)["ms_median"] is None
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from app.errors import InputError, NotFoundError
+from app.review.datasets import create_dataset
 from app.review.edit import SetBall
 from app.review.export import FORMATS, export
 from app.review.submit import load, submit
@@ -29,6 +30,14 @@ def judge(store, group_id, state, reason=None, note=None):
 def table(folder: Path) -> list[dict[str, str]]:
     with (folder / "SNv3D.csv").open(newline="") as file:
         return list(csv.DictReader(file))
+
+
+def ball_corners(folder: Path, image: str) -> list[float]:
+    (path,) = folder.rglob("Labels-v3D.json")
+    labels = json.loads(path.read_text())
+    boxes = (labels["actions"] | labels["replays"])[image]["bboxes"]
+    (ball,) = [box["points"] for box in boxes if box["class"] == "Ball"]
+    return [ball[name] for name in ("x1", "y1", "x2", "y2")]
 
 
 def files(path: Path) -> dict[str, bytes]:
@@ -78,8 +87,50 @@ class TestExport:
             export(store, "demo", "soccernet-v3d", tmp_path / out)
         assert not (tmp_path / out).exists()
 
-    def test_an_empty_dataset_has_nothing_either(self, store, fill, tmp_path) -> None:
-        fill()
+    @pytest.mark.parametrize("state", ["unreviewed", "stale"])
+    def test_nothing_to_export_is_said_in_one_sentence(
+        self, store, three, tmp_path, state: str
+    ) -> None:
+        if state == "stale":
+            etag = judge(store, three[0], "accepted").etag
+            submit(store, three[0], SetBall("7.png", None), if_match=etag, actor="ben")
+        with pytest.raises(InputError) as caught:
+            export(store, "demo", "soccernet-v3d", tmp_path / "out")
+        assert caught.value.hint is None
+
+    @pytest.mark.parametrize("out", ["out", "out.zip"])
+    def test_groups_without_cameras_are_nothing_to_export_as_cameras(
+        self, store, fill, make_group, tmp_path, out: str
+    ) -> None:
+        fill(make_group(7), solved=False)
+        with pytest.raises(InputError, match=r"no group of .* has a camera") as caught:
+            export(store, "demo", "cameras", tmp_path / out, everything=True)
+        assert caught.value.hint is None
+        assert list(tmp_path.glob("*out*")) == []
+
+    def test_groups_without_balls_are_nothing_to_export_as_issia_3d(
+        self, store, fill, make_static, tmp_path
+    ) -> None:
+        group = make_static(10)
+        views = tuple(replace(view, balls=()) for view in group.views)
+        fill(replace(group, views=views))
+        with pytest.raises(InputError, match="has a ball for issia-3d"):
+            export(store, "demo", "issia-3d", tmp_path / "out", everything=True)
+        assert list(tmp_path.glob("*out*")) == []
+
+    def test_a_stale_verdict_says_so_in_an_export_of_everything(
+        self, store, three, tmp_path
+    ) -> None:
+        judge(store, three[0], "accepted")
+        etag = judge(store, three[1], "accepted").etag
+        ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
+        submit(store, three[1], SetBall("8.png", ball), if_match=etag, actor="ben")
+        export(store, "demo", "soccernet-v3d", tmp_path / "out", everything=True)
+        verdicts = {row["main_action"]: row["verdict"] for row in table(tmp_path / "out")}
+        assert verdicts == {"7": "accepted", "8": "accepted (stale)", "9": "unreviewed"}
+
+    def test_an_empty_dataset_has_nothing_either(self, store, tmp_path) -> None:
+        create_dataset(store, "demo")
         with pytest.raises(InputError, match="holds no groups"):
             export(store, "demo", "cameras", tmp_path / "out", everything=True)
 
@@ -91,8 +142,53 @@ class TestExport:
         assert manifest["date"] == state.verdict.at
         assert manifest["settings"]["policy_hash"] == state.policy.hash
         assert manifest["settings"]["boxes"] == "exact"
+        assert manifest["settings"]["ball_bbox"] == "annotated"
         assert "soccer-net.org" in manifest["licence"]
         assert {item["path"] for item in manifest["files"]} >= {"SNv3D.csv", "SNv3D-train.txt"}
+
+    def test_the_chosen_boxes_stand_in_the_labels_and_not_in_the_table(
+        self, store, three, tmp_path
+    ) -> None:
+        fit = load(store, three[0]).solution.view("7.png").ball
+        annotated = load(store, three[0]).group.view("7.png").ball.box
+        expected = {
+            "annotated": annotated,
+            "optimized": fit.optimized_box,
+            "exact": fit.exact_box,
+        }
+        cells = set()
+        for kind, box in expected.items():
+            out = tmp_path / kind
+            export(store, "demo", "soccernet-v3d", out, everything=True, boxes=kind)
+            assert ball_corners(out, "7.png") == pytest.approx(
+                [box.x, box.y, box.x + box.width, box.y + box.height]
+            )
+            # The group that fails has no view that takes part.
+            raw = load(store, three[2]).group.view("9.png").ball.box
+            assert ball_corners(out, "9.png")[0] == raw.x
+            cells.add(table(out)[0]["ball_bbox"])
+        assert len(set(expected.values())) == 3
+        assert len(cells) == 1
+
+    @pytest.mark.parametrize("form", ["soccernet-v3", "cameras", "sn-calibration"])
+    def test_formats_without_a_chosen_box_claim_none_and_stay_the_same(
+        self, store, three, tmp_path, form: str
+    ) -> None:
+        for kind in ("annotated", "exact"):
+            out = tmp_path / f"{kind}.zip"
+            export(store, "demo", form, out, everything=True, boxes=kind)
+        assert (tmp_path / "annotated.zip").read_bytes() == (tmp_path / "exact.zip").read_bytes()
+        manifest = json.loads(files(tmp_path / "exact.zip")["manifest.json"])
+        assert "boxes" not in manifest["settings"]
+
+    def test_the_manifest_has_the_licence_of_every_source_once(
+        self, store, fill, make_group, make_static, tmp_path
+    ) -> None:
+        fill(make_group(7), make_static(10), make_static(11))
+        export(store, "demo", "cameras", tmp_path / "out", everything=True)
+        manifest = json.loads((tmp_path / "out/manifest.json").read_text())
+        assert manifest["licence"].count("soccer-net.org") == 1
+        assert manifest["licence"].count("CNR-ISSIA") == 1
 
     def test_the_same_state_makes_the_same_bytes(self, store, three, tmp_path) -> None:
         for name in ("a.zip", "b.zip"):

@@ -5,7 +5,9 @@ from dataclasses import replace
 import pytest
 from sqlalchemy import text
 
-from app.review.datasets import get_dataset
+from app.errors import NotFoundError
+from app.review.cameras import ingest_cameras
+from app.review.datasets import create_dataset, get_dataset, list_datasets
 from app.review.edit import IncludeView, SetBall, SetLines, SetStationLines
 from app.review.ingest import ingest
 from app.review.state import GroupState
@@ -19,6 +21,23 @@ from app.store.session import Store
 
 def again(store: Store, *groups: Group):
     return ingest(store, "demo", groups, source="test", actor="ann")
+
+
+def without_lines(group: Group) -> Group:
+    """As ISSIA comes when nobody names a folder of lines."""
+    views = (
+        replace(view, station=replace(view.station, lines={}, calibration="given"))
+        for view in group.views
+    )
+    return replace(group, views=tuple(views))
+
+
+def with_switch(group: Group, calibration: str) -> Group:
+    views = (
+        replace(view, station=replace(view.station, calibration=calibration))
+        for view in group.views
+    )
+    return replace(group, views=tuple(views))
 
 
 def with_ball(group: Group, view: str, x: float) -> Group:
@@ -61,6 +80,27 @@ class TestIngest:
         report = again(store, *groups)
         assert (report.new, report.changed, report.unchanged) == (0, 0, 3)
         assert rows(store) == before
+
+    def test_an_import_that_yields_no_group_makes_no_dataset(self, store) -> None:
+        assert vars(again(store)) == {
+            "new": 0, "changed": 0, "unchanged": 0, "findings": 0, "missing": 0, "problems": [],
+        }  # fmt: skip
+        with pytest.raises(NotFoundError):
+            get_dataset(store, "demo")
+
+    def test_an_import_that_fails_at_once_makes_no_dataset(self, store) -> None:
+        def failing():
+            raise NotFoundError("no such folder")
+            yield
+
+        with pytest.raises(NotFoundError):
+            ingest(store, "demo", failing(), source="test", actor="ann")
+        assert list_datasets(store) == []
+
+    def test_a_dataset_that_is_there_is_filled(self, store, make_group) -> None:
+        made = create_dataset(store, "demo")
+        again(store, make_group(7))
+        assert get_dataset(store, "demo").id == made.id
 
     def test_an_import_that_was_killed_is_taken_up_where_it_ended(
         self, store, make_group, monkeypatch
@@ -211,6 +251,63 @@ class TestAChangedSource:
         assert [load(store, number).solution for number in ids] == [None, None]
         assert load(store, ids[1]).group.views[0].station.lines == moved.lines
 
+    def test_a_static_camera_that_changed_counts_as_changed_once(
+        self, store, fill, make_static, monkeypatch
+    ) -> None:
+        monkeypatch.setattr("app.review.ingest.BATCH", 1)
+        fill(make_static(10), make_static(11))
+        report = again(store, *(with_switch(make_static(n), "lines") for n in (10, 11)))
+        assert (report.changed, report.unchanged) == (3, 2)
+
+    def test_a_static_camera_keeps_lines_and_switch_when_the_source_brings_none(
+        self, store, fill, make_static
+    ) -> None:
+        ids = fill(with_switch(make_static(10), "lines"))
+        before, counts = load(store, ids[0]), rows(store)
+        report = again(store, without_lines(make_static(10)))
+        assert (report.new, report.changed, report.unchanged) == (0, 0, 1)
+        after = load(store, ids[0])
+        assert after.group == before.group
+        assert after.group.views[0].station.lines != {}
+        assert after.group.views[0].station.calibration == "lines"
+        assert after.solution is not None
+        assert rows(store) == counts
+
+    def test_a_new_camera_follows_beside_lines_that_are_kept(
+        self, store, fill, make_static, opposite
+    ) -> None:
+        ids = fill(make_static(10))
+        group = without_lines(make_static(10))
+        view = group.views[0]
+        moved = replace(view, station=replace(view.station, given=opposite))
+        report = again(store, group.with_view(moved))
+        station = load(store, ids[0]).group.views[0].station
+        assert report.changed == 1
+        assert (station.given, station.lines) == (
+            opposite, make_static(10).views[0].station.lines,
+        )  # fmt: skip
+
+    @pytest.mark.parametrize("camera_alone", [False, True])
+    def test_an_edited_static_camera_stays_edited_without_a_finding_when_no_lines_come(
+        self, store, fill, make_static, opposite, camera_alone: bool
+    ) -> None:
+        (group_id,) = fill(make_static(10))
+        if camera_alone:
+            ingest_cameras(store, "demo", {"cam1": opposite}, source="x", actor="ann")
+        station_id = load(store, group_id).station_ids["cam1"]
+        station = load_station(store, station_id)
+        edit = SetStationLines({"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))})
+        submit_station(store, station_id, edit, if_match=station.etag, actor="ann")
+        edited, group = load_station(store, station_id), without_lines(make_static(10))
+        if camera_alone:
+            view = group.views[0]
+            group = group.with_view(replace(view, station=replace(view.station, given=None)))
+        report = again(store, group)
+        assert (report.changed, report.findings) == (0, 0)
+        after = load_station(store, station_id)
+        assert after == edited
+        assert after.stored.edited
+
     def test_an_edited_static_camera_stays_and_becomes_a_finding_of_its_groups(
         self, store, fill, make_static
     ) -> None:
@@ -243,3 +340,27 @@ class TestAChangedSource:
         report = again(store, make_group().with_view(changed))
         assert report.findings == 1
         assert "Middle line" not in load(store, state.id).group.views[0].station.lines
+
+
+class TestMissingGroups:
+    def test_groups_that_left_the_source_are_counted_and_stay(self, store, make_group) -> None:
+        again(store, make_group(7), make_group(8), make_group(9))
+        report = again(store, make_group(8))
+        assert (report.unchanged, report.missing) == (1, 2)
+        assert report.problems == ["2 groups of an earlier import did not come again; all stay"]
+        assert get_dataset(store, "demo").groups == 3
+
+    def test_groups_of_another_source_are_not_missing(self, store, make_group) -> None:
+        ingest(store, "demo", [make_group(7)], source="first", actor="ann")
+        report = ingest(store, "demo", [make_group(8)], source="second", actor="ann")
+        assert (report.missing, report.problems) == (0, [])
+
+    def test_a_group_belongs_to_the_source_that_changed_it_last(self, store, make_group) -> None:
+        ingest(store, "demo", [make_group(7), make_group(8)], source="first", actor="ann")
+        moved = with_ball(make_group(7), "7.png", 300.0)
+        ingest(store, "demo", [moved], source="second", actor="ann")
+        report = ingest(store, "demo", [make_group(8)], source="first", actor="ann")
+        assert report.missing == 0
+
+    def test_the_first_import_misses_nothing(self, store, make_group) -> None:
+        assert again(store, make_group(7)).missing == 0

@@ -91,12 +91,21 @@ class TestSolve:
         }
         assert solution.view("7_1.png").failed == "excluded"
 
+    def test_one_view_alone_puts_the_ball_where_its_box_says(self, clean):
+        fit = solve(clean, PAPER).view("7_2.png").ball
+        # A box of the true size: the rest is the distortion of the ball's own picture.
+        assert fit.monocular_error_m < 0.05 * fit.depth_m
+        assert np.linalg.norm(np.array(fit.monocular) - BALL) == pytest.approx(
+            fit.monocular_error_m, abs=0.05
+        )
+
     def test_points_without_a_box_are_enough(self):
         views = [given_view("a", MAIN, BALL), given_view("b", OPPOSITE, BALL)]
         points = [replace(one, balls=(BallAnnotation(point=one.balls[0].center),)) for one in views]
         solution = solve(group(*points), PAPER)
         assert solution.passes
         assert solution.views[0].ball.size_ratio is None
+        assert solution.views[0].ball.monocular is None
         assert solution.views[0].ball.optimized_diameter_px > 5
 
 

@@ -13,7 +13,7 @@ import pytest
 from app.errors import ImageError, NotFoundError, TooLargeError
 from app.soccer.group import Media
 from app.store.archives import Archives
-from app.store.media import content_type, media_facts, read_frame
+from app.store.media import content_type, frame_name, media_facts, read_frame
 
 # Left half dark, right half bright: a flip is seen.
 PICTURE = np.concatenate(
@@ -120,8 +120,25 @@ class TestReadFrame:
     def test_what_is_no_image_is_said(self, tmp_path, settings, data, width) -> None:
         path = tmp_path / "x.png"
         path.write_bytes(data)
-        with pytest.raises(ImageError):
+        with pytest.raises(ImageError, match=r"^frame x\.png is "):
             read_frame(Media(str(path)), width, False, settings)
+
+    @pytest.mark.parametrize("width", [None, 40])
+    def test_what_is_no_image_is_named_by_member_and_archive(
+        self, tmp_path, settings, width
+    ) -> None:
+        path = tmp_path / "Frames-v3.zip"
+        with zipfile.ZipFile(path, "w") as target:
+            target.writestr("7.png", b"GIF89a")
+            target.writestr("8.png", bomb(16_000, 16_000))
+            target.writestr("9.png", PNG[:-40])
+        for member, error, what in (
+            ("7.png", ImageError, "is no JPEG, PNG or WebP image"),
+            ("8.png", TooLargeError, "declares 16000 x 16000 pixels"),
+            ("9.png", ImageError, "is damaged"),
+        ):
+            with pytest.raises(error, match=f"^frame {member} of Frames-v3.zip {what}"):
+                read_frame(Media(str(path), member), width, False, settings)
 
     def test_what_is_too_many_bytes_is_not_read(self, file, archive, settings) -> None:
         small = settings.model_copy(update={"max_file_bytes": 50})
@@ -155,6 +172,15 @@ class TestReadFrame:
         archive.write_bytes(data)
         with pytest.raises(ImageError, match="cannot be read"):
             read_frame(Media(str(archive), "v3_frames/7.png"), None, False, settings)
+
+
+class TestFrameName:
+    def test_says_file_and_place_in_it_and_no_folder(self) -> None:
+        assert frame_name(Media("/data/7.png")) == "frame 7.png"
+        assert (
+            frame_name(Media("/data/a.zip", "v3_frames/7.png")) == "frame v3_frames/7.png of a.zip"
+        )
+        assert frame_name(Media("/data/cam1.mp4", frame=3)) == "frame 3 of cam1.mp4"
 
 
 class TestMediaFacts:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
+import zipfile
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from app.api.routers.views import MAX_WIDTH, MIN_WIDTH, clamp_width
+from app.review.ingest import ingest
+from app.soccer.group import Media
 
 API = "/api/v1"
 
@@ -79,9 +84,37 @@ class TestBall:
         after = patch(api, document, "/ball", {"point": [600.5, 300.5]}).json()
         assert after["views"][0]["balls"][0]["point"] == [600.5, 300.5]
 
-    @pytest.mark.parametrize("body", [None, {"box": None}, {"point": None, "occluded": False}])
-    def test_null_means_that_there_is_none(self, api, document, body) -> None:
-        after = patch(api, document, "/ball", body).json()
+    def test_out_of_view_is_an_annotation_too(self, api, document) -> None:
+        after = patch(api, document, "/ball", {"box": None, "out_of_view": True}).json()
+        assert after["views"][0]["balls"] == [
+            {"box": None, "point": None, "occluded": False, "out_of_view": True}
+        ]
+
+    @pytest.mark.parametrize(
+        "body",
+        [
+            {"occluded": True},
+            {"occluded": False},
+            {"point": None},
+            {"box": None},
+            {"point": None, "occluded": False},
+            {"out_of_view": False},
+            {"box": [1, 2, 3, 4], "out_of_view": True},
+            {"point": [1, 2], "out_of_view": True},
+        ],
+        ids=str,
+    )
+    def test_what_places_no_ball_or_contradicts_itself_deletes_none(
+        self, api, document, body
+    ) -> None:
+        assert patch(api, document, "/ball", body).status_code == 422
+        what_if = {"views": {document["views"][0]["key"]: {"ball": body}}}
+        group = f"{API}/groups/{document['id']}"
+        assert api.post(f"{group}/preview", json=what_if).status_code == 422
+        assert api.get(group).json() == document
+
+    def test_the_body_null_means_that_there_is_none(self, api, document) -> None:
+        after = patch(api, document, "/ball", None).json()
         assert after["views"][0]["balls"] == []
         assert after["solution"]["ball"] is None
 
@@ -139,7 +172,44 @@ class TestPreconditions:
 
     def test_labels_alone_have_no_frame(self, api, document) -> None:
         assert document["views"][0]["image"] is None
-        assert api.get(f"{API}/views/{document['views'][0]['id']}/image").status_code == 404
+        answer = api.get(f"{API}/views/{document['views'][0]['id']}/image")
+        assert answer.status_code == 404
+        problem = answer.json()
+        assert problem["detail"] == "this view has no frame that could be read"
+        assert problem["hint"] == (
+            "The import's report says why; importing again after the files are mended attaches "
+            "the frames."
+        )
+
+
+class TestImage:
+    @pytest.fixture
+    def frames(self, app, tmp_path, group) -> Path:
+        """A match's archive: its first frame is no image, its second is not there."""
+        path = tmp_path / "Frames-v3.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("7.png", b"GIF89a")
+        views = tuple(replace(view, media=Media(str(path), view.key)) for view in group.views)
+        store = app.state.services.store
+        ingest(store, "framed", [replace(group, views=views)], source="test", actor="local")
+        return path
+
+    @pytest.mark.parametrize("width", [None, 208])
+    def test_what_is_no_image_is_named_with_its_view(self, api, frames, width) -> None:
+        row = api.get(f"{API}/groups", params={"dataset": "framed"}).json()["items"][0]
+        first, second = api.get(f"{API}/groups/{row['id']}").json()["views"]
+        params = {} if width is None else {"width": width}
+        answer = api.get(first["image"], params=params)
+        assert (answer.status_code, answer.json()["detail"]) == (
+            422,
+            "view 7.png: frame 7.png of Frames-v3.zip is no JPEG, PNG or WebP image",
+        )
+        missing = api.get(second["image"], params=params)
+        assert (missing.status_code, missing.json()["detail"]) == (
+            404,
+            "view 7_1.png: Frames-v3.zip has no member 7_1.png",
+        )
+        assert str(frames.parent) not in answer.text + missing.text
 
 
 class TestClampWidth:
