@@ -116,13 +116,6 @@ def list_groups(
     return Page(items, order.encode(rows[limit - 1]) if more else None, total)
 
 
-def matching_ids(session: Session, dataset_id: int, query: str = "") -> list[int]:
-    """Ids of all groups that match, in order."""
-    parsed = parse_query(query)
-    statement = select(QueueModel.group_id).where(*_where(dataset_id, parsed))
-    return list(session.scalars(statement.order_by(*Order(parsed).ascending)))
-
-
 def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
     """Where a group stands in a query's order, and up to five groups on either side.
 

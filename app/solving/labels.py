@@ -95,18 +95,13 @@ def find_suspects(
     search = _Search(problem, GAMMA_SHARE * problem.size.diagonal)
     if search.all_fit(observations, fit):
         return fit, observations, ()
-    trial = search.without_minority(observations)
-    doubts: tuple[_Doubt, ...] = trial.doubts if trial is not None else ()
-    rest, now = observations, fit
-    while trial is None or not search.settled(trial, fit.cost):
-        trial = search.next_without(rest, now)
-        if trial is None or len(doubts) == MAX_SUSPECTS:
-            return fit, observations, ()
-        doubts += trial.doubts
-        rest, now = trial.rest, trial.fit
+    found = search.explanation(observations, fit)
+    if found is None:
+        return fit, observations, ()
+    trial, names = found
     # Only now is it known which classes are free (two posts may have been swapped), and whether
     # what was left out on the way there is off at all.
-    final = [search.doubt(observations, trial.rest, trial.fit, item.marking) for item in doubts]
+    final = [search.doubt(observations, trial.rest, trial.fit, name) for name in names]
     suspects = [doubt for doubt in final if doubt.is_off]
     fit, rest = trial.fit, trial.rest
     if len(suspects) < len(final):
@@ -125,6 +120,25 @@ class _Search:
     def all_fit(self, observations: Observations, fit: Resection) -> bool:
         """Whether no marking is off."""
         return max(self.largest(observations, fit).values(), default=0.0) <= MISFIT
+
+    def explanation(
+        self, observations: Observations, fit: Resection
+    ) -> tuple[_Trial, list[str]] | None:
+        """The trial to believe with all that is left out on the way to it, or None."""
+        trial = self.without_minority(observations)
+        if trial is not None and self.settled(trial, fit.cost):
+            return trial, [doubt.marking for doubt in trial.doubts]
+        names: list[str] = []
+        rest, now = observations, fit
+        for _ in range(MAX_SUSPECTS):
+            trial = self.next_without(rest, now)
+            if trial is None:
+                return None
+            names += [doubt.marking for doubt in trial.doubts]
+            if self.settled(trial, fit.cost):
+                return trial, names
+            rest, now = trial.rest, trial.fit
+        return None
 
     def settled(self, trial: _Trial, cost: float) -> bool:
         """Whether a trial is good enough to believe, against the cost with all markings."""

@@ -131,11 +131,6 @@ class ResectionProblem:
             parameters, observations.curves, observations.sightings(), self.size.diagonal / 2
         )
 
-    def cost(self, parameters: FloatArray, observations: Observations) -> float:
-        """Robust cost of one camera at the final scale, square pixels."""
-        problem = self._equations(observations, self.robust_scale_px)
-        return float(problem(parameters[None])[0][0])
-
     def covariance(self, parameters: FloatArray, observations: Observations) -> FloatArray:
         """Covariance of the parameters at a minimum, shape (8, 8).
 
