@@ -7,6 +7,7 @@ import { html, render } from 'htm/preact';
 
 import { startKeys } from './lib/keys.js';
 import { startRouter } from './lib/router.js';
+import { startArrivals } from './state/arrival.js';
 import { unsaved } from './state/group.js';
 import { App } from './views/app.js';
 
@@ -14,5 +15,6 @@ addEventListener('beforeunload', (event) => {
 	if (unsaved.value > 0) event.preventDefault();
 });
 startRouter();
+startArrivals();
 startKeys();
 render(html`<${App} />`, /** @type {HTMLElement} */ (document.querySelector('.app')));

@@ -15,6 +15,7 @@ import { latest } from '../lib/latest.js';
 import { known, load, remember } from './documents.js';
 import { applyEdit, describe, previewBody, requestOf, sameTarget, stationOf } from './edits.js';
 import { announce, complain } from './notice.js';
+import { resetForGroup } from './workspace.js';
 
 /** @import {GroupDocument, SolutionJson} from '../api/types.js' */
 /** @import {Edit} from './edits.js' */
@@ -86,9 +87,10 @@ export async function open(id) {
 /** The group that the person asked for last; answers about others come too late. */
 let wanted = 0;
 
-/** Show what is known of a group, at once. @param {number} id */
-export function turnTo(id) {
+/** Show what is known of a group, at once; nothing asked or selected stays. @param {number} id */
+function turnTo(id) {
 	wanted = id;
+	resetForGroup();
 	show(known(id) ?? null);
 }
 

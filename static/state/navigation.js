@@ -7,7 +7,7 @@ import { getGroups, getNeighbours } from '../api/client.js';
 import { address, navigate, page, param } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 import { prefetch } from './documents.js';
-import { settle, turnTo } from './group.js';
+import { settle } from './group.js';
 import { announce, dismiss } from './notice.js';
 
 /** @import {Neighbours} from '../api/types.js' */
@@ -31,15 +31,22 @@ export function queueAddress(dataset, q) {
 	return address('/groups', { dataset, q });
 }
 
+/** When the neighbours of the group on screen are known, or cannot be. */
+let located = Promise.resolve();
+
 /**
  * Find out what comes before and after a group, and load what comes next.
  *
  * @param {number} id
  */
 export async function locate(id) {
-	const found = await getNeighbours(id, query.value);
+	const asked = getNeighbours(id, query.value).then((found) => {
+		if (currentId() === id) neighbours.value = { ...found, id };
+		return found;
+	});
+	located = asked.then(() => {}, () => {});
+	const found = await asked;
 	if (currentId() !== id) return;
-	neighbours.value = { ...found, id };
 	lastGroup.value = id;
 	// What is on screen comes first.
 	await prefetch([id, ...found.next]);
@@ -50,28 +57,48 @@ export function currentId() {
 	return page.value.page === 'review' ? page.value.group : null;
 }
 
-/** Go to the group after this one; says so when there is none. */
+/** Go to the group after this one; says so, and answers false, when there is none. */
 export function goNext() {
-	return go(neighbours.value?.next[0], 'This is the last group of the queue.');
+	return go(1, 'This is the last group of the queue.');
 }
 
 /** Go to the group before this one. */
 export function goPrevious() {
-	return go(neighbours.value?.previous[0], 'This is the first group of the queue.');
+	return go(-1, 'This is the first group of the queue.');
 }
 
-/** @param {number | undefined} id @param {string} otherwise @returns {boolean} */
-function go(id, otherwise) {
+/**
+ * At once where the queue is known, so that the next key already speaks about the next group;
+ * whoever is faster than the answer about a group's neighbours goes on when it is there.
+ *
+ * @param {1 | -1} step @param {string} otherwise @returns {Promise<boolean>}
+ */
+async function go(step, otherwise) {
+	const from = currentId();
+	let id = beside(from, step);
+	if (id === undefined && neighbours.value?.id !== from) {
+		await located;
+		// The person has gone somewhere else meanwhile.
+		if (currentId() !== from) return true;
+		id = beside(from, step);
+	}
 	if (id === undefined) {
 		announce(otherwise);
 		return false;
 	}
 	settle();
 	dismiss();
-	// At once, so that the next key already speaks about the next group.
-	turnTo(id);
 	navigate(reviewAddress(id));
 	return true;
+}
+
+/** The group beside another one, as far as the queue is known. @param {number | null} from @param {1 | -1} step */
+function beside(from, step) {
+	const at = neighbours.value;
+	if (!at || from === null) return undefined;
+	const known = [...at.previous.toReversed(), at.id, ...at.next];
+	const place = known.indexOf(from);
+	return place < 0 ? undefined : known[place + step];
 }
 
 /**

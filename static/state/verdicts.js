@@ -9,6 +9,7 @@ import { known, remember } from './documents.js';
 import { document, queued, settle } from './group.js';
 import { currentId, goNext, query, queueAddress, reviewAddress } from './navigation.js';
 import { announce, inform } from './notice.js';
+import { asking } from './workspace.js';
 
 /** @import {GroupDocument, VerdictJson} from '../api/types.js' */
 
@@ -23,8 +24,6 @@ export const REASONS = [
 	{ name: 'other', label: 'Other…' },
 ];
 
-/** What the person is asked before the verdict can be given; null when nothing. */
-export const asking = signal(/** @type {null | 'reason' | 'note' | 'override'} */ (null));
 /** The reason last used, for `X X`. */
 export const lastReason = signal(/** @type {string | null} */ (null));
 
@@ -80,12 +79,16 @@ function decide(state, reason, note) {
 	const before = group.verdict;
 	overlay(group, { ...before, state, reason, note, stale: false, at: new Date().toISOString() });
 	announce(`Group ${group.number} ${state}.`);
-	if (!goNext()) {
-		inform('That was the last group of this queue.', {
-			label: 'Back to the queue', run: () => navigate(queueAddress(group.dataset.name, query.value)),
-		});
-	}
+	leave(group.dataset.name);
 	queued(group.id, (present) => put(present, { state, reason, note }, before));
+}
+
+/** On to the next group, or back to the queue when that was the last one. @param {string} dataset */
+async function leave(dataset) {
+	if (await goNext()) return;
+	inform('That was the last group of this queue.', {
+		label: 'Back to the queue', run: () => navigate(queueAddress(dataset, query.value)),
+	});
 }
 
 /**

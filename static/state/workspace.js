@@ -17,6 +17,8 @@ export const focused = signal('A');
 export const maximised = signal(/** @type {string | null} */ (null));
 /** The object that keys move. */
 export const selected = signal(/** @type {Selection | null} */ (null));
+/** What the person is asked before a verdict can be given; null when nothing. */
+export const asking = signal(/** @type {null | 'reason' | 'note' | 'override'} */ (null));
 /** Whether Tab walks through the objects of the focused view. */
 export const editing = signal(false);
 
@@ -50,4 +52,5 @@ export function toggleMaximised(letter) {
 export function resetForGroup() {
 	selected.value = null;
 	editing.value = false;
+	asking.value = null;
 }

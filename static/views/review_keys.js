@@ -6,11 +6,11 @@ import { draft, group, submit, withdraw } from '../state/group.js';
 import { redo, undo } from '../state/history.js';
 import { goNext, goPrevious } from '../state/navigation.js';
 import { announce, dismiss, notice } from '../state/notice.js';
-import { accept, askReason, asking, cancelAsking, defer } from '../state/verdicts.js';
+import { accept, askReason, cancelAsking, defer } from '../state/verdicts.js';
 import { fitAll, fitPanel, isZoomed, zoomTo } from '../state/viewports.js';
 import {
-	boxes, cycleGain, editing, focused, focusView, gain, maximised, overlaysHidden, projections,
-	selected, stripCollapsed, toggleMaximised,
+	asking, boxes, cycleGain, editing, focused, focusView, gain, maximised, overlaysHidden,
+	projections, selected, stripCollapsed, toggleMaximised,
 } from '../state/workspace.js';
 import { deleteSelected, nudge, nudgeDiameter } from '../tools/nudge.js';
 

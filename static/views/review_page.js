@@ -4,49 +4,16 @@
 import { html } from 'htm/preact';
 import { useEffect, useMemo } from 'preact/hooks';
 
-import { ApiError } from '../api/problem.js';
 import { useKeys } from '../lib/hooks.js';
-import { navigate, page } from '../lib/router.js';
 import { picturesOf } from '../overlays/scene.js';
-import { dataset, failure, loadDatasets } from '../state/datasets.js';
-import { document, group, isPreview, open, solution } from '../state/group.js';
-import { firstGroup, lastGroup, locate, query, reviewAddress } from '../state/navigation.js';
-import { complain } from '../state/notice.js';
-import { cancelAsking } from '../state/verdicts.js';
-import { focused, maximised, resetForGroup, stripCollapsed } from '../state/workspace.js';
+import { document, group, isPreview, solution } from '../state/group.js';
+import { focused, maximised, stripCollapsed } from '../state/workspace.js';
 import { ConflictBar, NoticeBar } from './bars.js';
 import { ImageGrid } from './image_grid.js';
 import { Rail } from './rail.js';
 import { ReviewHeader } from './review_header.js';
 import { REVIEW_KEYS } from './review_keys.js';
 import { BottomStrip } from './strip.js';
-
-/** @param {number} id */
-async function enter(id) {
-	resetForGroup();
-	cancelAsking();
-	try {
-		await open(id);
-		await locate(id);
-	} catch (error) {
-		if (!(error instanceof ApiError)) throw error;
-		if (error.status === 404) lastGroup.value = 0;
-		complain(`Group ${id} cannot be shown: ${error.message}`, {
-			label: 'Open the queue', run: () => navigate('/groups'),
-		});
-	}
-}
-
-/** Without a number: the first group of the queue. */
-async function enterFirst() {
-	await loadDatasets();
-	if (failure.value) {
-		navigate('/groups', { replace: true });
-		return;
-	}
-	const first = dataset.value ? await firstGroup(dataset.value.name) : null;
-	navigate(first === null ? '/groups' : reviewAddress(first), { replace: true });
-}
 
 /** What is focused or shown alone must exist in this group. @param {string[]} letters */
 function keepWithin(letters) {
@@ -72,12 +39,7 @@ function Workspace() {
 }
 
 export function ReviewPage() {
-	const at = page.value.page === 'review' ? page.value.group : null;
 	useKeys(REVIEW_KEYS);
-	useEffect(() => {
-		if (at === null) enterFirst();
-		else enter(at);
-	}, [at, query.value]);
 	useEffect(() => {
 		globalThis.document.title = group.value ? `${group.value.label} · Touchline` : 'Touchline';
 	}, [group.value?.label]);

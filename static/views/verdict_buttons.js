@@ -6,8 +6,9 @@ import { useEffect, useRef } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
 import {
-	accept, answer, asking, askReason, cancelAsking, defer, lastReason, reject, REASONS,
+	accept, answer, askReason, cancelAsking, defer, lastReason, reject, REASONS,
 } from '../state/verdicts.js';
+import { asking } from '../state/workspace.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
 

@@ -8,6 +8,7 @@ import json
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from threading import Timer
 from typing import Any
 
 import pytest
@@ -128,6 +129,17 @@ def submitted(page: Page) -> list[str]:
 
     page.on("request", hear)
     return seen
+
+
+def withdraw_verdict(page: Page, group: int) -> None:
+    """Leave a group as the next test expects it."""
+    present = page.request.get(f"/api/v1/groups/{group}")
+    answer = page.request.put(
+        f"/api/v1/groups/{group}/verdict",
+        data={"state": "unreviewed"},
+        headers={"If-Match": present.headers["etag"]},
+    )
+    assert answer.ok
 
 
 @pytest.fixture
@@ -309,6 +321,7 @@ class TestVerdicts:
         screen.press("a")
         page.wait_for_url(lambda url: f"/review/{first}" not in url)
         screen.saved()
+        screen.ready()
         second = screen.group
         screen.press("x")
         expect(page.locator(".reasons")).to_be_visible()
@@ -327,6 +340,22 @@ class TestVerdicts:
         download.value.save_as(target)
         check_export(target, key)
         expect(page.locator(".export__result")).to_contain_text("Ready")
+
+    def test_keys_faster_than_the_network_lose_nothing(self, open_page: OpenPage) -> None:
+        page = open_page(None)
+        chain = [row["id"] for row in rows(page)][-4:]
+        page.goto(f"/review/{chain[0]}")
+        screen = Screen(page)
+        screen.ready()
+        page.wait_for_load_state("networkidle")
+        page.route("**/neighbours*", lambda route: Timer(1.0, route.continue_).run())
+        screen.press("s", "x", "1", "s")
+        page.wait_for_url(f"**/review/{chain[3]}")
+        screen.saved()
+        verdicts = {row["id"]: row["status"] for row in rows(page)}
+        assert [verdicts[group] for group in chain[:3]] == ["deferred", "rejected", "deferred"]
+        for group in chain[:3]:
+            withdraw_verdict(page, group)
 
     def test_a_failing_group_is_accepted_only_with_a_reason(self, open_page: OpenPage) -> None:
         page = open_page(None)

@@ -1,0 +1,56 @@
+// @ts-check
+/** Arriving at a group: what the address bar names is on screen in the same moment. */
+
+import { effect, untracked } from '@preact/signals';
+
+import { ApiError } from '../api/problem.js';
+import { navigate, page } from '../lib/router.js';
+import { dataset, failure, loadDatasets } from './datasets.js';
+import { open } from './group.js';
+import { currentId, firstGroup, lastGroup, locate, query, reviewAddress } from './navigation.js';
+import { complain } from './notice.js';
+import { resetForGroup } from './workspace.js';
+
+/** @param {number} id */
+async function enter(id) {
+	try {
+		await Promise.all([open(id), locate(id)]);
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		if (currentId() !== id) return;
+		if (error.status === 404) lastGroup.value = 0;
+		complain(`Group ${id} cannot be shown: ${error.message}`, {
+			label: 'Open the queue', run: () => navigate('/groups'),
+		});
+	}
+}
+
+/** Without a number: the first group of the queue. */
+async function enterFirst() {
+	await loadDatasets();
+	if (failure.value) {
+		navigate('/groups', { replace: true });
+		return;
+	}
+	const first = dataset.value ? await firstGroup(dataset.value.name) : null;
+	navigate(first === null ? '/groups' : reviewAddress(first), { replace: true });
+}
+
+/**
+ * Follow the address bar.
+ *
+ * An effect of signals and not of a component: those wait for the next frame, and a key pressed
+ * before it would speak about a group that the person has already left.
+ */
+export function startArrivals() {
+	effect(() => {
+		const at = page.value;
+		// Another query has other neighbours.
+		query.value;
+		untracked(() => {
+			if (at.page !== 'review') resetForGroup();
+			else if (at.group === null) enterFirst();
+			else enter(at.group);
+		});
+	});
+}
