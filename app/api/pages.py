@@ -23,13 +23,19 @@ PAGES = (
     "/groups",
     "/review",
     "/review/{group}",
+    "/review/{group}/calibration",
     "/datasets",
     "/datasets/{dataset}",
     "/datasets/{dataset}/yield",
+    "/datasets/{dataset}/policy",
+    "/datasets/{dataset}/statistics",
+    "/datasets/{dataset}/versions",
     "/datasets/{dataset}/evaluation",
     "/exports",
     "/findings",
     "/help",
+    "/import",
+    "/jobs",
 )
 """Addresses that the browser's own router understands."""
 MEDIA_TYPES = {
