@@ -54,6 +54,7 @@ def calibrate(
     suspects: tuple[Suspect, ...] = ()
     if policy.check_labels:
         fit, observations, suspects = find_suspects(problem, observations, fit)
+    fit = problem.refine_main(fit, observations)
     try:
         spread = problem.covariance(fit.parameters, observations)
     except DegenerateGeometryError:

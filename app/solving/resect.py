@@ -18,7 +18,11 @@ from app.geometry.resection import (
     ARC,
     KAPPA,
     PARAMETERS,
+    ROLL,
     Prior,
+    X,
+    Y,
+    Z,
     camera_from_parameters,
     distances,
     normal_equations,
@@ -52,6 +56,14 @@ SEARCH = Stage(starts=12, steps=8, scale_px=30.0, tolerance=1e-3)
 NARROW = Stage(starts=6, steps=10, scale_px=8.0, tolerance=1e-4)
 FINAL = Stage(starts=2, steps=25, scale_px=0.0, tolerance=1e-6)
 """Its scale is the policy's."""
+MAIN_STAND_X_M, MAIN_STAND_Y_M, MAIN_STAND_Z_M = (-20.0, 20.0), (38.0, 110.0), (-30.0, -6.0)
+"""A camera that stands within these bounds (pitch frame) is a main camera."""
+MAIN_MEAN = np.array([0.0, 0.0, 64.5, -15.5])
+MAIN_SIGMA = np.array([np.radians(0.4), 2.0, 11.0, 4.5])
+"""Roll (radians) and position (metres) of main cameras in real stadiums."""
+MAIN_FREEDOM = 10.0
+"""Degrees of freedom of that prior's Student distribution: some stadiums are unlike the others."""
+MAIN_ROUNDS = 3
 POOR_PX = 8.0
 """A fit is poor when a point lies farther than this from its marking, at 960 x 540."""
 POINTS_PER_LINE, POINTS_PER_CIRCLE = 4, 8
@@ -125,6 +137,25 @@ class ResectionProblem:
         fit = self._run(observations, best(narrowed, FINAL.starts), FINAL)
         return Resection(best(fit, 1)[0], float(fit.cost.min()))
 
+    def refine_main(self, fit: Resection, observations: Observations) -> Resection:
+        """The camera once more with what is known of main cameras, where it stands like one.
+
+        Where the lines determine the camera this changes nothing; where they leave a direction
+        open the stadium closes it. A replay, which may stand anywhere, is left alone.
+        """
+        position = fit.parameters[X : Z + 1]
+        low, high = np.transpose([MAIN_STAND_X_M, MAIN_STAND_Y_M, MAIN_STAND_Z_M])
+        if not ((low < position) & (position < high)).all():
+            return fit
+        variance = self.click_variance(fit.parameters, observations)
+        offset = np.zeros(len(MAIN_MEAN))
+        for _ in range(MAIN_ROUNDS):
+            prior = self._main_prior(variance, offset)
+            found = self._run(observations, fit.parameters[None], FINAL, prior=prior)
+            fit = Resection(found.parameters[0], float(found.cost[0]))
+            offset = fit.parameters[ROLL : Z + 1] - MAIN_MEAN
+        return fit
+
     def distances(self, parameters: FloatArray, observations: Observations) -> FloatArray:
         """Distance of each observed point to its marking, pixels, shape (N,)."""
         return distances(
@@ -152,13 +183,18 @@ class ResectionProblem:
             4 * scale,
             self.size.diagonal / 2,
         )
-        apart = self.distances(parameters, observations)
-        spare = max(len(apart) - PARAMETERS + 1, 1)
-        robust = 2 * scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)
-        variance = max(float(robust.sum()) / spare, (MIN_CLICK_SIGMA_PX * self.unit) ** 2)
+        variance = self.click_variance(parameters, observations)
         # The prior's share of the information is not scaled by the clicks' variance.
         information[0, KAPPA, KAPPA] += (variance - 1) / self.distortion_sigma**2
         return covariance(information[0], variance)
+
+    def click_variance(self, parameters: FloatArray, observations: Observations) -> float:
+        """Variance of the clicks' distances, from the robust fit, pixels squared."""
+        scale = self.robust_scale_px * self.unit
+        apart = self.distances(parameters, observations)
+        spare = max(len(apart) - PARAMETERS + 1, 1)
+        robust = 2 * scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)
+        return max(float(robust.sum()) / spare, (MIN_CLICK_SIGMA_PX * self.unit) ** 2)
 
     def camera(self, parameters: FloatArray) -> Camera:
         """Camera of one row of parameters."""
@@ -171,16 +207,23 @@ class ResectionProblem:
         return parameters_from_camera(camera, self.size.diagonal / 2)
 
     def _run(
-        self, observations: Observations, starts: FloatArray, stage: Stage, damping: float = 1e-3
+        self,
+        observations: Observations,
+        starts: FloatArray,
+        stage: Stage,
+        damping: float = 1e-3,
+        prior: Prior | None = None,
     ) -> Fit:
-        equations = self._equations(observations, stage.scale_px or self.robust_scale_px)
+        scale_px = stage.scale_px or self.robust_scale_px
+        equations = self._equations(observations, scale_px, prior or self._prior())
         return levenberg_marquardt(
             equations, starts, stage.steps, tolerance=stage.tolerance, damping=damping
         )
 
-    def _equations(self, observations: Observations, scale_px: float) -> NormalEquations:
+    def _equations(
+        self, observations: Observations, scale_px: float, prior: Prior
+    ) -> NormalEquations:
         sightings = observations.sightings()
-        prior = self._prior()
 
         def equations(parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
             return normal_equations(
@@ -201,6 +244,20 @@ class ResectionProblem:
         level = np.radians(2)
         sigma = np.array([np.inf, np.inf, level, 300.0, 300.0, 60.0, 3.0, self.distortion_sigma])
         return Prior(mean, sigma)
+
+    def _main_prior(self, variance: float, offset: FloatArray) -> Prior:
+        """Student prior of main cameras, reweighted for an offset from its mean, shape (4,).
+
+        The better the clicks fit (variance, pixels squared) and the more they insist on an
+        offset, the less it weighs.
+        """
+        prior = self._prior()
+        prior.mean[ROLL : Z + 1] = MAIN_MEAN
+        apart = (offset / MAIN_SIGMA) ** 2
+        prior.sigma[ROLL : Z + 1] = MAIN_SIGMA * np.sqrt(1 + apart / MAIN_FREEDOM)
+        # The cost counts pixels as if a click's standard deviation were one.
+        prior.sigma[[ROLL, X, Y, Z, KAPPA]] /= np.sqrt(variance)
+        return prior
 
 
 def best(fit: Fit, count: int) -> FloatArray:
