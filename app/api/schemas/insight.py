@@ -1,0 +1,83 @@
+"""What would help a group, and what each marking of a view is worth."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, Field
+
+from app.api.schemas.solution import XY, FixDocument
+from app.review.influence import Influence
+from app.review.remedies import Remedy
+from app.soccer.solution import GAMMAS_PERCENT
+
+Jac = dict[str, float]
+
+
+class RemedyEdit(FixDocument):
+    """An edit as findings propose it, or a point moved."""
+
+    point: XY | None = Field(description="Where `move_point` or `move_ball` puts it.")
+
+
+class RemedyDocument(BaseModel):
+    """An edit that the solver has tried out."""
+
+    gate: str = Field(description="The gate that fails now.")
+    view: str | None
+    sentence: str = Field(description='Reads on after "would pass if".')
+    edit: RemedyEdit
+    value: float | None = Field(description="What the gate would measure.")
+    passes: bool = Field(description="Whether the whole group would pass.")
+
+    @staticmethod
+    def of(remedy: Remedy) -> RemedyDocument:
+        """The document of a remedy."""
+        edit = RemedyEdit(**vars(remedy.fix), point=remedy.point)
+        return RemedyDocument(
+            gate=remedy.gate,
+            view=remedy.view,
+            sentence=remedy.sentence,
+            edit=edit,
+            value=remedy.value,
+            passes=remedy.passes,
+        )
+
+
+class Remedies(BaseModel):
+    """What would make a group pass, the gentlest first; empty when it passes."""
+
+    items: list[RemedyDocument]
+
+
+class InfluenceDocument(BaseModel):
+    """What the camera would be without one marking."""
+
+    marking: str
+    jac: Jac | None = Field(description="Of the view as it is, by gamma in per cent.")
+    jac_without: Jac | None = Field(description="If the marking were deleted.")
+    largest_px: float | None
+    largest_px_without: float | None = Field(
+        description="Distance of its points from a camera that never saw them."
+    )
+
+    @staticmethod
+    def of(found: Influence) -> InfluenceDocument:
+        """The document of an influence."""
+        return InfluenceDocument(
+            marking=found.marking,
+            jac=_jac(found.jac),
+            jac_without=_jac(found.jac_without),
+            largest_px=found.largest_px,
+            largest_px_without=found.largest_px_without,
+        )
+
+
+class Influences(BaseModel):
+    """The influence of every annotated marking of a view."""
+
+    items: list[InfluenceDocument]
+
+
+def _jac(values: tuple[float, ...] | None) -> Jac | None:
+    if values is None:
+        return None
+    return {f"{gamma:g}": value for gamma, value in zip(GAMMAS_PERCENT, values, strict=True)}
