@@ -130,6 +130,9 @@ def _ball(left: Sequence[JudgedView]) -> Gate:
 def _baseline(left: Sequence[JudgedView], pairs: Sequence[Pair], policy: Policy) -> Gate:
     names = {view.key for view in left}
     apart = [pair.baseline_m for pair in pairs if pair.a in names and pair.b in names]
+    if not apart and sum(view.has_ball for view in left) >= MIN_VIEWS:
+        # One camera twice: there is nothing to triangulate.
+        apart = [0.0]
     if not apart:
         return _unjudged("baseline", policy.min_baseline_m)
     widest = max(apart)

@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import MIN_DEPTH, Camera
 from app.geometry.resection import (
@@ -64,16 +65,31 @@ def triangulate(sights: Sequence[Sight], policy: Policy) -> tuple[Pair, ...]:
     couples = [
         (a, b) for a, b in combinations(sights, 2) if not np.array_equal(a.camera.P, b.camera.P)
     ]
-    if not couples:
-        return ()
     ideal = {sight.view: sight.camera.undistort(np.array([sight.center]))[0] for sight in sights}
-    points = triangulate_pairs(
+    try:
+        points = [*_meet(couples, ideal)] if couples else []
+    except DegenerateGeometryError:
+        # A picture twice in a group: rays that are parallel meet nowhere, the others do.
+        couples = [couple for couple in couples if _can_meet(couple, ideal)]
+        points = [*_meet(couples, ideal)] if couples else []
+    return tuple(_pair(a, b, point, policy) for (a, b), point in zip(couples, points, strict=True))
+
+
+def _meet(couples: Sequence[tuple[Sight, Sight]], ideal: Mapping[str, FloatArray]) -> FloatArray:
+    return triangulate_pairs(
         np.array([a.camera.P for a, _ in couples]),
         np.array([b.camera.P for _, b in couples]),
         np.array([ideal[a.view] for a, _ in couples]),
         np.array([ideal[b.view] for _, b in couples]),
     )
-    return tuple(_pair(a, b, point, policy) for (a, b), point in zip(couples, points, strict=True))
+
+
+def _can_meet(couple: tuple[Sight, Sight], ideal: Mapping[str, FloatArray]) -> bool:
+    try:
+        _meet([couple], ideal)
+    except DegenerateGeometryError:
+        return False
+    return True
 
 
 def mean_ball(pairs: Sequence[Pair], sights: Sequence[Sight], policy: Policy) -> Ball3D | None:
