@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from app.geometry.camera import Camera
 from app.soccer.frames import Box
@@ -22,12 +23,22 @@ class ExportRecord:
         verdict: ``accepted``, ``rejected``, ``deferred`` or ``unreviewed``; ``accepted (stale)``
             where the group changed afterwards.
         reason: Why it was rejected, or why it was accepted against a gate.
+        override: The gate against which it was accepted, or None.
+        splits: Split by view, where views of one group are split.
+        frames: Where the frame of each view was placed in the export, by view key; relative.
     """
 
     group: Group
     solution: Solution | None
     verdict: str
     reason: str | None = None
+    override: str | None = None
+    splits: Mapping[str, str] = field(default_factory=dict)
+    frames: Mapping[str, str] = field(default_factory=dict)
+
+    def split(self, view: View) -> str:
+        """``train``, ``test``, ``valid`` or empty: that of the view, or else of its group."""
+        return self.splits.get(view.key, self.group.split)
 
     def view_solution(self, view: View) -> ViewSolution | None:
         """What was computed for one view."""

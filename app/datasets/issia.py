@@ -12,7 +12,7 @@ from typing import Any
 from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
 from app.datasets.camera_json import cameras_of
 from app.datasets.report import Report
-from app.datasets.sn_calibration import IMAGE_SUFFIXES, LineFile, read_line_files
+from app.datasets.sn_calibration import IMAGE_SUFFIXES, LineFile, line_files_of, read_line_files
 from app.datasets.viper import ViperTrack, read_viper
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
@@ -34,6 +34,7 @@ _NUMBERED = (
     re.compile(r"(\d{1,3})(?!.*\d)", re.ASCII),
 )
 _VIDEO = re.compile(r"(?:cam(?:era)?[ _-]?\d{1,3}|Film Role.*\bID-\d{1,3}\b.*)", re.IGNORECASE)
+_OWN_LINES = re.compile(r"lines/cam\d{1,3}\.json", re.ASCII)
 _FRAME = re.compile(r"(?:frame[ _-]?)?(\d{1,9})", re.ASCII | re.IGNORECASE)
 
 
@@ -117,14 +118,15 @@ class IssiaFolder:
 
 
 def _person_boxes(track: ViperTrack, frame: int) -> tuple[Mapping[str, Any], ...]:
-    """Boxes in the shape of SoccerNet's, so that all datasets show them alike."""
+    """Boxes in the shape of SoccerNet's, so that all datasets show them alike; by id."""
+    persons = sorted(track.persons.get(frame, ()), key=lambda item: (item[0].zfill(12), item[1:]))
     return tuple(
         {
             "class": "Person",
             "ID": identity,
             "points": {"x1": x, "y1": y, "x2": x + width, "y2": y + height},
         }
-        for identity, x, y, width, height in track.persons.get(frame, ())
+        for identity, x, y, width, height in persons
     )
 
 
@@ -159,7 +161,8 @@ def open_issia(
     """Read a folder (or zip) once, for its groups and its persons.
 
     XGTF files (plain or .gz) may lie anywhere below it; the camera's number comes from the
-    file's name. ``issia_calibration.json`` gives the cameras.
+    file's name. ``issia_calibration.json`` gives the cameras. Line files are those of
+    ``options.lines``, else ``lines/cam1.json`` .. of the folder itself.
     """
     found = IssiaFolder()
     tree = open_tree(folder, report, limits)
@@ -168,13 +171,28 @@ def open_issia(
     with closing(tree):
         names = tree.names()
         _read_tracks(tree, names, options, found, report, limits)
-        given = _read_given(tree, names, report)
-        _find_media(tree, names, found)
-    lines = _read_lines(options, report, limits)
+        complete(found, tree, names, options, report, limits)
+    count(found, report)
+    return found
+
+
+def complete(
+    found: IssiaFolder,
+    tree: FileTree,
+    names: list[str],
+    options: IssiaOptions,
+    report: Report,
+    limits: Limits,
+) -> None:
+    """Give each camera that has a track its station and its media."""
+    given = _read_given(tree, names, report)
+    _find_media(tree, names, found)
+    if options.lines is None:
+        lines = _own_lines(tree, names, options.size, report)
+    else:
+        lines = _read_lines(options.lines, options.size, report, limits)
     for camera in found.tracks:
         found.stations[camera] = _station(camera, given.get(camera), lines.get(camera), options)
-    _count(found, report)
-    return found
 
 
 def camera_number(name: str) -> int | None:
@@ -239,12 +257,22 @@ def _read_given(tree: FileTree, names: list[str], report: Report) -> dict[int, C
     }
 
 
-def _read_lines(options: IssiaOptions, report: Report, limits: Limits) -> dict[int, LineFile]:
-    if options.lines is None:
-        return {}
+def _read_lines(path: Path, size: ImageSize, report: Report, limits: Limits) -> dict[int, LineFile]:
     side = Report()
+    return _by_camera(read_line_files(path, size, side, limits), side, report)
+
+
+def _own_lines(
+    tree: FileTree, names: list[str], size: ImageSize, report: Report
+) -> dict[int, LineFile]:
+    """Lines that an export of this format laid beside the ground truth."""
+    own, side = [name for name in names if _OWN_LINES.fullmatch(name)], Report()
+    return _by_camera(line_files_of(tree, own, size, side), side, report)
+
+
+def _by_camera(files: Iterator[LineFile], side: Report, report: Report) -> dict[int, LineFile]:
     lines = {}
-    for file in read_line_files(options.lines, options.size, side, limits):
+    for file in files:
         number = camera_number(PurePosixPath(file.stem).name)
         if number is not None:
             lines[number] = file
@@ -287,7 +315,8 @@ def _find_media(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
                 found.frames.setdefault((camera, int(number[1])), Media(tree.shown(name)))
 
 
-def _count(found: IssiaFolder, report: Report) -> None:
+def count(found: IssiaFolder, report: Report) -> None:
+    """Note what a folder held."""
     balls = {frame for track in found.tracks.values() for frame in track.balls}
     persons = {frame for track in found.tracks.values() for frame in track.persons}
     report.read += len(balls)

@@ -8,15 +8,16 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from app.datasets.camera_json import camera_to_json
-from app.datasets.csv_text import Table, Value, plain_list
+from app.datasets.csv_text import Table, Value, cell, plain_list
 from app.datasets.export_record import ExportRecord
 from app.datasets.issia import CALIBRATION
+from app.datasets.issia_3d_reader import TABLE
+from app.datasets.spill import Spill, open_spill
 from app.errors import InputError
 from app.geometry.camera import Camera
-from app.soccer.group import View
+from app.soccer.group import Group, View
 from app.soccer.solution import BallFit
 
-TABLE = "ISSIA-3D.csv"
 CAMERAS = (1, 2, 3, 4, 5, 6)
 COLUMNS = (
     "frame",
@@ -48,27 +49,33 @@ def write_issia_3d(
     Raises:
         InputError: A group is not from ISSIA.
     """
-    rows: list[tuple[int, tuple[Value, ...]]] = []
+    counts = {"groups": 0, "balls": 0}
     cameras: dict[int, Camera] = {}
-    for record in records:
-        annotating = _annotating(record)
-        _collect_cameras(record, cameras)
-        if annotating:
-            verdict = (record.verdict_text,) if everything else ()
-            rows.append((_frame(record), (*_row(record, annotating), *verdict)))
-    rows.sort(key=lambda row: row[0])
-    with (root / TABLE).open("w", encoding="utf-8", newline="") as file:
-        table = Table(file, (*COLUMNS, *(("verdict",) if everything else ())))
-        for _, values in rows:
-            table.add(values)
+    with open_spill() as spill:
+        for record in records:
+            annotating = _annotating(record)
+            _collect_cameras(record, cameras)
+            if annotating:
+                verdict = (record.verdict_text,) if everything else ()
+                cells = [cell(value) for value in (*_row(record, annotating), *verdict)]
+                spill.add((frame_number(record.group), 0, "", 0), json.dumps(cells))
+                counts["groups"] += 1
+                counts["balls"] += record.point is not None
+        _write_table(root / TABLE, spill, everything)
     _write_calibration(root, cameras)
-    balls = sum(values[COLUMNS.index("ball_3D")] is not None for _, values in rows)
-    return {"groups": len(rows), "balls": balls}
+    return counts
+
+
+def _write_table(path: Path, spill: Spill, everything: bool) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = Table(file, (*COLUMNS, *(("verdict",) if everything else ())))
+        for _, cells in spill.items():
+            table.add_cells(json.loads(cells))
 
 
 def _annotating(record: ExportRecord) -> dict[int, View]:
     """Views that annotate the ball, by camera number."""
-    numbered = {_camera(record, view): view for view in record.group.views}
+    numbered = {view_camera(record.group, view): view for view in record.group.views}
     return {
         camera: view
         for camera, view in sorted(numbered.items())
@@ -76,30 +83,47 @@ def _annotating(record: ExportRecord) -> dict[int, View]:
     }
 
 
-def _camera(record: ExportRecord, view: View) -> int:
+def view_camera(group: Group, view: View) -> int:
+    """Number of the camera of a view of ISSIA.
+
+    Raises:
+        InputError: The group is from another kind of dataset.
+    """
     found = _VIEW.fullmatch(view.key)
-    if found is None or not _FRAME.fullmatch(record.group.key):
-        raise InputError(
-            f"group {record.group.key}, view {view.key} is not from ISSIA (frame, cam1 to cam6)",
-            hint="Export it as soccernet-v3d or cameras instead.",
-        )
+    if found is None:
+        raise _not_issia(group, view.key)
+    frame_number(group)
     return int(found[1])
 
 
-def _frame(record: ExportRecord) -> int:
-    return int(record.group.key)
+def frame_number(group: Group) -> int:
+    """Number of the frame of a group of ISSIA.
+
+    Raises:
+        InputError: The group is from another kind of dataset.
+    """
+    if not _FRAME.fullmatch(group.key):
+        raise _not_issia(group, ", ".join(view.key for view in group.views))
+    return int(group.key)
+
+
+def _not_issia(group: Group, view: str) -> InputError:
+    return InputError(
+        f"group {group.key}, view {view} is not from ISSIA (frame, cam1 to cam6)",
+        hint="Export it as soccernet-v3d or cameras instead.",
+    )
 
 
 def _collect_cameras(record: ExportRecord, cameras: dict[int, Camera]) -> None:
     for view in record.group.views:
         camera = record.camera(view)
         if camera is not None:
-            cameras.setdefault(_camera(record, view), camera)
+            cameras.setdefault(view_camera(record.group, view), camera)
 
 
 def _row(record: ExportRecord, annotating: dict[int, View]) -> Iterator[Value]:
     fits = {camera: record.ball_fit(view, True) for camera, view in annotating.items()}
-    yield _frame(record)
+    yield frame_number(record.group)
     for camera in CAMERAS:
         yield from _center(annotating.get(camera))
     yield len(annotating)

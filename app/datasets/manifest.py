@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,9 @@ class Manifest:
         settings: Policy and options of the export, plain JSON values.
         licence: Licence texts of all sources, of ``LICENCES``, one after another.
         media: Per frame that the dataset refers to: path, bytes and checksum.
+        verdicts: How many groups have each verdict.
+        overrides: Groups that are in it against a gate, with the gate and the reason.
+        stamp: What else there is to say of a frozen version: its hash, its counts.
     """
 
     dataset: str
@@ -51,8 +55,12 @@ class Manifest:
     licence: str = UNKNOWN_LICENCE
     version: str | None = None
     media: tuple[Mapping[str, Any], ...] = ()
+    verdicts: Mapping[str, int] = field(default_factory=dict)
+    overrides: tuple[Mapping[str, Any], ...] = ()
+    stamp: Mapping[str, Any] = field(default_factory=dict)
 
 
+@cache
 def software_version() -> str:
     """Version of the installed package."""
     try:
@@ -74,6 +82,9 @@ def write_manifest(root: Path, manifest: Manifest) -> Path:
         "licence": manifest.licence,
         "files": list(_files(root)),
         "media": [dict(item) for item in manifest.media],
+        "verdicts": dict(manifest.verdicts),
+        "overrides": [dict(item) for item in manifest.overrides],
+        **manifest.stamp,
     }
     path = root / MANIFEST
     path.write_text(

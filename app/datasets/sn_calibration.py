@@ -16,9 +16,9 @@ from app.datasets.exact import exact_inverse
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, UnknownMarkingError
-from app.soccer.annotation import Extras, Lines, make_lines
+from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Media
 from app.soccer.pitch import WITHOUT_GEOMETRY, canonical_marking
 
 DEFAULT_SIZE = ImageSize(960, 540)
@@ -26,8 +26,8 @@ LARGEST_UNIT = 2.0
 """A file in which any coordinate lies further from 0 is in pixels."""
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
-_OTHER_FILES = ("match_info.json", "manifest.json", "findings.json", "calibrate.json")
-_OTHER_PREFIXES = ("camera_", "Labels-")
+_OTHER_FILES = ("manifest.json", "findings.json", "calibrate.json", "leave_one_out.json")
+_OTHER_PREFIXES = ("camera_", "Labels-", "match_info")
 # SoccerNet spells this one with a space at the end; its readers look it up that way.
 _SPELLING = {"Goal left post left": "Goal left post left "}
 
@@ -42,6 +42,7 @@ class LineFile:
         others: Lines without geometry (``Line unknown``, unknown names), each as
             ``{"class": name, "points": [x1, y1, x2, y2, ...]}`` in pixels.
         media: The frame, when it lies beside the file.
+        place: Path of the file in its folder or zip, without the ending.
     """
 
     stem: str
@@ -49,6 +50,7 @@ class LineFile:
     lines: Lines
     others: tuple[Mapping[str, Any], ...] = ()
     media: Media | None = None
+    place: str = ""
 
 
 def spelling(marking: str) -> str:
@@ -75,17 +77,24 @@ def read_line_files(
     if tree is None:
         return
     with closing(tree):
-        names = tree.names()
-        beside = _images(names)
-        line_files = [name for name in names if _is_line_file(name)]
-        stems = Counter(PurePosixPath(name).stem for name in line_files)
-        for name in line_files:
-            place = PurePosixPath(name)
-            stem = place.stem if stems[place.stem] == 1 else str(place.with_suffix(""))
-            media = _media(tree, beside.get(str(place.with_suffix(""))))
-            file = _read_line_file(tree, name, LineFile(stem, size, {}, (), media), report)
-            if file is not None:
-                yield file
+        yield from line_files_of(tree, tree.names(), size, report)
+
+
+def line_files_of(
+    tree: FileTree, names: Sequence[str], size: ImageSize, report: Report
+) -> Iterator[LineFile]:
+    """The line files among some files of a tree, with the images that lie beside them."""
+    beside = _images(names)
+    line_files = [name for name in names if _is_line_file(name)]
+    stems = Counter(PurePosixPath(name).stem for name in line_files)
+    for name in line_files:
+        whole = str(PurePosixPath(name).with_suffix(""))
+        stem = PurePosixPath(name).stem
+        key = stem if stems[stem] == 1 else whole
+        empty = LineFile(key, size, {}, (), _media(tree, beside.get(whole)), whole)
+        file = _read_line_file(tree, name, empty, report)
+        if file is not None:
+            yield file
 
 
 def _read_line_file(tree: FileTree, name: str, empty: LineFile, report: Report) -> LineFile | None:
@@ -174,27 +183,18 @@ def _marking(name: str, path: str, report: Report) -> str | None:
         return None
 
 
-def read_sn_calibration(
-    path: Path,
-    size: ImageSize,
-    report: Report,
-    *,
-    calibration: str = "given",
-    limits: Limits = DEFAULT_LIMITS,
-) -> Iterator[Group]:
-    """Each frame as a group of one view, keyed by its stem."""
-    for file in read_line_files(path, size, report, limits):
-        station = Station(file.stem, file.size, lines=file.lines, calibration=calibration)
-        view = View(file.stem, station, media=file.media, extras=Extras(lines=file.others))
-        yield Group(file.stem, (view,), label=f"Frame {file.stem}")
-
-
 def lines_to_json(
-    lines: Lines, size: ImageSize, others: Sequence[Mapping[str, Any]] = ()
+    lines: Lines,
+    size: ImageSize,
+    others: Sequence[Mapping[str, Any]] = (),
+    *,
+    pixels: bool = False,
 ) -> dict[str, list[dict[str, float]]]:
     """One line file's object under SoccerNet's own spelling of the names.
 
-    Normalised, or in pixels where a point lies so far outside that it would be taken for one.
+    Normalised, or in pixels where that is asked for, or where a point lies so far outside that
+    it would be taken for one. Not every pixel has a normalised number that gives it back to the
+    last bit; numbers that came normalised have one.
     """
     flat = [line.get("points") or [] for line in others]
     points = {spelling(marking): list(line) for marking, line in lines.items()}
@@ -203,7 +203,9 @@ def lines_to_json(
         points.setdefault(str(line.get("class")), []).extend(extra)
     everything = [point for line in points.values() for point in line]
     # Far outside, a normalised coordinate would be read back as a pixel.
-    units = all(max(map(abs, size.pixel_to_unit(point))) <= LARGEST_UNIT for point in everything)
+    units = not pixels and all(
+        max(map(abs, size.pixel_to_unit(point))) <= LARGEST_UNIT for point in everything
+    )
     return {name: [_written(p, size, units) for p in line] for name, line in points.items()}
 
 
@@ -217,9 +219,15 @@ def _written(point: ImagePoint, size: ImageSize, units: bool) -> dict[str, float
     }
 
 
-def line_file_text(lines: Lines, size: ImageSize, others: Sequence[Mapping[str, Any]] = ()) -> str:
+def line_file_text(
+    lines: Lines,
+    size: ImageSize,
+    others: Sequence[Mapping[str, Any]] = (),
+    *,
+    pixels: bool = False,
+) -> str:
     """The text of one line file."""
-    return json.dumps(lines_to_json(lines, size, others), allow_nan=False) + "\n"
+    return json.dumps(lines_to_json(lines, size, others, pixels=pixels), allow_nan=False) + "\n"
 
 
 def write_line_files(root: Path, files: Iterable[LineFile]) -> list[Path]:

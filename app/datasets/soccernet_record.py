@@ -193,7 +193,7 @@ def record_to_json(view: View, split: str = "") -> dict[str, Any]:
     for name, side in (("width", view.size.width), ("height", view.size.height)):
         # The source's own spelling of the same number ("1280") stays.
         metadata[name] = metadata[name] if _same(metadata.get(name), side) else side
-    if split and "set" not in metadata:
+    if split:
         metadata["set"] = split
     lines = [
         {"class": spelling(marking), "points": [c for point in points for c in point]}

@@ -69,20 +69,29 @@ def read_soccernet_v3(
         folders = [name[: -len(LABELS)] for name in names if PurePosixPath(name).name == LABELS]
         if not folders:
             report.note(str(root), None, None, f"holds no {LABELS}")
-        reader = _TreeReader(tree, names, report, limits)
+        reader = MatchReader(tree, names, report, limits)
         for folder in folders:
             yield from reader.read_match(folder)
 
 
-class _TreeReader:
-    """Reads match after match of one tree."""
+class MatchReader:
+    """Reads match after match of one tree; ``file`` is the name of the labels in each."""
 
-    def __init__(self, tree: FileTree, names: list[str], report: Report, limits: Limits):
+    def __init__(
+        self,
+        tree: FileTree,
+        names: list[str],
+        report: Report,
+        limits: Limits,
+        file: str = LABELS,
+    ):
         self.tree, self.names, self.report, self.limits = tree, names, report, limits
+        self.file = file
         self.seen: dict[str, str] = {}
 
     def read_match(self, folder: str) -> Iterator[Group]:
-        path = self.tree.shown(folder + LABELS)
+        """The groups of the labels in one folder (``""``, or with a slash at its end)."""
+        path = self.tree.shown(folder + self.file)
         try:
             labels = self._labels(folder, path)
             match = _match_key(self.tree.path, folder, labels.get(GAME))
@@ -93,22 +102,24 @@ class _TreeReader:
             self.report.skip(error)
             return
         self.seen[match] = path
-        frames = MatchFrames(self.tree, folder, self._inside(folder), self.report, self.limits)
+        inside = files_inside(self.names, folder)
+        frames = MatchFrames(self.tree, folder, inside, self.report, self.limits)
         yield from _Match(match, labels, path, frames, self.report).groups()
 
     def _labels(self, folder: str, path: str) -> dict[str, Any]:
-        content = self.tree.read_bytes(folder + LABELS)
+        content = self.tree.read_bytes(folder + self.file)
         limit = self.limits.file_bytes
         labels = read_json(content, path, double_encoded=True, max_bytes=limit)
         if not isinstance(labels, dict):
             raise DatasetFormatError(path, None, None, "is not an object")
         return labels
 
-    def _inside(self, folder: str) -> set[str]:
-        """Files below a folder, by their name from there on."""
-        first = bisect_left(self.names, folder)
-        last = bisect_left(self.names, folder + chr(0x10FFFF))
-        return {name[len(folder) :] for name in self.names[first:last]}
+
+def files_inside(names: list[str], folder: str) -> set[str]:
+    """Of sorted names, those below a folder, by their name from there on."""
+    first = bisect_left(names, folder)
+    last = bisect_left(names, folder + chr(0x10FFFF))
+    return {name[len(folder) :] for name in names[first:last]}
 
 
 def _match_key(root: Path, folder: str, game: Any) -> str:
@@ -339,7 +350,8 @@ class LabelsWriter:
         if path in self.written:
             labels = _joined(json.loads(path.read_text(encoding="utf-8")), labels)
         path.parent.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(labels, indent=1, ensure_ascii=False, allow_nan=False)
+        # Without indentation: with it, writing would take ten times as long.
+        text = json.dumps(labels, ensure_ascii=False, allow_nan=False)
         path.write_text(text + "\n", encoding="utf-8")
         self.written[path] = None
 

@@ -12,6 +12,8 @@ from typing import Any, TextIO
 from app.datasets.camera_json import camera_to_json
 from app.datasets.csv_text import Table, Value, plain_list
 from app.datasets.export_record import ExportRecord, chosen_box
+from app.datasets.snv3d_reader import LABELS
+from app.datasets.snv3d_table import SPLIT_FILES, TABLE
 from app.datasets.soccernet_record import GAME, IMAGE
 from app.datasets.soccernet_v3 import (
     LabelsWriter,
@@ -23,9 +25,6 @@ from app.soccer.frames import Box
 from app.soccer.group import Group, View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit
 
-LABELS = "Labels-v3D.json"
-TABLE = "SNv3D.csv"
-SPLIT_FILES = {"train": "SNv3D-train.txt", "test": "SNv3D-test.txt"}
 JAC_NAMES = tuple(f"JaC@{gamma / 100:g}" for gamma in GAMMAS_PERCENT)
 COLUMNS = (
     "league",
@@ -109,8 +108,8 @@ def _add_rows(
         table.add((*_row(record, view, fit), *verdict))
         counts["views"] += 1
         counts["balls"] += fit is not None
-        if record.group.split in lists:
-            lists[record.group.split].write(f"{match}/{Path(view.key).stem}\n")
+        if record.split(view) in lists:
+            lists[record.split(view)].write(f"{match}/{Path(view.key).stem}\n")
 
 
 def _row(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Value]:
@@ -128,7 +127,7 @@ def _row(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Valu
     yield f"[array({plain_list(record.point)})]" if fit and record.point else None
     yield from (fit.error_px, fit.optimized_error_m) if fit else (None, None)
     yield fit.optimized_diameter_px if fit else None
-    yield record.group.split or None
+    yield record.split(view) or None
 
 
 def box_text(box: Box) -> str:
@@ -188,6 +187,6 @@ def _computed(record: ExportRecord, view: View, everything: bool) -> dict[str, A
         values["rep_error"] = fit.error_px
         values["optimized_error"] = fit.optimized_error_m
         values["optimized_d"] = fit.optimized_diameter_px
-    if everything:
+    if everything or record.override is not None:
         values["verdict"] = record.verdict_text
     return values

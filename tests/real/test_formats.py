@@ -18,9 +18,9 @@ from app.datasets.report import Report
 from app.datasets.sn_calibration import (
     DEFAULT_SIZE,
     read_line_files,
-    read_sn_calibration,
     write_line_files,
 )
+from app.datasets.sn_calibration_groups import read_sn_calibration
 from app.soccer.pitch import MARKINGS
 
 REAL_DATA = Path(

@@ -5,8 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from app.datasets.csv_text import Table, cell, plain_list
+from app.datasets.archive import DEFAULT_LIMITS, Limits
+from app.datasets.csv_text import Table, cell, is_missing, numbers_in, plain_list, read_rows
+from app.errors import DatasetFormatError
 
 
 class TestCell:
@@ -51,3 +55,63 @@ class TestTable:
         table.add(["x,y", False])
         assert file.getvalue() == ',a,b\n0,1.5,\n1,"x,y",False\n'
         assert table.rows == 2
+
+
+class TestReadRows:
+    def test_rows_by_column_with_their_lines(self) -> None:
+        content = '\ufeff,a,b\n0,"x\ny",\'=1+a\n\n1,2\n'.encode()
+        rows = list(read_rows(content, "f", ("a",), DEFAULT_LIMITS))
+        assert rows == [(3, {"": "0", "a": "x\ny", "b": "=1+a"}), (5, {"": "1", "a": "2"})]
+
+    @pytest.mark.parametrize(
+        ("content", "problem"),
+        [
+            (b"b\n1\n", "is missing from the columns"),
+            (b"a\n\xff\n", "is not UTF-8"),
+            (b'a\n"x', "is not sound CSV"),
+            (b"", "is missing from the columns"),
+        ],
+    )
+    def test_what_is_no_such_table_is_refused(self, content: bytes, problem: str) -> None:
+        with pytest.raises(DatasetFormatError, match=problem):
+            list(read_rows(content, "f", ("a",), DEFAULT_LIMITS))
+
+    def test_a_table_beyond_the_limit_is_refused(self) -> None:
+        with pytest.raises(DatasetFormatError, match="longer than 3 bytes"):
+            list(read_rows(b"a\n1\n", "f", ("a",), Limits(file_bytes=3)))
+
+    @given(st.text(st.characters(exclude_categories=["Cs"])))
+    def test_any_text_comes_back_through_a_table(self, text: str) -> None:
+        file = io.StringIO(newline="")
+        Table(file, ("a",)).add([text])
+        ((_, row),) = read_rows(file.getvalue().encode(), "f", ("a",), DEFAULT_LIMITS)
+        expected = text.replace("\r\n", "\n").replace("\r", "\n")
+        # An apostrophe of its own before a formula cannot be told from ours.
+        assert row["a"] in (expected, expected.removeprefix("'"))
+
+
+class TestNumbersIn:
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "[1, -2.5, 3e2]",
+            "[array([1., -2.5, 300.])]",
+            "[np.float64(1.0), -2.5, 300]",
+            "1 -2.5 300",
+        ],
+    )
+    def test_every_spelling_of_a_list(self, text: str) -> None:
+        assert numbers_in(text, 3) == (1.0, -2.5, 300.0)
+
+    @pytest.mark.parametrize(
+        "text", ["[1, 2]", "[1, 2, nan]", "[1, 2, x]", "[1, 2, f(3)]", "[1e999, 2, 3]"]
+    )
+    def test_anything_else_is_refused(self, text: str) -> None:
+        with pytest.raises(ValueError, match=r"numbers|large"):
+            numbers_in(text, 3)
+
+
+class TestIsMissing:
+    def test_nothing_and_nan_in_every_spelling(self) -> None:
+        assert all(map(is_missing, (None, "", " ", "nan", "NaN", "None")))
+        assert not any(map(is_missing, ("0", "0.0", "False", "na")))

@@ -16,10 +16,10 @@ from app.datasets.sn_calibration import (
     lines_from_json,
     lines_to_json,
     read_line_files,
-    read_sn_calibration,
     spelling,
     write_line_files,
 )
+from app.datasets.sn_calibration_groups import read_sn_calibration
 from app.errors import DatasetFormatError, UnsafePathError
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize

@@ -1,0 +1,199 @@
+"""COCO, read: our own files as they were said, anybody's as images with boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, check_name, open_tree
+from app.datasets.coco import PREFIX, STATE, UNASSIGNED
+from app.datasets.json_text import read_json
+from app.datasets.report import Report
+from app.datasets.sn_calibration import IMAGE_SUFFIXES
+from app.datasets.soccernet_v3 import SPLITS
+from app.datasets.view_groups import PlacedView, ViewGroups
+from app.datasets.view_state import GroupHead, StateReader
+from app.errors import DatasetFormatError, UnsafePathError
+from app.soccer.annotation import BallAnnotation, Extras
+from app.soccer.frames import Box
+from app.soccer.group import Group, Media, Station, View
+from app.soccer.pitch import Pitch
+
+BALLS = frozenset({"ball", "sports ball", "sports-ball", "soccer ball", "football"})
+"""Names of categories that are the ball, in lower case."""
+_FOLDERS = ("", "images/", "train/", "val/", "valid/", "test/")
+
+
+def read_coco(
+    root: Path,
+    report: Report,
+    *,
+    calibration: str = "given",
+    limits: Limits = DEFAULT_LIMITS,
+) -> Iterator[Group]:
+    """The images of every COCO file below ``root``.
+
+    Images with the field ``touchline`` come back as the groups that they were; a box that
+    somebody has changed since is the new annotation. Any other image is a group of one view,
+    keyed by its file name; boxes of other categories are kept beside the ball.
+
+    Args:
+        root: Folder, zip or one JSON file.
+        report: Takes what had to be left out.
+        calibration: What counts for a view that has a camera and lines (images of others).
+        limits: Caps on what is read.
+    """
+    tree = open_tree(root, report, limits)
+    if tree is None:
+        return
+    with closing(tree):
+        names = tree.names()
+        groups = ViewGroups(report)
+        found = False
+        for name in names:
+            place = PurePosixPath(name)
+            if place.suffix.lower() != ".json" or place.name == "manifest.json":
+                continue
+            value = _value(tree, name, report, limits)
+            if value is not None:
+                found = True
+                for view in _File(tree, name, names, value, report, calibration).views():
+                    yield from groups.add(view)
+        yield from groups.rest()
+        if not found:
+            report.note(str(root), None, None, "holds no COCO file (images and annotations)")
+
+
+def _value(tree: FileTree, name: str, report: Report, limits: Limits) -> dict[str, Any] | None:
+    try:
+        shown = tree.shown(name)
+        value = read_json(tree.read_bytes(name), shown, max_bytes=limits.file_bytes)
+    except DatasetFormatError as error:
+        report.skip(error)
+        return None
+    lists = isinstance(value, dict) and all(
+        isinstance(value.get(part), list) for part in ("images", "annotations")
+    )
+    return value if lists else None
+
+
+class _File:
+    """One file on its way to views."""
+
+    def __init__(
+        self,
+        tree: FileTree,
+        name: str,
+        names: list[str],
+        value: Mapping[str, Any],
+        report: Report,
+        calibration: str,
+    ):
+        self.path, self._tree, self._names = tree.shown(name), tree, set(names)
+        self._value, self._report, self._calibration = value, report, calibration
+        stem = PurePosixPath(name).stem.removeprefix(PREFIX)
+        self._split = stem if stem in SPLITS and stem != UNASSIGNED else ""
+        self._top = str(PurePosixPath(name).parent.parent)
+        self._categories = {
+            str(item.get("id")): str(item.get("name", "")).strip().lower()
+            for item in value.get("categories") or []
+            if isinstance(item, dict)
+        }
+        self._of_image = self._by_image()
+
+    def _by_image(self) -> dict[str, list[Mapping[str, Any]]]:
+        found: dict[str, list[Mapping[str, Any]]] = {}
+        for index, item in enumerate(self._value["annotations"]):
+            if isinstance(item, dict) and "image_id" in item:
+                found.setdefault(str(item["image_id"]), []).append(item)
+            else:
+                self._note(f"annotations[{index}]", "image_id", "is missing")
+        return found
+
+    def _note(self, record: str, field: str | None, problem: str) -> None:
+        self._report.note(self.path, record, field, problem)
+
+    def views(self) -> Iterator[PlacedView]:
+        """Image by image; what is wrong with one is reported and leaves it out."""
+        for index, item in enumerate(self._value["images"]):
+            record = f"images[{index}]"
+            self._report.read += 1
+            try:
+                image = StateReader(item, self.path, record)
+                if STATE in image.value:
+                    yield self._ours(image)
+                else:
+                    yield self._theirs(image)
+            except DatasetFormatError as error:
+                self._report.skip(error)
+
+    def _ours(self, image: StateReader) -> PlacedView:
+        state = StateReader(image.value[STATE], self.path, image.record)
+        view = state.view(image.size(), Extras())
+        changed = self._changed(image, view)
+        media = self._media(image.text("file_name", ""))
+        view = replace(view, balls=changed, media=media)
+        return PlacedView(state.head(), state.count("position"), view)
+
+    def _changed(self, image: StateReader, view: View) -> tuple[BallAnnotation, ...]:
+        """The balls, with the boxes that somebody changed after they were written."""
+        if len(view.balls) != 1:
+            return view.balls
+        for item in self._annotations(image):
+            if item.get("bbox") != item.get("written_bbox", item.get("bbox")):
+                box = self._box(item, image.record)
+                if box is not None:
+                    return (replace(view.balls[0], box=box, point=None),)
+        return view.balls
+
+    def _annotations(self, image: StateReader) -> list[Mapping[str, Any]]:
+        return self._of_image.get(str(image.value.get("id")), [])
+
+    def _box(self, item: Mapping[str, Any], record: str) -> Box | None:
+        try:
+            return StateReader.box(item.get("bbox"))
+        except ValueError as error:
+            self._note(record, "bbox", f"{error}; left out")
+            return None
+
+    def _theirs(self, image: StateReader) -> PlacedView:
+        name = image.text("file_name")
+        try:
+            key = str(PurePosixPath(check_name(name)))
+        except UnsafePathError as error:
+            raise image.error("file_name", error.message) from error
+        balls, boxes = [], []
+        for item in self._annotations(image):
+            box = self._box(item, image.record)
+            if box is None:
+                continue
+            category = self._categories.get(str(item.get("category_id")), "")
+            if category in BALLS:
+                balls.append(BallAnnotation(box=box, occluded=item.get("occluded") is True))
+            else:
+                boxes.append(_shown(category, item, box))
+        station = Station(key, image.size(), calibration=self._calibration)
+        view = View(key, station, tuple(balls), self._media(name), extras=Extras(tuple(boxes)))
+        label = f"Image {PurePosixPath(key).name}"
+        return PlacedView(GroupHead(key, "", self._split, label, Pitch(), 1), 0, view)
+
+    def _media(self, name: str) -> Media | None:
+        """The frame beside the annotations, where it lies in the tree."""
+        tops = ("", f"{self._top}/") if self._top != "." else ("",)
+        for top in tops:
+            for folder in _FOLDERS:
+                place = f"{top}{folder}{name}"
+                if place in self._names and PurePosixPath(place).suffix.lower() in IMAGE_SUFFIXES:
+                    if self._tree.path.is_dir():
+                        return Media(self._tree.shown(place))
+                    return Media(str(self._tree.path), place)
+        return None
+
+
+def _shown(category: str, item: Mapping[str, Any], box: Box) -> Mapping[str, Any]:
+    """A box of another category in the shape that all datasets show."""
+    corners = {"x1": box.x, "y1": box.y, "x2": box.x + box.width, "y2": box.y + box.height}
+    return {"class": category or None, "ID": str(item.get("id", "")), "points": corners}

@@ -1,0 +1,55 @@
+"""Where the frame of a view lies in an export: beside its labels, or flat for YOLO."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable
+from pathlib import PurePosixPath
+
+from app.datasets.sn_calibration import IMAGE_SUFFIXES
+from app.soccer.group import Group, View
+
+FOLDER = "Frames-v3"
+"""Beside the labels of a match, where SoccerNet's readers look for loose frames."""
+_UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
+
+
+FrameName = Callable[[Group, View, str, str], str]
+"""Place of a frame in an export, from its group, its view, its split and the ending to give."""
+
+
+def match_frame(group: Group, view: View, split: str, suffix: str) -> str:
+    """``<match>/Frames-v3/7_1.png``; static cameras: ``.../cam3/358.jpg``.
+
+    The ending of a view's key stays, whatever the frame is: labels and readers go by the name.
+    """
+    name = PurePosixPath(view.key)
+    match = group.match or "frames"
+    if view.station.shared:
+        return f"{match}/{FOLDER}/{view.key}/{group.key}{suffix}"
+    if name.suffix.lower() in IMAGE_SUFFIXES:
+        return f"{match}/{FOLDER}/{name}"
+    return f"{match}/{FOLDER}/{name}{suffix}"
+
+
+def flat_frame(group: Group, view: View, split: str, suffix: str) -> str:
+    """``images/<split>/<digest of the group>_<view>.jpg``: no name of ours meets another."""
+    digest = hashlib.sha256(group.key.encode()).hexdigest()[:12]
+    name = PurePosixPath(view.key)
+    known = name.suffix.lower() in IMAGE_SUFFIXES
+    stem = _UNSAFE.sub("-", str(name.with_suffix("")) if known else view.key)
+    return f"images/{split_folder(split)}/{digest}_{stem}{name.suffix.lower() if known else suffix}"
+
+
+def split_folder(split: str) -> str:
+    """Name of a split as a folder; YOLO says ``val``, and what has no split trains."""
+    return {"valid": "val", "test": "test", "challenge": "test"}.get(split, "train")
+
+
+def likely_suffix(view: View) -> str:
+    """Ending that a copy of a view's frame would most likely have."""
+    media = view.media
+    name = "" if media is None else media.member or media.path
+    suffix = PurePosixPath(name).suffix.lower()
+    return suffix if suffix in IMAGE_SUFFIXES else ".jpg"

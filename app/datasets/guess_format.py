@@ -1,0 +1,64 @@
+"""Which format a folder, a zip or a file most likely holds, from names alone."""
+
+from __future__ import annotations
+
+import os
+import re
+import zipfile
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from pathlib import Path
+
+MAX_NAMES = 2000
+"""Names that are looked at; a large folder must not hold a request up."""
+MAX_DEPTH = 4
+_NAMES: tuple[tuple[str, re.Pattern[str]], ...] = (
+    ("touchline", re.compile(r"(?:.*/)?touchline\.json")),
+    ("soccernet-v3d", re.compile(r"(?:.*/)?(?:Labels-v3D\.json|SNv3D\.csv)")),
+    ("soccernet-v3", re.compile(r"(?:.*/)?Labels-v3\.json")),
+    ("gamestate", re.compile(r"(?:.*/)?Labels-GameState\.json")),
+    ("issia-3d", re.compile(r"(?:.*/)?ISSIA-3D\.csv")),
+    ("issia", re.compile(r".*\.xgtf(?:\.gz)?", re.IGNORECASE)),
+    ("parquet", re.compile(r".*\.parquet", re.IGNORECASE)),
+    ("coco", re.compile(r"(?:.*/)?(?:instances_[^/]*|annotations[^/]*|[^/]*coco[^/]*)\.json")),
+    ("sn-calibration", re.compile(r"(?:.*/)?(?:\d{1,9}|match_info)\.json")),
+    ("cameras", re.compile(r"(?:.*/)?(?:camera_[^/]*|issia_calibration)\.json")),
+)
+"""The first one that any name fits: exports hold cameras beside their labels."""
+
+
+def guess_format(path: Path) -> str | None:
+    """Name of the format for ``touchline import``, or None where nothing looks familiar."""
+    names = list(islice(_names(path), MAX_NAMES))
+    for name, pattern in _NAMES:
+        if any(map(pattern.fullmatch, names)):
+            return name
+    return None
+
+
+def _names(path: Path) -> Iterable[str]:
+    if path.is_dir():
+        return _below(path, "", MAX_DEPTH)
+    if path.suffix.lower() != ".zip":
+        return [path.name]
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return archive.namelist()
+    except (zipfile.BadZipFile, OSError, ValueError):
+        return []
+
+
+def _below(root: Path, inside: str, depth: int) -> Iterator[str]:
+    """Names below a folder, files before folders; links are not followed."""
+    folders = []
+    try:
+        with os.scandir(root / inside) as entries:
+            for entry in islice(entries, MAX_NAMES):
+                if entry.is_dir(follow_symlinks=False):
+                    folders.append(f"{inside}{entry.name}/")
+                elif entry.is_file(follow_symlinks=False):
+                    yield inside + entry.name
+    except OSError:
+        return
+    for folder in sorted(folders)[:20] if depth > 1 else ():
+        yield from _below(root, folder, depth - 1)

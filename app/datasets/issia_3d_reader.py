@@ -1,0 +1,103 @@
+"""ISSIA-3D as released, read: the ball centres of ISSIA-3D.csv, and issia_calibration.json."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from contextlib import closing
+from pathlib import Path, PurePosixPath
+
+from app.datasets import fields
+from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
+from app.datasets.csv_text import is_missing, read_rows
+from app.datasets.issia import IssiaFolder, IssiaOptions, complete, count
+from app.datasets.report import Report
+from app.datasets.viper import ViperTrack
+from app.errors import DatasetFormatError
+
+TABLE = "ISSIA-3D.csv"
+_AXES = re.compile(r"x_cam(\d{1,3})", re.ASCII)
+
+
+def open_issia_3d(
+    folder: Path, options: IssiaOptions, report: Report, limits: Limits = DEFAULT_LIMITS
+) -> IssiaFolder:
+    """Read a folder (or zip, or the table alone) as if it were ISSIA's own ground truth.
+
+    A camera annotates the ball of a frame where the table has both its coordinates. 3D points
+    and errors are computed and not read; people and several balls of a view have no place in
+    the table. Numbers of frames are those of the videos: ``options.frame_offset`` is not used.
+    """
+    found = IssiaFolder()
+    tree = open_tree(folder, report, limits)
+    if tree is None:
+        return found
+    with closing(tree):
+        names = tree.names()
+        tables = [name for name in names if PurePosixPath(name).name == TABLE]
+        if not tables:
+            report.note(str(folder), None, None, f"holds no {TABLE}")
+        for name in tables[1:]:
+            report.note(tree.shown(name), None, None, f"is a second {TABLE}; {tables[0]} is used")
+        for name in tables[:1]:
+            _read_table(tree, name, found, report, limits)
+        complete(found, tree, names, options, report, limits)
+    count(found, report)
+    return found
+
+
+def _read_table(
+    tree: FileTree, name: str, found: IssiaFolder, report: Report, limits: Limits
+) -> None:
+    shown, seen = tree.shown(name), set[int]()
+    try:
+        for line, cells in read_rows(tree.read_bytes(name), shown, ("frame",), limits):
+            record = f"line {line}"
+            try:
+                frame = _frame(cells)
+            except ValueError as error:
+                report.note(shown, record, "frame", str(error))
+                continue
+            if frame in seen:
+                report.note(shown, record, "frame", f"is a second row of frame {frame}")
+                continue
+            seen.add(frame)
+            _read_row(cells, frame, found, DatasetFormatError(shown, record, None, ""), report)
+    except DatasetFormatError as error:
+        report.skip(error)
+
+
+def _frame(cells: Mapping[str, str]) -> int:
+    frame = fields.whole(cells.get("frame", ""))
+    if abs(frame) >= 10**9:
+        raise ValueError("is too large")
+    return frame
+
+
+def _read_row(
+    cells: Mapping[str, str],
+    frame: int,
+    found: IssiaFolder,
+    place: DatasetFormatError,
+    report: Report,
+) -> None:
+    """The ball centres of one row; ``place`` is where it stands."""
+    for name in cells:
+        axis = _AXES.fullmatch(name)
+        if axis is None:
+            continue
+        try:
+            point = _point(cells, axis[1])
+        except ValueError as error:
+            report.note(place.path, place.record, f"cam{axis[1]}", f"{error}; left out")
+            continue
+        if point is not None:
+            track = found.tracks.setdefault(int(axis[1]), ViperTrack())
+            track.balls.setdefault(frame, []).append(point)
+
+
+def _point(cells: Mapping[str, str], camera: str) -> tuple[float, float] | None:
+    x, y = cells.get(f"x_cam{camera}"), cells.get(f"y_cam{camera}")
+    if x is None or y is None or (is_missing(x) and is_missing(y)):
+        return None
+    return fields.pixel(x), fields.pixel(y)

@@ -1,0 +1,253 @@
+"""What was said of one view as plain JSON values, for formats that have room for all of it.
+
+COCO images carry it under ``touchline``, Parquet in columns: so an export can be read again and
+gives the same group.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from app.datasets import fields
+from app.datasets.archive import check_name
+from app.datasets.camera_json import camera_from_json, camera_to_json
+from app.datasets.soccernet_record import MAX_SIDE
+from app.errors import DatasetFormatError, InputError, UnknownMarkingError, UnsafePathError
+from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
+from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.group import Group, Station, View
+from app.soccer.pitch import Pitch, canonical_marking
+
+MAX_TEXT = 1000
+"""Longest key or label, characters."""
+CALIBRATIONS = ("given", "lines")
+
+
+@dataclass(frozen=True)
+class GroupHead:
+    """What a view says about its group; views of one key make one group."""
+
+    key: str
+    match: str
+    split: str
+    label: str
+    pitch: Pitch
+    views: int = 0
+    """How many views the group has; 0 where that is not known."""
+
+    def group(self, views: tuple[View, ...]) -> Group:
+        """The group of that head."""
+        return Group(self.key, views, self.match, self.pitch, self.split, self.label)
+
+
+def head_to_json(group: Group) -> dict[str, Any]:
+    """What a group is without its views."""
+    return {
+        "group": group.key,
+        "match": group.match,
+        "split": group.split,
+        "label": group.label,
+        "pitch": [float(group.pitch.length), float(group.pitch.width)],
+        "views": len(group.views),
+    }
+
+
+def view_to_json(view: View) -> dict[str, Any]:
+    """Everything that was said of a view but its size, its media and its extras."""
+    station, given = view.station, view.station.given
+    return {
+        "view": view.key,
+        "included": view.included,
+        "station": station.key,
+        "shared": station.shared,
+        "flipped": station.flipped,
+        "calibration": station.calibration,
+        "given": None if given is None else camera_to_json(given),
+        "lines": lines_to_json(station.lines),
+        "balls": [ball_to_json(ball) for ball in view.balls],
+    }
+
+
+def lines_to_json(lines: Lines) -> dict[str, Any]:
+    """``{marking: [[x, y], ...]}``, pixels."""
+    return {marking: [[float(x), float(y)] for x, y in points] for marking, points in lines.items()}
+
+
+def ball_to_json(ball: BallAnnotation) -> dict[str, Any]:
+    """``{"box": [x, y, w, h] | null, "point": [x, y] | null, ...}``, pixels."""
+    box = ball.box
+    return {
+        "box": None if box is None else [*map(float, (box.x, box.y, box.width, box.height))],
+        "point": None if ball.point is None else [*map(float, ball.point)],
+        "occluded": ball.occluded,
+        "out_of_view": ball.out_of_view,
+        **({"predicted_by": ball.predicted_by} if ball.predicted_by else {}),
+    }
+
+
+def extras_to_json(extras: Extras) -> dict[str, Any] | None:
+    """What the ball pipeline does not use; None when there is nothing."""
+    if not (extras.boxes or extras.lines or extras.metadata):
+        return None
+    return {
+        "boxes": [dict(box) for box in extras.boxes],
+        "lines": [dict(line) for line in extras.lines],
+        "metadata": dict(extras.metadata),
+    }
+
+
+class StateReader:
+    """Reads one record's values; whatever is wrong is an error with file, record and field."""
+
+    def __init__(self, value: Any, path: str, record: str):
+        self.path, self.record = path, record
+        self.value: Mapping[str, Any] = value if isinstance(value, dict) else {}
+        if not isinstance(value, dict):
+            raise self.error(None, "is not an object")
+
+    def error(self, field: str | None, problem: str) -> DatasetFormatError:
+        """What is wrong with a field."""
+        return DatasetFormatError(self.path, self.record, field, problem)
+
+    def text(self, name: str, default: str | None = None) -> str:
+        """A short text; ``default`` where there is none."""
+        found = self.value.get(name, default)
+        if found is None and default is not None:
+            return default
+        if not isinstance(found, str) or len(found) > MAX_TEXT:
+            raise self.error(
+                name, "is no text, or too long" if name in self.value else "is missing"
+            )
+        return found
+
+    def key(self, name: str) -> str:
+        """A text that may become part of a path."""
+        found = self.text(name)
+        try:
+            return check_name(found)
+        except UnsafePathError as error:
+            raise self.error(name, error.message) from error
+
+    def flag(self, name: str, default: bool) -> bool:
+        """True or false."""
+        found = self.value.get(name)
+        return found if isinstance(found, bool) else default
+
+    def size(self) -> ImageSize:
+        """``width`` and ``height``."""
+        sides = []
+        for name in ("width", "height"):
+            try:
+                side = fields.whole(self.value.get(name))
+            except ValueError as error:
+                raise self.error(name, str(error)) from error
+            if not 2 <= side <= MAX_SIDE:
+                raise self.error(name, f"is {side} pixels")
+            sides.append(side)
+        return ImageSize(*sides)
+
+    def head(self) -> GroupHead:
+        """Back from ``head_to_json``."""
+        try:
+            length, width = fields.numbers(self.value.get("pitch") or [105.0, 68.0], 2)
+            pitch = Pitch(length, width)
+        except (ValueError, InputError) as error:
+            raise self.error("pitch", str(error)) from error
+        match = self.text("match", "")
+        return GroupHead(
+            self.key("group"),
+            self.key("match") if match else "",
+            self.text("split", ""),
+            self.text("label", ""),
+            pitch,
+            self.count("views"),
+        )
+
+    def count(self, name: str) -> int:
+        """A whole number from 0; 0 where there is none."""
+        try:
+            return max(fields.whole(self.value.get(name) or 0), 0)
+        except ValueError as error:
+            raise self.error(name, str(error)) from error
+
+    def view(self, size: ImageSize, extras: Extras) -> View:
+        """Back from ``view_to_json``."""
+        key = self.key("view")
+        calibration = self.text("calibration", "given")
+        if calibration not in CALIBRATIONS:
+            raise self.error("calibration", f"is none of {' and '.join(CALIBRATIONS)}")
+        given = self.value.get("given")
+        station = Station(
+            key=self.key("station"),
+            size=size,
+            shared=self.flag("shared", False),
+            lines=self.lines(),
+            given=None if given is None else camera_from_json(given, self.path, self.record),
+            calibration=calibration,
+            flipped=self.flag("flipped", False),
+        )
+        return View(key, station, self.balls(), None, self.flag("included", True), extras)
+
+    def lines(self) -> Lines:
+        """Back from ``lines_to_json``."""
+        lines = {}
+        try:
+            for name, points in fields.mapping(self.value.get("lines") or {}).items():
+                lines[canonical_marking(name)] = [self._point(p) for p in fields.sequence(points)]
+        except UnknownMarkingError as error:
+            raise self.error("lines", error.message) from error
+        except ValueError as error:
+            raise self.error("lines", str(error)) from error
+        return make_lines(lines)
+
+    def balls(self) -> tuple[BallAnnotation, ...]:
+        """Back from ``ball_to_json``."""
+        try:
+            values = fields.sequence(self.value.get("balls") or [])
+            return tuple(self._ball(fields.mapping(item)) for item in values)
+        except ValueError as error:
+            raise self.error("balls", str(error)) from error
+
+    def _ball(self, value: Mapping[str, Any]) -> BallAnnotation:
+        box, point = value.get("box"), value.get("point")
+        out_of_view = value.get("out_of_view") is True
+        if (box is None) == (point is None) and not out_of_view:
+            raise ValueError("has a ball that is not one of box and point")
+        return BallAnnotation(
+            box=None if box is None else self.box(box),
+            point=None if point is None else self._point(point),
+            occluded=value.get("occluded") is True,
+            out_of_view=out_of_view,
+            predicted_by=str(value.get("predicted_by") or ""),
+        )
+
+    @staticmethod
+    def box(value: Any) -> Box:
+        """``[x, y, w, h]``, pixels.
+
+        Raises:
+            ValueError: Anything else, or a box without area.
+        """
+        x, y, width, height = (fields.pixel(item) for item in fields.numbers(value, 4))
+        if width <= 0 or height <= 0:
+            raise ValueError("has a box without area")
+        return Box(x, y, width, height)
+
+    @staticmethod
+    def _point(value: Any) -> ImagePoint:
+        x, y = (fields.pixel(item) for item in fields.numbers(value, 2))
+        return ImagePoint(x, y)
+
+
+def extras_from_json(value: Any) -> Extras:
+    """Back from ``extras_to_json``; what is none of it is left out."""
+    if not isinstance(value, dict):
+        return Extras()
+    boxes, lines = (
+        tuple(item for item in value.get(name) or () if isinstance(item, dict))
+        for name in ("boxes", "lines")
+    )
+    metadata = value.get("metadata")
+    return Extras(boxes, lines, metadata if isinstance(metadata, dict) else {})

@@ -1,0 +1,124 @@
+"""YOLO: ``labels/<split>/<name>.txt`` with ``class cx cy w h``, data.yaml and image lists."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import ExitStack
+from pathlib import Path, PurePosixPath
+from typing import IO, Any
+
+from app.datasets.csv_text import Table
+from app.datasets.export_record import ExportRecord, chosen_box
+from app.datasets.frame_names import flat_frame, likely_suffix, split_folder
+from app.soccer.frames import Box, ImageSize
+from app.soccer.group import View
+
+LISTS = ("train", "val", "test")
+TABLE = "frames.csv"
+_COLUMNS = ("image", "present", "group", "view", "split", "width", "height", "verdict")
+_DATA = """# Ball boxes, one class. {missing}
+path: .
+train: train.txt
+val: {val}
+{test}nc: 1
+names:
+  0: ball
+"""
+
+
+def write_yolo(
+    root: Path, records: Iterable[ExportRecord], *, boxes: str = "optimized"
+) -> dict[str, int]:
+    """Write labels, lists and ``data.yaml`` below an existing folder.
+
+    Every view has a label file; one without a ball box is empty, which says "no ball here".
+    Boxes are clipped at the image border. ``frames.csv`` says which image is which view, and
+    whether it is there: a frame that was not copied must be put under its name before training.
+
+    Args:
+        root: Existing folder.
+        records: Groups; one is in memory at a time.
+        boxes: One of ``BOX_KINDS``.
+
+    Returns:
+        Counts: ``groups``, ``labels`` (files), ``balls``, ``images``, ``images_missing``.
+    """
+    counts = {"groups": 0, "labels": 0, "balls": 0, "images": 0, "images_missing": 0}
+    with ExitStack() as stack:
+        lists = {name: stack.enter_context(_open(root / f"{name}.txt")) for name in LISTS}
+        used: set[str] = set()
+        file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
+        table = Table(file, _COLUMNS)
+        for record in records:
+            counts["groups"] += 1
+            for view in record.group.views:
+                split = split_folder(record.split(view))
+                used.add(split)
+                image = _add(root, record, view, table, boxes, counts)
+                lists[split].write(f"./{image}\n")
+    for name in set(LISTS) - used - {"train"}:
+        (root / f"{name}.txt").unlink()
+    _write_data(root, used, counts)
+    return counts
+
+
+def _open(path: Path) -> IO[str]:
+    return path.open("w", encoding="utf-8", newline="\n")
+
+
+def _add(
+    root: Path,
+    record: ExportRecord,
+    view: View,
+    table: Table,
+    boxes: str,
+    counts: dict[str, int],
+) -> str:
+    """Write the label file of a view; returns the name of its image."""
+    group, present, split = record.group, view.key in record.frames, record.split(view)
+    image = record.frames.get(view.key) or flat_frame(group, view, split, likely_suffix(view))
+    label = root / str(PurePosixPath("labels", *PurePosixPath(image).parts[1:]).with_suffix(".txt"))
+    label.parent.mkdir(parents=True, exist_ok=True)
+    box = chosen_box(record, view, boxes) if view.ball else None
+    line = None if box is None else label_line(box, view.size)
+    label.write_text("" if line is None else f"{line}\n", encoding="utf-8")
+    cells: tuple[Any, ...] = (image, present, group.key, view.key, split)
+    table.add((*cells, view.size.width, view.size.height, record.verdict_text))
+    counts["labels"] += 1
+    counts["balls"] += line is not None
+    counts["images" if present else "images_missing"] += 1
+    return image
+
+
+def label_line(box: Box, size: ImageSize) -> str | None:
+    """``0 cx cy w h`` in parts of the image; None where the box lies outside.
+
+    Example:
+        >>> label_line(Box(192.0, 54.0, 96.0, 54.0), ImageSize(960, 540))
+        '0 0.25 0.15 0.1 0.1'
+    """
+    left, right = max(box.x, 0.0), min(box.x + box.width, float(size.width))
+    top, bottom = max(box.y, 0.0), min(box.y + box.height, float(size.height))
+    if right <= left or bottom <= top:
+        return None
+    numbers = (
+        (left + right) / 2 / size.width,
+        (top + bottom) / 2 / size.height,
+        (right - left) / size.width,
+        (bottom - top) / size.height,
+    )
+    return "0 " + " ".join(f"{number:.9g}" for number in numbers)
+
+
+def _write_data(root: Path, used: set[str], counts: dict[str, int]) -> None:
+    missing = counts["images_missing"]
+    sentence = (
+        f"{missing} images are not in this export: put each frame where {TABLE} names it."
+        if missing
+        else "All images are in this export."
+    )
+    # Without a validation split, tools look at the next best list.
+    val = next((f"{name}.txt" for name in ("val", "test") if name in used), "train.txt")
+    test = "test: test.txt\n" if "test" in used else ""
+    text = _DATA.format(missing=sentence, val=val, test=test)
+    (root / "data.yaml").write_text(text, encoding="utf-8")

@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.datasets.coco import write_coco
+from app.datasets.coco_reader import read_coco
+from app.datasets.export_record import ExportRecord
+from app.datasets.report import Report
+from app.soccer.frames import Box, ImageSize
+from app.soccer.group import Group
+
+Solved = Callable[..., ExportRecord]
+Make = Callable[..., Group]
+
+
+def foreign(**changes: Any) -> dict[str, Any]:
+    """A file of another tool."""
+    return {
+        "images": [{"id": 5, "file_name": "clip/0001.jpg", "width": 1280, "height": 720}],
+        "annotations": [
+            {"id": 1, "image_id": 5, "category_id": 37, "bbox": [1, 2, 3, 4]},
+            {"id": 2, "image_id": 5, "category_id": 1, "bbox": [10, 20, 30, 40]},
+        ],
+        "categories": [{"id": 37, "name": "sports ball"}, {"id": 1, "name": "Person"}],
+    } | changes
+
+
+@pytest.fixture
+def read(tmp_path: Path, report: Report) -> Callable[[Any], list[Group]]:
+    def run(value: Any) -> list[Group]:
+        (tmp_path / "annotations").mkdir(exist_ok=True)
+        path = tmp_path / "annotations/instances_test.json"
+        path.write_text(value if isinstance(value, str) else json.dumps(value))
+        return list(read_coco(tmp_path, report))
+
+    return run
+
+
+class TestReadCoco:
+    def test_files_of_others_are_images_with_boxes(
+        self, read: Callable[[Any], list[Group]], tmp_path: Path, report: Report
+    ) -> None:
+        (tmp_path / "images/clip").mkdir(parents=True)
+        (tmp_path / "images/clip/0001.jpg").write_bytes(b"x")
+        (group,) = read(foreign())
+        (view,) = group.views
+        assert (group.key, group.split, view.size) == (
+            "clip/0001.jpg",
+            "test",
+            ImageSize(1280, 720),
+        )
+        assert view.balls[0].box == Box(1.0, 2.0, 3.0, 4.0)
+        assert [box["class"] for box in view.extras.boxes] == ["person"]
+        assert view.media is not None
+        assert report.problems == []
+
+    def test_a_box_changed_in_another_tool_is_the_new_annotation(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        write_coco(tmp_path, [solved(soccer_group())])
+        path = tmp_path / "annotations/instances_train.json"
+        value = json.loads(path.read_text())
+        value["annotations"][1]["bbox"] = [600, 301, 20, 21]
+        path.write_text(json.dumps(value))
+        (group,) = read_coco(tmp_path, report)
+        assert group.views[0].balls[0].box == Box(610.0, 300.0, 12.0, 11.0)
+        assert group.views[1].balls[0].box == Box(600.0, 301.0, 20.0, 21.0)
+
+    def test_a_group_whose_views_are_in_two_files_is_one(
+        self, tmp_path: Path, solved: Solved, issia_group: Make, report: Report
+    ) -> None:
+        groups = [issia_group(), issia_group(400)]
+        splits = {"cam3": "train", "cam4": "test"}
+        write_coco(tmp_path, [replace(solved(group), splits=splits) for group in groups])
+        again = sorted(read_coco(tmp_path, report), key=lambda group: group.key)
+        assert [group.views for group in again] == [group.views for group in groups]
+        assert again[0].views[0].station is again[1].views[0].station
+
+    @pytest.mark.parametrize(
+        ("value", "field"),
+        [
+            (foreign(images=[{"id": 5, "file_name": "../x.jpg", "width": 9, "height": 9}]),
+             "file_name"),
+            (foreign(images=[{"id": 5, "file_name": "x.jpg", "width": 1e9, "height": 9}]), "width"),
+            (foreign(images=["x"]), None),
+            (foreign(annotations=[{"image_id": 5, "category_id": 37, "bbox": [1, 2, -3, 4]}]),
+             "bbox"),
+            (foreign(annotations=[{"category_id": 37}]), "image_id"),
+        ],
+    )  # fmt: skip
+    def test_what_is_wrong_is_named(
+        self, read: Callable[[Any], list[Group]], report: Report, value: Any, field: str | None
+    ) -> None:
+        read(value)
+        assert [item.field for item in report.problems] == [field]
+
+    def test_a_state_that_was_tampered_with_leaves_its_image_out(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        write_coco(tmp_path, [solved(soccer_group(replays=2))])
+        path = tmp_path / "annotations/instances_train.json"
+        value = json.loads(path.read_text())
+        images = value["images"]
+        images[0]["touchline"]["group"] = "../../etc"
+        images[1]["touchline"]["lines"] = {"Midfield": [[1, 2]]}
+        images[2]["touchline"]["given"] = {"pan_degrees": 1}
+        path.write_text(json.dumps(value))
+        assert list(read_coco(tmp_path, report)) == []
+        assert [item.record for item in report.problems] == [f"images[{n}]" for n in range(3)]
+
+    def test_infinity_is_no_number(
+        self, read: Callable[[Any], list[Group]], report: Report
+    ) -> None:
+        assert read(json.dumps(foreign()).replace("[1, 2, 3, 4]", "[1, 2, Infinity, 4]")) == []
+        assert "Infinity" in report.problems[0].problem

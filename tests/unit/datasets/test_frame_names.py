@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from app.datasets.frame_names import flat_frame, likely_suffix, match_frame, split_folder
+from app.soccer.group import Group, Media
+
+Make = Callable[..., Group]
+
+
+class TestMatchFrame:
+    def test_beside_the_labels_of_the_match(self, soccer_group: Make, issia_group: Make) -> None:
+        group, static = soccer_group(match="l/s/m"), issia_group()
+        assert match_frame(group, group.views[1], "train", ".jpg") == "l/s/m/Frames-v3/7_1.png"
+        name = match_frame(static, static.views[0], "", ".jpg")
+        assert name == "issia/Frames-v3/cam3/358.jpg"
+
+
+class TestFlatFrame:
+    def test_no_two_views_of_a_dataset_have_one_name(
+        self, soccer_group: Make, issia_group: Make
+    ) -> None:
+        groups = [soccer_group(), soccer_group("8.png"), issia_group(), issia_group(359)]
+        names = [flat_frame(g, v, "valid", ".jpg") for g in groups for v in g.views]
+        assert len(set(names)) == len(names) == 8
+        assert all(name.startswith("images/val/") for name in names)
+
+
+class TestSplitFolder:
+    def test_says_it_as_yolo_does(self) -> None:
+        splits = ("train", "valid", "test", "challenge", "")
+        assert [split_folder(split) for split in splits] == [
+            "train", "val", "test", "test", "train",
+        ]  # fmt: skip
+
+
+class TestLikelySuffix:
+    def test_follows_the_frame_and_is_jpeg_for_videos(self, soccer_group: Make) -> None:
+        view = soccer_group().views[0]
+        assert likely_suffix(view) == ".jpg"
+        assert likely_suffix(replace(view, media=Media("a.zip", "7.PNG"))) == ".png"
+        assert likely_suffix(replace(view, media=Media("cam3.mp4", frame=3))) == ".jpg"

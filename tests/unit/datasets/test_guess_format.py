@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.datasets.guess_format import guess_format
+
+CASES = [
+    ("soccernet-v3", "l/s/m/Labels-v3.json"),
+    ("soccernet-v3d", "l/s/m/Labels-v3D.json"),
+    ("soccernet-v3d", "SNv3D.csv"),
+    ("issia", "ground_truth_1.xgtf.gz"),
+    ("issia-3d", "ISSIA-3D.csv"),
+    ("gamestate", "test/SNGS-1/Labels-GameState.json"),
+    ("sn-calibration", "valid/00002.json"),
+    ("cameras", "camera_00002.json"),
+    ("coco", "annotations/instances_train.json"),
+    ("parquet", "views.parquet"),
+    (None, "notes.txt"),
+]
+
+
+class TestGuessFormat:
+    @pytest.mark.parametrize(("form", "name"), CASES)
+    def test_knows_folders_zips_and_files(
+        self, tmp_path: Path, make_zip: Callable[..., Path], form: str | None, name: str
+    ) -> None:
+        path = tmp_path / "in" / name
+        path.parent.mkdir(parents=True)
+        path.write_text("x")
+        assert guess_format(tmp_path / "in") == form
+        assert guess_format(path) == form
+        assert guess_format(make_zip({name: "x"})) == form
+
+    def test_labels_count_more_than_the_cameras_beside_them(self, tmp_path: Path) -> None:
+        for name in ("camera_00002.json", "00002.json", "manifest.json"):
+            (tmp_path / name).write_text("{}")
+        assert guess_format(tmp_path) == "sn-calibration"
+
+    def test_a_damaged_zip_and_a_missing_file_are_nothing(self, tmp_path: Path) -> None:
+        (tmp_path / "a.zip").write_bytes(b"PK\x03\x04")
+        assert guess_format(tmp_path / "a.zip") is None
+        assert guess_format(tmp_path / "b.zip") is None
