@@ -1,0 +1,177 @@
+"""Average precision of ball detections.
+
+The headline numbers come from faster-coco-eval. A frame shows one ball, so its matching is
+simple enough to be repeated here, which intervals, curves and VOC's area under the curve need; a
+test holds that both give the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from app.evaluation.frame import Judged
+from app.evaluation.overlap import iou
+from app.geometry.arrays import FloatArray
+
+IOUS = tuple(round(0.5 + 0.05 * step, 2) for step in range(10))
+MAX_DETECTIONS = 100
+"""Of one frame; COCO's limit."""
+RECALLS = np.linspace(0.0, 1.0, 101)
+
+
+@dataclass(frozen=True)
+class Hits:
+    """All detections of all frames, the surest first.
+
+    Attributes:
+        scores: Shape (D,).
+        frames: Index of each detection's frame, shape (D,).
+        found: Whether it finds the ball, at each of ``IOUS``, shape (D, 10).
+        balls: Whether each frame has a ball, shape (F,).
+    """
+
+    scores: FloatArray
+    frames: npt.NDArray[np.int64]
+    found: npt.NDArray[np.bool_]
+    balls: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Precision and recall after each detection, and the score there, all of shape (D,)."""
+
+    recall: FloatArray
+    precision: FloatArray
+    score: FloatArray
+
+
+def find_hits(judged: Sequence[Judged]) -> Hits:
+    """Match detections to balls as COCO does: the surest that overlaps enough gets the ball."""
+    scores, frames, found = [], [], []
+    for index, item in enumerate(judged):
+        free = np.ones(len(IOUS), dtype=bool)
+        for detection in item.detections[:MAX_DETECTIONS]:
+            overlap = iou(detection.box, item.truth) if item.truth is not None else 0.0
+            hit = free & (overlap >= np.array(IOUS))
+            free &= ~hit
+            scores.append(detection.score)
+            frames.append(index)
+            found.append(hit)
+    order = np.argsort(-np.array(scores), kind="stable")
+    return Hits(
+        np.array(scores)[order],
+        np.array(frames, dtype=np.int64)[order],
+        np.array(found, dtype=bool).reshape(-1, len(IOUS))[order],
+        np.array([item.truth is not None for item in judged], dtype=bool),
+    )
+
+
+def coco_average_precision(judged: Sequence[Judged]) -> tuple[float | None, float | None]:
+    """AP at IoU 0.5, and its mean over 0.5 to 0.95, by faster-coco-eval; None without a ball."""
+    if not any(item.truth is not None for item in judged):
+        return None, None
+    if not any(item.detections for item in judged):
+        return 0.0, 0.0
+    from faster_coco_eval import COCO, COCOeval_faster
+
+    truth = COCO(_coco_truth(judged), print_function=_silent)
+    found = truth.loadRes(_coco_results(judged))
+    run = COCOeval_faster(truth, found, "bbox", print_function=_silent)
+    run.evaluate()
+    run.accumulate()
+    precision = np.asarray(run.eval["precision"])[:, :, 0, 0, -1]
+    return float(precision[0].mean()), float(precision.mean())
+
+
+def curve(hits: Hits, threshold: int = 0, weights: FloatArray | None = None) -> Curve:
+    """Precision against recall.
+
+    Args:
+        hits: Of all frames.
+        threshold: Index into ``IOUS``.
+        weights: How often each frame counts, shape (F,); once each by default.
+    """
+    weights = np.ones(len(hits.balls)) if weights is None else weights
+    each, found = weights[hits.frames], hits.found[:, threshold]
+    right, wrong = np.cumsum(each * found), np.cumsum(each * ~found)
+    balls = float(weights @ hits.balls)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        precision = right / np.maximum(right + wrong, np.finfo(float).eps)
+        recall = right / balls
+    return Curve(recall, precision, hits.scores)
+
+
+def interpolated(found: Curve) -> float:
+    """COCO's AP: the mean of the interpolated precision at 101 recalls."""
+    return float(_at_recalls(found).mean())
+
+
+def area(found: Curve) -> float:
+    """VOC's AP since 2010: the area under the interpolated precision."""
+    steps = np.diff(found.recall, prepend=0.0)
+    return float(np.sum(steps * _envelope(found.precision)))
+
+
+def mean_interpolated(hits: Hits, weights: FloatArray | None = None) -> float:
+    """COCO's AP averaged over ``IOUS``."""
+    every = [interpolated(curve(hits, index, weights)) for index in range(len(IOUS))]
+    return float(np.mean(every))
+
+
+def _at_recalls(found: Curve) -> FloatArray:
+    if not len(found.recall) or not np.isfinite(found.recall).all():
+        return np.full(len(RECALLS), np.nan if len(found.recall) else 0.0)
+    places = np.searchsorted(found.recall, RECALLS, side="left")
+    envelope = np.append(_envelope(found.precision), 0.0)
+    at: FloatArray = envelope[places]
+    return at
+
+
+def _envelope(precision: FloatArray) -> FloatArray:
+    """The best precision at this recall or any higher one."""
+    best: FloatArray = np.maximum.accumulate(precision[::-1])[::-1]
+    return best
+
+
+def _coco_truth(judged: Sequence[Judged]) -> dict[str, object]:
+    balls = [(image, item.truth) for image, item in enumerate(judged, 1) if item.truth is not None]
+    return {
+        "images": [
+            {"id": image, "width": item.frame.size.width, "height": item.frame.size.height}
+            for image, item in enumerate(judged, 1)
+        ],
+        "annotations": [
+            # Ids from 1: the evaluator takes 0 for "matched with nothing".
+            {
+                "id": number,
+                "image_id": image,
+                "category_id": 1,
+                "bbox": [box.x, box.y, box.width, box.height],
+                "area": box.width * box.height,
+                "iscrowd": 0,
+            }
+            for number, (image, box) in enumerate(balls, 1)
+        ],
+        "categories": [{"id": 1, "name": "ball"}],
+    }
+
+
+def _coco_results(judged: Sequence[Judged]) -> list[dict[str, object]]:
+    return [
+        {
+            "image_id": image,
+            "category_id": 1,
+            "bbox": [found.box.x, found.box.y, found.box.width, found.box.height],
+            "score": found.score,
+        }
+        for image, item in enumerate(judged, 1)
+        for found in item.detections
+    ]
+
+
+def _silent(*_words: object, **_options: object) -> None:
+    """Where the evaluator's remarks go: stdout belongs to results."""

@@ -1,0 +1,119 @@
+"""Cameras: JaC and the challenge's score of predicted cameras against a dataset's lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from app.evaluation.bootstrap import Resamples
+from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
+from app.evaluation.frame import Frame
+from app.evaluation.table import Cell, Column, Row, Table
+from app.geometry.camera import Camera
+from app.solving.score import GAMMAS_PERCENT, SHARE_ABOVE, FrameScore, score, score_frame
+
+COLUMNS = (
+    Column("completeness", "Calibrated", "", "higher"),
+    *(Column(f"jac_{gamma:g}", f"JaC {gamma:g} %", "", "higher") for gamma in GAMMAS_PERCENT),
+    Column("share", f"JaC 0.5 % > {SHARE_ABOVE:g}", "", "higher"),
+    Column("challenge", "Challenge score (5 px)", "", "higher"),
+    Column("error_median_px", "Median error", "px", "lower"),
+    Column("error_p95_px", "95 % error", "px", "lower"),
+)
+THRESHOLDS = np.arange(0, 101) / 100
+Scores = dict[int, FrameScore | None]
+"""By id of the frame; None: annotated lines, and no camera."""
+Step = Callable[[int], None]
+
+
+def score_cameras(
+    frames: Sequence[Frame], cameras: Mapping[int, Camera], step: Step | None = None
+) -> Scores:
+    """Every frame with lines against its camera; a static camera's same lines are measured once."""
+    scores: Scores = {}
+    known: dict[tuple[str, Camera], FrameScore] = {}
+    for number, frame in enumerate(frames):
+        if step is not None:
+            step(number)
+        if not frame.lines:
+            continue
+        camera = cameras.get(frame.id)
+        if camera is None:
+            scores[frame.id] = None
+            continue
+        key = (frame.station or str(frame.id), camera)
+        if key not in known:
+            known[key] = score_frame(camera, frame.lines, frame.pitch, frame.size)
+        scores[frame.id] = known[key]
+    return scores
+
+
+def cameras_table(
+    rows: Sequence[tuple[str, str, Scores]], frames: Sequence[Frame], resamples: Resamples
+) -> Table:
+    """One row per set of cameras, over all frames with lines; a frame without camera counts 0."""
+    match = {frame.id: frame.match for frame in frames}
+    made = tuple(_row(name, label, scores, match, resamples) for name, label, scores in rows)
+    count = len(rows[0][2]) if rows else 0
+    note = (
+        f"{count} frames with annotated lines; JaC, share and challenge score count a frame "
+        f"without a camera as 0. The challenge score takes the better of the labels as given and "
+        f"turned by 180 degrees; JaC does not."
+    )
+    return Table("calibration", "Calibration against annotated lines", COLUMNS, made, note)
+
+
+def jac_figure(rows: Sequence[tuple[str, str, Scores]], min_jac: float) -> Figure:
+    """Share of frames whose JaC is above a threshold, for each gamma."""
+    panels = tuple(_panel(label, scores, min_jac) for _name, label, scores in rows)
+    note = f"{len(rows[0][2]) if rows else 0} frames with annotated lines."
+    return Figure("jac", "Frames above a JaC", panels, note)
+
+
+def _row(
+    name: str, label: str, scores: Scores, match: Mapping[int, str], resamples: Resamples
+) -> Row:
+    total, count = score(scores.values()), len(scores)
+    matches = [match[frame] for frame in scores]
+    found = list(scores.values())
+
+    def mean(value: Callable[[FrameScore], float]) -> Cell:
+        values = [0.0 if item is None else value(item) for item in found]
+        return resamples.mean(values, matches)
+
+    cells = (
+        mean(lambda _item: 1.0),
+        *(mean(lambda item, place=place: item.jac[place]) for place in range(len(GAMMAS_PERCENT))),  # type: ignore[misc]
+        mean(lambda item: float(item.jac[0] > SHARE_ABOVE)),
+        mean(lambda item: item.challenge),
+        Cell(total.error_median_px, count=total.calibrated, of=count),
+        Cell(total.error_p95_px, count=total.calibrated, of=count),
+    )
+    return Row(name, label, cells)
+
+
+def _panel(label: str, scores: Scores, min_jac: float) -> Panel:
+    values = np.array(
+        [item.jac if item is not None else (0.0,) * len(GAMMAS_PERCENT) for item in scores.values()]
+    ).reshape(-1, len(GAMMAS_PERCENT))
+    series = []
+    for place, gamma in enumerate(GAMMAS_PERCENT):
+        above = (values[:, place, None] > THRESHOLDS).sum(axis=0)
+        share = above / max(len(values), 1)
+        series.append(
+            Series(
+                f"gamma_{gamma:g}",
+                f"γ = {gamma:g} %",
+                tuple(THRESHOLDS.tolist()),
+                tuple(share.tolist()),
+                count=tuple(above.tolist()),
+            )
+        )
+    return Panel(
+        label,
+        Axis("JaC above", "", 0.0, 1.0),
+        Axis("Share of frames", "", 0.0, 1.0),
+        tuple(series),
+        (Mark("x", min_jac, f"{min_jac:g}"),),
+    )

@@ -1,0 +1,79 @@
+"""Careful boxes: the paper's table 1, a dataset's boxes against boxes drawn with care."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from app.evaluation.bootstrap import Resamples
+from app.evaluation.frame import Detection, Frame
+from app.evaluation.overlap import iou, size_error_percent
+from app.evaluation.table import Column, Frames, Row, Table
+from app.soccer.frames import Box
+
+COLUMNS = (
+    Column("iou", "IoU", "", "higher"),
+    Column("size_error_percent", "Size error", "%", "lower"),
+)
+ROWS = (
+    ("annotated", "Original boxes"),
+    ("optimized", "Optimised boxes"),
+    ("exact", "Exact boxes"),
+)
+
+
+def boxes_table(
+    frames: Sequence[Frame],
+    careful: Mapping[int, Box],
+    detections: Mapping[int, Sequence[Detection]],
+    resamples: Resamples,
+) -> Table:
+    """IoU and size error of every kind of box, over the same frames for each.
+
+    A frame takes part when it has a careful box and all three boxes of the dataset. Where there
+    are detections, one more row measures the surest of each frame that overlaps the careful box.
+
+    Args:
+        frames: Of the dataset.
+        careful: The careful box by id of the frame.
+        detections: By id of the frame.
+        resamples: For the intervals.
+    """
+    compared = [
+        (frame, careful[frame.id])
+        for frame in frames
+        if frame.id in careful and all(kind in frame.boxes for kind, _ in ROWS)
+    ]
+    rows = [
+        _row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared], resamples,
+             len(careful))
+        for kind, label in ROWS
+    ]  # fmt: skip
+    if detections:
+        found = [
+            (frame, hit, box) for frame, box in compared if (hit := _hit(detections, frame, box))
+        ]
+        rows.append(_row("detected", "Detected boxes, IoU > 0", found, resamples, len(careful)))
+    note = (
+        f"{len(compared)} frames that have a careful box and a 3D ball, of {len(careful)} careful "
+        f"boxes. Size error is |d - d careful| in per cent of the careful box's diagonal."
+    )
+    return Table("boxes", "Boxes against careful boxes", COLUMNS, tuple(rows), note)
+
+
+def _row(
+    kind: str,
+    label: str,
+    compared: Sequence[tuple[Frame, Box, Box]],
+    resamples: Resamples,
+    whole: int,
+) -> Row:
+    matches = [frame.match for frame, _, _ in compared]
+    overlaps = [iou(box, careful) for _, box, careful in compared]
+    errors = [size_error_percent(box, careful) for _, box, careful in compared]
+    cells = (resamples.mean(overlaps, matches, whole), resamples.mean(errors, matches, whole))
+    return Row(kind, label, cells, Frames("box_iou"))
+
+
+def _hit(detections: Mapping[int, Sequence[Detection]], frame: Frame, careful: Box) -> Box | None:
+    found = sorted(detections.get(frame.id, ()), key=lambda item: -item.score)
+    return next((item.box for item in found if iou(item.box, careful) > 0), None)

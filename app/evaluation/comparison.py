@@ -1,0 +1,130 @@
+"""Comparison of two runs: their tables side by side, and frame by frame what changed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from app.evaluation.result import FrameResult
+from app.evaluation.table import Cell, Table
+
+FIELDS = ("error_m", "iou", "hit_iou", "predicted_error_m", "predicted_jac")
+"""Fields of ``FrameResult`` whose difference is told per frame."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One number of both runs; ``change`` is the second minus the first."""
+
+    table: str
+    row: str
+    column: str
+    label: str
+    first: Cell | None
+    second: Cell | None
+
+    @property
+    def change(self) -> float | None:
+        """None where one of them has no value."""
+        values = [cell.value if cell else None for cell in (self.first, self.second)]
+        if values[0] is None or values[1] is None:
+            return None
+        return values[1] - values[0]
+
+
+@dataclass(frozen=True)
+class FrameDifference:
+    """One frame of both runs; ``change`` of one field, None where a run has no value."""
+
+    first: FrameResult
+    second: FrameResult
+    change: float | None
+
+
+@dataclass(frozen=True)
+class FrameComparison:
+    """Frames by field.
+
+    Attributes:
+        better: Frames whose field became smaller (errors) or larger (overlap).
+        gained: Frames that only the second run has a value for; ``lost`` the other way round.
+        frames: Those that differ, the largest change first; gained and lost ones before.
+    """
+
+    field: str
+    shared: int
+    better: int
+    worse: int
+    gained: int
+    lost: int
+    mean_change: float | None
+    frames: tuple[FrameDifference, ...]
+
+
+def compare_tables(first: Sequence[Table], second: Sequence[Table]) -> list[Difference]:
+    """Every number that stands in either run, in the order of the first."""
+    names = list(dict.fromkeys([table.name for table in (*first, *second)]))
+    found: list[Difference] = []
+    for name in names:
+        pair = [next((t for t in tables if t.name == name), None) for tables in (first, second)]
+        found += _compare(name, pair[0], pair[1])
+    return found
+
+
+def compare_frames(
+    first: Sequence[FrameResult], second: Sequence[FrameResult], field: str = "error_m"
+) -> FrameComparison:
+    """What became of each frame that both runs judged.
+
+    Args:
+        first: Of the run that is compared with.
+        second: Of the newer one.
+        field: One of ``FIELDS``.
+    """
+    then = {(frame.group, frame.view): frame for frame in first}
+    pairs = [
+        (then[frame.group, frame.view], frame)
+        for frame in second
+        if (frame.group, frame.view) in then
+    ]
+    sign = -1.0 if field.endswith("error_m") else 1.0
+    rows, changes = [], []
+    better = worse = gained = lost = 0
+    for before, after in pairs:
+        a, b = getattr(before, field), getattr(after, field)
+        change = None if a is None or b is None else b - a
+        if change is not None:
+            changes.append(change)
+            better += sign * change > 0
+            worse += sign * change < 0
+        gained += a is None and b is not None
+        lost += a is not None and b is None
+        if a != b:
+            rows.append(FrameDifference(before, after, change))
+    rows.sort(key=lambda row: (row.change is not None, -abs(row.change or 0.0)))
+    mean = sum(changes) / len(changes) if changes else None
+    return FrameComparison(field, len(pairs), better, worse, gained, lost, mean, tuple(rows))
+
+
+def _compare(name: str, first: Table | None, second: Table | None) -> list[Difference]:
+    known = first or second
+    assert known is not None
+    rows = {row.name: row.label for table in (first, second) if table for row in table.rows}
+    return [
+        Difference(
+            name,
+            row,
+            column.name,
+            f"{label}: {column.label}",
+            _cell(first, row, column.name),
+            _cell(second, row, column.name),
+        )
+        for row, label in rows.items()
+        for column in known.columns
+    ]
+
+
+def _cell(table: Table | None, row: str, column: str) -> Cell | None:
+    if table is None or table.row(row) is None:
+        return None
+    return table.cell(row, column)

@@ -1,0 +1,343 @@
+"""Prediction files: ball boxes with scores, as detectors and people write them.
+
+Three formats, each a file, a folder or a zip:
+
+``coco``  COCO results: ``[{"image_id", "category_id", "bbox": [x, y, w, h], "score"}]``, pixels.
+          ``image_id`` is the name of a frame, or an id of the ``images`` of a COCO document (in
+          the same file, in another JSON file beside it, or handed over with it).
+``yolo``  A text file per frame, a line per ball: ``class cx cy w h [confidence]``, shares of the
+          image.
+``csv``   A table. The frame stands in ``league, season, match, main_action, replay`` as in
+          SNv3D.csv, or in ``frame`` (with ``camera``), ``image`` or ``file_name``; the box in
+          ``ball_bbox`` (``[x, y, w, h]``) or in ``x, y, w, h``; ``score`` may be missing.
+
+What is wrong is reported with file, record and field, and left out; frames that the dataset does
+not have are counted and listed. Nothing is evaluated.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from app.datasets import fields
+from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
+from app.datasets.camera_json import read_cameras
+from app.datasets.csv_text import is_missing, numbers_in, read_rows
+from app.datasets.json_text import read_json
+from app.datasets.report import Report
+from app.errors import DatasetFormatError, InputError
+from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.prediction_run import (
+    FieldError,
+    PredictionRun,
+    ReadPredictions,
+    in_field,
+    noted,
+    read_field,
+)
+from app.geometry.camera import Camera
+from app.soccer.frames import Box, ImageSize
+
+FORMATS = ("coco", "yolo", "csv")
+_SCORES = ("score", "confidence", "conf")
+_NAMES = ("image", "file_name", "image_id", "path", "name")
+_SIDES = (("x", "y", "w", "h"), ("x", "y", "width", "height"))
+_NUMBER_ALONE = "is a number; the COCO document with its images must come with the results"
+_NOT_LABELS = frozenset({"classes.txt", "readme.txt", "license.txt", "licence.txt"})
+
+
+@dataclass
+class ReadPredictedCameras:
+    """Cameras by id of the frame, at the annotated size, and what was wrong."""
+
+    cameras: dict[int, Camera] = field(default_factory=dict)
+    unknown: Counter[str] = field(default_factory=Counter)
+    reasons: dict[str, str] = field(default_factory=dict)
+    report: Report = field(default_factory=Report)
+
+
+def read_predictions(
+    path: Path,
+    format: str,  # noqa: A002
+    names: FrameNames,
+    *,
+    category: int | None = None,
+    size: ImageSize | None = None,
+    images: Path | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> ReadPredictions:
+    """Read ball boxes.
+
+    Args:
+        path: File, folder or zip.
+        format: One of ``FORMATS``.
+        names: The frames of the dataset.
+        category: The class that is the ball; None where the file has one class only.
+        size: Size of the images that pixels refer to; None: the annotated size of each frame.
+        images: The COCO document that the numbers of ``coco`` results refer to.
+        limits: Caps on what is read.
+
+    Raises:
+        InputError: The format is none, or the file as a whole is not what it should be.
+    """
+    if format not in FORMATS:
+        raise InputError(f'"{format}" is no format of predictions; {", ".join(FORMATS)} are',
+                         pointer="/format")  # fmt: skip
+    run = PredictionRun(names, category, size)
+    tree = open_tree(path, run.found.report, limits)
+    if tree is None:
+        raise run.found.report.problems[0]
+    with closing(tree):
+        if format == "coco":
+            _read_coco(tree, run, [] if images is None else _document(images, run, limits))
+        elif format == "yolo":
+            _read_yolo(tree, run)
+        else:
+            _read_csv(tree, run, limits)
+    run.finish(path)
+    return run.found
+
+
+def read_predicted_cameras(
+    path: Path,
+    names: FrameNames,
+    *,
+    size: ImageSize | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> ReadPredictedCameras:
+    """Read SoccerNet camera JSON files; one of a static camera's name serves all its frames.
+
+    Args:
+        path: Folder, zip or file.
+        names: The frames of the dataset.
+        size: Size of the images that the cameras were made for; None: the annotated size.
+        limits: Caps on what is read.
+
+    Raises:
+        InputError: No camera could be read.
+    """
+    found = ReadPredictedCameras()
+    cameras = read_cameras(path, found.report, limits)
+    if not cameras:
+        problem = InputError(f"{path.name} holds no camera files")
+        raise found.report.problems[0] if found.report.problems else problem
+    for name, camera in cameras.items():
+        frame = names.find(name)
+        ids = (frame.id,) if frame is not None else names.of_station(name)
+        if not ids:
+            found.unknown[name] += 1
+            found.reasons[name] = names.why_not(name)
+        for identity in ids:
+            found.cameras[identity] = _sized(camera, size, names.frames[identity].size)
+    return found
+
+
+def _sized(camera: Camera, made_for: ImageSize | None, annotated: ImageSize) -> Camera:
+    if made_for is None or made_for == annotated:
+        return camera
+    return camera.scaled(annotated.width / made_for.width, annotated.height / made_for.height)
+
+
+Documents = list[tuple[str, Any]]
+"""JSON lists and objects, each with the name of its file."""
+
+
+def _document(path: Path, run: PredictionRun, limits: Limits) -> Documents:
+    tree = open_tree(path, run.found.report, limits)
+    if tree is None:
+        raise run.found.report.problems[0]
+    with closing(tree):
+        return _json_documents(tree)
+
+
+def _read_coco(tree: FileTree, run: PredictionRun, beside: Documents) -> None:
+    documents = _json_documents(tree)
+    images = _coco_images([*documents, *beside])
+    several = any(isinstance(value, list) for _name, value in documents)
+    for shown, value in documents:
+        # Beside results, a document with annotations is the truth that they belong to.
+        annotations = value if isinstance(value, list) else value.get("annotations", [])
+        if several and not isinstance(value, list):
+            continue
+        if not isinstance(annotations, list):
+            raise DatasetFormatError(shown, None, "annotations", "is not a list")
+        for number, item in enumerate(annotations):
+            run.found.report.read += 1
+            with noted(run.found.report, shown, f"result {number}"):
+                _add_coco(run, item, images)
+
+
+def _json_documents(tree: FileTree) -> Documents:
+    found = []
+    for name in tree.names():
+        if not name.lower().endswith(".json"):
+            continue
+        value = read_json(tree.read_bytes(name), tree.shown(name))
+        if not isinstance(value, (list, dict)):
+            raise DatasetFormatError(
+                tree.shown(name), None, None, "is neither a list nor an object"
+            )
+        if isinstance(value, list) or "images" in value or "annotations" in value:
+            found.append((tree.shown(name), value))
+    if not found:
+        raise DatasetFormatError(str(tree.path), None, None, "holds no COCO results")
+    return found
+
+
+def _coco_images(documents: Documents) -> dict[Any, tuple[str, ImageSize | None]]:
+    """Name and size of each image of the COCO documents, by its id."""
+    images: dict[Any, tuple[str, ImageSize | None]] = {}
+    for shown, value in documents:
+        listed = value.get("images", []) if isinstance(value, dict) else []
+        for number, item in enumerate(listed if isinstance(listed, list) else []):
+            try:
+                image = fields.mapping(item)
+                size = None
+                if image.get("width") and image.get("height"):
+                    size = ImageSize(fields.whole(image["width"]), fields.whole(image["height"]))
+                identity = image.get("id")
+                if not isinstance(identity, (int, str)):
+                    raise ValueError("has no id")
+                images[identity] = (str(image.get("file_name", "")), size)
+            except ValueError as error:
+                raise DatasetFormatError(shown, f"image {number}", None, str(error)) from error
+    return images
+
+
+def _add_coco(
+    run: PredictionRun, item: Any, images: Mapping[Any, tuple[str, ImageSize | None]]
+) -> None:
+    value = fields.mapping(item)
+    identity = value.get("image_id")
+    if isinstance(identity, bool) or not isinstance(identity, (int, str)):
+        raise FieldError("image_id", "is missing or neither a number nor a name")
+    box = read_field(value, "bbox", lambda item: Box(*fields.numbers(item, 4)))
+    score = read_field(value, "score", fields.number) if "score" in value else None
+    if not run.wants(
+        read_field(value, "category_id", fields.whole) if "category_id" in value else 1
+    ):
+        return
+    name, size = images.get(identity, ("", None))
+    frame = _coco_frame(run, identity, name)
+    if frame is not None:
+        with in_field("bbox"):
+            run.add(frame, box, score, size)
+
+
+def _coco_frame(run: PredictionRun, identity: int | str, name: str) -> NamedFrame | None:
+    if name or isinstance(identity, str):
+        return run.frame(name or str(identity))
+    run.miss(f"image {identity}", _NUMBER_ALONE)
+    return None
+
+
+def _read_yolo(tree: FileTree, run: PredictionRun) -> None:
+    names = [
+        name
+        for name in tree.names()
+        if name.lower().endswith(".txt") and PurePosixPath(name).name.lower() not in _NOT_LABELS
+    ]
+    if not names:
+        raise DatasetFormatError(str(tree.path), None, None, "holds no text files")
+    for name in names:
+        shown = tree.shown(name)
+        try:
+            lines = tree.read_bytes(name).decode("utf-8-sig").splitlines()
+        except UnicodeDecodeError as error:
+            raise DatasetFormatError(shown, None, None, "is not UTF-8 text") from error
+        boxes = [(number, line.split()) for number, line in enumerate(lines, 1) if line.strip()]
+        frame = run.names.find(name)
+        if frame is None:
+            run.found.unknown[name] += len(boxes)
+            run.found.reasons[name] = run.names.why_not(name)
+        for number, cells in boxes:
+            run.found.report.read += 1
+            with noted(run.found.report, shown, f"line {number}"):
+                _add_yolo(run, frame, cells)
+
+
+def _add_yolo(run: PredictionRun, frame: NamedFrame | None, cells: list[str]) -> None:
+    if len(cells) not in (5, 6):
+        raise ValueError(
+            f"has {len(cells)} numbers, not class, cx, cy, w, h and maybe a confidence"
+        )
+    category = fields.whole(cells[0])
+    x, y, width, height = (fields.number(cell) for cell in cells[1:5])
+    if not all(-1 <= value <= 2 for value in (x, y, width, height)):
+        raise ValueError("is in pixels; YOLO's numbers are shares of the image")
+    score = fields.number(cells[5]) if len(cells) == 6 else None
+    if not run.wants(category) or frame is None:
+        return
+    across, down = frame.size.width, frame.size.height
+    box = Box((x - width / 2) * across, (y - height / 2) * down, width * across, height * down)
+    run.add(frame, box, score, frame.size)
+
+
+def _read_csv(tree: FileTree, run: PredictionRun, limits: Limits) -> None:
+    names = [name for name in tree.names() if name.lower().endswith(".csv")]
+    if len(names) != 1:
+        what = "no CSV file" if not names else f"{len(names)} CSV files; one is read"
+        raise DatasetFormatError(str(tree.path), None, None, f"holds {what}")
+    shown = tree.shown(names[0])
+    for line, cells in read_rows(tree.read_bytes(names[0]), shown, (), limits):
+        run.found.report.read += 1
+        with noted(run.found.report, shown, f"line {line}"):
+            _add_row(run, cells)
+
+
+def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:
+    box = _row_box(cells)
+    if box is None:
+        return
+    score_name = next((name for name in _SCORES if not is_missing(cells.get(name))), None)
+    score = read_field(cells, score_name, fields.number) if score_name else None
+    category = cells.get("class", cells.get("category_id"))
+    if not run.wants(fields.whole(category) if not is_missing(category) else 0):
+        return
+    frame = run.frame(_row_name(cells))
+    if frame is not None:
+        size = None
+        if not is_missing(cells.get("img_w")) and not is_missing(cells.get("img_h")):
+            size = ImageSize(
+                read_field(cells, "img_w", fields.whole), read_field(cells, "img_h", fields.whole)
+            )
+        run.add(frame, box, score, size)
+
+
+def _row_box(cells: Mapping[str, str]) -> Box | None:
+    """The box of a row; None where the row has none."""
+    if "ball_bbox" in cells:
+        if is_missing(cells["ball_bbox"]):
+            return None
+        return read_field(cells, "ball_bbox", lambda text: Box(*numbers_in(text, 4)))
+    for sides in _SIDES:
+        if all(side in cells for side in sides):
+            if all(is_missing(cells[side]) for side in sides):
+                return None
+            return Box(*(read_field(cells, side, fields.number) for side in sides))
+    raise FieldError("ball_bbox", "is missing, and so are x, y, w and h")
+
+
+def _row_name(cells: Mapping[str, str]) -> str:
+    """How a row calls its frame."""
+    if not is_missing(cells.get("main_action")):
+        action = read_field(cells, "main_action", fields.whole)
+        replay = cells.get("replay")
+        image = f"{action}" if is_missing(replay) else f"{action}_{fields.whole(replay)}"
+        parts = [cells.get(name, "").strip() for name in ("league", "season", "match")]
+        return "/".join([part for part in parts if part] + [image])
+    if not is_missing(cells.get("frame")):
+        camera = cells.get("camera")
+        if is_missing(camera):
+            return cells["frame"].strip()
+        number = (camera or "").strip().removeprefix("cam")
+        return f"cam{number}/{cells['frame'].strip().removesuffix('.0')}"
+    for name in _NAMES:
+        if not is_missing(cells.get(name)):
+            return cells[name].strip()
+    raise FieldError("frame", "is missing, and so is every other name of the frame")

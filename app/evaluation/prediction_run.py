@@ -1,0 +1,185 @@
+"""One file of predictions under way: every box passes here on its way to its frame."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from app.datasets.report import Report
+from app.errors import InputError
+from app.evaluation.frame import Detection
+from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.soccer.frames import Box, ImageSize
+
+MAX_PER_FRAME = 1000
+"""Detections of one frame; more is no detector's output but an accident."""
+MAX_BOXES = 5_000_000
+
+T = TypeVar("T")
+
+
+@dataclass
+class ReadPredictions:
+    """What a file held, by id of the frame.
+
+    Attributes:
+        detections: In the order of the file.
+        unknown: Names of frames that the dataset does not have, with their number of boxes.
+        reasons: Why, by name.
+        without_score: Boxes that came without a score and count as sure.
+        report: What was wrong.
+    """
+
+    detections: dict[int, list[Detection]] = field(default_factory=dict)
+    unknown: Counter[str] = field(default_factory=Counter)
+    reasons: dict[str, str] = field(default_factory=dict)
+    without_score: int = 0
+    report: Report = field(default_factory=Report)
+
+    @property
+    def boxes(self) -> int:
+        """How many boxes were read and belong to a frame."""
+        return sum(map(len, self.detections.values()))
+
+
+class PredictionRun:
+    """One file under way: every box passes here on its way to its frame."""
+
+    def __init__(self, names: FrameNames, category: int | None, size: ImageSize | None):
+        self.names, self.category, self.size = names, category, size
+        self.found = ReadPredictions()
+        self.categories: Counter[int] = Counter()
+        self.left_out = 0
+        self._total = 0
+
+    def frame(self, name: str) -> NamedFrame | None:
+        """The frame of a name; a name that is none is counted."""
+        found = self.names.find(name)
+        if found is None:
+            self.miss(name, self.names.why_not(name))
+        return found
+
+    def miss(self, name: str, why: str) -> None:
+        """Count a box whose frame is not known."""
+        self.found.unknown[name] += 1
+        self.found.reasons[name] = why
+
+    def wants(self, category: int) -> bool:
+        """Whether a box of that class is a ball."""
+        self.categories[category] += 1
+        if self.category is None or category == self.category:
+            return True
+        self.left_out += 1
+        return False
+
+    def add(self, frame: NamedFrame, box: Box, score: float | None, size: ImageSize | None) -> None:
+        """Keep a box.
+
+        Args:
+            frame: Where it was found.
+            box: Pixels of an image of ``size``.
+            score: None where the file has none.
+            size: None: the size that the caller named, else the annotated size.
+
+        Raises:
+            ValueError: It cannot be a box of that image, or there are too many.
+        """
+        seen = size or self.size or frame.size
+        _check_box(box, seen)
+        if score is None:
+            self.found.without_score += 1
+        elif not 0 <= score <= 1:
+            raise FieldError("score", f"is {score:g}, which is not between 0 and 1")
+        found = self.found.detections.setdefault(frame.id, [])
+        self._total += 1
+        if len(found) >= MAX_PER_FRAME or self._total > MAX_BOXES:
+            raise ValueError(f"is one of more than {MAX_PER_FRAME} boxes of its frame")
+        found.append(Detection(_scaled(box, seen, frame.size), 1.0 if score is None else score))
+
+    def finish(self, path: Path) -> None:
+        """Refuse a file that says nothing, or whose ball cannot be told from other classes."""
+        if self.category is None and len(self.categories) > 1:
+            classes = ", ".join(map(str, sorted(self.categories)))
+            raise InputError(
+                f"{path.name} holds several classes ({classes})",
+                hint="Say which one is the ball (category).",
+                pointer="/category",
+            )
+        report = self.found.report
+        if not self.found.detections and not self.found.unknown and report.problems:
+            raise report.problems[0]
+        report.imported = self.found.boxes
+        if self.left_out:
+            report.counts["other classes"] = self.left_out
+
+
+def _check_box(box: Box, size: ImageSize) -> None:
+    if not (box.width > 0 and box.height > 0):
+        raise ValueError("is not wider and higher than nothing")
+    right, bottom = box.x + box.width, box.y + box.height
+    if right < 0 or bottom < 0 or box.x > size.width or box.y > size.height:
+        raise ValueError(f"lies outside the image of {size.width} x {size.height} pixels")
+
+
+def _scaled(box: Box, seen: ImageSize, annotated: ImageSize) -> Box:
+    if seen == annotated:
+        return box
+    x, y = annotated.width / seen.width, annotated.height / seen.height
+    return Box(box.x * x, box.y * y, box.width * x, box.height * y)
+
+
+class FieldError(ValueError):
+    """What is wrong with one field of a record."""
+
+    def __init__(self, name: str, problem: str):
+        super().__init__(problem)
+        self.name = name
+
+
+def read_field(value: Mapping[str, Any], name: str, parse: Callable[[Any], T]) -> T:
+    if name not in value:
+        raise FieldError(name, "is missing")
+    with in_field(name):
+        return parse(value[name])
+
+
+class in_field:  # noqa: N801
+    """Says which field a ValueError is about."""
+
+    def __init__(self, name: str):
+        self.name = name
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, ValueError) and not isinstance(error, FieldError):
+            raise FieldError(self.name, str(error)) from error
+
+
+class noted:  # noqa: N801
+    """Notes a record that is wrong, and goes on with the next one."""
+
+    def __init__(self, report: Report, path: str, record: str):
+        self.report, self.path, self.record = report, path, record
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
+        if not isinstance(error, ValueError):
+            return False
+        name = error.name if isinstance(error, FieldError) else None
+        self.report.note(self.path, self.record, name, str(error))
+        return True
+
+
+def listed(
+    unknown: Mapping[str, int], reasons: Mapping[str, str], most: int
+) -> Iterator[dict[str, Any]]:
+    """The first unknown frames by name, for people."""
+    for name in sorted(unknown)[:most]:
+        yield {"frame": name, "boxes": unknown[name], "problem": reasons.get(name, "")}

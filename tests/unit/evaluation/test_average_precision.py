@@ -1,0 +1,140 @@
+"""AP against pycocotools, and against cases small enough for a pencil."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+
+import numpy as np
+import pytest
+
+from app.evaluation.average_precision import (
+    IOUS,
+    area,
+    coco_average_precision,
+    curve,
+    find_hits,
+    interpolated,
+    mean_interpolated,
+)
+from app.evaluation.frame import Detection, Judged
+from app.soccer.frames import Box
+
+BALL = Box(100, 100, 10, 10)
+HALF = Box(100, 100, 10, 5)
+"""IoU 0.5 with the ball: just enough."""
+AWAY = Box(300, 300, 10, 10)
+
+
+@pytest.fixture
+def random_judged(make_frame) -> list[Judged]:
+    """Two hundred frames; some without a ball, many scores alike."""
+    rng = np.random.default_rng(0)
+    judged = []
+    for number in range(200):
+        truth = None if rng.random() < 0.1 else Box(*rng.uniform(100, 500, 2).tolist(), 10, 10)
+        around = truth or BALL
+        found = []
+        for _ in range(rng.integers(0, 4)):
+            x, y = (np.array([around.x, around.y]) + rng.normal(0, 1.5, 2)).tolist()
+            width, height = (10 * rng.uniform(0.7, 1.4, 2)).tolist()
+            found.append(Detection(Box(x, y, width, height), float(np.round(rng.random(), 1))))
+        found.sort(key=lambda item: -item.score)
+        judged.append(Judged(make_frame(number + 1), truth, tuple(found)))
+    return judged
+
+
+def by_pycocotools(judged: list[Judged]) -> tuple[float, float]:
+    """AP at 0.5 and over all thresholds, by the reference."""
+    from pycocotools.coco import COCO
+    from pycocotools.cocoeval import COCOeval
+
+    with contextlib.redirect_stdout(io.StringIO()):
+        truth = COCO()
+        truth.dataset = {
+            "info": {},
+            "images": [{"id": i, "width": 1280, "height": 720} for i in range(len(judged))],
+            "categories": [{"id": 1, "name": "ball"}],
+            "annotations": [
+                {"id": i + 1, "image_id": i, "category_id": 1, "iscrowd": 0,
+                 "bbox": [b.x, b.y, b.width, b.height], "area": b.width * b.height}
+                for i, item in enumerate(judged) if (b := item.truth) is not None
+            ],
+        }  # fmt: skip
+        truth.createIndex()
+        found = truth.loadRes(
+            [
+                {"image_id": i, "category_id": 1, "score": d.score,
+                 "bbox": [d.box.x, d.box.y, d.box.width, d.box.height]}
+                for i, item in enumerate(judged) for d in item.detections
+            ]
+        )  # fmt: skip
+        run = COCOeval(truth, found, "bbox")
+        run.evaluate()
+        run.accumulate()
+        precision = run.eval["precision"][:, :, 0, 0, -1]
+    return float(precision[0].mean()), float(precision.mean())
+
+
+class TestCocoAveragePrecision:
+    def test_equals_pycocotools(self, random_judged) -> None:
+        expected = by_pycocotools(random_judged)
+        assert 0.05 < expected[1] < expected[0] < 0.95
+        assert coco_average_precision(random_judged) == pytest.approx(expected, abs=1e-9)
+
+    def test_says_nothing_on_stdout(self, random_judged, capfd) -> None:
+        coco_average_precision(random_judged)
+        assert capfd.readouterr() == ("", "")
+
+    def test_of_perfect_detections_is_one(self, make_judged) -> None:
+        judged = [make_judged(BALL, (BALL, 0.9), identity=number) for number in (1, 2)]
+        assert coco_average_precision(judged) == (1, 1)
+
+    def test_without_detections_is_nothing(self, make_judged) -> None:
+        assert coco_average_precision([make_judged(BALL)]) == (0, 0)
+
+    def test_without_balls_is_not_defined(self, make_judged) -> None:
+        assert coco_average_precision([make_judged(None, (BALL, 0.9))]) == (None, None)
+
+
+class TestFindHits:
+    def test_the_surest_detection_that_overlaps_gets_the_ball(self, make_judged) -> None:
+        hits = find_hits([make_judged(BALL, (AWAY, 0.9), (HALF, 0.8), (BALL, 0.7))])
+        assert hits.found[:, 0].tolist() == [False, True, False]
+        # At 0.55 the half box does not reach, so the exact one does.
+        assert hits.found[:, 1].tolist() == [False, False, True]
+
+    def test_an_overlap_of_exactly_the_threshold_counts(self, make_judged) -> None:
+        assert IOUS[0] == 0.5
+        assert find_hits([make_judged(BALL, (HALF, 0.8))]).found[0, 0]
+
+    def test_whatever_is_found_where_no_ball_is_is_wrong(self, make_judged) -> None:
+        assert not find_hits([make_judged(None, (BALL, 0.9))]).found.any()
+
+
+class TestCurve:
+    def test_by_hand(self, make_judged) -> None:
+        # Right, wrong, right: of two balls.
+        judged = [
+            make_judged(BALL, (BALL, 0.9), (AWAY, 0.8), identity=1),
+            make_judged(BALL, (BALL, 0.7), identity=2),
+        ]
+        found = curve(find_hits(judged))
+        assert found.recall.tolist() == [0.5, 0.5, 1.0]
+        assert found.precision == pytest.approx([1, 0.5, 2 / 3])
+        # VOC: half of the recall at precision 1, half at 2/3.
+        assert area(found) == pytest.approx(0.5 + 0.5 * 2 / 3)
+        # COCO: recalls 0 to 0.5 at 1, the 50 others at 2/3.
+        assert interpolated(found) == pytest.approx((51 + 50 * 2 / 3) / 101)
+
+    def test_a_frame_that_counts_twice_is_a_frame_that_is_there_twice(self, make_judged) -> None:
+        one, two = make_judged(BALL, (BALL, 0.9), identity=1), make_judged(BALL, (AWAY, 0.8))
+        twice = curve(find_hits([one, two]), 0, np.array([1.0, 2.0]))
+        written = curve(find_hits([one, two, two]))
+        assert interpolated(twice) == pytest.approx(interpolated(written))
+
+    def test_is_the_evaluators_own(self, random_judged) -> None:
+        hits = find_hits(random_judged)
+        ap_50, ap = coco_average_precision(random_judged)
+        assert interpolated(curve(hits)) == pytest.approx(ap_50, abs=1e-12)
+        assert mean_interpolated(hits) == pytest.approx(ap, abs=1e-12)

@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.evaluation.bootstrap import Resamples
+from app.evaluation.cameras import cameras_table, jac_figure, score_cameras
+from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.soccer.annotation import make_lines
+from app.soccer.pitch import MARKINGS, Pitch
+from app.solving.score import score_frame
+
+
+def with_lines(frame):
+    """The frame with every marking that its camera sees, exactly."""
+    lines = {}
+    for marking in MARKINGS:
+        pixels = frame.camera.project(Pitch().sample(marking, 0.9, 0.2))
+        inside = (pixels > 0).all(axis=1) & (pixels < [1280, 720]).all(axis=1)
+        if inside.any():
+            lines[marking] = pixels[inside].tolist()
+    return replace(frame, lines=make_lines(lines))
+
+
+@pytest.fixture
+def frames(make_frame):
+    high = np.array([0.0, 60.0, -20.0])
+    made = []
+    for number in (1, 2, 3):
+        frame = make_frame(number, match=f"m{number}")
+        down = rotation_from_pan_tilt_roll(*np.radians([0.0, 72.0, 0.0]))
+        camera = replace(frame.camera, position=high, rotation=down)
+        made.append(with_lines(replace(frame, camera=camera)))
+    return [*made[:2], replace(made[2], lines={})]
+
+
+class TestScoreCameras:
+    def test_a_frame_without_camera_counts_and_one_without_lines_does_not(self, frames) -> None:
+        scores = score_cameras(frames, {1: frames[0].camera})
+        assert list(scores) == [1, 2]
+        assert scores[2] is None
+        assert scores[1] == score_frame(frames[0].camera, frames[0].lines, Pitch(), frames[0].size)
+
+    def test_a_static_camera_is_measured_once(self, frames, monkeypatch) -> None:
+        calls = []
+
+        def counted(*arguments):
+            calls.append(arguments)
+            return score_frame(*arguments)
+
+        monkeypatch.setattr("app.evaluation.cameras.score_frame", counted)
+        same = [replace(frame, station="cam1") for frame in frames[:2]]
+        score_cameras(same, {frame.id: frames[0].camera for frame in same})
+        assert len(calls) == 1
+
+
+class TestCamerasTable:
+    def test_missing_cameras_count_as_nothing(self, frames) -> None:
+        rows = [("predicted", "Predicted", score_cameras(frames, {1: frames[0].camera}))]
+        table = cameras_table(rows, frames, Resamples.draw(["m1", "m2", "m3"]))
+        assert table.cell("predicted", "completeness").value == 0.5
+        assert table.cell("predicted", "jac_0.5").value == pytest.approx(0.5)
+        assert table.cell("predicted", "challenge").value == pytest.approx(0.5)
+        assert table.cell("predicted", "jac_2").of == 2
+        assert table.cell("predicted", "error_median_px").value == pytest.approx(0, abs=0.5)
+
+
+class TestJacFigure:
+    def test_counts_frames_above_each_threshold(self, frames) -> None:
+        rows = [("predicted", "Predicted", score_cameras(frames, {1: frames[0].camera}))]
+        (panel,) = jac_figure(rows, 0.75).panels
+        at = dict(zip(panel.series[0].x, panel.series[0].y, strict=True))
+        assert (at[0.0], at[0.75], at[1.0]) == (0.5, 0.5, 0)
+        assert panel.marks[0].at == 0.75

@@ -1,0 +1,30 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from app.evaluation.bootstrap import Resamples
+from app.evaluation.careful import boxes_table
+from app.evaluation.frame import Detection
+
+
+class TestBoxesTable:
+    def test_measures_every_kind_over_the_same_frames(self, make_frame) -> None:
+        frame, bare = make_frame(1), replace(make_frame(2), boxes={})
+        careful = {1: frame.boxes["exact"], 2: frame.boxes["exact"], 99: frame.boxes["exact"]}
+        table = boxes_table([frame, bare], careful, {}, Resamples.draw(["m"]))
+        # The annotated box is 1.25 times the careful one: IoU 0.64, and a quarter of d over the
+        # diagonal of a square.
+        assert table.cell("annotated", "iou").value == pytest.approx(0.64)
+        assert table.cell("annotated", "size_error_percent").value == pytest.approx(25 / 2**0.5)
+        assert table.cell("optimized", "iou").value == pytest.approx(1)
+        assert table.cell("exact", "size_error_percent").value == pytest.approx(0)
+        assert all((row.cells[0].count, row.cells[0].of) == (1, 3) for row in table.rows)
+        assert table.row("detected") is None
+
+    def test_detections_get_a_row_where_they_overlap(self, make_frame) -> None:
+        frame = make_frame(1)
+        found = {1: [Detection(frame.boxes["annotated"], 0.4)]}
+        table = boxes_table([frame], {1: frame.boxes["exact"]}, found, Resamples.draw(["m"]))
+        assert table.cell("detected", "iou").value == pytest.approx(0.64)

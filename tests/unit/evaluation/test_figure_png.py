@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
+from app.evaluation.figure_png import HEIGHT, PALETTE, WIDTH, figure_png
+
+LINE = Series("a", "A line", (0.0, 1.0), (0.0, 1.0))
+
+
+def drawn(figure: Figure) -> np.ndarray:
+    return cv2.imdecode(np.frombuffer(figure_png(figure), np.uint8), cv2.IMREAD_COLOR)
+
+
+def figure(*series: Series, **more) -> Figure:
+    panel = Panel("P", Axis("x", "m"), Axis("y"), series, **more)
+    return Figure("f", "Title", (panel,), "A note that says over what it was computed.")
+
+
+def count(picture: np.ndarray, color: tuple[int, int, int]) -> int:
+    return int((np.abs(picture.astype(int) - color).max(axis=2) < 12).sum())
+
+
+class TestFigurePng:
+    def test_has_a_place_for_each_panel(self) -> None:
+        two = Figure("f", "T", figure(LINE).panels * 2)
+        assert drawn(figure(LINE)).shape == (HEIGHT + 40, WIDTH, 3)
+        assert drawn(two).shape == (HEIGHT + 40, 2 * WIDTH, 3)
+
+    def test_draws_the_curve_and_not_without_it(self) -> None:
+        assert count(drawn(figure(LINE)), PALETTE[0]) > 400
+        assert count(drawn(figure()), PALETTE[0]) == 0
+
+    def test_a_dashed_curve_has_gaps(self) -> None:
+        dashed = Series("a", "", (0.0, 1.0), (0.0, 1.0), "dashed")
+        whole = Series("a", "", (0.0, 1.0), (0.0, 1.0))
+        share = count(drawn(figure(dashed)), PALETTE[0]) / count(drawn(figure(whole)), PALETTE[0])
+        assert 0.4 < share < 0.8
+
+    def test_a_mark_stands_where_it_should(self) -> None:
+        picture = drawn(figure(LINE, marks=(Mark("x", 0.5, "half"),)))
+        columns = np.flatnonzero((np.abs(picture.astype(int) - PALETTE[4]).max(axis=2) < 12).any(0))
+        assert columns.min() == pytest.approx((84 + 696) / 2, abs=25)
+
+    @pytest.mark.parametrize(
+        "series",
+        [
+            Series("a", "A", (), ()),
+            Series("a", "A", (3.0,), (4.0,), "points"),
+            Series("a", "A", (0.0, 0.0), (1.0, 1.0)),
+            Series("a", "A", (0.0, 1.0), (-5.0, 5.0), low=(-6.0, 4.0), high=(-4.0, 6.0)),
+            Series("a", "A", (0.0, 1.0), (0.0, 1e9)),
+        ],
+    )
+    def test_draws_whatever_there_is(self, series) -> None:
+        assert drawn(figure(series)).shape[0] == HEIGHT + 40
+
+    def test_colours_follow_the_value(self) -> None:
+        near = Series("a", "A", (0.0, 1.0), (0.0, 1.0), color=10.0)
+        far = Series("b", "B", (0.0, 1.0), (1.0, 0.0), color=90.0)
+        picture = drawn(figure(near, far, color=Axis("Distance", "m"))).astype(int)
+        lower = picture[HEIGHT // 2 :, 100 : WIDTH // 2 - 20]
+        # Near is blue and begins at the bottom left, far is red and begins at the top.
+        assert ((lower[:, :, 0] - lower[:, :, 2]) > 80).sum() > 50
+        assert ((lower[:, :, 2] - lower[:, :, 0]) > 80).sum() < 20

@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import pytest
+
+from app.datasets.frame_names import flat_frame, match_frame
+from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.soccer.frames import ImageSize
+from app.soccer.group import Group, Station, View
+
+SIZE = ImageSize(1280, 720)
+ALDER = "league/2030-2031/2030-08-17 - 18-00 Alder 3 - 1 Birch"
+CEDAR = "league/2030-2031/2030-08-24 - 18-00 Cedar 0 - 0 Birch"
+
+
+def broadcast(identity: int, match: str, view: str) -> NamedFrame:
+    return NamedFrame(identity, f"{match}/7.png", view, match, SIZE)
+
+
+@pytest.fixture
+def names() -> FrameNames:
+    return FrameNames.of(
+        [
+            broadcast(1, ALDER, "7.png"),
+            broadcast(2, ALDER, "7_1.png"),
+            broadcast(3, CEDAR, "7.png"),
+            NamedFrame(4, "358", "cam3", "issia", SIZE, station="cam3"),
+            NamedFrame(5, "359", "cam3", "issia", SIZE, station="cam3"),
+        ]
+    )
+
+
+class TestFind:
+    @pytest.mark.parametrize(
+        "name",
+        [
+            f"{ALDER}/7_1.png",
+            f"{ALDER}/7_1",
+            f"{ALDER.rsplit('/', 1)[1]}/7_1.jpg",
+            f"labels/test/{ALDER}/7_1.txt",
+            f"{ALDER}/Frames-v3/7_1.png",
+            ALDER.replace("/", "_") + "_7_1.txt",
+            "7_1.png",
+            "predictions/7_1.txt",
+        ],
+    )
+    def test_knows_the_spellings_of_a_broadcast_frame(self, names, name: str) -> None:
+        assert names.find(name).id == 2
+
+    @pytest.mark.parametrize("name", ["cam3/358.jpg", "358/cam3", "358_cam3.txt", "a/cam3_358.txt"])
+    def test_knows_the_spellings_of_a_static_frame(self, names, name: str) -> None:
+        assert names.find(name).id == 4
+
+    def test_knows_what_exports_call_it(self, names) -> None:
+        group, view = Group(f"{ALDER}/7.png", (), match=ALDER), View("7_1.png", Station("x", SIZE))
+        for place in (match_frame, flat_frame):
+            assert names.find(place(group, view, "test", ".jpg")).id == 2
+        label = flat_frame(group, view, "test", ".jpg").replace("images/", "labels/")
+        assert names.find(label.rsplit(".", 1)[0] + ".txt").id == 2
+
+    def test_a_name_that_fits_several_is_none_of_them(self, names) -> None:
+        assert names.find("7.png") is None
+        assert "several" in names.why_not("7.png")
+        assert names.find(f"{CEDAR}/7.png").id == 3
+
+    def test_a_frame_of_another_match_is_not_the_one_of_that_number(self, names) -> None:
+        other = "league/2030-2031/2030-09-01 - 18-00 Fir 1 - 0 Oak/7_1.png"
+        assert names.find(other) is None
+        assert names.why_not(other) == "is no frame of the dataset"
+
+
+class TestOfStation:
+    def test_is_every_frame_of_the_camera(self, names) -> None:
+        assert names.of_station("camera/cam3.json") == (4, 5)
+        assert names.of_station("cam9") == ()

@@ -1,0 +1,233 @@
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from app.datasets.camera_json import camera_to_json
+from app.errors import DatasetFormatError, InputError
+from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.prediction_files import read_predicted_cameras, read_predictions
+from app.soccer.frames import Box, ImageSize
+from tests.unit.evaluation.conftest import SIZE, camera_at
+
+MATCH = "league/2030-2031/2030-08-17 - 18-00 Alder 3 - 1 Birch"
+
+
+@pytest.fixture
+def names() -> FrameNames:
+    frames = [
+        NamedFrame(number, f"{MATCH}/7.png", view, MATCH, SIZE)
+        for number, view in enumerate(("7.png", "7_1.png"), 1)
+    ]
+    return FrameNames.of([*frames, NamedFrame(9, "358", "cam3", "issia", SIZE, station="cam3")])
+
+
+def write(path: Path, value: object) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(value if isinstance(value, str) else json.dumps(value))
+    return path
+
+
+def result(image: object = f"{MATCH}/7.png", **more: object) -> dict[str, object]:
+    return {"image_id": image, "category_id": 1, "bbox": [10, 20, 8, 9], "score": 0.5, **more}
+
+
+def problems(found) -> list[tuple[str | None, str | None, str]]:
+    return [(item.record, item.field, item.problem) for item in found.report.problems]
+
+
+class TestCoco:
+    def test_reads_boxes_with_scores_in_order(self, tmp_path, names) -> None:
+        path = write(tmp_path / "r.json", [result(), result("7_1", score=1), result(score=0)])
+        found = read_predictions(path, "coco", names)
+        assert [item.score for item in found.detections[1]] == [0.5, 0]
+        assert found.detections[1][0].box == Box(10, 20, 8, 9)
+        assert (found.boxes, found.report.read, found.without_score) == (3, 3, 0)
+
+    def test_unknown_frames_are_counted_and_named(self, tmp_path, names) -> None:
+        path = write(tmp_path / "r.json", [result(), result("9.png"), result("9.png")])
+        found = read_predictions(path, "coco", names)
+        assert found.unknown == {"9.png": 2}
+        assert found.boxes == 1
+
+    def test_numbers_mean_the_images_of_a_document_in_the_zip(self, tmp_path, names) -> None:
+        images = {"images": [{"id": 5, "file_name": f"{MATCH}/7_1.png"}], "annotations": []}
+        path = tmp_path / "r.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("instances_test.json", json.dumps(images))
+            archive.writestr("results.json", json.dumps([result(5), result(6)]))
+        found = read_predictions(path, "coco", names)
+        assert list(found.detections) == [2]
+        assert found.unknown == {"image 6": 1}
+
+    def test_numbers_mean_the_images_of_a_document_beside_it(self, tmp_path, names) -> None:
+        image = {"id": 5, "file_name": "7_1.png", "width": 640, "height": 360}
+        images = write(tmp_path / "truth.json", {"images": [image]})
+        path = write(tmp_path / "results" / "r.json", [result(5)])
+        found = read_predictions(path, "coco", names, images=images)
+        # Half the annotated size: the document says so.
+        assert found.detections[2][0].box == Box(20, 40, 16, 18)
+
+    def test_numbers_alone_are_never_guessed(self, tmp_path, names) -> None:
+        found = read_predictions(write(tmp_path / "r.json", [result(1)]), "coco", names)
+        assert found.detections == {}
+        assert "document" in found.reasons["image 1"]
+
+    @pytest.mark.parametrize(
+        ("more", "field", "words"),
+        [
+            ({"bbox": [1, 2, 3]}, "bbox", "has 3 numbers, not 4"),
+            ({"bbox": [1, 2, 0, 4]}, "bbox", "wider"),
+            ({"bbox": [5000, 2, 3, 4]}, "bbox", "outside the image of 1280 x 720"),
+            ({"bbox": [1, 2, True, 4]}, "bbox", "truth value"),
+            ({"score": 1.5}, "score", "is 1.5"),
+            ({"score": None}, "score", "not a number"),
+            ({"image_id": None}, "image_id", "neither"),
+            ({"image_id": True}, "image_id", "neither"),
+        ],
+    )
+    def test_what_is_wrong_is_left_out_with_its_place(
+        self, tmp_path, names, more, field, words
+    ) -> None:
+        path = write(tmp_path / "r.json", [result(), result(**more)])
+        found = read_predictions(path, "coco", names)
+        assert found.boxes == 1
+        ((record, where, problem),) = problems(found)
+        assert (record, where) == ("result 1", field)
+        assert words in problem
+
+    def test_a_record_that_is_no_object_is_left_out(self, tmp_path, names) -> None:
+        found = read_predictions(write(tmp_path / "r.json", [result(), 7]), "coco", names)
+        assert problems(found)[0][0] == "result 1"
+
+    def test_boxes_of_other_classes_are_left_out_when_the_ball_is_named(
+        self, tmp_path, names
+    ) -> None:
+        path = write(tmp_path / "r.json", [result(category_id=32), result(category_id=0)])
+        found = read_predictions(path, "coco", names, category=32)
+        assert (found.boxes, found.report.counts["other classes"]) == (1, 1)
+        with pytest.raises(InputError, match=r"several classes \(0, 32\)"):
+            read_predictions(path, "coco", names)
+
+    def test_a_file_that_is_something_else_is_refused(self, tmp_path, names) -> None:
+        for text, words in (("{]", "not JSON"), ('{"a": 1}', "no COCO results"), ("[NaN]", "NaN")):
+            with pytest.raises(DatasetFormatError, match=words):
+                read_predictions(write(tmp_path / "r.json", text), "coco", names)
+
+    def test_a_missing_file_and_an_unknown_format_are_refused(self, tmp_path, names) -> None:
+        with pytest.raises(InputError, match="does not exist"):
+            read_predictions(tmp_path / "none.json", "coco", names)
+        with pytest.raises(InputError, match='"xml" is no format'):
+            read_predictions(tmp_path / "none.json", "xml", names)
+
+    def test_a_size_of_the_callers_scales_pixels(self, tmp_path, names) -> None:
+        path = write(tmp_path / "r.json", [result()])
+        found = read_predictions(path, "coco", names, size=ImageSize(2560, 1440))
+        assert found.detections[1][0].box == Box(5, 10, 4, 4.5)
+
+
+class TestYolo:
+    def test_reads_shares_of_the_image(self, tmp_path, names) -> None:
+        write(tmp_path / "labels" / "7.txt", "0 0.5 0.5 0.01 0.02 0.75\n\n0 0.25 0.5 0.01 0.02\n")
+        write(tmp_path / "labels" / "7_1.txt", "")
+        write(tmp_path / "classes.txt", "ball")
+        found = read_predictions(tmp_path, "yolo", names)
+        first, second = found.detections[1]
+        assert first.box.center == (640, 360)
+        assert (first.box.width, first.box.height) == pytest.approx((12.8, 14.4))
+        assert (first.score, second.score, found.without_score) == (0.75, 1, 1)
+
+    def test_reads_a_zip_and_counts_unknown_files(self, tmp_path, names) -> None:
+        path = tmp_path / "y.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("out/cam3_358.txt", "0 0.5 0.5 0.01 0.02 0.75\n")
+            archive.writestr("out/cam3_999.txt", "0 0.5 0.5 0.01 0.02 0.75\n" * 3)
+        found = read_predictions(path, "yolo", names)
+        assert list(found.detections) == [9]
+        assert found.unknown == {"out/cam3_999.txt": 3}
+
+    @pytest.mark.parametrize(
+        ("line", "words"),
+        [
+            ("0 0.5 0.5 0.01", "has 4 numbers"),
+            ("0 640 360 12 14 0.5", "in pixels"),
+            ("0 0.5 0.5 x 0.1", "'x'"),
+            ("0.5 0.5 0.5 0.1 0.1", "whole number"),
+            ("0 0.5 0.5 0 0.1", "wider"),
+            ("0 0.5 0.5 0.1 0.1 2", "is 2, which"),
+        ],
+    )
+    def test_what_is_wrong_is_left_out_with_its_line(self, tmp_path, names, line, words) -> None:
+        write(tmp_path / "7.txt", f"0 0.5 0.5 0.01 0.02 0.5\n{line}\n")
+        found = read_predictions(tmp_path, "yolo", names)
+        ((record, _field, problem),) = problems(found)
+        assert record == "line 2"
+        assert words in problem
+        assert found.boxes == 1
+
+
+class TestCsv:
+    def test_reads_a_table_like_snv3d(self, tmp_path, names) -> None:
+        league, season, match = MATCH.split("/")
+        head = ",league,season,match,main_action,replay,img_w,img_h,ball_bbox,score"
+        row = f"{league},{season},{match},7"
+        text = (
+            f'{head}\n0,{row},,640,360,"[10, 20, 8, 9]",0.5\n'
+            f'1,{row},1.0,1280,720,"[10.0, 20.0, 8.0, 9.0]",\n2,{row},,640,360,,\n'
+        )
+        found = read_predictions(write(tmp_path / "p.csv", text), "csv", names)
+        assert found.detections[1][0].box == Box(20, 40, 16, 18)
+        assert found.detections[2][0].box == Box(10, 20, 8, 9)
+        assert (found.boxes, found.without_score) == (2, 1)
+
+    def test_reads_cameras_and_frames(self, tmp_path, names) -> None:
+        text = "camera,frame,x,y,w,h,confidence\n3,358,10,20,8,9,0.25\ncam3,358.0,1,2,3,4,0.5\n"
+        found = read_predictions(write(tmp_path / "p.csv", text), "csv", names)
+        assert [item.score for item in found.detections[9]] == [0.25, 0.5]
+
+    def test_reads_names_of_images(self, tmp_path, names) -> None:
+        text = "image,x,y,width,height,score\n7_1.png,10,20,8,9,0.25\n"
+        assert 2 in read_predictions(write(tmp_path / "p.csv", text), "csv", names).detections
+
+    @pytest.mark.parametrize(
+        ("text", "field", "words"),
+        [
+            ("image,score\n7.png,0.5\n", "ball_bbox", "missing"),
+            ("image,x,y,w,h\n7.png,1,2,a,4\n", "w", "'a'"),
+            ("x,y,w,h\n1,2,3,4\n", "frame", "missing"),
+            ('image,ball_bbox\n7.png,"[1, 2, __import__(3), 4]"\n', "ball_bbox", "not a list"),
+        ],
+    )
+    def test_what_is_wrong_is_named(self, tmp_path, names, text, field, words) -> None:
+        good = write(tmp_path / "p.csv", text)
+        with pytest.raises(DatasetFormatError, match=words) as caught:
+            read_predictions(good, "csv", names)
+        assert (caught.value.record, caught.value.field) == ("line 2", field)
+
+
+class TestPredictedCameras:
+    def test_belong_to_frames_by_name_and_to_all_of_a_static_camera(self, tmp_path, names) -> None:
+        camera = camera_at(50.0)
+        text = json.dumps(camera_to_json(camera))
+        write(tmp_path / MATCH / "camera_7.json", text)
+        write(tmp_path / "camera_cam3.json", text)
+        write(tmp_path / "camera_44.json", text)
+        found = read_predicted_cameras(tmp_path, names)
+        assert set(found.cameras) == {1, 9}
+        assert found.cameras[1].focal_length == camera.focal_length
+        assert list(found.unknown) == ["44"]
+
+    def test_are_scaled_from_their_own_size(self, tmp_path, names) -> None:
+        write(
+            tmp_path / "camera_7.json", json.dumps(camera_to_json(camera_at(50.0).scaled(0.5, 0.5)))
+        )
+        found = read_predicted_cameras(tmp_path, names, size=ImageSize(640, 360))
+        assert found.cameras[1].focal_length == pytest.approx((2000, 2000))
+        assert found.cameras[1].principal_point == pytest.approx((639.5, 359.5))
+
+    def test_without_any_it_is_refused(self, tmp_path, names) -> None:
+        with pytest.raises(InputError, match="no camera files"):
+            read_predicted_cameras(tmp_path, names)
