@@ -31,6 +31,8 @@ class BallAnnotation:
     point: ImagePoint | None = None
     occluded: bool = False
     out_of_view: bool = False
+    predicted_by: str = ""
+    """The set of predictions that a person accepted it from; empty: a dataset or a person said it."""
 
     @property
     def center(self) -> ImagePoint | None:

@@ -13,6 +13,7 @@ from app.soccer.group import Group, Station, View
 from app.store import codecs
 from app.store.digest import group_inputs_hash, station_digest, view_digest
 from app.store.models import GroupModel, StationModel, ViewModel
+from app.store.view_models import UsedIdModel
 
 
 def station_values(station: Station) -> dict[str, Any]:
@@ -61,8 +62,13 @@ def head_values(group: Group) -> dict[str, Any]:
 
 
 def next_id(session: Session, model: Any) -> int:
-    """The id that a new row gets; sound because writes hold the lock from their start."""
-    return int(session.execute(select(func.coalesce(func.max(model.id), 0))).scalar_one()) + 1
+    """The id that a new row gets; sound because writes hold the lock from their start.
+
+    Ids of deleted datasets are not given again: the log still speaks of what had them.
+    """
+    newest = session.scalar(select(func.max(model.id))) or 0
+    used = select(UsedIdModel.id).where(UsedIdModel.table == model.__tablename__)
+    return max(int(newest), session.scalar(used) or 0) + 1
 
 
 @dataclass

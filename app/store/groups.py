@@ -190,16 +190,19 @@ def save_group(
         source: Where the change comes from the dataset: the group as it would be had nobody
             edited it.
     """
-    rows = NewRows(session, stored.dataset_id)
     kept = {view.key for view in group.views if keeps_station(stored, view)}
     _delete_views(session, stored, set(stored.view_ids) - kept)
     for position, view in enumerate(group.views):
         if view.key in kept:
             base = None if source is None else source.view(view.key)
             _save_view(session, stored, view, position, base)
-        else:
-            rows.add_view(stored.id, view, position, shared or {})
-    rows.insert()
+    if len(kept) < len(group.views):
+        # Only an import brings new views; asking for new ids would cost every edit.
+        rows = NewRows(session, stored.dataset_id)
+        for position, view in enumerate(group.views):
+            if view.key not in kept:
+                rows.add_view(stored.id, view, position, shared or {})
+        rows.insert()
     values = {**head_values(group), "revision": stored.revision + 1, "changed": at}
     if digest is not None:
         values["source_hash"] = digest

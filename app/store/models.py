@@ -198,7 +198,23 @@ class LogModel(Base):
     """Everything that was ever said, in order; each row's hash covers the row before."""
 
     __tablename__ = "log"
-    __table_args__ = (Index("log_group", "group_id", "id"), Index("log_station", "station_id"))
+    __table_args__ = (
+        Index("log_group", "group_id", "id"),
+        Index("log_station", "station_id"),
+        Index(
+            "log_policy",
+            "dataset_id",
+            "id",
+            sqlite_where=text("kind IN ('dataset', 'policy')"),
+            postgresql_where=text("kind IN ('dataset', 'policy')"),
+        ),
+        Index(
+            "log_deleted",
+            "dataset_id",
+            sqlite_where=text("kind = 'dataset_deleted'"),
+            postgresql_where=text("kind = 'dataset_deleted'"),
+        ),
+    )
 
     id: Mapped[int] = mapped_column(primary_key=True)
     at: Mapped[str]
@@ -268,3 +284,7 @@ class QueueModel(Base):
     size_ratio: Mapped[float | None]
     height_m: Mapped[float | None]
     findings: Mapped[str]
+    distance_m: Mapped[float | None]
+    box_px: Mapped[float | None]
+    x_m: Mapped[float | None]
+    y_m: Mapped[float | None]

@@ -6,11 +6,13 @@ import json
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from sqlalchemy import select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
+from app.errors import ConflictError
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
 from app.store import value_codec
@@ -76,16 +78,31 @@ def _compress(value: object) -> bytes:
 def insert_solutions(
     session: Session, solutions: Sequence[tuple[SolutionKey, EncodedSolution]]
 ) -> None:
-    """Insert solutions with their calibrations; what is already there stays."""
+    """Insert solutions with their calibrations; what is already there stays.
+
+    Raises:
+        ConflictError: A calibration that the solver knew is gone by now.
+    """
     bodies: dict[str, bytes] = {}
     for _key, encoded in solutions:
         bodies.update(encoded.calibrations)
     insert_calibrations(session, bodies)
+    _require_calibrations(session, solutions)
     if solutions:
         session.execute(
             insert(SolutionModel).on_conflict_do_nothing(),
             [_row(key, encoded) for key, encoded in solutions],
         )
+
+
+def _require_calibrations(
+    session: Session, solutions: Sequence[tuple[SolutionKey, EncodedSolution]]
+) -> None:
+    """A dataset that is deleted takes its calibrations along, and the solver may have read one."""
+    wanted = {key for _, encoded in solutions for key in encoded.calibration_keys}
+    statement = select(CalibrationModel.key).where(CalibrationModel.key.in_(wanted))
+    if wanted - set(session.scalars(statement)):
+        raise ConflictError("a calibration was deleted while this was computed", hint="Try again.")
 
 
 def insert_calibrations(session: Session, bodies: Mapping[str, bytes]) -> None:
@@ -125,11 +142,15 @@ def read_solutions(session: Session, keys: Iterable[SolutionKey]) -> dict[int, S
     ]
     names = {name for row in rows for name in json.loads(row.calibrations)}
     calibrations = read_calibrations(session, names)
-    return {row.group_id: _decode(row.body, calibrations) for row in rows}
+    return {
+        row.group_id: decode_solution(json.loads(zlib.decompress(row.body)), calibrations)
+        for row in rows
+    }
 
 
-def _decode(body: bytes, calibrations: Mapping[str, Calibration]) -> Solution:
-    solution = value_codec.from_json(Solution, json.loads(zlib.decompress(body)))
+def decode_solution(value: Any, calibrations: Mapping[str, Calibration]) -> Solution:
+    """A solution from the JSON value of its body and the calibrations that it names."""
+    solution = value_codec.from_json(Solution, value)
     views = tuple(
         replace(view, calibration=calibrations[view.calibration_key]) for view in solution.views
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from app.soccer.frames import height_above_grass
 from app.soccer.group import Group
-from app.soccer.solution import BallFit, Gate, Pair, Solution
+from app.soccer.solution import BallFit, Gate, Pair, Solution, ViewSolution
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,10 @@ class Summary:
             best pair; ``error_percent`` the same in per cent of the diagonal.
         size_ratio: Annotated over optimised diameter, the one farthest from 1.
         findings: Kinds, each once.
+        distance_m: Of the ball from the camera of the first view that it comes from.
+        box_px: Diameter of the ball in that view, as annotated, else (a point) as optimised;
+            without a ball that of the first view that has an annotated box.
+        x_m: Of the ball in the pitch frame, like ``y_m``.
     """
 
     passes: bool
@@ -38,6 +42,10 @@ class Summary:
     size_ratio: float | None
     height_m: float | None
     findings: tuple[str, ...]
+    distance_m: float | None = None
+    box_px: float | None = None
+    x_m: float | None = None
+    y_m: float | None = None
 
 
 def summarize(group: Group, solution: Solution) -> Summary:
@@ -61,6 +69,10 @@ def summarize(group: Group, solution: Solution) -> Summary:
         size_ratio=_size_ratio(solution),
         height_m=height_above_grass(ball.point[2]) if ball else None,
         findings=tuple(dict.fromkeys(finding.kind for finding in solution.findings)),
+        distance_m=_distance(solution),
+        box_px=_box(group, solution),
+        x_m=ball.point[0] if ball else None,
+        y_m=ball.point[1] if ball else None,
     )
 
 
@@ -121,3 +133,28 @@ def _parallax(pairs: tuple[Pair, ...]) -> float | None:
 def _size_ratio(solution: Solution) -> float | None:
     ratios = [fit.size_ratio for fit in _fits(solution) if fit.size_ratio]
     return max(ratios, key=lambda ratio: abs(math.log(ratio)), default=None)
+
+
+def _first(solution: Solution) -> ViewSolution | None:
+    """The first view that the ball comes from, most often the main camera's."""
+    return solution.view(solution.ball.views[0]) if solution.ball is not None else None
+
+
+def _distance(solution: Solution) -> float | None:
+    first, ball = _first(solution), solution.ball
+    if first is None or ball is None or first.calibration.camera is None:
+        return None
+    return math.dist(ball.point, first.calibration.camera.position.tolist())
+
+
+def _box(group: Group, solution: Solution) -> float | None:
+    annotated = {
+        view.key: view.ball.box.diameter if view.ball.box is not None else None
+        for view in group.views
+        if view.included and view.ball is not None
+    }
+    first = _first(solution)
+    if first is None:
+        return next((diameter for diameter in annotated.values() if diameter is not None), None)
+    optimized = first.ball.optimized_diameter_px if first.ball is not None else None
+    return annotated.get(first.view) or optimized

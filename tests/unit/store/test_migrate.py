@@ -7,8 +7,8 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import text
 
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
-from app.store.models import Base
 from app.store.session import Store, make_engine
+from app.store.tables import Base
 
 
 class TestMigrate:

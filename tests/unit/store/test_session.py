@@ -190,11 +190,14 @@ class TestAppendOnly:
                 session.scalars(text("SELECT name FROM sqlite_master WHERE type = 'trigger'"))
             )
         assert triggers == {
-            *(f"{name}_refuses_update" for name in ("log", "verdict", "solution", "calibration")),
+            *(f"{name}_refuses_update" for name in ("solution", "calibration", "frozen")),
+            "frozen_refuses_delete",
+            "frozen_keeps_what_it_has",
+            "calibration_stays_in_versions",
             *(
                 f"{name}_refuses_{verb}"
-                for name in ("log", "verdict")
-                for verb in ("delete", "insert")
+                for name in ("log", "verdict", "version", "version_group")
+                for verb in ("update", "delete", "insert")
             ),
         }
 

@@ -1,0 +1,170 @@
+"""Frozen content: what versions keep for good, each thing once a dataset, under its own digest.
+
+What is said about a group is frozen without its media: where a frame lies differs from machine
+to machine, and the digest must not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import zlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import insert, select
+from sqlalchemy.orm import Session
+
+from app.soccer.group import Group, Station, View
+from app.soccer.pitch import Pitch
+from app.store.codecs import (
+    Json,
+    canonical,
+    group_head_to_json,
+    parse,
+    station_from_json,
+    station_to_json,
+    view_from_json,
+    view_to_json,
+)
+from app.store.solutions import read_calibration_bodies
+from app.store.version_models import FrozenModel
+
+SAID, STATION, SOLUTION, CALIBRATION = "said:", "station:", "solution:", "calibration:"
+
+Frames = Mapping[str, Mapping[str, Any]]
+"""By view: ``path``, ``member``, ``frame``, ``flipped``, and the frame's size and checksum."""
+
+
+@dataclass(frozen=True)
+class FrozenSaid:
+    """What was said about a group: its key, and texts by key that belong with it."""
+
+    key: str
+    texts: Mapping[str, str]
+
+
+def freeze_said(group: Group) -> FrozenSaid:
+    """A group as canonical JSON without media; a shared station is a text of its own."""
+    texts: dict[str, str] = {}
+    views = []
+    for view in group.views:
+        station = _station(view.station)
+        if view.station.shared:
+            text = canonical(station)
+            station = STATION + digest_of(text.encode())
+            texts[station] = text
+        value = view_to_json(view, station)
+        del value["media"]
+        views.append(value)
+    text = canonical({**group_head_to_json(group), "views": views})
+    key = SAID + digest_of(text.encode())
+    return FrozenSaid(key, {**texts, key: text})
+
+
+def _station(station: Station) -> Json:
+    # Whether the frames are mirrored is about the frames, not about what was said.
+    return {name: value for name, value in station_to_json(station).items() if name != "flipped"}
+
+
+def station_keys(said: Json) -> set[str]:
+    """Keys of the shared stations that a frozen group names."""
+    return {view["station"] for view in said["views"] if isinstance(view["station"], str)}
+
+
+def thaw_group(said: Json, stations: Mapping[str, Json], frames: Frames | None = None) -> Group:
+    """Back from ``freeze_said``, with media where ``frames`` has them."""
+    known = frames or {}
+    views = tuple(_thaw_view(view, stations, known.get(view["key"])) for view in said["views"])
+    return Group(
+        key=said["key"],
+        views=views,
+        match=said["match"],
+        pitch=Pitch(*said["pitch"]),
+        split=said["split"],
+        label=said["label"],
+    )
+
+
+def _thaw_view(
+    value: Mapping[str, Any], stations: Mapping[str, Json], frame: Mapping[str, Any] | None
+) -> View:
+    said = value["station"]
+    known = frame or {}
+    station = stations[said] if isinstance(said, str) else said
+    media = None
+    if "path" in known:
+        media = [known["path"], known["member"], known["frame"]]
+    whole = station_from_json({**station, "flipped": known.get("flipped", False)})
+    return view_from_json({**value, "media": media}, whole)
+
+
+def frames_of(group: Group, facts: Mapping[str, Mapping[str, int]]) -> Frames | None:
+    """Where the frames of a group lie; None where nothing is known of them.
+
+    Args:
+        group: The group.
+        facts: Size and checksum by view, of frames that are there.
+    """
+    frames: dict[str, dict[str, Any]] = {}
+    for view in group.views:
+        value: dict[str, Any] = {"flipped": True} if view.station.flipped else {}
+        if view.media is not None:
+            media = view.media
+            value |= {"path": media.path, "member": media.member, "frame": media.frame}
+            value |= {"facts": dict(facts.get(view.key, {}))}
+        if value:
+            frames[view.key] = value
+    return frames or None
+
+
+def digest_of(content: bytes) -> str:
+    """Digest of content, 32 hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()[:32]
+
+
+def known_frozen(session: Session, dataset_id: int, keys: Iterable[str]) -> set[str]:
+    """Those of the keys that are there already."""
+    statement = select(FrozenModel.key).where(
+        FrozenModel.dataset_id == dataset_id, FrozenModel.key.in_(list(keys))
+    )
+    return set(session.scalars(statement))
+
+
+def insert_frozen(session: Session, dataset_id: int, bodies: Mapping[str, bytes | None]) -> None:
+    """Insert content; what is there already stays (a trigger sees to it).
+
+    The body of a calibration is None: it stays where it is for as long as it is there.
+    """
+    if bodies:
+        rows = [
+            {"dataset_id": dataset_id, "key": key, "body": body} for key, body in bodies.items()
+        ]
+        session.execute(insert(FrozenModel), rows, execution_options={"render_nulls": True})
+
+
+def read_frozen(session: Session, dataset_id: int, keys: Iterable[str]) -> dict[str, bytes]:
+    """Content by key; unknown keys are left out."""
+    statement = select(FrozenModel.key, FrozenModel.body).where(
+        FrozenModel.dataset_id == dataset_id, FrozenModel.key.in_(list(keys))
+    )
+    bodies = {row.key: row.body for row in session.execute(statement)}
+    elsewhere = {key.removeprefix(CALIBRATION) for key, body in bodies.items() if body is None}
+    found = read_calibration_bodies(session, elsewhere) if elsewhere else {}
+    bodies |= {CALIBRATION + key: body for key, body in found.items()}
+    return {key: body for key, body in bodies.items() if body is not None}
+
+
+def text_of(body: bytes) -> str:
+    """The text of frozen JSON."""
+    return zlib.decompress(body).decode()
+
+
+def json_of(body: bytes) -> Json:
+    """The value of frozen JSON."""
+    return parse(text_of(body))
+
+
+def body_of(text: str) -> bytes:
+    """Frozen JSON of a text."""
+    return zlib.compress(text.encode())

@@ -1,0 +1,50 @@
+"""The tables of background work: jobs, and the first answers to requests that may come twice."""
+
+from __future__ import annotations
+
+from sqlalchemy import Index, LargeBinary
+from sqlalchemy.orm import Mapped, mapped_column
+
+from app.store.models import Base
+
+
+class JobModel(Base):
+    """A piece of background work and how far it is.
+
+    ``request`` (JSON) is what it was asked for, enough to start it again where its kind can be;
+    ``result`` and ``problem`` (JSON) are what came of it. A dataset may be gone before its jobs.
+    """
+
+    __tablename__ = "job"
+    __table_args__ = (Index("job_dataset", "dataset_id", "id"), Index("job_kind", "kind", "id"))
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    kind: Mapped[str]
+    title: Mapped[str]
+    dataset_id: Mapped[int | None]
+    state: Mapped[str]
+    done: Mapped[int]
+    total: Mapped[int | None]
+    sentence: Mapped[str]
+    request: Mapped[str | None]
+    result: Mapped[str | None]
+    problem: Mapped[str | None]
+    created: Mapped[str]
+    started: Mapped[str | None]
+    ended: Mapped[str | None]
+    actor: Mapped[str]
+
+
+class AnswerModel(Base):
+    """The first answer to a request that carried an Idempotency-Key (the body compressed)."""
+
+    __tablename__ = "answer"
+    __table_args__ = (Index("answer_at", "at"),)
+
+    key: Mapped[str] = mapped_column(primary_key=True)
+    actor: Mapped[str] = mapped_column(primary_key=True)
+    request_digest: Mapped[str]
+    status: Mapped[int]
+    headers: Mapped[str]
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+    at: Mapped[str]

@@ -1,0 +1,159 @@
+"""Jobs in the database: what is under way and what came of it, newest first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import delete, insert, select, update
+from sqlalchemy.orm import Session
+
+from app.store.clock import now
+from app.store.codecs import Json, canonical, parse
+from app.store.group_rows import next_id
+from app.store.job_models import JobModel
+from app.store.models import DatasetModel
+
+WAITING, RUNNING = "waiting", "running"
+DONE, FAILED, CANCELLED = "done", "failed", "cancelled"
+OPEN = (WAITING, RUNNING)
+"""States that are not the last one of a job."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A piece of background work as it stands.
+
+    Attributes:
+        dataset: Name of its dataset; None where it has none, or that is gone.
+        state: ``waiting``, ``running``, ``done``, ``failed`` or ``cancelled``.
+        total: How much there is to do; None while that is unknown.
+        sentence: What it is at, for people.
+        request: What it was asked for.
+        problem: ``{"detail", "hint", "pointer"}`` of what failed.
+    """
+
+    id: int
+    kind: str
+    title: str
+    dataset_id: int | None
+    dataset: str | None
+    state: str
+    done: int
+    total: int | None
+    sentence: str
+    request: Json
+    result: Json
+    problem: Json
+    created: str
+    started: str | None
+    ended: str | None
+    actor: str
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing more will come of it."""
+        return self.state not in OPEN
+
+
+@dataclass(frozen=True)
+class NewJob:
+    """What a job is from its start."""
+
+    kind: str
+    title: str
+    actor: str
+    dataset_id: int | None = None
+    request: Json = None
+
+
+def insert_job(session: Session, job: NewJob) -> int:
+    """Insert a job that waits; returns its id."""
+    identity = next_id(session, JobModel)
+    values = {
+        "id": identity,
+        "kind": job.kind,
+        "title": job.title,
+        "dataset_id": job.dataset_id,
+        "actor": job.actor,
+        "state": WAITING,
+        "done": 0,
+        "sentence": "",
+        "request": _text(job.request),
+        "created": now(),
+    }
+    session.execute(insert(JobModel), [values])
+    return identity
+
+
+def update_job(session: Session, job_id: int, **values: Any) -> None:
+    """Set columns of a job; ``result`` and ``problem`` are JSON values."""
+    for name in ("result", "problem"):
+        if name in values:
+            values[name] = _text(values[name])
+    session.execute(update(JobModel).where(JobModel.id == job_id).values(values))
+
+
+def read_job(session: Session, job_id: int) -> Job | None:
+    """A job by its id."""
+    row = session.execute(_SELECT.where(JobModel.id == job_id)).one_or_none()
+    return None if row is None else _job(row)
+
+
+def read_jobs(
+    session: Session,
+    *,
+    dataset_id: int | None = None,
+    kinds: Sequence[str] = (),
+    states: Sequence[str] = (),
+    before: int | None = None,
+    limit: int = 50,
+) -> list[Job]:
+    """Jobs, the newest first.
+
+    Args:
+        session: Any session.
+        dataset_id: Of this dataset alone.
+        kinds: Of these kinds alone.
+        states: In these states alone.
+        before: Those older than the job of this id.
+        limit: How many at most.
+    """
+    statement = _SELECT.order_by(JobModel.id.desc()).limit(limit)
+    if dataset_id is not None:
+        statement = statement.where(JobModel.dataset_id == dataset_id)
+    if kinds:
+        statement = statement.where(JobModel.kind.in_(kinds))
+    if states:
+        statement = statement.where(JobModel.state.in_(states))
+    if before is not None:
+        statement = statement.where(JobModel.id < before)
+    return [_job(row) for row in session.execute(statement)]
+
+
+def trim_jobs(session: Session, kind: str, keep: int) -> None:
+    """Forget the oldest jobs of a kind that are over, so that the table does not grow forever."""
+    oldest = (
+        select(JobModel.id)
+        .where(JobModel.kind == kind, JobModel.state.not_in(OPEN))
+        .order_by(JobModel.id.desc())
+        .offset(keep)
+    )
+    session.execute(delete(JobModel).where(JobModel.id.in_(oldest)))
+
+
+def _text(value: Json) -> str | None:
+    return None if value is None else canonical(value)
+
+
+def _job(row: Any) -> Job:
+    values = dict(row._mapping)
+    for name in ("request", "result", "problem"):
+        values[name] = None if values[name] is None else parse(values[name])
+    return Job(**values)
+
+
+_SELECT = select(*JobModel.__table__.columns, DatasetModel.name.label("dataset")).outerjoin(
+    DatasetModel, DatasetModel.id == JobModel.dataset_id
+)

@@ -1,0 +1,184 @@
+"""Predictions in the database: sets, their boxes and their cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import delete, insert, select
+from sqlalchemy.orm import Session
+
+from app.geometry.camera import Camera
+from app.store.codecs import Json, camera_from_json, camera_to_json, canonical, parse
+from app.store.digest import digest
+from app.store.group_rows import next_id
+from app.store.models import GroupModel, StationModel, ViewModel
+from app.store.prediction_models import (
+    PredictedCameraModel,
+    PredictionModel,
+    PredictionSetModel,
+)
+
+_BATCH = 5000
+
+
+@dataclass(frozen=True)
+class PredictionSet:
+    """What one file or one run of a detector predicted.
+
+    Attributes:
+        format: ``coco``, ``yolo``, ``csv``, or ``detect`` for a detector of ours.
+        source: Name of the file or of the model.
+        frames: Frames with a box; ``boxes`` and ``cameras`` count those that have their frame.
+        unknown: Frames that the dataset does not have.
+        report: JSON; what could not be read, and where it comes from.
+    """
+
+    id: int
+    dataset_id: int
+    name: str
+    format: str
+    source: str
+    created: str
+    actor: str
+    digest: str
+    frames: int
+    boxes: int
+    cameras: int
+    unknown: int
+    report: Json
+
+
+@dataclass(frozen=True)
+class PredictedBox:
+    """One predicted ball: pixels of the view's annotated size."""
+
+    id: int
+    set_id: int
+    view_id: int
+    x: float
+    y: float
+    width: float
+    height: float
+    score: float
+
+
+Boxes = Mapping[int, Sequence[tuple[float, float, float, float, float]]]
+"""x, y, width, height and score of each ball by id of the view, in the order of the file."""
+
+
+def predictions_digest(keys: Mapping[int, str], boxes: Boxes, cameras: Mapping[int, Camera]) -> str:
+    """Digest of what was predicted, the same on every machine.
+
+    Args:
+        keys: A name of each view that does not depend on the database.
+        boxes: By id of the view.
+        cameras: By id of the view.
+    """
+    said = sorted((keys[view], [list(map(float, box)) for box in boxes[view]]) for view in boxes)
+    seen = sorted((keys[view], camera_to_json(cameras[view])) for view in cameras)
+    return digest([[list(item) for item in said], [list(item) for item in seen]])
+
+
+def insert_prediction_set(
+    session: Session, values: Mapping[str, Any], boxes: Boxes, cameras: Mapping[int, Camera]
+) -> int:
+    """Insert a set with everything that belongs to it; returns its id.
+
+    Args:
+        session: A write session.
+        values: Columns of the set but its id, ``report`` as a JSON value.
+        boxes: By id of the view.
+        cameras: By id of the view.
+    """
+    identity = next_id(session, PredictionSetModel)
+    row = {**values, "id": identity, "report": canonical(values["report"])}
+    session.execute(insert(PredictionSetModel), [row])
+    names = ("x", "y", "width", "height", "score")
+    rows = [
+        {"set_id": identity, "view_id": view, **dict(zip(names, box, strict=True))}
+        for view, found in boxes.items()
+        for box in found
+    ]
+    for start in range(0, len(rows), _BATCH):
+        session.execute(insert(PredictionModel), rows[start : start + _BATCH])
+    seen = [
+        {"set_id": identity, "view_id": view, "camera": canonical(camera_to_json(camera))}
+        for view, camera in cameras.items()
+    ]
+    for start in range(0, len(seen), _BATCH):
+        session.execute(insert(PredictedCameraModel), seen[start : start + _BATCH])
+    return identity
+
+
+def delete_prediction_set(session: Session, set_id: int) -> None:
+    """Delete a set with everything that belongs to it; nothing where there is none."""
+    session.execute(delete(PredictionSetModel).where(PredictionSetModel.id == set_id))
+
+
+def read_prediction_sets(session: Session, *where: Any) -> list[PredictionSet]:
+    """Sets, the newest first."""
+    statement = (
+        select(*PredictionSetModel.__table__.columns)
+        .where(*where)
+        .order_by(PredictionSetModel.id.desc())
+    )
+    return [
+        PredictionSet(**{**row._mapping, "report": parse(row.report)})
+        for row in session.execute(statement)
+    ]
+
+
+def read_boxes(session: Session, set_id: int) -> dict[int, list[PredictedBox]]:
+    """Every box of a set, by id of the view, as they came."""
+    found: dict[int, list[PredictedBox]] = {}
+    for box in _boxes(session, PredictionModel.set_id == set_id):
+        found.setdefault(box.view_id, []).append(box)
+    return found
+
+
+def read_view_boxes(session: Session, view_id: int) -> list[PredictedBox]:
+    """Every box of a view over all sets, the newest set first, the surest box first."""
+    found = _boxes(session, PredictionModel.view_id == view_id)
+    return sorted(found, key=lambda box: (-box.set_id, -box.score, box.id))
+
+
+def read_predicted_cameras(session: Session, set_id: int) -> dict[int, Camera]:
+    """Every camera of a set, by id of the view."""
+    model = PredictedCameraModel
+    rows = session.execute(select(model.view_id, model.camera).where(model.set_id == set_id))
+    return {row.view_id: camera_from_json(parse(row.camera)) for row in rows}
+
+
+def read_view_rows(session: Session, dataset_id: int) -> list[Any]:
+    """The views of a dataset by every name that a file may give them.
+
+    Returns:
+        Rows (id, view, group_id, group, match, width, height, station, shared), by group.
+    """
+    statement = (
+        select(
+            ViewModel.id,
+            ViewModel.key.label("view"),
+            GroupModel.id.label("group_id"),
+            GroupModel.key.label("group"),
+            GroupModel.match,
+            StationModel.width,
+            StationModel.height,
+            StationModel.key.label("station"),
+            StationModel.shared,
+        )
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(GroupModel.dataset_id == dataset_id)
+        .order_by(GroupModel.number, ViewModel.position)
+    )
+    return list(session.execute(statement))
+
+
+def _boxes(session: Session, *where: Any) -> Iterable[PredictedBox]:
+    statement = (
+        select(*PredictionModel.__table__.columns).where(*where).order_by(PredictionModel.id)
+    )
+    return [PredictedBox(**row._mapping) for row in session.execute(statement)]
