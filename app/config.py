@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import Field
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import Field, field_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 
 def _user_data_folder() -> Path:
@@ -31,8 +33,12 @@ class Settings(BaseSettings):
     """Host headers the server answers to, without the port."""
     workers: int = Field(default_factory=lambda: os.cpu_count() or 1)
     """Processes that solve in batches."""
-    max_upload_bytes: int = 64 * 1024 * 1024
-    """Largest request body."""
+    max_upload_bytes: int = 2 * 1024**3
+    """Largest uploaded file; a JSON body is smaller still."""
+    upload_days: int = 7
+    """After so many days an uploaded file that no dataset reads its frames from is deleted."""
+    import_folders: Annotated[list[Path], NoDecode] = []
+    """Folders below which imports over REST may read, separated by ``:`` (or a JSON list)."""
     max_file_bytes: int = 256 * 1024 * 1024
     """Largest single data file (JSON, XML, CSV) that an importer reads."""
     max_members: int = 200_000
@@ -41,6 +47,20 @@ class Settings(BaseSettings):
     """Most pixels of an image, checked before it is decoded."""
     max_side: int = 16_384
     """Longest side of an image, pixels, checked before it is decoded."""
+
+    @field_validator("import_folders", mode="before")
+    @classmethod
+    def _folders(cls, value: object) -> object:
+        if not isinstance(value, str):
+            return value
+        if value.lstrip().startswith("["):
+            return json.loads(value)
+        return [part for part in value.split(os.pathsep) if part]
+
+    @property
+    def uploads(self) -> Path:
+        """Files uploaded over REST."""
+        return self.home / "uploads"
 
     @property
     def database(self) -> str:

@@ -16,6 +16,7 @@
         DegenerateGeometryError
         NoConvergenceError
       StorageError          the disk or the database refuses
+      OverloadedError       more work waits than is taken
     ShapeError(ValueError)  our own mistake, outside the tree
 
 Only ``api/errors.py`` knows which HTTP status belongs to which branch, and only ``cli.py`` which
@@ -139,6 +140,10 @@ class NoConvergenceError(GeometryError):
 
 class StorageError(ReviewError):
     """The disk or the database refuses; what was acknowledged before is safe."""
+
+
+class OverloadedError(ReviewError):
+    """As much waits as may wait; later it can be taken."""
 
 
 class ShapeError(ValueError):

@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from app.geometry.camera import Camera
 from app.review.datasets import get_dataset
-from app.review.ingest import IngestReport
+from app.review.ingest import IngestReport, attempt
 from app.store.clock import now
 from app.store.codecs import camera_to_json
 from app.store.groups import (
@@ -39,7 +39,13 @@ class _Place:
 
 
 def ingest_cameras(
-    store: Store, dataset: str, cameras: Mapping[str, Camera], *, source: str, actor: str
+    store: Store,
+    dataset: str,
+    cameras: Mapping[str, Camera],
+    *,
+    source: str,
+    actor: str,
+    dry_run: bool = False,
 ) -> IngestReport:
     """Attach given calibrations to what they name; attaching them again changes nothing.
 
@@ -52,6 +58,7 @@ def ingest_cameras(
         cameras: By name, as ``datasets.camera_json.read_cameras`` reads them.
         source: Where they come from, for the log.
         actor: Who imports.
+        dry_run: Say what would happen, and keep nothing.
 
     Returns:
         ``changed`` and ``unchanged`` count cameras; ``problems`` name those that fit nothing.
@@ -71,7 +78,7 @@ def ingest_cameras(
             several = "several views are" if fitting else "no view is"
             report.problems.append(f'camera "{name}": {several} called so')
     for start in range(0, len(known), BATCH):
-        with store.write() as session:
+        with attempt(store, keep=not dry_run) as session:
             batch = known[start : start + BATCH]
             _attach_batch(session, found.id, batch, source, actor, report)
     return report

@@ -58,18 +58,23 @@ def create_dataset(
 
 def insert_dataset(session: Session, name: str, policy: Policy, actor: str) -> int:
     """Insert a dataset and its log entry; returns its id."""
-    if not _NAME.fullmatch(name) or name.isdigit():
-        raise InputError(
-            f'"{name}" cannot be the name of a dataset',
-            hint="Use letters, digits, spaces and . _ -, up to 100, not digits alone.",
-            pointer="/name",
-        )
+    require_name(name)
     identity, at = next_id(session, DatasetModel), now()
     body = {"name": name, "policy": policy_to_json(policy)}
     values = {"id": identity, "name": name, "created": at, **_policy_values(policy)}
     session.execute(insert(DatasetModel), [values])
     append(session, [Entry("dataset", actor, at, body, dataset_id=identity)])
     return identity
+
+
+def require_name(name: str, pointer: str = "/name") -> None:
+    """Raise InputError where a dataset cannot be called so."""
+    if not _NAME.fullmatch(name) or name.isdigit():
+        raise InputError(
+            f'"{name}" cannot be the name of a dataset',
+            hint="Use letters, digits, spaces and . _ -, up to 100, not digits alone.",
+            pointer=pointer,
+        )
 
 
 def list_datasets(store: Store) -> list[Dataset]:
@@ -89,6 +94,15 @@ def get_dataset(store: Store, dataset: str | int) -> Dataset:
         return read_dataset(session, dataset)
 
 
+def dataset_id(store: Store, dataset: str | int) -> int:
+    """The id of a dataset; raises NotFoundError when there is none."""
+    with store.read() as session:
+        row = find_dataset(session, dataset)
+    if row is None:
+        raise NotFoundError(f'there is no dataset "{dataset}"')
+    return int(row.id)
+
+
 def read_dataset(session: Session, dataset: str | int) -> Dataset:
     """``get_dataset`` within a session."""
     row = find_dataset(session, dataset)
@@ -103,13 +117,18 @@ def set_policy(
     """Judge a dataset by another policy; what that leaves without a solution is stale."""
     with store.write() as session:
         found = read_dataset(session, dataset)
-        values = _policy_values(policy)
-        session.execute(update(DatasetModel).where(DatasetModel.id == found.id).values(values))
-        body = {"policy": policy_to_json(policy)}
-        append(session, [Entry("policy", actor, now(), body, dataset_id=found.id)])
-        groups = select(GroupModel.id).where(GroupModel.dataset_id == found.id)
-        refresh_queue(session, list(session.scalars(groups)))
+        save_policy(session, found.id, policy, actor)
         return read_dataset(session, found.id)
+
+
+def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -> None:
+    """``set_policy`` within a write session."""
+    values = _policy_values(policy)
+    session.execute(update(DatasetModel).where(DatasetModel.id == dataset_id).values(values))
+    body = {"policy": policy_to_json(policy)}
+    append(session, [Entry("policy", actor, now(), body, dataset_id=dataset_id)])
+    groups = select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
+    refresh_queue(session, list(session.scalars(groups)))
 
 
 def find_dataset(session: Session, dataset: str | int) -> Any:

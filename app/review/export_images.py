@@ -8,15 +8,12 @@ from typing import Any
 
 from app.config import Settings
 from app.datasets.archive import resolve_inside
+from app.datasets.frame_names import FrameName, match_frame
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.soccer.group import Group, Media, View
 from app.store.media import content_type, media_facts, read_frame
 
-FOLDER = "Frames-v3"
-"""Beside the labels of a match, where SoccerNet's readers look for loose frames."""
-
 _SUFFIXES = {"image/jpeg": ".jpg", "image/png": ".png", "image/webp": ".webp"}
-_KNOWN = frozenset({".jpg", ".jpeg", ".png", ".webp"})
 
 
 class ExportImages:
@@ -25,24 +22,49 @@ class ExportImages:
     Attributes:
         media: Size and checksum of each frame, for the manifest.
         missing: Frames that could not be had, with the reason.
+        placed: Where the frames of the newest group are, by view; relative to the export.
     """
 
-    def __init__(self, root: Path, images: str, settings: Settings):
+    def __init__(
+        self, root: Path, images: str, settings: Settings, layout: FrameName = match_frame
+    ):
         self.media: list[Mapping[str, Any]] = []
         self.missing: list[str] = []
+        self.placed: dict[str, str] = {}
         self._root, self._images, self._settings = root, images, settings
+        self._layout = layout
+        self._splits: Mapping[str, str] = {}
 
-    def add(self, group: Group) -> None:
-        """Note the frames of a group, and place them when images are asked for."""
+    def add(
+        self,
+        group: Group,
+        frozen: Mapping[str, Mapping[str, int]] | None = None,
+        splits: Mapping[str, str] | None = None,
+    ) -> None:
+        """Note the frames of a group, and place them when images are asked for.
+
+        Args:
+            group: The group.
+            frozen: What was known of its frames when it was frozen, by view; another frame than
+                that is missing.
+            splits: Split by view, where views of one group are split.
+        """
+        self.placed, self._splits = {}, splits or {}
         for view in group.views:
             if view.media is not None:
-                self._add(group, view, view.media)
+                then = None if frozen is None else frozen.get(view.key, {})
+                self._add(group, view, view.media, then)
 
-    def _add(self, group: Group, view: View, media: Media) -> None:
-        facts = media_facts(media)
+    def _add(
+        self, group: Group, view: View, media: Media, frozen: Mapping[str, int] | None
+    ) -> None:
+        facts = media_facts(media) if frozen is None else frozen
         if facts:
             self.media.append({"group": group.key, "view": view.key, **facts})
         if self._images == "none":
+            return
+        if frozen and frozen != media_facts(media):
+            self.missing.append(f"{group.key}, {view.key}: not the file that was frozen")
             return
         try:
             self._place(group, view, media)
@@ -59,14 +81,9 @@ class ExportImages:
         target.write_bytes(data)
 
     def _target(self, group: Group, view: View, suffix: str) -> Path:
-        """Where a frame goes: under its own name in its match, or by frame and camera."""
-        name = PurePosixPath(view.key)
-        if view.station.shared:
-            path = f"{group.match or 'frames'}/{FOLDER}/{view.key}/{group.key}{suffix}"
-        elif name.suffix.lower() in _KNOWN:
-            path = f"{group.match or 'frames'}/{FOLDER}/{name}"
-        else:
-            path = f"{group.match or 'frames'}/{FOLDER}/{name}{suffix}"
+        """Where a frame goes, in folders that are there."""
+        path = self._layout(group, view, self._splits.get(view.key, group.split), suffix)
         target = resolve_inside(self._root, path)
         target.parent.mkdir(parents=True, exist_ok=True)
+        self.placed[view.key] = path
         return target

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from app.soccer.annotation import make_lines
+from app.geometry.camera import Camera
+from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
+from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.calibrate import calibrate
-from app.solving.jaccard import measure_markings, project_markings
+from app.solving.jaccard import jaccard, measure_markings, outcomes, project_markings
 
 
 @dataclass(frozen=True)
@@ -19,7 +21,8 @@ class Influence:
     Attributes:
         marking: The marking.
         jac: JaC of the view as it is, for each of ``GAMMAS_PERCENT``; None without a camera.
-        jac_without: The same if the marking were deleted; None when no camera is left.
+        jac_without: JaC of the other markings by a camera that never saw this one; None when no
+            camera is left.
         largest_px: Largest distance of its points from the camera as it is.
         largest_px_without: The same from the camera that never saw the marking.
     """
@@ -41,14 +44,31 @@ def influences(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> lis
     """
     whole = calibrate(station.lines, pitch, station.size, policy)
     largest = {fit.marking: max(fit.distances_px) for fit in whole.markings if fit.distances_px}
+    doubted = {suspect.marking for suspect in whole.suspects}
+    # Wrong labels are known by now: they are left out of every refit and not sought again.
+    trusting = replace(policy, check_labels=False)
     found = []
-    for marking, points in station.lines.items():
-        others = make_lines({name: at for name, at in station.lines.items() if name != marking})
-        rest = calibrate(others, pitch, station.size, policy)
-        predicted = None
-        if rest.camera is not None:
-            projected = project_markings(rest.camera, pitch, station.size)
-            seen = measure_markings(projected, make_lines({marking: points})).get(marking)
-            predicted = None if seen is None else float(seen.distances.max())
-        found.append(Influence(marking, whole.jac, rest.jac, largest.get(marking), predicted))
+    for marking in station.lines:
+        used = _without(station.lines, {marking, *doubted})
+        rest = calibrate(used, pitch, station.size, trusting).camera
+        jac, error = (None, None) if rest is None else _seen_by(rest, marking, station, pitch)
+        found.append(Influence(marking, whole.jac, jac, largest.get(marking), error))
     return found
+
+
+def _seen_by(
+    camera: Camera, marking: str, station: Station, pitch: Pitch
+) -> tuple[tuple[float, ...], float | None]:
+    """JaC of the other markings, and the largest distance of this one."""
+    measured = measure_markings(project_markings(camera, pitch, station.size), station.lines)
+    values = []
+    for gamma in GAMMAS_PERCENT:
+        found = outcomes(measured, station.lines, gamma / 100 * station.size.diagonal)
+        found.pop(marking, None)
+        values.append(jaccard(found))
+    seen = measured.get(marking)
+    return tuple(values), None if seen is None else float(seen.distances.max())
+
+
+def _without(lines: Lines, markings: set[str]) -> Lines:
+    return make_lines({name: at for name, at in lines.items() if name not in markings})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -11,12 +12,13 @@ from sqlalchemy import delete, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.review.datasets import find_dataset, insert_dataset
+from app.review.import_body import import_body, places_of
+from app.review.missing import gone_groups, note_gone, of_read_matches
 from app.review.shared_stations import SharedStations
 from app.review.upstream import KIND, Kept, follow_group
 from app.soccer.group import Group, View
 from app.soccer.policy import PAPER
 from app.store.clock import now
-from app.store.codecs import Json, group_head_to_json, view_to_json
 from app.store.digest import source_hash
 from app.store.group_rows import NewRows
 from app.store.groups import StoredGroup, read_groups, save_group
@@ -52,7 +54,9 @@ class IngestReport:
 
 
 @dataclass(frozen=True)
-class _Origin:
+class Origin:
+    """Into which dataset, from where, and who brings it."""
+
     dataset_id: int
     source: str
     actor: str
@@ -66,6 +70,7 @@ def ingest(
     source: str,
     actor: str,
     progress: Progress | None = None,
+    dry_run: bool = False,
 ) -> IngestReport:
     """Bring groups into a dataset, which the first of them makes when there is none of that name.
 
@@ -79,20 +84,44 @@ def ingest(
         source: Where they come from, for the log.
         actor: Who imports.
         progress: Called after each batch.
+        dry_run: Say what would happen, and keep nothing.
     """
     report, seen, done = IngestReport(), set[str](), 0
-    sound = _sound(groups, seen, report)
+    sound, stations = _sound(groups, seen, report), set[str]()
     while batch := list(islice(sound, BATCH)):
-        with store.write() as session:
-            origin = _Origin(_ensure_dataset(session, dataset, actor), source, actor)
-            _ingest_batch(session, origin, batch, report)
+        with attempt(store, keep=not dry_run) as session:
+            origin = Origin(_ensure_dataset(session, dataset, actor), source, actor)
+            ingest_batch(session, origin, batch, report, stations)
         done += len(batch)
         if progress is not None:
             progress(done)
     if done:
         with store.read() as session:
-            _note_missing(session, origin, seen, report)
+            missing = _note_missing(session, origin, seen, report)
+            gone = of_read_matches(session, origin.dataset_id, seen, missing)
+        for start in range(0, 0 if dry_run else len(gone), BATCH):
+            with store.write() as session:
+                ids = gone[start : start + BATCH]
+                report.findings += note_gone(
+                    session, origin.dataset_id, ids, source=origin.source, actor=actor
+                )
     return report
+
+
+class _TakenBack(Exception):  # noqa: N818
+    """Ends a transaction that shall leave nothing."""
+
+
+@contextmanager
+def attempt(store: Store, *, keep: bool) -> Iterator[Session]:
+    """A write session; where nothing shall be kept, what it did is taken back at its end."""
+    try:
+        with store.write() as session:
+            yield session
+            if not keep:
+                raise _TakenBack
+    except _TakenBack:
+        pass
 
 
 def ensure_dataset(store: Store, dataset: str, actor: str) -> int:
@@ -107,9 +136,10 @@ def _ensure_dataset(session: Session, dataset: str, actor: str) -> int:
 
 
 def _note_missing(
-    session: Session, origin: _Origin, seen: Collection[str], report: IngestReport
-) -> None:
+    session: Session, origin: Origin, seen: Collection[str], report: IngestReport
+) -> set[int]:
     """Count the groups that the same source brought last and that did not come this time."""
+    missing: set[int] = set()
     statement = select(GroupModel.id, GroupModel.key).where(
         GroupModel.dataset_id == origin.dataset_id
     )
@@ -121,10 +151,14 @@ def _note_missing(
             .group_by(LogModel.group_id)
         )
         entries = read_log(session, LogModel.id.in_(newest))
-        report.missing += sum(entry.body["source"] == origin.source for entry in entries)
+        missing |= {
+            entry.group_id or 0 for entry in entries if entry.body["source"] == origin.source
+        }
+    report.missing = len(missing)
     if report.missing:
         groups = "1 group" if report.missing == 1 else f"{report.missing} groups"
         report.problems.append(f"{groups} of an earlier import did not come again; all stay")
+    return missing
 
 
 def _sound(groups: Iterable[Group], seen: set[str], report: IngestReport) -> Iterator[Group]:
@@ -146,21 +180,31 @@ def _absolute(view: View) -> View:
     return replace(view, media=replace(view.media, path=str(Path(view.media.path).absolute())))
 
 
-def _ingest_batch(
-    session: Session, origin: _Origin, batch: Sequence[Group], report: IngestReport
+def ingest_batch(
+    session: Session,
+    origin: Origin,
+    batch: Sequence[Group],
+    report: IngestReport,
+    stations: set[str],
 ) -> None:
+    """Bring a batch of groups, inside the caller's write transaction.
+
+    ``stations`` are shared ones that are counted already: a dry run meets them again.
+    """
     shared = SharedStations(session, origin.dataset_id, origin.source, origin.actor)
     for group in batch:
         shared.follow(view.station for view in group.views)
-    report.changed += shared.changed
-    report.findings += shared.findings
+    report.changed += len(set(shared.changed) - stations)
+    report.findings += len(set(shared.kept) - stations)
+    stations.update(shared.changed)
     known = _known(session, origin.dataset_id, [group.key for group in batch])
+    gone = gone_groups(session, [number for number, _ in known.values()])
     fresh: list[tuple[Group, str]] = []
     for group in batch:
         digest = source_hash(group)
         if group.key not in known:
             fresh.append((group, digest))
-        elif known[group.key][1] == digest:
+        elif known[group.key][1] == digest and known[group.key][0] not in gone:
             report.unchanged += 1
         else:
             _follow(session, origin, known[group.key][0], group, digest, shared.ids, report)
@@ -176,7 +220,7 @@ def _known(session: Session, dataset_id: int, keys: list[str]) -> dict[str, tupl
 
 
 def _insert(
-    session: Session, origin: _Origin, fresh: Sequence[tuple[Group, str]], shared: dict[str, int]
+    session: Session, origin: Origin, fresh: Sequence[tuple[Group, str]], shared: dict[str, int]
 ) -> None:
     if not fresh:
         return
@@ -196,7 +240,7 @@ def _insert(
 
 def _follow(
     session: Session,
-    origin: _Origin,
+    origin: Origin,
     group_id: int,
     incoming: Group,
     digest: str,
@@ -209,8 +253,8 @@ def _follow(
         session, stored, followed.group, at=at, source=followed.base, digest=digest, shared=shared
     )
     after = read_groups(session, [group_id])[group_id]
-    kept = _note(session, after, followed.kept)
-    body = import_body(followed.group, followed.base, origin.source, digest, _places(after))
+    kept = note_kept(session, after, followed.kept)
+    body = import_body(followed.group, followed.base, origin.source, digest, places_of(after))
     body["kept"] = [[item.view, item.sentence] for item in kept]
     append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, group_id)])
     refresh_queue(session, [group_id])
@@ -218,7 +262,7 @@ def _follow(
     report.findings += len(followed.kept)
 
 
-def _note(session: Session, stored: StoredGroup, kept: Sequence[Kept]) -> list[Kept]:
+def note_kept(session: Session, stored: StoredGroup, kept: Sequence[Kept]) -> list[Kept]:
     """Save what imports noticed about a group: this one, and earlier ones as far as it holds.
 
     A finding goes when its view is as the dataset has it now. Returns what is noticed then.
@@ -242,36 +286,3 @@ def _note(session: Session, stored: StoredGroup, kept: Sequence[Kept]) -> list[K
     if rows:
         session.execute(insert(model), rows)
     return noticed
-
-
-def _places(stored: StoredGroup) -> dict[str, tuple[int, int]]:
-    return {key: (stored.view_ids[key], stored.stations[key].id) for key in stored.view_ids}
-
-
-def import_body(
-    group: Group,
-    base: Group | None,
-    source: str,
-    digest: str,
-    places: dict[str, tuple[int, int]],
-) -> dict[str, Json]:
-    """What the log keeps of an import: the group whole, with the ids of its rows.
-
-    ``base`` is left out where it is the group itself.
-    """
-    return {
-        "source": source,
-        "source_hash": digest,
-        "group": _logged(group),
-        "base": None if base is None or base == group else _logged(base),
-        "ids": {key: list(pair) for key, pair in places.items()},
-    }
-
-
-def _logged(group: Group) -> Json:
-    """A group in which a shared station is its key: the log has it in an entry of its own."""
-    views = [
-        view_to_json(view, view.station.key if view.station.shared else None)
-        for view in group.views
-    ]
-    return {**group_head_to_json(group), "views": views}

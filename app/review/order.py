@@ -11,8 +11,11 @@ from typing import Any
 from sqlalchemy import ColumnElement, Label, and_, case, func, literal, or_
 
 from app.errors import InputError
-from app.review.query import SORTS, Query
+from app.review.query import SORTS, TEXT_SORTS, Query
 from app.store.models import QueueModel
+
+_LARGEST = 2**63 - 1
+"""No key of a row is beyond; NaN is not below it either."""
 
 
 class Order:
@@ -30,7 +33,8 @@ class Order:
             keys.append((case((unreviewed, 0), else_=1), False))
         if query.sort not in ("number", "newest"):
             keys.append((case((column.is_(None), 1), else_=0), False))
-            keys.append((func.coalesce(column, 0.0), query.descending))
+            absent = "" if query.sort in TEXT_SORTS else 0.0
+            keys.append((func.coalesce(column, absent), query.descending))
         else:
             # "newest" says the direction itself.
             keys.append((column, query.descending != (query.sort == "newest")))
@@ -85,11 +89,20 @@ class Order:
         """The keys of a cursor; raises InputError when it is none of this query's."""
         try:
             padded = cursor + "=" * (-len(cursor) % 4)
-            name, *values = json.loads(base64.b64decode(padded, altchars=b"-_", validate=True))
+            text = base64.b64decode(padded, altchars=b"-_", validate=True)
+            name, *values = json.loads(text)
         except (binascii.Error, ValueError, TypeError) as error:
             raise InputError("the cursor is damaged", pointer="/cursor") from error
-        kinds = (int, float, str)
-        sound = all(isinstance(value, kinds) for value in values)
+        sound = all(map(_is_key, values))
         if name != self.name or len(values) != len(self._keys) or not sound:
             raise InputError("the cursor belongs to another query", pointer="/cursor")
         return list(values)
+
+
+def _is_key(value: Any) -> bool:
+    """Whether the database can compare with a value: no NaN, no Infinity, no endless integer."""
+    if isinstance(value, str):
+        return True
+    if not isinstance(value, (int, float)):
+        return False
+    return abs(value) <= _LARGEST

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from sqlalchemy import ColumnElement, Integer, cast, func, select
-from sqlalchemy.orm import InstrumentedAttribute, Session
+import numpy as np
+from sqlalchemy import select
 
 from app.review.query import STATUSES, parse_query
 from app.store.models import QueueModel
@@ -55,42 +55,27 @@ def summary(store: Store, dataset_id: int, query: str = "") -> Summary:
         InputError: The query cannot be understood.
     """
     where = [QueueModel.dataset_id == dataset_id, *parse_query(query).conditions]
-    counts = (
-        func.count(),
-        func.sum(cast(QueueModel.solved, Integer)),
-        func.sum(cast(QueueModel.stale, Integer)),
-    )
+    columns = [column for column, _, _ in RANGES.values()]
+    # One pass for all of it: seven statements over ten thousand groups take seven times as long.
+    statement = select(QueueModel.status, QueueModel.solved, QueueModel.stale, *columns)
     with store.read() as session:
-        states = session.execute(
-            select(QueueModel.status, *counts).where(*where).group_by(QueueModel.status)
-        ).all()
-        histograms = {
-            name: _histogram(session, where, column, low, high)
-            for name, (column, low, high) in RANGES.items()
-        }
-    by_state = {row[0]: int(row[1]) for row in states}
+        rows = session.execute(statement.where(*where)).all()
+    status, solved, stale, *numbers = zip(*rows, strict=True) if rows else ((),) * (3 + len(RANGES))
+    states = Counter(status)
     return Summary(
-        groups=sum(by_state.values()),
-        solved=sum(int(row[2]) for row in states),
-        stale=sum(int(row[3]) for row in states),
-        histograms=histograms,
-        **{state: by_state.get(state, 0) for state in STATUSES},
+        groups=len(rows),
+        solved=sum(solved),
+        stale=sum(stale),
+        histograms={
+            name: _histogram(values, low, high)
+            for (name, (_, low, high)), values in zip(RANGES.items(), numbers, strict=True)
+        },
+        **{state: states[state] for state in STATUSES},
     )
 
 
-def _histogram(
-    session: Session,
-    where: Sequence[ColumnElement[bool]],
-    column: InstrumentedAttribute[Any],
-    low: float,
-    high: float,
-) -> Histogram:
-    # Counted by the database: the numbers of a whole season need not travel.
-    place = cast((column - low) * (BINS / (high - low)), Integer)
-    within = func.max(func.min(place, BINS - 1), 0).label("place")
-    counted = dict(
-        session.execute(
-            select(within, func.count()).where(*where, column.is_not(None)).group_by(within)
-        ).all()
-    )
-    return Histogram(low, high, tuple(counted.get(index, 0) for index in range(BINS)))
+def _histogram(values: Sequence[float | None], low: float, high: float) -> Histogram:
+    numbers = np.array(values, float)
+    place = np.floor((numbers[~np.isnan(numbers)] - low) * (BINS / (high - low)))
+    counts = np.bincount(np.clip(place, 0, BINS - 1).astype(np.int64), minlength=BINS)
+    return Histogram(low, high, tuple(counts.tolist()))

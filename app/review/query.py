@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, not_, or_
+from sqlalchemy import ColumnElement, and_, case, func, not_, or_
 from sqlalchemy.orm import InstrumentedAttribute
 
 from app.errors import InputError
@@ -34,12 +34,17 @@ NUMBERS: dict[str, InstrumentedAttribute[Any]] = {
     "ratio": QueueModel.size_ratio,
     "size_ratio": QueueModel.size_ratio,
     "height": QueueModel.height_m,
+    "distance": QueueModel.distance_m,
+    "box": QueueModel.box_px,
+    "x": QueueModel.x_m,
+    "y": QueueModel.y_m,
     "margin": QueueModel.margin,
     "value": QueueModel.value,
     "views": QueueModel.views,
     "number": QueueModel.number,
 }
-"""Fields that compare with < <= > >= = and with :, which is =."""
+"""Fields that compare with < <= > >= = and with :, which is =; ``none`` is where there is no
+number."""
 
 STATUSES = ("unreviewed", "accepted", "rejected", "deferred")
 FLAGS: dict[str, InstrumentedAttribute[Any]] = {
@@ -54,18 +59,42 @@ EXACT: dict[str, InstrumentedAttribute[Any]] = {
     "key": QueueModel.key,
     "reviewer": QueueModel.reviewer,
     "reason": QueueModel.reason,
+    "override": QueueModel.override,
 }
-"""Fields whose whole text must be the same."""
+"""Fields whose whole text must be the same; ``none`` is where there is none, ``any`` where there
+is one."""
 
-SORTS: dict[str, InstrumentedAttribute[Any]] = {
-    "number": QueueModel.number,
-    "value": QueueModel.value,
-    "sigma": QueueModel.sigma_m,
-    "jac": QueueModel.min_jac,
-    "error": QueueModel.error_px,
-    "parallax": QueueModel.parallax_degrees,
-    "newest": QueueModel.changed,
+SORTS: dict[str, ColumnElement[Any]] = {
+    "number": QueueModel.number.expression,
+    "value": QueueModel.value.expression,
+    "sigma": QueueModel.sigma_m.expression,
+    "jac": QueueModel.min_jac.expression,
+    "error": QueueModel.error_px.expression,
+    "error_percent": QueueModel.error_percent.expression,
+    "parallax": QueueModel.parallax_degrees.expression,
+    "margin": QueueModel.margin.expression,
+    "ratio": QueueModel.size_ratio.expression,
+    "height": QueueModel.height_m.expression,
+    "distance": QueueModel.distance_m.expression,
+    "box": QueueModel.box_px.expression,
+    "x": QueueModel.x_m.expression,
+    "y": QueueModel.y_m.expression,
+    "views": QueueModel.views.expression,
+    "findings": func.length(QueueModel.findings)
+    - func.length(func.replace(QueueModel.findings, ",", "")),
+    "gate": case(
+        {name: place for place, name in enumerate(GATES)}, value=QueueModel.gate, else_=None
+    ),
+    "status": QueueModel.status.expression,
+    "split": QueueModel.split.expression,
+    "reviewer": QueueModel.reviewer.expression,
+    "label": QueueModel.label.expression,
+    "newest": QueueModel.changed.expression,
 }
+"""What the queue can be sorted by; ``findings`` by how many kinds there are, ``gate`` by the
+order in which gates are judged."""
+TEXT_SORTS = frozenset({"status", "split", "reviewer", "label", "newest"})
+"""Sorts whose keys are texts."""
 
 _TERM = re.compile(
     r"""\s*(?P<minus>-)?
@@ -206,7 +235,9 @@ def _finding(term: _Term, value: str) -> ColumnElement[bool]:
 
 
 def _gate(term: _Term, value: str) -> ColumnElement[bool]:
-    """The first failing gate; ``none`` for groups that pass."""
+    """The first failing gate; ``none`` for groups that pass, ``unsolved`` for neither."""
+    if value == "unsolved":
+        return QueueModel.solved.is_(False)
     if value == "none":
         return QueueModel.passes.is_(True)
     return QueueModel.gate == _choice(term, value, GATES)
@@ -232,6 +263,9 @@ def _text(_term: _Term, value: str) -> ColumnElement[bool]:
 
 def _exact(term: _Term, value: str) -> ColumnElement[bool]:
     column = EXACT[term.field]
+    if value in ("any", "none"):
+        missing = or_(column.is_(None), column == "")
+        return missing if value == "none" else not_(missing)
     return and_(column.is_not(None), column == value)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from sqlalchemy import ColumnElement, func, select
+from sqlalchemy import ColumnElement, Select, func, select
 from sqlalchemy.orm import Session
 
 from app.errors import InputError, NotFoundError
@@ -26,6 +26,7 @@ class GroupRow:
     Attributes:
         gate: The first failing gate with its view and sentence, None when the group passes.
         main_view: Id of the main view, None when it has no frame to show.
+        override: The gate that was overridden when the group was accepted, or None.
         findings: Kinds.
     """
 
@@ -43,6 +44,7 @@ class GroupRow:
     fixed: bool
     reason: str | None
     reviewer: str | None
+    override: str | None
     solved: bool
     passes: bool | None
     gate: str | None
@@ -57,6 +59,10 @@ class GroupRow:
     parallax_degrees: float | None
     size_ratio: float | None
     height_m: float | None
+    distance_m: float | None
+    box_px: float | None
+    x_m: float | None
+    y_m: float | None
     findings: tuple[str, ...]
 
 
@@ -133,16 +139,28 @@ def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
         if here is None:
             raise NotFoundError(f"there is no group {group_id}")
         where = _where(here.dataset_id, parsed)
+        # One pass over all that match is faster than counting what comes before each time.
+        ids = list(session.scalars(_ordered(where, order)))
+        if group_id in ids:
+            return _around(ids, ids.index(group_id))
         values = [here[index + 1] for index in range(len(order.keys))]
         before, after = order.before(values), order.after(values)
         return Neighbours(
-            index=_count(session, [*where, before])
-            if _count(session, [*where, QueueModel.group_id == group_id])
-            else None,
-            total=_count(session, where),
+            index=None,
+            total=len(ids),
             previous=_ids(session, [*where, before], order.backwards),
             next=_ids(session, [*where, after], order.ascending),
         )
+
+
+def _ordered(where: Sequence[ColumnElement[bool]], order: Order) -> Select[int]:
+    return select(QueueModel.group_id).where(*where).order_by(*order.ascending)
+
+
+def _around(ids: Sequence[int], index: int) -> Neighbours:
+    before = ids[max(index - _NEIGHBOURS, 0) : index]
+    after = ids[index + 1 : index + 1 + _NEIGHBOURS]
+    return Neighbours(index, len(ids), tuple(reversed(before)), tuple(after))
 
 
 def _where(dataset_id: int, query: Query) -> list[ColumnElement[bool]]:

@@ -5,14 +5,15 @@ Killed anywhere it loses nothing but the chunks in hand.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
 from sqlalchemy import and_, select
 from sqlalchemy.orm import Session
 
 from app.review.datasets import Dataset, get_dataset, read_dataset
+from app.review.fan_out import fan_out
 from app.review.known import calibration_keys
 from app.review.solver import Solver
 from app.soccer.group import Group, Station
@@ -39,8 +40,6 @@ from app.store.solutions import (
 
 CHUNK = 40
 """Groups a task: a second of work, or a few when lines must be calibrated."""
-_AHEAD = 8
-"""Tasks that may wait for a worker, so that memory stays flat however large the dataset."""
 
 Progress = Callable[[int, int], None]
 """Called with the number of groups done and the number that were to do."""
@@ -108,7 +107,7 @@ def solve_dataset(
     _calibrate_shared(store, found)
     chunks = (ids[start : start + CHUNK] for start in range(0, len(ids), CHUNK))
     tasks = (_task(store, found, chunk, solver) for chunk in chunks)
-    for results in _run(tasks, executor):
+    for results in fan_out(solve_task, tasks, executor):
         _save(store, results, report)
         if progress is not None:
             progress(report.solved + len(report.failed), report.total)
@@ -131,26 +130,6 @@ def _solve_one(key: SolutionKey, group: Group, task: Task, known: dict[str, Cali
         # One broken group must not stop the others; it stays stale and is reported by name.
         return Result(key, group.key, problem=f"{type(error).__name__}: {error}")
     return Result(key, group.key, solution.passes, encoded)
-
-
-def _run(tasks: Iterator[Task], executor: Executor | None) -> Iterator[list[Result]]:
-    """Results as they come, with a bounded number of tasks under way."""
-    if executor is None:
-        yield from map(solve_task, tasks)
-        return
-    running: set[Future[list[Result]]] = set()
-    try:
-        for task in tasks:
-            running.add(executor.submit(solve_task, task))
-            if len(running) >= _AHEAD:
-                done, running = wait(running, return_when=FIRST_COMPLETED)
-                yield from (future.result() for future in done)
-        while running:
-            done, running = wait(running, return_when=FIRST_COMPLETED)
-            yield from (future.result() for future in done)
-    finally:
-        for future in running:
-            future.cancel()
 
 
 def _save(store: Store, results: Sequence[Result], report: SolveReport) -> None:

@@ -54,13 +54,19 @@ def replay(session: Session) -> Ledger:
     verify_chain(session)
     ledger, numbers = Ledger(), Counter[int]()
     for entry in read_log(session):
+        assert entry.kind != "import" or entry.dataset_id is not None
         if entry.kind == "import" and entry.group_id not in ledger.groups:
-            assert entry.dataset_id is not None
-            numbers[entry.dataset_id] += 1
-            _new_group(ledger, entry, numbers[entry.dataset_id])
-        else:
-            _STEPS[entry.kind](ledger, entry)
+            numbers[entry.dataset_id or 0] += 1
+        apply_entry(ledger, entry, numbers[entry.dataset_id or 0])
     return ledger
+
+
+def apply_entry(ledger: Ledger, entry: LogEntry, number: int = 0) -> None:
+    """Bring one entry of the log into the ledger; ``number`` is that of a group that is new."""
+    if entry.kind == "import" and entry.group_id not in ledger.groups:
+        _new_group(ledger, entry, number)
+    else:
+        _STEPS[entry.kind](ledger, entry)
 
 
 def rebuild(store: Store) -> int:
@@ -207,6 +213,25 @@ def _verdict(ledger: Ledger, entry: LogEntry) -> None:
     ledger.verdicts.setdefault(entry.group_id, []).append(dict(entry.body))
 
 
+def _dataset_deleted(ledger: Ledger, entry: LogEntry) -> None:
+    """Everything of the dataset goes; its entries before this one still tell what it was."""
+    gone = entry.dataset_id
+    assert gone is not None
+    del ledger.datasets[gone]
+    groups = {key for key, record in ledger.groups.items() if record.dataset_id == gone}
+    stations = {key for key, record in ledger.stations.items() if record.dataset_id == gone}
+    for key in groups:
+        del ledger.groups[key]
+        ledger.verdicts.pop(key, None)
+    for key in stations:
+        del ledger.stations[key]
+    for place in [place for place in ledger.spare if place[0] == gone]:
+        del ledger.spare[place]
+    ledger.noticed = {
+        item for item in ledger.noticed if item[0] not in groups and item[1] not in stations
+    }
+
+
 def _spare(ledger: Ledger, entry: LogEntry) -> None:
     assert entry.dataset_id is not None
     for camera, frame, extras in entry.body["frames"]:
@@ -283,6 +308,7 @@ def _packed(extras: Any) -> bytes:
 
 _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
     "dataset": _dataset,
+    "dataset_deleted": _dataset_deleted,
     "policy": _policy,
     "station": _station,
     "import": _import,
@@ -295,4 +321,9 @@ _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
     "camera": _camera,
     "verdict": _verdict,
     "spare": _spare,
+    # What a batch did stands in the verdicts themselves.
+    "verdict_batch": lambda _ledger, _entry: None,
+    "verdict_batch_undo": lambda _ledger, _entry: None,
+    # Versions have tables of their own, which nothing rebuilds and nothing changes.
+    "freeze": lambda _ledger, _entry: None,
 }

@@ -29,11 +29,12 @@ from app.store.queue import refresh_queue
 class SharedStations:
     """The shared stations of a dataset within one write transaction.
 
-    ``changed`` counts those that were there and changed, ``findings`` edits that stayed.
+    ``changed`` names those that were there and changed, ``kept`` those with edits that stayed.
     """
 
     def __init__(self, session: Session, dataset_id: int, source: str, actor: str):
-        self.changed = self.findings = 0
+        self.changed: list[str] = []
+        self.kept: list[str] = []
         self.ids: dict[str, int] = {}
         """By key."""
         self._session, self._dataset_id = session, dataset_id
@@ -66,7 +67,7 @@ class SharedStations:
         changed = followed.station != stored.station
         if changed or station_digest(followed.base) != stored.source_digest:
             self._save(stored, followed)
-            self.changed += 1
+            self.changed.append(incoming.key)
 
     def _source_of(self, stored: StoredStation) -> Station | None:
         """A station as its dataset last brought it; under an edit only the log remembers."""
@@ -101,7 +102,7 @@ class SharedStations:
         where = model.station_id == station_id
         if followed.kept is not None:
             sentence: str | None = followed.kept.sentence
-            self.findings += 1
+            self.kept.append(followed.station.key)
         elif station_digest(followed.station) != station_digest(followed.base):
             sentence = self._session.scalar(select(model.sentence).where(where))
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -10,7 +11,8 @@ from sqlalchemy import select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
-from app.review.datasets import get_dataset
+from app.datasets.issia import FramePersons
+from app.review.datasets import read_dataset
 from app.review.ingest import IngestReport, ensure_dataset
 from app.soccer.annotation import Extras
 from app.store.clock import now
@@ -21,6 +23,8 @@ from app.store.session import Store
 
 BATCH = 1000
 """Frames a transaction and a log entry."""
+_NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
+_CAMERA = re.compile(r"cam[1-6]", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -49,21 +53,32 @@ def ingest_spare(
 
 def read_spare(store: Store, dataset: str | int) -> Iterator[SpareFrame]:
     """The spare frames of a dataset, by camera and frame as texts."""
-    found, after = get_dataset(store, dataset), 0
-    model = SpareFrameModel
+    with store.read() as session:
+        yield from spare_frames(session, read_dataset(session, dataset).id)
+
+
+def spare_frames(session: Session, dataset_id: int) -> Iterator[SpareFrame]:
+    """The same within a session's snapshot."""
+    model, after = SpareFrameModel, 0
     while True:
-        with store.read() as session:
-            rows = session.execute(
-                select(model.id, model.camera, model.frame, model.extras)
-                .where(model.dataset_id == found.id, model.id > after)
-                .order_by(model.id)
-                .limit(BATCH)
-            ).all()
+        rows = session.execute(
+            select(model.id, model.camera, model.frame, model.extras)
+            .where(model.dataset_id == dataset_id, model.id > after)
+            .order_by(model.id)
+            .limit(BATCH)
+        ).all()
         for row in rows:
             yield SpareFrame(row.camera, row.frame, extras_from_json(unpack(row.extras)))
         if len(rows) < BATCH:
             return
         after = rows[-1].id
+
+
+def spare_persons(session: Session, dataset: str | int) -> Iterator[FramePersons]:
+    """People of the spare frames of a dataset of ISSIA, for its original shape."""
+    for item in spare_frames(session, read_dataset(session, dataset).id):
+        if _NUMBER.fullmatch(item.frame) and _CAMERA.fullmatch(item.camera):
+            yield FramePersons(int(item.frame), item.camera, item.extras.boxes)
 
 
 def _keep(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,10 +10,11 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.errors import NotFoundError, StaleRevisionError
+from app.review.etags import group_etag, said_of, said_part
 from app.review.undo import read_stacks
 from app.soccer.group import Group
 from app.soccer.policy import Policy
-from app.soccer.solution import SOLVER_VERSION, Finding, Solution
+from app.soccer.solution import Finding, Solution
 from app.store.codecs import parse, policy_from_json
 from app.store.digest import digest
 from app.store.groups import StoredGroup, StoredStation, read_groups
@@ -83,19 +84,34 @@ class GroupState:
         return SolutionKey(self.id, self.stored.inputs_hash, self.policy.hash)
 
 
-def read_state(session: Session, group_id: int) -> GroupState:
+Solutions = Callable[[Session, Sequence[SolutionKey]], Mapping[int, Solution]]
+"""Where solutions come from: the database, or whoever knows them already."""
+
+
+def unsolved(_session: Session, _keys: Sequence[SolutionKey]) -> Mapping[int, Solution]:
+    """No solutions, for who asks what was said alone; such a state's ETag says so."""
+    return {}
+
+
+def read_state(
+    session: Session, group_id: int, solutions: Solutions = read_solutions
+) -> GroupState:
     """A group as it is in a session's snapshot.
 
     Raises:
         NotFoundError: There is no such group.
     """
-    states = read_states(session, [group_id])
+    states = read_states(session, [group_id], solutions)
     if not states:
         raise NotFoundError(f"there is no group {group_id}")
     return states[0]
 
 
-def read_states(session: Session, group_ids: list[int]) -> list[GroupState]:
+def read_states(
+    session: Session,
+    group_ids: list[int],
+    solutions: Solutions = read_solutions,
+) -> list[GroupState]:
     """Groups of one dataset as they are, in the order asked for; at most a few hundred."""
     groups = read_groups(session, group_ids)
     if not groups:
@@ -107,7 +123,7 @@ def read_states(session: Session, group_ids: list[int]) -> list[GroupState]:
     ).one()
     policy = policy_from_json(parse(dataset.policy))
     keys = [SolutionKey(item.id, item.inputs_hash, policy.hash) for item in groups.values()]
-    solutions = read_solutions(session, keys)
+    found = solutions(session, keys)
     noticed = import_findings(session, group_ids)
     verdicts = _read_verdicts(session, group_ids)
     stacks = read_stacks(session, group_ids)
@@ -116,7 +132,7 @@ def read_states(session: Session, group_ids: list[int]) -> list[GroupState]:
             item,
             dataset.name,
             policy,
-            _with_noticed(solutions.get(item.id), noticed[item.id]),
+            _with_noticed(found.get(item.id), noticed[item.id]),
             verdicts.get(item.id, []),
             stacks[item.id].can_undo,
             stacks[item.id].can_redo,
@@ -158,15 +174,9 @@ def _state(
 
 
 def _etag(stored: StoredGroup, verdict_id: int, policy: Policy, solution: Solution | None) -> str:
-    """Before the dash what people said, after it what was computed from that.
-
-    A change builds on the first part alone: a solution that arrives is no conflict, but a
-    cached document without it is out of date.
-    """
-    said = digest([stored.inputs_hash, stored.revision, verdict_id])[:16]
-    kinds = [] if solution is None else sorted(item.kind for item in solution.findings)
-    computed = digest([policy.hash, policy.name, SOLVER_VERSION, solution is None, kinds])[:8]
-    return f'"{said}-{computed}"'
+    said = said_part(stored.inputs_hash, stored.revision, verdict_id)
+    kinds = None if solution is None else [item.kind for item in solution.findings]
+    return group_etag(said, policy.hash, policy.name, kinds)
 
 
 def station_etag(stored: StoredStation) -> str:
@@ -180,14 +190,10 @@ def require_etag(current: str, if_match: str, what: str) -> None:
     Raises:
         StaleRevisionError: With both ETags.
     """
-    if _said(current) != _said(if_match):
+    if said_of(current) != said_of(if_match):
         raise StaleRevisionError(
             f"{what} has changed in the meantime", base_etag=if_match, current_etag=current
         )
-
-
-def _said(etag: str) -> str:
-    return etag.strip().strip('"').partition("-")[0]
 
 
 def _read_verdicts(session: Session, group_ids: list[int]) -> dict[int, list[Any]]:

@@ -91,15 +91,19 @@ def submit_station(
     return _change(store, station_id, plan, if_match, request)
 
 
-def undo_station(store: Store, station_id: int, *, if_match: str, actor: str) -> StationState:
+def undo_station(
+    store: Store, station_id: int, *, if_match: str, actor: str, idempotency_key: str | None = None
+) -> StationState:
     """Take the last edit of a static camera back; raises ConflictError without one."""
-    request = Request(None, actor, ["undo", station_id])
+    request = Request(idempotency_key, actor, ["undo", "station", station_id])
     return _change(store, station_id, _plan_undo, if_match, request)
 
 
-def redo_station(store: Store, station_id: int, *, if_match: str, actor: str) -> StationState:
+def redo_station(
+    store: Store, station_id: int, *, if_match: str, actor: str, idempotency_key: str | None = None
+) -> StationState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    request = Request(None, actor, ["redo", station_id])
+    request = Request(idempotency_key, actor, ["redo", "station", station_id])
     return _change(store, station_id, _plan_redo, if_match, request)
 
 

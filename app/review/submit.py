@@ -6,18 +6,20 @@ nobody was faster; the edit's log entry, the revision and the solution are one t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError, NotFoundError, SharedStationError
 from app.review.edit import STATION_EDITS, Edit, need_view
 from app.review.edit_codec import edit_from_json, edit_to_json
+from app.review.etags import require_unchanged
 from app.review.idempotency import Request, is_repeated, remember
 from app.review.known import known_calibrations
 from app.review.solver import Solver
-from app.review.state import GroupState, read_state, require_etag
+from app.review.state import GroupState, Solutions, read_state, unsolved
 from app.review.undo import Stacks, read_stacks
 from app.soccer.group import Group
 from app.soccer.solution import Solution
@@ -27,10 +29,10 @@ from app.store.codecs import Json
 from app.store.digest import group_inputs_hash
 from app.store.groups import save_group
 from app.store.log import Entry, LogEntry, append, read_log
-from app.store.models import LogModel
+from app.store.models import GroupModel, LogModel
 from app.store.queue import refresh_queue
 from app.store.session import Store
-from app.store.solutions import SolutionKey, encode_solution, insert_solutions
+from app.store.solutions import SolutionKey, encode_solution, insert_solutions, read_solutions
 
 
 @dataclass(frozen=True)
@@ -137,8 +139,10 @@ def preview(
 def history(store: Store, group_id: int) -> list[LogEntry]:
     """Everything that was said about a group, oldest first."""
     with store.read() as session:
+        # The log remembers groups of datasets that were deleted, too.
+        there = session.scalar(select(GroupModel.id).where(GroupModel.id == group_id))
         entries = list(read_log(session, LogModel.group_id == group_id))
-    if not entries:
+    if there is None:
         raise NotFoundError(f"there is no group {group_id}")
     return entries
 
@@ -176,29 +180,36 @@ def _change(
     solver: Solver,
 ) -> GroupState:
     with store.read() as session:
-        state = read_state(session, group_id)
-        if is_repeated(session, request):
-            return state
-        require_etag(state.etag, if_match, f"group {state.key}")
-        change = plan(session, state)
-        known = known_calibrations(session, [change.group], state.policy)
-    if change.group == state.group:
-        return state
+        state = read_state(session, group_id, unsolved)
+        repeated = is_repeated(session, request)
+        if not repeated:
+            require_unchanged(session, group_id, if_match, f"group {state.key}")
+            change = plan(session, state)
+            known = known_calibrations(session, [change.group], state.policy)
+    if repeated or change.group == state.group:
+        return load(store, group_id)
     solution = solver(change.group, state.policy, known)
     encoded = encode_solution(change.group, solution, known)
     key = SolutionKey(group_id, group_inputs_hash(change.group), state.policy.hash)
     with store.write() as session:
         if not is_repeated(session, request):
-            _require_unchanged(session, state)
+            require_unchanged(session, group_id, state.etag, f"group {state.key}")
             _save(session, state, change, request)
             insert_solutions(session, [(key, encoded)])
             refresh_queue(session, [group_id])
-    return load(store, group_id)
+    with store.read() as session:
+        return read_state(session, group_id, _known(key, solution))
 
 
-def _require_unchanged(session: Session, state: GroupState) -> None:
-    current = read_state(session, state.id)
-    require_etag(current.etag, state.etag, f"group {state.key}")
+def _known(key: SolutionKey, solution: Solution) -> Solutions:
+    """The solution at hand where the group still is what it was solved as, else the stored one."""
+
+    def solutions(session: Session, keys: Sequence[SolutionKey]) -> Mapping[int, Solution]:
+        if list(keys) == [key]:
+            return {key.group_id: solution}
+        return read_solutions(session, keys)
+
+    return solutions
 
 
 def _save(session: Session, state: GroupState, change: _Change, request: Request) -> None:

@@ -8,9 +8,10 @@ from sqlalchemy import insert
 from sqlalchemy.orm import Session
 
 from app.errors import InputError
+from app.review.etags import require_unchanged
 from app.review.idempotency import Request, is_repeated, remember
 from app.review.solver import Solver
-from app.review.state import GroupState, read_state, require_etag
+from app.review.state import GroupState
 from app.review.submit import load, solved
 from app.solving.solve import solve
 from app.store.clock import now
@@ -35,7 +36,9 @@ MAX_NOTE = 2000
 
 
 @dataclass(frozen=True)
-class _Verdict:
+class Verdict:
+    """A verdict as it is given, checked."""
+
     state: str
     reason: str | None
     note: str | None
@@ -62,22 +65,26 @@ def set_verdict(
         InputError: Unknown state or reason, or a note is missing.
         StaleRevisionError: The group is not what the person saw.
     """
-    verdict = _checked(state, reason, note)
+    verdict = check_verdict(state, reason, note)
     request = Request(idempotency_key, actor, ["verdict", group_id, state, reason, note])
     # Accepting weighs the gates, so they must be known.
     seen = solved(store, group_id, solver=solver) if state == "accepted" else load(store, group_id)
     override = _override(seen, verdict)
     with store.write() as session:
         if not is_repeated(session, request):
-            current = read_state(session, group_id)
-            require_etag(current.etag, if_match, f"group {current.key}")
+            require_unchanged(session, group_id, if_match, f"group {seen.key}")
             # The override was judged on what the person saw, and that has not changed.
-            require_etag(current.etag, seen.etag, f"group {current.key}")
-            _save(session, current, verdict, override, request)
+            require_unchanged(session, group_id, seen.etag, f"group {seen.key}")
+            _save(session, seen, verdict, override, request)
     return load(store, group_id)
 
 
-def _checked(state: str, reason: str | None, note: str | None) -> _Verdict:
+def check_verdict(state: str, reason: str | None, note: str | None) -> Verdict:
+    """A verdict from what was sent.
+
+    Raises:
+        InputError: Unknown state or reason, or a note is missing or too long.
+    """
     note = (note or "").strip() or None
     if state not in STATES:
         raise InputError(f'"{state}" is no verdict; {", ".join(STATES)} are', pointer="/state")
@@ -90,10 +97,10 @@ def _checked(state: str, reason: str | None, note: str | None) -> _Verdict:
         raise InputError(f"a rejection needs a reason: {known}", pointer="/reason")
     if reason == "other" and note is None:
         raise InputError('the reason "other" needs a note', pointer="/note")
-    return _Verdict(state, reason, note)
+    return Verdict(state, reason, note)
 
 
-def _override(state: GroupState, verdict: _Verdict) -> str | None:
+def _override(state: GroupState, verdict: Verdict) -> str | None:
     """The gate that an acceptance overrides, or None."""
     if verdict.state != "accepted" or state.solution is None or state.solution.passes:
         return None
@@ -111,7 +118,7 @@ def _override(state: GroupState, verdict: _Verdict) -> str | None:
 def _save(
     session: Session,
     state: GroupState,
-    verdict: _Verdict,
+    verdict: Verdict,
     override: str | None,
     request: Request,
 ) -> None:

@@ -12,14 +12,16 @@ import numpy as np
 import pytest
 
 from app.errors import InputError, NotFoundError
-from app.review.datasets import create_dataset
+from app.review.datasets import create_dataset, set_policy
 from app.review.edit import SetBall
 from app.review.export import FORMATS, export
+from app.review.recompute import solve_dataset
 from app.review.submit import load, submit
 from app.review.verdict import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Media
+from app.soccer.policy import PAPER
 
 
 def judge(store, group_id, state, reason=None, note=None):
@@ -69,6 +71,19 @@ class TestExport:
         verdicts = {row["main_action"]: row["verdict"] for row in table(tmp_path / "all")}
         assert verdicts["9"] == "accepted: overrides reprojection: seen on video"
         assert verdicts["7"] == "unreviewed"
+
+    def test_an_override_of_one_gate_covers_no_other_that_fails_later(
+        self, store, three, tmp_path
+    ) -> None:
+        judge(store, three[0], "accepted")
+        judge(store, three[2], "accepted", note="seen on video")
+        wide = replace(PAPER, name="wide", min_baseline_m=1000.0)
+        set_policy(store, "demo", wide)
+        solve_dataset(store, "demo")
+        judge(store, three[0], "accepted", note="the baseline is known")
+        report = export(store, "demo", "soccernet-v3d", tmp_path / "out")
+        assert {row["main_action"] for row in table(report.out)} == {"7"}
+        assert report.left_out == {"failing": 1}
 
     def test_what_changed_after_its_verdict_is_left_out_and_counted(
         self, store, three, tmp_path
@@ -195,7 +210,7 @@ class TestExport:
             export(store, "demo", "soccernet-v3d", tmp_path / name, everything=True)
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
 
-    @pytest.mark.parametrize("form", [name for name in FORMATS if name != "issia-3d"])
+    @pytest.mark.parametrize("form", [name for name in FORMATS if not name.startswith("issia")])
     def test_every_format_of_broadcast_groups(self, store, three, tmp_path, form: str) -> None:
         report = export(store, "demo", form, tmp_path / "out.zip", everything=True)
         assert report.counts["groups"] == 3
@@ -257,6 +272,21 @@ class TestImages:
         assert copied.parent.name == "Frames-v3"
         assert len(report.missing_images) == 1
         assert "7_1.png" in report.missing_images[0]
+
+    def test_labels_name_the_images_that_were_copied(self, store, framed, tmp_path) -> None:
+        _, data = framed
+        for form in ("yolo", "coco", "parquet"):
+            export(store, "demo", form, tmp_path / form, everything=True, images="copy")
+        with (tmp_path / "yolo/frames.csv").open(newline="") as file:
+            rows = {row["view"]: row for row in csv.DictReader(file)}
+        assert (rows["7.png"]["present"], rows["7_1.png"]["present"]) == ("True", "False")
+        assert (tmp_path / "yolo" / rows["7.png"]["image"]).read_bytes() == data
+        manifest = json.loads((tmp_path / "yolo/manifest.json").read_text())
+        assert manifest["settings"]["missing_images"].startswith("1 image is not")
+        assert manifest["counts"]["images_missing"] == 1
+        (path,) = (tmp_path / "coco/annotations").iterdir()
+        image = json.loads(path.read_text())["images"][0]
+        assert (tmp_path / "coco" / image["file_name"]).read_bytes() == data
 
     def test_the_manifest_knows_frames_that_are_not_copied(self, store, framed, tmp_path) -> None:
         _, data = framed

@@ -47,7 +47,7 @@ class TestParseQuery:
             ("finding:ghosts", "/q/0"),
             ("gate:none,heaven", "/q/0"),
             ("split<train", "/q/0"),
-            ("sort:label", "/q/0"),
+            ("sort:colour", "/q/0"),
             ("jac<nan", "/q/0"),
             ("passes:maybe", "/q/0"),
             ('match:"open', "/q/0"),

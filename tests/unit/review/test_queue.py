@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import random
 import time
+from typing import Any
 
 import pytest
 from sqlalchemy import insert
@@ -10,9 +11,10 @@ from app.errors import InputError, NotFoundError
 from app.review.datasets import create_dataset
 from app.review.progress import summary
 from app.review.query import SORTS
-from app.review.queue import list_groups, neighbours
+from app.review.queue import GroupRow, list_groups, neighbours
 from app.review.submit import load
 from app.review.verdict import set_verdict
+from app.soccer.solution import GATES
 from app.store.models import GroupModel, QueueModel
 from app.store.session import Store
 
@@ -47,7 +49,7 @@ def queue_rows(count: int, seed: int = 5) -> list[dict[str, object]]:
             "fixed": False,
             "solved": True,
             "passes": rng.choice([True, False]),
-            "gate": rng.choice(["jac", None]),
+            "gate": rng.choice(["jac", "sigma", "ball", None]),
             "gate_view": None,
             "gate_sentence": None,
             "margin": number(-1.0, 1.0),
@@ -60,6 +62,10 @@ def queue_rows(count: int, seed: int = 5) -> list[dict[str, object]]:
             "size_ratio": number(0.9, 1.1),
             "height_m": number(0.1, 2.0),
             "findings": rng.choice(["", ",low_parallax,", ",low_parallax,bad_point,"]),
+            "distance_m": number(20.0, 60.0),
+            "box_px": number(8.0, 14.0),
+            "x_m": number(-30.0, 0.0),
+            "y_m": number(5.0, 20.0),
         }
         for index in range(1, count + 1)
     ]
@@ -101,6 +107,15 @@ def walk(store: Store, dataset: int, query: str, limit: int) -> list[int]:
             return ids
 
 
+def sorted_by(row: GroupRow, name: str) -> Any:
+    """What a row is sorted by."""
+    if name == "findings":
+        return len(row.findings) + bool(row.findings)
+    if name == "gate":
+        return None if row.gate is None else GATES.index(row.gate)
+    return getattr(row, SORTS[name].key)
+
+
 SORTED = [f"sort:{name}{end}" for name in SORTS for end in ("", "-desc")]
 
 
@@ -120,16 +135,16 @@ class TestListGroups:
     @pytest.mark.parametrize("query", SORTED)
     def test_numbers_that_are_missing_come_last(self, store, query: str) -> None:
         dataset = fill_queue(store, COUNT)
-        column = SORTS[query[5:].removesuffix("-desc")].key
+        name = query[5:].removesuffix("-desc")
         rows = list_groups(store, dataset, query, 500).items
-        if column == "value":
+        if name == "value":
             statuses = [row.status != "unreviewed" for row in rows]
             assert statuses == sorted(statuses)
             rows = [row for row in rows if row.status == "unreviewed"]
-        values = [getattr(row, column) for row in rows]
+        values = [sorted_by(row, name) for row in rows]
         known = [value for value in values if value is not None]
         assert values[: len(known)] == known
-        backwards = query.endswith("-desc") != (column == "changed")
+        backwards = query.endswith("-desc") != (name == "newest")
         assert known == sorted(known, reverse=backwards)
 
     @pytest.mark.parametrize(
@@ -149,6 +164,13 @@ class TestListGroups:
             ("match:m1", lambda row: row.match == "m1"),
             ("gate:jac", lambda row: row.gate == "jac"),
             ("gate:none", lambda row: row.passes),
+            ("gate:unsolved", lambda row: not row.solved),
+            ("reviewer:none", lambda row: row.reviewer is None),
+            ("reviewer:any", lambda row: row.reviewer is not None),
+            ("override:any", lambda row: row.override is not None),
+            ("distance>=20 distance<60", lambda row: row.distance_m == 20.0),
+            ("box:none", lambda row: row.box_px is None),
+            ("x<0 y>5", lambda row: row.x_m == -30.0 and row.y_m == 20.0),
             ("passes:no", lambda row: not row.passes),
             ("reviewer:ann", lambda row: row.reviewer == "ann"),
             ("-reviewer:ann", lambda row: row.reviewer != "ann"),

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
@@ -14,12 +15,15 @@ from app.errors import (
     SharedStationError,
     StaleRevisionError,
 )
+from app.review import state as state_module
 from app.review.edit import IncludeView, SetBall, SetBalls, SetLines
 from app.review.queue import list_groups
+from app.review.state import GroupState
 from app.review.submit import history, load, preview, redo, solved, submit, undo
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
 from app.solving.solve import solve
+from app.store import solutions
 from app.store.session import Store
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
@@ -256,3 +260,49 @@ class TestHistory:
     def test_an_unknown_group_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):
             history(store, 99)
+
+
+class TestCost:
+    def test_an_edit_decodes_no_stored_solution_and_answers_what_a_reader_gets(
+        self, store: Store, state: GroupState, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        decoded: list[object] = []
+        plain = solutions.decode_solution
+
+        def counted(*arguments):
+            decoded.append(arguments)
+            return plain(*arguments)
+
+        monkeypatch.setattr(solutions, "decode_solution", counted)
+        edit = SetBall("7.png", None)
+        done = submit(store, state.id, edit, if_match=state.etag, actor="ann")
+        assert decoded == []
+        read = load(store, state.id)
+        assert len(decoded) == 1
+        assert (done.etag, done.revision, done.can_undo) == (read.etag, read.revision, True)
+        assert done.solution is not None
+        assert done.solution.gates == read.solution.gates
+        assert done.solution.findings == read.solution.findings
+        assert done.group == read.group
+
+    def test_while_others_wait_no_group_is_decoded(
+        self, store: Store, state: GroupState, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        writing, seen = [], []
+        plain_write, plain_read = Store.write, state_module.read_groups
+
+        @contextmanager
+        def write(self):
+            with plain_write(self) as session:
+                writing.append(session)
+                yield session
+                writing.remove(session)
+
+        def read_groups(session, ids, **options):
+            seen.append(session in writing)
+            return plain_read(session, ids, **options)
+
+        monkeypatch.setattr(Store, "write", write)
+        monkeypatch.setattr(state_module, "read_groups", read_groups)
+        submit(store, state.id, SetBall("7.png", None), if_match=state.etag, actor="ann")
+        assert seen == [False, False]

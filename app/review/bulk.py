@@ -1,0 +1,344 @@
+"""Bulk: one verdict for every group that a query matches, tried first.
+
+A batch is many short write transactions, so that others go on working; killed in between it
+leaves whole verdicts, and given again it does the rest. ``bulk_undo`` takes it back.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from sqlalchemy import ColumnElement, Integer, and_, cast, func, insert, select, update
+from sqlalchemy.orm import Session
+
+from app.errors import ConflictError
+from app.review.idempotency import Request, is_repeated, remember
+from app.review.query import parse_query
+from app.review.verdict import Verdict, check_verdict
+from app.store.clock import now
+from app.store.group_rows import next_id
+from app.store.log import Entry, append
+from app.store.models import (
+    DatasetModel,
+    GroupModel,
+    IdempotencyModel,
+    QueueModel,
+    StationModel,
+    VerdictModel,
+    ViewModel,
+)
+from app.store.queue import refresh_verdicts
+from app.store.session import Store
+from app.store.view_models import VerdictBatchModel
+
+CHUNK = 500
+"""Groups a transaction: a few hundredths of a second."""
+SAMPLE = 5
+UNSOLVED, NEEDS_NOTE = "unsolved", "needs_note"
+"""Why a group is left alone: its gates are not known, or it fails one and nobody says why it
+shall be accepted all the same."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Groups that a bulk verdict leaves alone, and why."""
+
+    reason: str
+    groups: int
+
+
+@dataclass(frozen=True)
+class BulkPlan:
+    """What a bulk verdict would do.
+
+    Attributes:
+        matches: Groups that the query finds.
+        would_change: Those that would get the verdict.
+        sample: Id and key of the first of them.
+    """
+
+    matches: int
+    would_change: int
+    refused: tuple[Refusal, ...]
+    sample: tuple[tuple[int, str], ...]
+
+
+@dataclass(frozen=True)
+class BatchReport:
+    """What a bulk verdict did; ``batch`` is None when there was nothing to do."""
+
+    batch: int | None
+    changed: int
+    refused: tuple[Refusal, ...]
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A bulk verdict as it is remembered; ``done`` is False while it runs or was killed."""
+
+    id: int
+    at: str
+    actor: str
+    query: str
+    state: str
+    reason: str | None
+    note: str | None
+    changed: int
+    done: bool
+    undone: str | None
+    undone_by: str | None
+
+
+def plan_verdicts(
+    store: Store,
+    dataset_id: int,
+    query: str,
+    state: str,
+    reason: str | None = None,
+    note: str | None = None,
+) -> BulkPlan:
+    """What a verdict on all groups of a query would do; nothing is saved.
+
+    Raises:
+        InputError: The query or the verdict cannot be.
+    """
+    verdict = check_verdict(state, reason, note)
+    with store.read() as session:
+        rows = _rows(session, _where(dataset_id, query))
+    sorted_out = _sorted_out(rows, verdict)
+    sample = [(row.group_id, row.key) for row in sorted_out.change[:SAMPLE]]
+    return BulkPlan(len(rows), len(sorted_out.change), sorted_out.refused, tuple(sample))
+
+
+def give_verdicts(
+    store: Store,
+    dataset_id: int,
+    query: str,
+    state: str,
+    reason: str | None = None,
+    note: str | None = None,
+    *,
+    actor: str,
+    expected: int | None = None,
+    idempotency_key: str | None = None,
+) -> BatchReport:
+    """Give a verdict to all groups of a query, as each of them is when its turn comes.
+
+    Accepting a group that fails a gate overrides the policy, as it does for one group alone:
+    without a note such groups are refused and counted.
+
+    Args:
+        store: The database.
+        dataset_id: The dataset.
+        query: As ``query.parse_query`` reads it; its sort is of no matter.
+        state: As ``verdict.set_verdict`` takes it, like ``reason`` and ``note``.
+        actor: Who says so.
+        expected: How many groups ``plan_verdicts`` said would change; refuse another number.
+        idempotency_key: The caller's name for this request; sent again it changes nothing.
+
+    Raises:
+        InputError: The query or the verdict cannot be.
+        ConflictError: Another number of groups would change than the caller expects.
+        IdempotencyError: The key was used for something else.
+    """
+    verdict = check_verdict(state, reason, note)
+    content = ["verdicts", dataset_id, query, verdict.state, verdict.reason, verdict.note]
+    request = Request(idempotency_key, actor, content)
+    where = _where(dataset_id, query)
+    with store.read() as session:
+        if is_repeated(session, request):
+            return _again(session, request)
+        found = _sorted_out(_rows(session, where), verdict)
+    if expected is not None and expected != len(found.change):
+        raise ConflictError(
+            f"{len(found.change)} groups would change, not {expected}",
+            hint="Look at what would happen once more (dry_run=true).",
+        )
+    if not found.change:
+        return BatchReport(None, 0, found.refused)
+    run = _Run(dataset_id, query, verdict, request)
+    ids = [row.group_id for row in found.change]
+    for start in range(0, len(ids), CHUNK):
+        with store.write() as session:
+            chosen = [*where, QueueModel.group_id.in_(ids[start : start + CHUNK])]
+            run.save(session, _sorted_out(_rows(session, chosen), verdict).change)
+    with store.write() as session:
+        run.close(session)
+    return BatchReport(run.batch, run.changed, found.refused)
+
+
+def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[Batch]:
+    """The newest bulk verdicts of a dataset, the newest first."""
+    model = VerdictBatchModel
+    statement = select(*model.__table__.columns).where(model.dataset_id == dataset_id)
+    with store.read() as session:
+        rows = session.execute(statement.order_by(model.id.desc()).limit(limit)).all()
+    return [_batch(row) for row in rows]
+
+
+@dataclass(frozen=True)
+class _SortedOut:
+    """Rows that a verdict changes, and those that it is refused for."""
+
+    change: list[Any]
+    refused: tuple[Refusal, ...]
+
+
+def _where(dataset_id: int, query: str) -> list[ColumnElement[bool]]:
+    return [QueueModel.dataset_id == dataset_id, *parse_query(query).conditions]
+
+
+def _rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[Any]:
+    names = ("group_id", "key", "status", "stale", "reason", "solved", "passes", "gate")
+    columns = [getattr(QueueModel, name) for name in names]
+    statement = select(*columns).where(*where).order_by(QueueModel.number)
+    return list(session.execute(statement).all())
+
+
+def _sorted_out(rows: Sequence[Any], verdict: Verdict) -> _SortedOut:
+    change, refused = [], {UNSOLVED: 0, NEEDS_NOTE: 0}
+    for row in rows:
+        if _has(row, verdict):
+            continue
+        if verdict.state == "accepted" and not row.solved:
+            refused[UNSOLVED] += 1
+        elif verdict.state == "accepted" and not row.passes and verdict.note is None:
+            refused[NEEDS_NOTE] += 1
+        else:
+            change.append(row)
+    reasons = (Refusal(reason, count) for reason, count in refused.items() if count)
+    return _SortedOut(change, tuple(reasons))
+
+
+def _has(row: Any, verdict: Verdict) -> bool:
+    """Whether a group has the verdict already; one with a note of its own is always new."""
+    if verdict.state == row.status == "unreviewed":
+        return True
+    same = row.status == verdict.state and row.reason == verdict.reason and not row.stale
+    return bool(same and verdict.note is None)
+
+
+class _Run:
+    """A batch while it is given, chunk by chunk."""
+
+    def __init__(self, dataset_id: int, query: str, verdict: Verdict, request: Request):
+        self.batch: int | None = None
+        self.changed = 0
+        self._dataset_id, self._query = dataset_id, query
+        self._verdict, self._request = verdict, request
+        self._spans: list[tuple[int, int]] = []
+
+    def save(self, session: Session, rows: Sequence[Any]) -> None:
+        """Save the verdicts of one chunk with its log entries, in one transaction."""
+        if not rows:
+            return
+        at = now()
+        verdicts = _verdict_rows(session, rows, self._verdict, self._request.actor, at)
+        save_verdicts(session, self._dataset_id, self._request.actor, at, verdicts)
+        self.changed += len(verdicts)
+        self._spans.append((verdicts[0]["id"], verdicts[-1]["id"]))
+        self._save_batch(session, at)
+
+    def close(self, session: Session) -> None:
+        """Say in the log that the batch is complete."""
+        if self.batch is None:
+            return
+        at = now()
+        body = {"batch": self.batch, "q": self._query, "changed": self.changed}
+        body |= asdict(self._verdict)
+        entry = Entry("verdict_batch", self._request.actor, at, body, self._dataset_id)
+        (log_id,) = append(session, [entry])
+        remember(session, self._request, log_id, at)
+        mine = VerdictBatchModel.id == self.batch
+        session.execute(update(VerdictBatchModel).where(mine).values(log_id=log_id))
+
+    def _save_batch(self, session: Session, at: str) -> None:
+        values: dict[str, Any] = {"changed": self.changed, "spans": json.dumps(self._spans)}
+        if self.batch is not None:
+            mine = VerdictBatchModel.id == self.batch
+            session.execute(update(VerdictBatchModel).where(mine).values(values))
+            return
+        self.batch = next_id(session, VerdictBatchModel)
+        values |= {"id": self.batch, "dataset_id": self._dataset_id, "at": at}
+        values |= {"actor": self._request.actor, "query": self._query, **asdict(self._verdict)}
+        session.execute(insert(VerdictBatchModel), [values])
+
+
+def _verdict_rows(
+    session: Session, rows: Sequence[Any], verdict: Verdict, actor: str, at: str
+) -> list[dict[str, Any]]:
+    ids = [row.group_id for row in rows]
+    heads = _heads(session, ids)
+    number = next_id(session, VerdictModel)
+    overrides = verdict.state == "accepted"
+    return [
+        {
+            "id": number + place,
+            "group_id": row.group_id,
+            "actor": actor,
+            "at": at,
+            **asdict(verdict),
+            "inputs_hash": heads[row.group_id].inputs_hash,
+            "policy_hash": heads[row.group_id].policy_hash,
+            "fixed": bool(heads[row.group_id].fixed),
+            "override": (row.gate or "unknown") if overrides and not row.passes else None,
+        }
+        for place, row in enumerate(rows)
+    ]
+
+
+def _heads(session: Session, ids: Sequence[int]) -> dict[int, Any]:
+    """What a verdict keeps of its group: the hashes, and whether a person had edited it."""
+    own = and_(StationModel.shared.is_(False), StationModel.digest != StationModel.source_digest)
+    edited = cast(ViewModel.digest != ViewModel.source_digest, Integer)
+    statement = (
+        select(
+            GroupModel.id,
+            GroupModel.inputs_hash,
+            DatasetModel.policy_hash,
+            func.max(func.max(edited, cast(own, Integer))).label("fixed"),
+        )
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .outerjoin(ViewModel, ViewModel.group_id == GroupModel.id)
+        .outerjoin(StationModel, StationModel.id == ViewModel.station_id)
+        .where(GroupModel.id.in_(ids))
+        .group_by(GroupModel.id)
+    )
+    return {row.id: row for row in session.execute(statement)}
+
+
+def save_verdicts(
+    session: Session, dataset_id: int, actor: str, at: str, rows: Sequence[dict[str, Any]]
+) -> None:
+    """Insert verdicts, log them under who gives them, and show them in the queue."""
+    session.execute(insert(VerdictModel), rows, execution_options={"render_nulls": True})
+    bodies = [
+        {name: value for name, value in row.items() if name not in ("id", "group_id")}
+        for row in rows
+    ]
+    entries = [
+        Entry("verdict", actor, at, body, dataset_id, row["group_id"])
+        for row, body in zip(rows, bodies, strict=True)
+    ]
+    append(session, entries)
+    refresh_verdicts(session, list({row["group_id"]: None for row in rows}))
+
+
+def _again(session: Session, request: Request) -> BatchReport:
+    """What the same request did the first time."""
+    statement = (
+        select(VerdictBatchModel.id, VerdictBatchModel.changed)
+        .join(IdempotencyModel, IdempotencyModel.log_id == VerdictBatchModel.log_id)
+        .where(IdempotencyModel.key == request.key, IdempotencyModel.actor == request.actor)
+    )
+    row = session.execute(statement).one()
+    return BatchReport(row.id, row.changed, ())
+
+
+def _batch(row: Any) -> Batch:
+    same = ("id", "at", "actor", "query", "state", "reason", "note", "changed")
+    values = {name: getattr(row, name) for name in same}
+    return Batch(**values, done=row.log_id is not None, undone=row.undone, undone_by=row.undone_by)

@@ -1,0 +1,121 @@
+"""ETags of groups: what names a group's state, worked out from its rows without decoding it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+
+from sqlalchemy import and_, func, select
+from sqlalchemy.orm import Session
+
+from app.errors import NotFoundError, StaleRevisionError
+from app.soccer.solution import SOLVER_VERSION
+from app.store.codecs import parse
+from app.store.digest import digest
+from app.store.models import DatasetModel, GroupModel, SolutionModel, VerdictModel
+from app.store.queue import import_findings
+
+
+def said_part(inputs_hash: str, revision: int, verdict_id: int) -> str:
+    """What people said about a group: the part of its ETag that a change builds on."""
+    return digest([inputs_hash, revision, verdict_id])[:16]
+
+
+def group_etag(
+    said: str, policy_hash: str, policy_name: str, findings: Iterable[str] | None
+) -> str:
+    """The ETag of a group, quoted.
+
+    Before the dash what people said, after it what was computed from that. A change builds on the
+    first part alone: a solution that arrives is no conflict, but a cached document without it is
+    out of date.
+
+    Args:
+        said: ``said_part``.
+        policy_hash: Of the dataset's policy.
+        policy_name: Of the dataset's policy.
+        findings: Kinds of the solution's findings; None without a solution.
+    """
+    kinds = sorted(set(findings or ()))
+    computed = digest([policy_hash, policy_name, SOLVER_VERSION, findings is None, kinds])[:8]
+    return f'"{said}-{computed}"'
+
+
+def read_said(session: Session, group_id: int) -> str | None:
+    """The first part of a group's ETag as it is now; None where there is no such group."""
+    newest = select(func.max(VerdictModel.id)).where(VerdictModel.group_id == group_id)
+    row = session.execute(
+        select(
+            GroupModel.inputs_hash, GroupModel.revision, newest.scalar_subquery().label("last")
+        ).where(GroupModel.id == group_id)
+    ).one_or_none()
+    return None if row is None else said_part(row.inputs_hash, row.revision, row.last or 0)
+
+
+def said_of(etag: str) -> str:
+    """The first part of an ETag, quoted or not."""
+    return etag.strip().strip('"').partition("-")[0]
+
+
+def require_unchanged(session: Session, group_id: int, if_match: str, what: str) -> None:
+    """Refuse a change that builds on another state of a group than the present one.
+
+    Two numbers and a digest are read, and nothing is decoded: this is what runs while everybody
+    else who writes is waiting.
+
+    Raises:
+        NotFoundError: The group is gone.
+        StaleRevisionError: With both ETags.
+    """
+    said = read_said(session, group_id)
+    if said is None:
+        raise NotFoundError(f"there is no group {group_id}")
+    if said != said_of(if_match):
+        raise StaleRevisionError(
+            f"{what} has changed in the meantime",
+            base_etag=if_match,
+            current_etag=read_etags(session, [group_id])[group_id],
+        )
+
+
+def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
+    """ETags by group id; at most a few hundred groups, those that do not exist are left out."""
+    newest = (
+        select(func.max(VerdictModel.id))
+        .where(VerdictModel.group_id == GroupModel.id)
+        .correlate(GroupModel)
+        .scalar_subquery()
+    )
+    statement = (
+        select(
+            GroupModel.id,
+            GroupModel.inputs_hash,
+            GroupModel.revision,
+            DatasetModel.policy,
+            DatasetModel.policy_hash,
+            SolutionModel.summary,
+            newest.label("last"),
+        )
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .outerjoin(
+            SolutionModel,
+            and_(
+                SolutionModel.group_id == GroupModel.id,
+                SolutionModel.inputs_hash == GroupModel.inputs_hash,
+                SolutionModel.policy_hash == DatasetModel.policy_hash,
+                SolutionModel.solver_version == SOLVER_VERSION,
+            ),
+        )
+        .where(GroupModel.id.in_(group_ids))
+    )
+    noticed = import_findings(session, group_ids)
+    etags = {}
+    for row in session.execute(statement):
+        said = said_part(row.inputs_hash, row.revision, row.last or 0)
+        findings = None
+        if row.summary is not None:
+            kinds = [item.kind for item in noticed[row.id]]
+            findings = [*json.loads(row.summary)["findings"], *kinds]
+        name = parse(row.policy)["name"]
+        etags[row.id] = group_etag(said, row.policy_hash, name, findings)
+    return etags

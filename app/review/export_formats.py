@@ -1,0 +1,135 @@
+"""Export formats: which writer writes which format, and what each has room for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.datasets.coco import write_coco
+from app.datasets.export_record import ExportRecord
+from app.datasets.frame_names import FrameName, flat_frame, match_frame
+from app.datasets.gamestate_writer import write_gamestate
+from app.datasets.issia import FramePersons
+from app.datasets.issia_3d import write_issia_3d
+from app.datasets.manifest import SOFTWARE, software_version
+from app.datasets.parquet import write_parquet
+from app.datasets.per_view import write_camera_files, write_sn_calibration
+from app.datasets.soccernet_v3 import write_soccernet_v3
+from app.datasets.soccernet_v3d import write_soccernet_v3d
+from app.datasets.xgtf import write_issia
+from app.datasets.yolo import write_yolo
+from app.soccer.group import Group
+
+FORMATS = (
+    "soccernet-v3d",
+    "soccernet-v3",
+    "issia-3d",
+    "issia",
+    "cameras",
+    "sn-calibration",
+    "gamestate",
+    "coco",
+    "yolo",
+    "parquet",
+    "touchline",
+)
+CONTENT = {
+    "cameras": ("cameras", "camera"),
+    "issia-3d": ("groups", "ball"),
+    "sn-calibration": ("frames", "frame"),
+    "gamestate": ("images", "image"),
+}
+"""What a format consists of: the name of its count, and the word for one."""
+WITH_BOXES = ("soccernet-v3d", "coco", "yolo", "parquet")
+"""Formats that hold the ball box that was chosen; all others have no place for it."""
+
+
+@dataclass(frozen=True)
+class WriteOptions:
+    """What a writer is told besides its groups.
+
+    Attributes:
+        format: One of ``FORMATS``.
+        everything: Whether groups and views that failed a gate take part.
+        boxes: Which ball box is written.
+        provenance: Where the groups come from, by the names of ``parquet.PROVENANCE``.
+        spare: People of frames that are no view of a group.
+    """
+
+    format: str
+    everything: bool = False
+    boxes: str = "optimized"
+    provenance: Mapping[str, str | None] = field(default_factory=dict)
+    spare: Iterable[FramePersons] = ()
+
+
+def write_format(
+    root: Path, records: Iterable[ExportRecord], options: WriteOptions
+) -> dict[str, int]:
+    """Write a format's files below an existing folder; returns its counts."""
+    everything, boxes = options.everything, options.boxes
+    counts = {"groups": 0}
+    groups = _groups(records, counts)
+    match options.format:
+        case "soccernet-v3d":
+            return write_soccernet_v3d(root, records, everything=everything, boxes=boxes)
+        case "soccernet-v3":
+            write_soccernet_v3(root, groups)
+            return counts
+        case "issia-3d":
+            return write_issia_3d(root, records, everything=everything)
+        case "issia":
+            return write_issia(root, groups, options.spare)
+        case "cameras":
+            return write_camera_files(root, records)
+        case "sn-calibration":
+            return write_sn_calibration(root, records)
+        case "gamestate":
+            return write_gamestate(root, groups)
+        case "coco":
+            info = {"description": options.provenance.get("dataset"), "software": _software()}
+            return write_coco(root, records, everything=everything, boxes=boxes, info=info)
+        case "yolo":
+            return write_yolo(root, records, boxes=boxes)
+        case _:
+            return write_parquet(
+                root,
+                records,
+                everything=everything,
+                boxes=boxes,
+                provenance=options.provenance,
+            )
+
+
+def _groups(records: Iterable[ExportRecord], counts: dict[str, int]) -> Iterator[Group]:
+    for record in records:
+        counts["groups"] += 1
+        yield record.group
+
+
+def frame_layout(format: str) -> FrameName:  # noqa: A002
+    """Where a format looks for the frames of its views."""
+    return flat_frame if format == "yolo" else match_frame
+
+
+def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
+    """Which ball box stands where, for a format that holds a chosen one."""
+    if format not in WITH_BOXES:
+        return {}
+    # optimized_d is defined around the centre of the annotated box.
+    own = {"ball_bbox": "annotated"} if format == "soccernet-v3d" else {}
+    return {"boxes": boxes, **own}
+
+
+def missing_sentence(format: str, counts: Mapping[str, int]) -> dict[str, str]:  # noqa: A002
+    """What a manifest says of frames that a format needs and that were not copied."""
+    missing = counts.get("images_missing", 0)
+    if format != "yolo" or not missing:
+        return {}
+    images = "1 image is" if missing == 1 else f"{missing} images are"
+    return {"missing_images": f"{images} not in this export; frames.csv names their places"}
+
+
+def _software() -> str:
+    return f"{SOFTWARE} {software_version()}"

@@ -1,0 +1,109 @@
+"""Folders that the operator allows imports to read, listed and resolved by names alone."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from app.config import Settings
+from app.datasets.archive import check_name, resolve_inside
+from app.datasets.guess_format import guess_format
+from app.errors import InputError, NotFoundError
+
+MAX_ITEMS = 1000
+"""Entries of a folder that are listed."""
+
+
+@dataclass(frozen=True)
+class FolderItem:
+    """A folder or file that an import could read; ``path`` starts with an allowed folder's name."""
+
+    path: str
+    name: str
+    folder: bool
+
+
+@dataclass(frozen=True)
+class FolderListing:
+    """What is in a folder.
+
+    Attributes:
+        path: Empty for the list of allowed folders.
+        format: What it most likely holds, or None.
+        more: Whether there is more than is listed.
+    """
+
+    path: str
+    format: str | None
+    items: tuple[FolderItem, ...]
+    more: bool
+
+
+def allowed_folders(settings: Settings) -> dict[str, Path]:
+    """The operator's folders by the names that requests use for them."""
+    found: dict[str, Path] = {}
+    for folder in settings.import_folders:
+        name = folder.name or "root"
+        number = 2
+        while name in found:
+            name, number = f"{folder.name}-{number}", number + 1
+        found[name] = folder
+    return found
+
+
+def resolve_folder(settings: Settings, path: str) -> Path:
+    """The folder or file that a request means by ``<allowed folder>/<inside>``.
+
+    Raises:
+        UnsafePathError: The path would leave the allowed folder.
+        NotFoundError: Nothing is there.
+        InputError: The operator allows no folders.
+    """
+    folders = allowed_folders(settings)
+    if not folders:
+        raise InputError(
+            "no folders may be imported from",
+            hint="The operator names them in TOUCHLINE_IMPORT_FOLDERS; or upload the data.",
+        )
+    root, _, inside = check_name(path.rstrip("/")).partition("/")
+    if root not in folders:
+        raise NotFoundError(f'there is no folder "{root}" to import from')
+    found = resolve_inside(folders[root], inside) if inside else folders[root]
+    if not found.exists():
+        raise NotFoundError(f'there is no "{path}" to import from')
+    return found
+
+
+def list_folder(settings: Settings, path: str = "") -> FolderListing:
+    """The allowed folders, or what is in one of them."""
+    if not path:
+        roots = (FolderItem(name, name, True) for name in sorted(allowed_folders(settings)))
+        return FolderListing("", None, tuple(roots), False)
+    found = resolve_folder(settings, path)
+    if not found.is_dir():
+        return FolderListing(path, guess_format(found), (), False)
+    items = list(islice(_items(found, path.rstrip("/")), MAX_ITEMS + 1))
+    items.sort(key=lambda item: (not item.folder, item.name))
+    more = len(items) > MAX_ITEMS
+    return FolderListing(path, guess_format(found), tuple(items[:MAX_ITEMS]), more)
+
+
+def _items(folder: Path, path: str) -> Iterator[FolderItem]:
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            hidden = entry.name.startswith(".")
+            # A link may lead out; what it leads to is reached by its own name, if it may be.
+            if hidden or entry.is_symlink() or not _is_name(entry.name):
+                continue
+            if entry.is_dir() or entry.is_file():
+                yield FolderItem(f"{path}/{entry.name}", entry.name, entry.is_dir())
+
+
+def _is_name(name: str) -> bool:
+    try:
+        return bool(check_name(name))
+    except InputError:
+        return False

@@ -1,0 +1,138 @@
+"""Membership: which groups of a dataset enter a version, and why the others do not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.errors import ConflictError
+from app.store.codecs import Json
+from app.store.models import QueueModel, VerdictModel
+
+RULES = ("accepted", "passing")
+UNSOLVED = "not solved"
+_DIGITS = re.compile(r"(\d+)")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A group that may enter a version.
+
+    Attributes:
+        why: Why it does not; None: it does.
+        verdict: State, reason, note and override; None where nobody decided.
+        unsolved: It might enter, and nobody knows while it has no solution.
+    """
+
+    id: int
+    key: str
+    match: str
+    split: str
+    why: str | None
+    verdict: Json
+    unsolved: bool
+
+    @property
+    def overrides(self) -> bool:
+        """Whether it enters against a gate."""
+        return self.why is None and self.verdict is not None and bool(self.verdict["override"])
+
+
+def read_candidates(session: Session, dataset_id: int, rule: str) -> list[Candidate]:
+    """Every group of a dataset, by match and key: an order that no machine changes."""
+    newest = (
+        select(VerdictModel.group_id, func.max(VerdictModel.id).label("id"))
+        .join(QueueModel, QueueModel.group_id == VerdictModel.group_id)
+        .where(QueueModel.dataset_id == dataset_id)
+        .group_by(VerdictModel.group_id)
+        .subquery()
+    )
+    names = ("group_id", "key", "match", "split", "status", "stale", "solved", "passes", "gate")
+    statement = (
+        select(
+            *(getattr(QueueModel, name) for name in names),
+            VerdictModel.reason,
+            VerdictModel.note,
+            VerdictModel.override,
+        )
+        .outerjoin(newest, newest.c.group_id == QueueModel.group_id)
+        .outerjoin(VerdictModel, VerdictModel.id == newest.c.id)
+        .where(QueueModel.dataset_id == dataset_id)
+    )
+    found = [_candidate(row, rule) for row in session.execute(statement)]
+    return sorted(found, key=lambda item: (item.match, natural(item.key), item.key))
+
+
+def natural(key: str) -> list[str | int]:
+    """Sorts 7_2 before 7_10, and frame 99 before 100."""
+    parts: list[str | int] = list(_DIGITS.split(key))
+    parts[1::2] = [int(part) for part in parts[1::2]]
+    return parts
+
+
+def require_solved(candidates: Sequence[Candidate]) -> None:
+    """Raise ConflictError where groups that might enter have no solution."""
+    count = sum(item.unsolved for item in candidates)
+    if count:
+        groups = "1 group has" if count == 1 else f"{count} groups have"
+        raise ConflictError(
+            f"{groups} no solution under the present policy and might enter the version",
+            hint="Solve the dataset first.",
+        )
+
+
+def _candidate(row: Any, rule: str) -> Candidate:
+    why = _accepted(row) if rule == "accepted" else _passing(row)
+    return Candidate(
+        id=row.group_id,
+        key=row.key,
+        match=row.match,
+        split=row.split,
+        why=why,
+        verdict=_verdict(row),
+        unsolved=why == UNSOLVED,
+    )
+
+
+def _verdict(row: Any) -> Json:
+    if row.status == "unreviewed":
+        return None
+    return {
+        "state": f"{row.status} (stale)" if row.stale else row.status,
+        "reason": row.reason,
+        "note": row.note,
+        "override": row.override,
+    }
+
+
+def _accepted(row: Any) -> str | None:
+    if row.status != "accepted":
+        return _decided(row) or "unreviewed"
+    if row.stale:
+        return "changed after its verdict"
+    return _judged(row)
+
+
+def _passing(row: Any) -> str | None:
+    if row.status in ("rejected", "deferred"):
+        return _decided(row)
+    return _judged(row)
+
+
+def _decided(row: Any) -> str | None:
+    if row.status == "rejected":
+        return f"rejected: {row.reason}"
+    return "deferred" if row.status == "deferred" else None
+
+
+def _judged(row: Any) -> str | None:
+    if not row.solved:
+        return UNSOLVED
+    # An override speaks of the gate that failed then, of no other that fails now.
+    overridden = row.status == "accepted" and not row.stale and row.override == row.gate
+    return None if row.passes or overridden else f"fails {row.gate}"

@@ -1,0 +1,138 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from app.errors import InputError, NotFoundError
+from app.review.accept import AcceptRequest, accept, plan_accept
+from app.review.edit import SetBall
+from app.review.ledger import read_ledger
+from app.review.predictions import PredictionFiles, add_predictions
+from app.review.replay import replay
+from app.review.submit import history, load, submit, undo
+from app.soccer.frames import Box
+
+
+@pytest.fixture
+def cleared(store, fill, make_group):
+    """Two groups; nobody annotated a ball in the main view of the first."""
+    ids = fill(make_group(7), make_group(8))
+    state = load(store, ids[0])
+    return submit(store, ids[0], SetBall("7.png", None), if_match=state.etag, actor="ann")
+
+
+@pytest.fixture
+def predictions(store, cleared, tmp_path):
+    """Two boxes in 7.png, one in 7_1.png, a less sure one in 8.png."""
+    boxes = [("7.png", 10, 0.6), ("7.png", 600, 0.9), ("7_1.png", 20, 0.8), ("8.png", 30, 0.4)]
+    values = [
+        {"image_id": name, "category_id": 1, "bbox": [x, 300, 14, 14], "score": score}
+        for name, x, score in boxes
+    ]
+    path = tmp_path / "p.json"
+    path.write_text(json.dumps(values))
+    return add_predictions(store, "demo", "yolo", PredictionFiles(path), actor="ann")
+
+
+class TestPlanAccept:
+    def test_takes_the_surest_of_views_without_a_ball(self, store, cleared, predictions) -> None:
+        plan = plan_accept(store, "demo", AcceptRequest(predictions.id))
+        assert [(item.view, item.box.x) for item in plan.changes] == [("7.png", 600)]
+        assert plan.refused == {"annotated": 2}
+        assert load(store, cleared.id) == cleared
+
+    def test_replaces_where_it_is_told_to(self, store, predictions) -> None:
+        plan = plan_accept(
+            store, "demo", AcceptRequest(predictions.id, replace=True, min_score=0.5)
+        )
+        assert [item.view for item in plan.changes] == ["7.png", "7_1.png"]
+        assert plan.refused == {"below_score": 1}
+
+    def test_a_query_chooses_groups(self, store, predictions) -> None:
+        request = AcceptRequest(predictions.id, query="number:2", replace=True)
+        assert [item.view for item in plan_accept(store, "demo", request).changes] == ["8.png"]
+
+    def test_what_does_not_exist_is_refused(self, store, cleared, predictions) -> None:
+        with pytest.raises(NotFoundError):
+            plan_accept(store, "demo", AcceptRequest(99))
+        with pytest.raises(NotFoundError, match="no prediction for view"):
+            plan_accept(store, "demo", AcceptRequest(predictions.id, views=(12345,)))
+        with pytest.raises(InputError):
+            plan_accept(store, "demo", AcceptRequest(predictions.id, query="nothing:at_all"))
+
+
+class TestAccept:
+    def test_makes_an_edit_whose_ball_says_where_it_is_from(
+        self, store, cleared, predictions
+    ) -> None:
+        report = accept(store, "demo", AcceptRequest(predictions.id), actor="bob")
+        assert (report.views, report.groups, report.refused) == (1, 1, {"annotated": 2})
+        after = load(store, cleared.id)
+        ball = after.group.view("7.png").ball
+        assert ball.box == Box(600, 300, 14, 14)
+        assert ball.predicted_by == "yolo"
+        entry = history(store, cleared.id)[-1]
+        assert (entry.kind, entry.actor) == ("edit", "bob")
+        assert entry.body["edit"]["balls"][0]["predicted_by"] == "yolo"
+        # Only now a solve has seen it.
+        assert cleared.solution.ball is None
+        assert after.solution is not None
+
+    def test_can_be_undone(self, store, cleared, predictions) -> None:
+        accept(store, "demo", AcceptRequest(predictions.id), actor="bob")
+        after = load(store, cleared.id)
+        assert undo(store, cleared.id, if_match=after.etag, actor="bob").group == cleared.group
+
+    def test_done_again_it_changes_nothing(self, store, cleared, predictions) -> None:
+        request = AcceptRequest(predictions.id, replace=True)
+        accept(store, "demo", request, actor="bob")
+        before = load(store, cleared.id)
+        report = accept(store, "demo", request, actor="bob")
+        assert (report.views, report.refused) == (0, {"the_same": 3})
+        assert load(store, cleared.id) == before
+
+    def test_named_views_alone(self, store, cleared, predictions) -> None:
+        view = cleared.view_ids["7_1.png"]
+        request = AcceptRequest(predictions.id, views=(view,), replace=True)
+        assert accept(store, "demo", request, actor="bob").views == 1
+        assert load(store, cleared.id).group.view("7.png").balls == ()
+
+    def test_a_person_who_moves_it_is_the_source_from_then_on(
+        self, store, cleared, predictions
+    ) -> None:
+        from app.soccer.annotation import BallAnnotation
+
+        accept(store, "demo", AcceptRequest(predictions.id), actor="bob")
+        state = load(store, cleared.id)
+        edit = SetBall("7.png", BallAnnotation(box=Box(601, 300, 14, 14)))
+        after = submit(store, cleared.id, edit, if_match=state.etag, actor="bob")
+        assert after.group.view("7.png").ball.predicted_by == ""
+
+    def test_the_log_alone_rebuilds_it(self, store, cleared, predictions) -> None:
+        accept(store, "demo", AcceptRequest(predictions.id), actor="bob")
+        with store.read() as session:
+            assert replay(session) == read_ledger(session)
+
+    def test_a_group_that_changed_meanwhile_is_left_alone(
+        self, store, cleared, predictions, monkeypatch
+    ) -> None:
+        plan = plan_accept(store, "demo", AcceptRequest(predictions.id))
+        accept(store, "demo", AcceptRequest(predictions.id), actor="bob")
+        monkeypatch.setattr("app.review.accept.plan_accept", lambda *_: plan)
+        report = accept(store, "demo", AcceptRequest(predictions.id), actor="eve")
+        assert report.refused["changed_meanwhile"] == 1
+        assert history(store, cleared.id)[-1].actor == "bob"
+
+    def test_progress_can_end_it_and_what_was_accepted_stays(
+        self, store, cleared, predictions
+    ) -> None:
+        def stop(done, _total, _sentence) -> None:
+            if done == 1:
+                raise KeyboardInterrupt
+
+        request = AcceptRequest(predictions.id, replace=True)
+        with pytest.raises(KeyboardInterrupt):
+            accept(store, "demo", request, actor="bob", progress=stop)
+        assert load(store, cleared.id).group.view("7_1.png").ball.predicted_by == "yolo"
+        assert accept(store, "demo", request, actor="bob").views == 1
