@@ -9,23 +9,70 @@ from pathlib import Path
 
 from fastapi import FastAPI
 
-from app.api.deps import Services
+from app.api.deps import LOCAL_USER, Services
 from app.api.errors import install_handlers
+from app.api.first_answers import FirstAnswers
 from app.api.openapi import describe
 from app.api.pages import STATIC, Site, install_pages
-from app.api.routers import datasets, exports, findings, groups, health, pitch, stations, views
+from app.api.routers import (
+    bulk,
+    datasets,
+    evaluations,
+    events,
+    exports,
+    findings,
+    groups,
+    health,
+    imports,
+    insight,
+    jobs,
+    pitch,
+    policies,
+    predictions,
+    saved_views,
+    stations,
+    statistics,
+    timeline,
+    uploads,
+    versions,
+    views,
+    yields,
+)
 from app.api.security.bodies import MAX_JSON_BYTES, JsonBodies
 from app.api.security.failures import Failures
 from app.api.security.headers import SecurityHeaders
 from app.api.security.origin import KnownHosts, SameOrigin
 from app.api.security.requests import HeadAsGet, OneRange
 from app.config import Settings
+from app.review.jobs import Pool
 
 PREFIX = "/api/v1"
-ROUTERS = (datasets, groups, views, stations, findings, exports, pitch)
+ROUTERS = (
+    datasets,
+    groups,
+    views,
+    stations,
+    timeline,
+    findings,
+    insight,
+    exports,
+    pitch,
+    jobs,
+    events,
+    policies,
+    yields,
+    versions,
+    predictions,
+    evaluations,
+    uploads,
+    imports,
+    bulk,
+    saved_views,
+    statistics,
+)
 
 
-def create_app(settings: Settings, *, static: Path = STATIC) -> FastAPI:
+def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None = None) -> FastAPI:
     """The whole service over one home.
 
     The database must exist in the present schema (``touchline migrate``); it is opened here, so
@@ -34,11 +81,12 @@ def create_app(settings: Settings, *, static: Path = STATIC) -> FastAPI:
     Args:
         settings: Where things live and how much is allowed.
         static: Folder of the browser application.
+        pool: Makes the processes that large jobs solve in; None: they share this one.
 
     Raises:
         StorageError: The database cannot be used.
     """
-    services = Services.open(settings)
+    services = Services.open(settings, pool)
     site = Site(static)
     app = FastAPI(
         title="Touchline",
@@ -58,7 +106,7 @@ def create_app(settings: Settings, *, static: Path = STATIC) -> FastAPI:
     app.include_router(health.router)
     install_pages(app, site)
     describe(app)
-    _add_middleware(app, settings, site)
+    _add_middleware(app, services, site)
     return app
 
 
@@ -70,11 +118,17 @@ def software_version() -> str:
         return "0"
 
 
-def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
+def _add_middleware(app: FastAPI, services: Services, site: Site) -> None:
     """The first one added is the innermost."""
+    settings = services.settings
+    app.add_middleware(FirstAnswers, store=services.store, actor=LOCAL_USER)
     app.add_middleware(OneRange)
     app.add_middleware(HeadAsGet)
-    app.add_middleware(JsonBodies, max_bytes=min(MAX_JSON_BYTES, settings.max_upload_bytes))
+    app.add_middleware(
+        JsonBodies,
+        max_bytes=min(MAX_JSON_BYTES, settings.max_upload_bytes),
+        streamed=frozenset({f"{PREFIX}/uploads"}),
+    )
     app.add_middleware(SameOrigin)
     app.add_middleware(KnownHosts, allowed=settings.allowed_hosts)
     health.install_metrics(app)

@@ -10,11 +10,17 @@ from typing import Annotated
 from fastapi import Depends, Header, Path, Query, Request
 
 from app.api.errors import PreconditionRequiredError
+from app.api.events import Events
 from app.api.export_folder import ExportFolder
-from app.api.recompute import Recompute
+from app.api.export_job import resume_exports
 from app.config import Settings
 from app.errors import InputError
-from app.review.datasets import list_datasets
+from app.review.evaluation_jobs import resume_evaluations
+from app.review.import_jobs import resume_imports
+from app.review.jobs import Jobs, Pool
+from app.review.solve_job import resume_solving, solve_leftovers
+from app.review.version_jobs import resume_versions
+from app.review.yield_store import YieldStore
 from app.solving.warm import warm_up
 from app.store.session import Store
 
@@ -22,7 +28,6 @@ LOCAL_USER = "local"
 """Who acts in single-user mode."""
 MAX_ID = 2**63 - 1
 _STRONG_ETAG = re.compile(r'"[\x21\x23-\x7e]*"')
-_KEY = re.compile(r"[\x21-\x7e]{1,200}")
 
 
 @dataclass(frozen=True)
@@ -32,24 +37,33 @@ class Services:
     settings: Settings
     store: Store
     exports: ExportFolder
-    recompute: Recompute
+    jobs: Jobs
+    events: Events
+    yields: YieldStore
 
     @staticmethod
-    def open(settings: Settings) -> Services:
-        """Open everything over one home."""
+    def open(settings: Settings, pool: Pool | None = None) -> Services:
+        """Open everything over one home; ``pool`` is for jobs that are worth processes."""
         store = Store.open(settings)
-        return Services(settings, store, ExportFolder(settings.exports), Recompute(store))
+        jobs = Jobs(store, pool=pool)
+        exports = ExportFolder(settings.exports)
+        return Services(settings, store, exports, jobs, Events(store, jobs), YieldStore(store))
 
     def start(self) -> None:
-        """Load the solver's kernels, and take up the solving that an earlier run left undone."""
+        """Load the solver's kernels, and take up the work that an earlier run left undone."""
         Thread(target=warm_up, daemon=True).start()
-        for dataset in list_datasets(self.store):
-            if dataset.solved < dataset.groups:
-                self.recompute.request(dataset.name)
+        resume_solving(self.jobs, self.store)
+        resume_exports(self.jobs, self.store, self.exports)
+        resume_versions(self.jobs, self.store)
+        resume_imports(self.jobs, self.store, self.settings)
+        resume_evaluations(self.jobs, self.store)
+        self.jobs.start()
+        solve_leftovers(self.jobs, self.store, actor=LOCAL_USER)
 
     def close(self) -> None:
         """Let the running work end and close the database."""
-        self.recompute.close()
+        self.events.close()
+        self.jobs.close()
         self.store.close()
 
 
@@ -109,9 +123,10 @@ def get_idempotency_key(
         ),
     ] = None,
 ) -> str | None:
-    """The caller's name for this request, so that sending it twice does it once."""
-    if idempotency_key is not None and not _KEY.fullmatch(idempotency_key):
-        raise InputError("Idempotency-Key must be 1 to 200 visible ASCII characters")
+    """The caller's name for this request, so that sending it twice does it once.
+
+    ``FirstAnswers`` has checked its form, on whatever route it was sent.
+    """
     return idempotency_key
 
 

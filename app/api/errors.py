@@ -21,6 +21,7 @@ from app.errors import (
     ImageError,
     InputError,
     NotFoundError,
+    OverloadedError,
     ReviewError,
     SharedStationError,
     StaleRevisionError,
@@ -40,6 +41,7 @@ STATUSES: tuple[tuple[type[ReviewError], int], ...] = (
     (ConflictError, 409),
     (GeometryError, 422),
     (StorageError, 507),
+    (OverloadedError, 503),
 )
 """The first branch that fits decides."""
 RETRY_SECONDS = "5"
@@ -47,10 +49,6 @@ RETRY_SECONDS = "5"
 
 class PreconditionRequiredError(ReviewError):
     """A change without If-Match: it could overwrite what its sender never saw."""
-
-
-class BusyError(ReviewError):
-    """The one place for this kind of work is taken."""
 
 
 class StaleStateError(ReviewError):
@@ -68,7 +66,7 @@ class StaleStateError(ReviewError):
 
 def status_of(error: ReviewError) -> int:
     """The HTTP status of an error of the tree."""
-    special = {PreconditionRequiredError: 428, StaleStateError: 412, BusyError: 429}
+    special = {PreconditionRequiredError: 428, StaleStateError: 412}
     if type(error) in special:
         return special[type(error)]
     if isinstance(error, StorageError) and not _is_full(error):
@@ -102,7 +100,7 @@ async def _review_error(request: Request, error: Exception) -> Response:
         station=error.station if isinstance(error, SharedStationError) else None,
         current=error.current if isinstance(error, StaleStateError) else None,
     )
-    headers = {"Retry-After": RETRY_SECONDS} if status == 429 else {}
+    headers = {"Retry-After": RETRY_SECONDS} if status in (429, 503) else {}
     if isinstance(error, StaleStateError):
         headers["ETag"] = error.etag
     if isinstance(error, StorageError):

@@ -14,7 +14,7 @@ Everything that the browser does goes through these addresses.
 
 * **State and ETag.** `PATCH`, `PUT`, undo and redo need `If-Match` with the ETag of the state that
   they build on: 428 without it, 412 (with the present document as `current`) when somebody else
-  was faster. The policy of a dataset alone is replaced without.
+  was faster.
 * **Problems.** Every answer that is not a success is `application/problem+json` (RFC 9457).
 * **Pages.** Lists take `limit` and `cursor`; `next` is the cursor of the next page, `total` says
   how many match.
@@ -27,7 +27,14 @@ TAGS = {
     "views": "One image of an instant: its lines, its ball, its frame.",
     "stations": "Static cameras, whose lines many views share.",
     "findings": "What a person should look at.",
+    "verdicts": "Many groups judged at once.",
+    "queue": "Saved queries, and who has reviewed how much.",
+    "yield": "What a policy lets through, and what another one would.",
+    "versions": "Datasets as they were frozen.",
     "exports": "Datasets as files.",
+    "policies": "The thresholds that judge a dataset.",
+    "jobs": "Work that outlasts a request: how far it is and what came of it.",
+    "events": "What changes, as it changes.",
     "pitch": "Names and shapes of the 26 markings.",
     "health": "For whoever runs the service.",
 }
@@ -53,6 +60,7 @@ def _document(app: FastAPI) -> dict[str, Any]:
         routes=app.routes,
         tags=[{"name": name, "description": text} for name, text in TAGS.items()],
     )
+    _add_keys(document)
     schemas = document["components"]["schemas"]
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
@@ -60,3 +68,23 @@ def _document(app: FastAPI) -> dict[str, Any]:
     schemas.update(problem.pop("$defs", {}))
     schemas["Problem"] = problem
     return document
+
+
+def _add_keys(document: dict[str, Any]) -> None:
+    """Say of every operation that changes something that it takes an Idempotency-Key."""
+    for operations in document["paths"].values():
+        for method, operation in operations.items():
+            parameters = operation.setdefault("parameters", [])
+            named = {parameter["name"] for parameter in parameters}
+            if method != "get" and KEY_PARAMETER["name"] not in named:
+                parameters.append(KEY_PARAMETER)
+
+
+KEY_PARAMETER: dict[str, Any] = {
+    "name": "Idempotency-Key",
+    "in": "header",
+    "required": False,
+    "schema": {"type": "string", "pattern": "^[!-~]{1,200}$"},
+    "description": "Any text of up to 200 visible characters. The same key with the same request "
+    "gives the first answer again, for a day; with another request, 422.",
+}

@@ -71,4 +71,17 @@ def run(app: FastAPI, server: socket.socket) -> None:
         timeout_keep_alive=30,
         timeout_graceful_shutdown=10,
     )
-    uvicorn.Server(config).run(sockets=[server])
+    Server(config, app).run(sockets=[server])
+
+
+class Server(uvicorn.Server):
+    """Ends the streams that have no end before it waits for all answers to be sent."""
+
+    def __init__(self, config: uvicorn.Config, app: FastAPI):
+        super().__init__(config)
+        self._app = app
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop; open event streams end at once."""
+        self._app.state.services.events.close()
+        await super().shutdown(sockets)

@@ -153,10 +153,14 @@ class TestFullPath:
 
         made = client.post(f"{API}/exports", json=order)
         export = made.json()
-        assert made.status_code == 201, made.text
-        assert made.headers["location"] == f"{API}/exports/{export['id']}"
-        assert client.get(made.headers["location"]).json() == export
+        assert made.status_code == 202, made.text
+        assert made.headers["location"] == f"{API}/jobs/{export['id']}"
+        # Asked for at once: it waits for the job.
         content = client.get(export["content"])
+        assert client.get(made.headers["location"]).json()["state"] == "done"
+        document = client.get(f"{API}/exports/{export['id']}").json()
+        assert (document["status"], document["content"]) == ("ready", export["content"])
+        assert document["counts"]["groups"] == 1
         assert content.headers["content-type"] == "application/zip"
         assert 'filename="touchline-soccernet-v3d-' in content.headers["content-disposition"]
         with zipfile.ZipFile(io.BytesIO(content.content)) as archive:

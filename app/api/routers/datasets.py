@@ -1,17 +1,23 @@
-"""Datasets: what there is, how far it is, how its numbers are spread, and what judges it."""
+"""Datasets: what there is, how far it is, and how its numbers are spread."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path
+from fastapi import APIRouter, Path, Query
 
 from app.api.deps import Actor, AppServices, AppStore, QueryText
-from app.api.policies import choose_policy
 from app.api.problem import responses
-from app.api.schemas.dataset import DatasetDocument, DatasetList, SummaryDocument
-from app.api.schemas.policy import PolicyEdit
+from app.api.schemas.dataset import (
+    DatasetDeletion,
+    DatasetDocument,
+    DatasetList,
+    DeletedDocument,
+    SummaryDocument,
+)
 from app.review import datasets as review
+from app.review import delete_dataset as deletion
+from app.review.delete_dataset import read_contents
 from app.review.progress import summary
 
 router = APIRouter(prefix="/datasets", tags=["datasets"])
@@ -38,15 +44,26 @@ def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") ->
     return SummaryDocument.of(summary(store, found.id, query))
 
 
-@router.put("/{dataset}/policy", operation_id="setPolicy", responses=responses(404, 413, 415))
-def put_policy(
-    dataset: DatasetPath, policy: PolicyEdit, services: AppServices, actor: Actor
-) -> DatasetDocument:
-    """Judge the dataset by another policy.
+@router.delete("/{dataset}", operation_id="deleteDataset", responses=responses(404, 409, 413, 415))
+def delete_dataset(
+    dataset: DatasetPath,
+    request: DatasetDeletion,
+    services: AppServices,
+    actor: Actor,
+    dry_run: Annotated[bool, Query(description="Only say what would go.")] = False,
+) -> DeletedDocument:
+    """Delete a dataset with all that hangs on it; `confirm` is its name, else 409.
 
-    Needs no If-Match: it replaces the whole policy, so the last one counts. What is left without
-    a solution is stale and solved in the background; `solved` of the dataset follows.
+    Its jobs are cancelled first. Cannot be undone; the log of what was said stays.
     """
-    chosen = choose_policy(services.store, dataset, policy.name, actor=actor)
-    services.recompute.request(chosen.name)
-    return DatasetDocument.of(chosen)
+    contents = read_contents(services.store, dataset)
+    if not dry_run:
+        exports = services.jobs.find(dataset_id=contents.id, kinds=["export"], limit=1000)
+        if request.confirm == contents.name:
+            services.jobs.cancel_all(contents.id)
+        contents = deletion.delete_dataset(
+            services.store, contents.id, confirm=request.confirm, actor=actor
+        )
+        for job in exports:
+            services.exports.forget(str(job.id))
+    return DeletedDocument(dry_run=dry_run, **vars(contents))

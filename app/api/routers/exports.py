@@ -1,25 +1,33 @@
-"""Exports: made on request, fetched as a zip."""
+"""Exports: written by a job, fetched as a zip."""
 
 from __future__ import annotations
 
-from pathlib import Path as FilePath
+import asyncio
+import time
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Response
+from fastapi import APIRouter, Depends, Path, Response
 from starlette.responses import FileResponse
 
-from app.api.deps import AppServices, IdempotencyKey
+from app.api.deps import Actor, AppServices, IdempotencyKey, Services
+from app.api.export_job import KIND, request_export
+from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import Responses, responses
-from app.api.schemas.export import ExportDocument, ExportRequest
-from app.errors import NotFoundError
+from app.api.routers.jobs import Cursor, DatasetFilter, Limit, parse_cursor
+from app.api.schemas.export import (
+    ExportDocument,
+    ExportJobDocument,
+    ExportPage,
+    ExportRequest,
+)
+from app.errors import ConflictError, NotFoundError
 from app.review.datasets import get_dataset
-from app.review.export import ExportReport, export
-from app.store.session import Store
 
 router = APIRouter(prefix="/exports", tags=["exports"])
 
+PATIENCE = 20.0
+"""Seconds that a request for the zip waits for it to be written."""
 ExportId = Annotated[str, Path(max_length=64)]
-LOCATION = {"Location": {"description": "Of the export.", "schema": {"type": "string"}}}
 ZIP: Responses = {
     200: {
         "description": "The zip.",
@@ -31,60 +39,119 @@ ZIP: Responses = {
 @router.post(
     "",
     operation_id="makeExport",
-    status_code=201,
-    responses={
-        **responses(404, 413, 415, 429, 507),
-        201: {"headers": LOCATION, "description": "The export is ready."},
-    },
+    status_code=202,
+    responses={**responses(404, 409, 413, 415, 507), **ACCEPTED},
 )
 def make_export(
-    request: ExportRequest, services: AppServices, key: IdempotencyKey, response: Response
-) -> ExportDocument:
+    request: ExportRequest,
+    services: AppServices,
+    actor: Actor,
+    _key: IdempotencyKey,
+    response: Response,
+) -> ExportJobDocument:
     """Write accepted groups, or all of them, to a zip; 400 when there is nothing to write."""
-    # By id: a dataset may be asked for by its name, and the file's name is ours.
-    found = get_dataset(services.store, request.dataset)
-    entry = services.exports.make(
-        request.model_dump(),
-        key,
-        lambda path: _write(services.store, found.name, request, path),
+    job = request_export(
+        services.jobs, services.store, services.exports, request.model_dump(), actor=actor
     )
-    response.headers["Location"] = f"/api/v1/exports/{entry.id}"
-    return ExportDocument.of(entry)
+    return ExportJobDocument.of_export(accepted(job, response))
+
+
+@router.get("", operation_id="listExports", responses=responses(404))
+def list_exports(
+    services: AppServices,
+    dataset: DatasetFilter = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
+) -> ExportPage:
+    """Exports, the newest first, those under way and those that failed too."""
+    found = None if dataset is None else get_dataset(services.store, dataset).id
+    jobs = services.jobs.find(
+        dataset_id=found, kinds=[KIND], before=parse_cursor(cursor), limit=limit + 1
+    )
+    more = str(jobs[limit - 1].id) if len(jobs) > limit else None
+    items = [ExportDocument.of_job(job, services.exports.find(str(job.id))) for job in jobs[:limit]]
+    return ExportPage(items=items, next=more)
 
 
 @router.get("/{export}", operation_id="getExport", responses=responses(404))
 def get_export(export: ExportId, services: AppServices) -> ExportDocument:
-    """What was asked for, and what came of it."""
-    return ExportDocument.of(services.exports.get(export))
+    """What was asked for, how far it is, and what came of it."""
+    return _document(services, export)
+
+
+@router.delete(
+    "/{export}",
+    operation_id="deleteExport",
+    status_code=204,
+    response_class=Response,
+    responses={**responses(404, 409), 204: {"description": "It is gone."}},
+)
+def delete_export(export: ExportId, services: AppServices) -> Response:
+    """Delete the file of an export; 409 while it is being written, which its job can end."""
+    document = _document(services, export)
+    if document.status in ("waiting", "running"):
+        raise _not_ready(document)
+    if document.status == "gone":
+        raise NotFoundError("there is no such export")
+    services.exports.forget(export)
+    return Response(status_code=204)
+
+
+async def written(export: ExportId, services: AppServices) -> str:
+    """The id of an export, once that is no longer under way or patience is at its end."""
+    end = time.monotonic() + PATIENCE
+    number = int(export) if export.isascii() and export.isdigit() else 0
+    while services.jobs.is_open(number, KIND) and time.monotonic() < end:
+        await asyncio.sleep(0.05)
+    return export
 
 
 @router.get(
     "/{export}/content",
     operation_id="getExportContent",
     response_class=FileResponse,
-    responses={**responses(404), **ZIP},
+    responses={**responses(404, 409), **ZIP},
 )
-def get_content(export: ExportId, services: AppServices) -> FileResponse:
-    """The zip itself."""
-    entry = services.exports.get(export)
-    path = services.exports.content(entry.id)
-    if not path.is_file():
+def get_content(export: Annotated[str, Depends(written)], services: AppServices) -> FileResponse:
+    """The zip itself; waits a while for one that is still being written.
+
+    409 when it is not ready by then, or its writing failed.
+    """
+    document = _document(services, export)
+    path = services.exports.content(document.id)
+    if document.status == "gone" or (document.status == "ready" and not path.is_file()):
         raise NotFoundError("the file of this export is gone", hint="Make the export again.")
+    if document.status != "ready":
+        raise _not_ready(document)
     return FileResponse(
         path,
         media_type="application/zip",
-        filename=f"touchline-{entry.request['format']}-{entry.id[:8]}.zip",
+        filename=f"touchline-{document.request.format}-{document.id[:8]}.zip",
         headers={"Cache-Control": "private, no-cache"},
     )
 
 
-def _write(store: Store, dataset: str, request: ExportRequest, path: FilePath) -> ExportReport:
-    return export(
-        store,
-        dataset,
-        request.format,
-        path,
-        everything=request.all,
-        boxes=request.boxes,
-        images=request.images,
-    )
+def _document(services: Services, export: str) -> ExportDocument:
+    """The document of an export that is ready or under way.
+
+    Raises:
+        NotFoundError: There is none of that id.
+    """
+    entry = services.exports.find(export)
+    if entry is not None:
+        return ExportDocument.of(entry)
+    if export.isascii() and export.isdigit() and len(export) < 19:
+        job = services.jobs.get(int(export))
+        if job.kind == KIND:
+            return ExportDocument.of_job(job, None)
+    raise NotFoundError("there is no such export")
+
+
+def _not_ready(document: ExportDocument) -> ConflictError:
+    if document.status in ("waiting", "running"):
+        return ConflictError(
+            "the export is still being written",
+            hint=f"GET /api/v1/jobs/{document.id} says how far it is.",
+        )
+    reason = f": {document.error}" if document.error else ""
+    return ConflictError(f"the export was not written{reason}", hint="Make the export again.")

@@ -25,7 +25,9 @@ from app.api.schemas.group import GroupDocument
 from app.api.schemas.station import StationDetail
 from app.api.schemas.view import StationEdit
 from app.errors import NotFoundError
+from app.review.datasets import get_dataset
 from app.review.edit import SetStationCalibration, SetStationLines
+from app.review.solve_job import request_solve
 from app.review.stations import (
     StationState,
     load_station,
@@ -86,6 +88,7 @@ def patch_lines(
         lambda: submit_station(
             services.store, station, edit, if_match=if_match, actor=actor, idempotency_key=key
         ),
+        actor,
         response,
     )
 
@@ -110,6 +113,7 @@ def patch_station(
         lambda: submit_station(
             services.store, station, edit, if_match=if_match, actor=actor, idempotency_key=key
         ),
+        actor,
         response,
     )
 
@@ -120,6 +124,7 @@ def undo(
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
+    key: IdempotencyKey,
     response: Response,
     group: GroupOfStation = None,
 ) -> GroupDocument:
@@ -128,7 +133,10 @@ def undo(
         services,
         station,
         group,
-        lambda: undo_station(services.store, station, if_match=if_match, actor=actor),
+        lambda: undo_station(
+            services.store, station, if_match=if_match, actor=actor, idempotency_key=key
+        ),
+        actor,
         response,
     )
 
@@ -139,6 +147,7 @@ def redo(
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
+    key: IdempotencyKey,
     response: Response,
     group: GroupOfStation = None,
 ) -> GroupDocument:
@@ -147,7 +156,10 @@ def redo(
         services,
         station,
         group,
-        lambda: redo_station(services.store, station, if_match=if_match, actor=actor),
+        lambda: redo_station(
+            services.store, station, if_match=if_match, actor=actor, idempotency_key=key
+        ),
+        actor,
         response,
     )
 
@@ -157,6 +169,7 @@ def _change(
     station: int,
     group: int | None,
     change: Callable[[], StationState],
+    actor: str,
     response: Response,
 ) -> GroupDocument:
     """Change a station, solve the group in view at once, and queue the others."""
@@ -165,7 +178,8 @@ def _change(
     with current_state(lambda: load_document(store, shown)):
         state = change()
     document = answer(solved(store, shown), response)
-    services.recompute.request(state.dataset)
+    dataset = get_dataset(store, state.dataset_id)
+    request_solve(services.jobs, store, dataset, actor=actor)
     return document
 
 

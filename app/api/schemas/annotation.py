@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
@@ -175,16 +175,22 @@ class Ball(BaseModel):
     point: PointNumbers | None
     occluded: bool
     out_of_view: bool
+    source: Literal["dataset", "person", "prediction"] = Field(
+        description="Who says so; `prediction`: a person accepted it from `predicted_by`."
+    )
+    predicted_by: str | None = Field(description="Name of the set of predictions.")
 
     @staticmethod
-    def of(ball: BallAnnotation) -> Ball:
-        """The document of an annotation."""
+    def of(ball: BallAnnotation, *, edited: bool = False) -> Ball:
+        """The document of an annotation; ``edited``: a person has changed it."""
         box, point = ball.box, ball.point
         return Ball.model_construct(
             box=None if box is None else (box.x, box.y, box.width, box.height),
             point=None if point is None else (point.x, point.y),
             occluded=ball.occluded,
             out_of_view=ball.out_of_view,
+            source="prediction" if ball.predicted_by else "person" if edited else "dataset",
+            predicted_by=ball.predicted_by or None,
         )
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Annotated
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.policy import PolicyDocument
 from app.review.datasets import Dataset
@@ -76,3 +77,22 @@ class SummaryDocument(BaseModel):
                 for name, item in summary.histograms.items()
             },
         )
+
+
+class DatasetDeletion(BaseModel):
+    """The name of the dataset, once more: nobody deletes one by a slip."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"confirm": "demo"}]})
+
+    confirm: Annotated[str, Field(max_length=200)] = ""
+
+
+class DeletedDocument(BaseModel):
+    """What was deleted, or, with `dry_run`, what would be."""
+
+    dry_run: bool
+    id: int
+    name: str
+    counts: dict[str, int] = Field(
+        description="groups, views, verdicts, saved_views, versions, predictions, evaluations."
+    )

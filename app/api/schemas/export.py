@@ -8,10 +8,25 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.api.export_folder import ExportEntry
+from app.api.schemas.job import JobDocument
+from app.store.jobs import DONE, Job
 
-Format = Literal["soccernet-v3d", "issia-3d", "cameras", "sn-calibration", "soccernet-v3"]
+Format = Literal[
+    "soccernet-v3d",
+    "soccernet-v3",
+    "issia-3d",
+    "issia",
+    "cameras",
+    "sn-calibration",
+    "gamestate",
+    "coco",
+    "yolo",
+    "parquet",
+    "touchline",
+]
 Boxes = Literal["optimized", "annotated", "exact"]
 Images = Literal["none", "copy"]
+VersionId = Annotated[int, Field(ge=1, le=2**63 - 1)] | Annotated[str, Field(max_length=100)]
 
 
 class ExportRequest(BaseModel):
@@ -25,38 +40,75 @@ class ExportRequest(BaseModel):
     dataset: Annotated[str, Field(min_length=1, max_length=200)]
     format: Format
     all: StrictBool = Field(default=False, description="Every group, not the accepted ones alone.")
+    version: VersionId | None = Field(
+        default=None,
+        description="Id, name or hash of a frozen version: its groups as they were, always the "
+        "same bytes.",
+    )
     boxes: Boxes = Field(default="optimized", description="Which ball box is written.")
     images: Images = Field(default="none", description="Whether frames are copied into the zip.")
 
 
+class ExportJobDocument(JobDocument):
+    """The job that writes an export; its `id` is that of the export, too."""
+
+    content: str = Field(description="Address of the zip; asked early, it waits for it.")
+
+    @staticmethod
+    def of_export(job: JobDocument) -> ExportJobDocument:
+        """The document of an export's job."""
+        content = f"/api/v1/exports/{job.id}/content"
+        return ExportJobDocument(**job.model_dump(), content=content)
+
+
 class ExportDocument(BaseModel):
-    """An export that is ready."""
+    """An export: what was asked for, how far it is, and, once it is ready, what came of it."""
 
     id: str
-    status: Literal["ready"]
+    status: Literal["waiting", "running", "ready", "failed", "cancelled", "gone"]
     request: ExportRequest
     created: datetime
-    content: str = Field(description="Address of the zip.")
-    bytes: int
-    counts: dict[str, int] = Field(description="As the format counts.")
-    left_out: dict[str, int] = Field(
+    content: str | None = Field(description="Address of the zip, once it is ready.")
+    bytes: int | None
+    counts: dict[str, int] | None = Field(description="As the format counts.")
+    left_out: dict[str, int] | None = Field(
         description="Accepted groups that are not in it, by reason: stale, failing, unsolved."
     )
-    missing_images: list[str]
+    missing_images: list[str] | None
+    error: str | None = Field(description="Why it failed.")
 
     @staticmethod
     def of(entry: ExportEntry) -> ExportDocument:
         """The document of a finished export."""
         return ExportDocument.model_validate(
             {
-                "id": entry.id,
+                **vars(entry),
                 "status": "ready",
-                "request": entry.request,
-                "created": entry.created,
                 "content": f"/api/v1/exports/{entry.id}/content",
-                "bytes": entry.bytes,
-                "counts": entry.counts,
-                "left_out": entry.left_out,
-                "missing_images": entry.missing_images,
+                "error": None,
             }
         )
+
+    @staticmethod
+    def of_job(job: Job, entry: ExportEntry | None) -> ExportDocument:
+        """The document of an export by its job; ``entry`` is what it left behind, if anything."""
+        if entry is not None:
+            return ExportDocument.of(entry)
+        nothing = dict.fromkeys(("content", "bytes", "counts", "left_out", "missing_images"))
+        return ExportDocument.model_validate(
+            {
+                **nothing,
+                "id": str(job.id),
+                "status": "gone" if job.state == DONE else job.state,
+                "request": job.request,
+                "created": job.created,
+                "error": job.problem and job.problem["detail"],
+            }
+        )
+
+
+class ExportPage(BaseModel):
+    """Exports, the newest first; ``next`` is the cursor of the next page."""
+
+    items: list[ExportDocument]
+    next: str | None

@@ -176,7 +176,7 @@ def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument
         included=view.included,
         station=_station(state, view),
         lines=lines_document(view.station.lines),
-        balls=[Ball.of(ball) for ball in view.balls],
+        balls=[Ball.of(ball, edited=view.key in state.stored.edited_views) for ball in view.balls],
         image=None if view.media is None else image_address(view_id),
     )
 

@@ -53,7 +53,9 @@ class InfluenceDocument(BaseModel):
 
     marking: str
     jac: Jac | None = Field(description="Of the view as it is, by gamma in per cent.")
-    jac_without: Jac | None = Field(description="If the marking were deleted.")
+    jac_without: Jac | None = Field(
+        description="Of the other markings, by a camera that never saw this one."
+    )
     largest_px: float | None
     largest_px_without: float | None = Field(
         description="Distance of its points from a camera that never saw them."

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from datetime import datetime
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.review.policies import PolicyState
+from app.review.policy_text import MAX_CHARACTERS, policy_to_yaml, policy_values
 from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy
-
-
-class PolicyEdit(BaseModel):
-    """The policy that a dataset shall be judged by, by its name."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"name": "strict"}]})
-
-    name: Literal["paper", "strict"]
 
 
 class PolicyDocument(BaseModel):
@@ -49,3 +44,120 @@ class PolicyDocument(BaseModel):
             calibration=policy.calibration,
             **values,
         )
+
+
+class PolicyChange(BaseModel):
+    """The policy that a dataset shall be judged by: a name, thresholds, or a YAML text."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"name": "strict"},
+                {"name": "tight", "values": {"tau_percent": 0.5}},
+                {"yaml": "name: tight\ntau_percent: 0.5\n"},
+            ]
+        },
+    )
+
+    name: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=80,
+        description="Of the new policy. A shipped one's name alone chooses that.",
+    )
+    values: dict[str, Any] | None = Field(
+        default=None,
+        description="Thresholds that shall differ, those of `calibration` nested in it.",
+    )
+    yaml: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=MAX_CHARACTERS,
+        description="A whole policy, and nothing else beside it; what it does not name is as in "
+        "`paper`.",
+    )
+
+
+class PolicyVersionDocument(BaseModel):
+    """A policy that judged the dataset from some time on."""
+
+    version: int
+    name: str
+    hash: str
+    at: datetime
+    actor: str
+
+
+class PolicyStateDocument(BaseModel):
+    """What judges a dataset, and what did before; the newest version last."""
+
+    dataset: str
+    etag: str
+    version: int
+    name: str
+    hash: str
+    values: dict[str, Any] = Field(
+        description="Every threshold by name; those of the calibration's part in `calibration`."
+    )
+    yaml: str = Field(description="The same for a file.")
+    history: list[PolicyVersionDocument]
+
+    @staticmethod
+    def of(state: PolicyState) -> PolicyStateDocument:
+        """The document of a dataset's policy."""
+        return PolicyStateDocument(
+            dataset=state.dataset,
+            etag=state.etag,
+            version=state.version,
+            history=[
+                PolicyVersionDocument.model_validate(
+                    {**vars(item), "name": item.policy.name, "hash": item.policy.hash}
+                )
+                for item in state.history
+            ],
+            **_described(state.policy),
+        )
+
+
+class ShippedPolicyDocument(BaseModel):
+    """A policy that comes with the software."""
+
+    name: str
+    hash: str
+    values: dict[str, Any]
+    yaml: str
+
+    @staticmethod
+    def of(policy: Policy) -> ShippedPolicyDocument:
+        """The document of a shipped policy."""
+        return ShippedPolicyDocument(**_described(policy))
+
+
+class PolicyFieldDocument(BaseModel):
+    """What a threshold is called and between which ends it lies, for forms."""
+
+    name: str = Field(description="Those of the calibration's part are dotted.")
+    label: str
+    unit: str
+    default: float | bool | None = Field(description="In `paper`; null asks for nothing.")
+    minimum: float | None
+    maximum: float | None
+    gate: str | None = Field(description="The gate that it decides.")
+    optional: bool = Field(description="Whether it can be null.")
+
+
+class PolicyCatalogue(BaseModel):
+    """The policies that come with the software, and every threshold there is."""
+
+    items: list[ShippedPolicyDocument]
+    fields: list[PolicyFieldDocument]
+
+
+def _described(policy: Policy) -> dict[str, Any]:
+    return {
+        "name": policy.name,
+        "hash": policy.hash,
+        "values": policy_values(policy),
+        "yaml": policy_to_yaml(policy),
+    }

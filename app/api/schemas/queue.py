@@ -44,9 +44,19 @@ class GroupRow(BaseModel):
     parallax_degrees: float | None
     size_ratio: float | None
     height_m: float | None
+    distance_m: float | None = Field(
+        description="Of the ball from the camera of the first view that it comes from."
+    )
+    box_px: float | None = Field(
+        description="Diameter of the ball there: annotated, or, of a point, as optimised."
+    )
+    x_m: float | None
+    y_m: float | None
     views: int
     findings: list[str]
     reviewer: str | None
+    reason: str | None
+    override: str | None = Field(description="The gate that was overridden with a reason.")
     fixed: bool
     changed: datetime
     thumbnail: str | None

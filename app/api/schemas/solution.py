@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, Field
 
 from app.datasets.camera_json import camera_to_json
+from app.review.camera_sigma import CameraSigma, camera_sigma
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 from app.soccer.solution import (
     GAMMAS_PERCENT,
@@ -101,11 +102,30 @@ class SuspectDocument(BaseModel):
         return SuspectDocument.model_construct(**vars(suspect))
 
 
+class CameraSigmaDocument(BaseModel):
+    """One standard deviation of each number of a camera."""
+
+    pan_degrees: float
+    tilt_degrees: float
+    roll_degrees: float
+    position_meters: XYZ
+    focal_px: float
+    k1: float
+
+    @staticmethod
+    def of(sigma: CameraSigma) -> CameraSigmaDocument:
+        """The document of a camera's standard deviations."""
+        return CameraSigmaDocument.model_construct(**vars(sigma))
+
+
 class CalibrationDocument(BaseModel):
     """The camera of a view and how well it is known."""
 
     source: str = Field(description="`given` or `lines`.")
     camera: CameraDocument | None
+    sigma: CameraSigmaDocument | None = Field(
+        description="How well the lines determine the camera; null for a given one."
+    )
     reason: str | None = Field(description="Why there is no camera.")
     jac: dict[str, float] | None = Field(
         description="JaC at 0.5, 1 and 2 % of the diagonal.", examples=[{"0.5": 0.94, "1": 1.0}]
@@ -120,9 +140,11 @@ class CalibrationDocument(BaseModel):
         """The document of a calibration."""
         camera = calibration.camera
         jac = calibration.jac
+        sigma = camera_sigma(calibration)
         return CalibrationDocument.model_construct(
             source=calibration.source,
             camera=None if camera is None else _camera(camera_to_json(camera)),
+            sigma=None if sigma is None else CameraSigmaDocument.of(sigma),
             reason=calibration.reason,
             jac=None
             if jac is None

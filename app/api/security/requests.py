@@ -9,6 +9,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problem import make_problem, problem_response
 
+_HEAD = "touchline.head"
 _ONE_RANGE = re.compile(rb"bytes=(\d{1,18}-\d{0,18}|-\d{1,18})")
 
 
@@ -28,7 +29,12 @@ class HeadAsGet:
                 message = {**message, "body": b""}
             await send(message)
 
-        await self.app({**scope, "method": "GET"}, receive, send_without_body)
+        await self.app({**scope, "method": "GET", _HEAD: True}, receive, send_without_body)
+
+
+def is_head(scope: Scope) -> bool:
+    """Whether a request that looks like GET was HEAD: what has no end must end at once."""
+    return bool(scope.get(_HEAD))
 
 
 class OneRange:

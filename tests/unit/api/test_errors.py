@@ -9,7 +9,6 @@ from fastapi import FastAPI, Path, Query
 from sqlalchemy.exc import OperationalError
 
 from app.api.errors import (
-    BusyError,
     PreconditionRequiredError,
     StaleStateError,
     install_handlers,
@@ -25,6 +24,7 @@ from app.errors import (
     InputError,
     NoConvergenceError,
     NotFoundError,
+    OverloadedError,
     ReviewError,
     SharedStationError,
     StaleRevisionError,
@@ -62,11 +62,11 @@ CASES: list[tuple[ReviewError, int]] = [
     (StaleStateError(STALE, {}), 412),
     (IdempotencyError("x"), 422),
     (PreconditionRequiredError("x"), 428),
-    (BusyError("x"), 429),
     (DegenerateGeometryError("x"), 422),
     (NoConvergenceError("x"), 422),
     (StorageError("x"), 503),
     (full_disk(), 507),
+    (OverloadedError("x"), 503),
 ]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from app.api.schemas.solution import SolutionDocument
@@ -32,6 +33,20 @@ class TestSolutionDocument:
     def test_jac_is_named_by_its_threshold(self, solution: Solution) -> None:
         view = SolutionDocument.of(solution).views[0]
         assert list(view.calibration.jac) == ["0.5", "1", "2"]
+
+    def test_a_camera_says_how_well_it_is_known_where_that_is_known(
+        self, solution: Solution
+    ) -> None:
+        first = solution.views[0]
+        spread = tuple((np.eye(8) * 1e-4).ravel().tolist())
+        known = replace(first, calibration=replace(first.calibration, covariance=spread))
+        open_ = replace(first, calibration=replace(first.calibration, covariance=None))
+        documents = SolutionDocument.of(replace(solution, views=(known, open_))).views
+        sigma = documents[0].calibration.sigma
+        assert sigma is not None
+        assert sigma.position_meters == pytest.approx((0.01, 0.01, 0.01))
+        assert sigma.pan_degrees == pytest.approx(0.5729577951)
+        assert documents[1].calibration.sigma is None
 
     def test_the_document_fits_its_own_schema(self, solution: Solution) -> None:
         text = SolutionDocument.of(solution).model_dump_json()

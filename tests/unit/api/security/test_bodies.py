@@ -163,3 +163,38 @@ class TestJsonBodies:
     def test_a_body_of_another_type_never_arrives(self) -> None:
         done = Exchange([b"a=1"], [(b"content-type", b"text/plain")], "POST").run(10)
         assert (done.status, done.reached) == (415, None)
+
+
+class TestStreamedBodies:
+    def test_bytes_pass_as_they_come_and_nothing_else_does(self) -> None:
+        assert _ask("POST", b"application/octet-stream") == [b"\x00{not json", b"more"]
+        assert _ask("POST", b"application/json") == 415
+        assert _ask("POST", b"application/octet-stream; charset=x") == 415
+        assert _ask("PUT", b"application/octet-stream") == 415
+
+
+def _ask(method: str, kind: bytes) -> Any:
+    """What the application behind sees of two chunks, or the status of a refusal."""
+    chunks = [b"\x00{not json", b"more"]
+    seen: list[bytes] = []
+    statuses: list[int] = []
+
+    async def app(scope: Any, receive: Any, send: Any) -> None:
+        while True:
+            message = await receive()
+            seen.append(message["body"])
+            if not message.get("more_body"):
+                return
+
+    async def receive() -> Any:
+        body = chunks.pop(0)
+        return {"type": "http.request", "body": body, "more_body": bool(chunks)}
+
+    async def send(message: Any) -> None:
+        if message["type"] == "http.response.start":
+            statuses.append(message["status"])
+
+    scope = {"type": "http", "method": method, "path": "/up", "headers": [(b"content-type", kind)]}
+    guarded = JsonBodies(app, streamed=frozenset({"/up"}))
+    asyncio.run(guarded(scope, receive, send))
+    return statuses[0] if statuses else seen

@@ -1,0 +1,214 @@
+"""Events: what changed, told to every browser that listens.
+
+A thread of its own looks at the log while somebody listens, so that edits of other processes are
+told too and no request waits for it. Each listener has a bounded queue: one that does not keep up
+is let go, comes back with the last id that it saw, and misses nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections import deque
+from collections.abc import AsyncIterator
+
+import structlog
+from fastapi.sse import ServerSentEvent
+
+from app.api.schemas.event import DatasetEvent, GroupEvent
+from app.api.schemas.job import JobDocument
+from app.errors import OverloadedError, StorageError
+from app.review.changes import (
+    Change,
+    newest_entry,
+    newest_solution,
+    read_changes,
+    read_solved,
+)
+from app.review.jobs import Jobs
+from app.store.jobs import OPEN, Job
+from app.store.session import Store
+
+log = structlog.get_logger("touchline.events")
+
+TICK = 0.15
+"""Seconds between two looks at the log."""
+MAX_FEEDS = 100
+"""Listeners at a time; a browser has one a window."""
+MAX_WAITING = 1000
+"""Events that a listener may be behind."""
+RETRY_MS = 1000
+"""How long a browser waits before it comes back."""
+
+
+class Feed:
+    """One listener: what it has not been told yet.
+
+    Args:
+        dataset_id: Tell of this dataset alone; None: of all.
+        position: Id of the log entry up to which it knows everything.
+    """
+
+    def __init__(self, dataset_id: int | None, position: int):
+        self.dataset_id, self.position = dataset_id, position
+        self._events: deque[ServerSentEvent] = deque()
+        self._loop = asyncio.get_running_loop()
+        self._ready, self._ended = asyncio.Event(), False
+
+    def wants(self, dataset_id: int | None) -> bool:
+        """Whether what happens in a dataset (None: in none) is told here."""
+        return self.dataset_id is None or dataset_id in (None, self.dataset_id)
+
+    def offer(self, events: list[ServerSentEvent]) -> None:
+        """Tell of something; from any thread."""
+        if events:
+            self._call(events, False)
+
+    def end(self) -> None:
+        """Tell no more; from any thread."""
+        self._call([], True)
+
+    async def read(self) -> AsyncIterator[ServerSentEvent]:
+        """Events as they come, until the feed ends."""
+        while True:
+            await self._ready.wait()
+            self._ready.clear()
+            while self._events:
+                yield self._events.popleft()
+            if self._ended:
+                return
+
+    def _call(self, events: list[ServerSentEvent], ended: bool) -> None:
+        try:
+            self._loop.call_soon_threadsafe(self._take, events, ended)
+        except RuntimeError:
+            # The loop of a server that has stopped.
+            return
+
+    def _take(self, events: list[ServerSentEvent], ended: bool) -> None:
+        self._ended = self._ended or ended or len(self._events) + len(events) > MAX_WAITING
+        if not self._ended:
+            self._events.extend(events)
+        self._ready.set()
+
+
+class Events:
+    """All listeners of one server, and the thread that looks at the log for them."""
+
+    def __init__(self, store: Store, jobs: Jobs):
+        self._store, self._jobs = store, jobs
+        self._feeds: set[Feed] = set()
+        self._lock = threading.Lock()
+        self._wake, self._closing = threading.Event(), threading.Event()
+        self._thread: threading.Thread | None = None
+        self._solutions = 0
+        jobs.listen(self._tell_job)
+
+    def position(self) -> int:
+        """Id of the newest entry of the log."""
+        with self._store.read() as session:
+            return newest_entry(session)
+
+    def subscribe(self, dataset_id: int | None, position: int) -> Feed:
+        """Begin to listen; on the event loop.
+
+        Raises:
+            OverloadedError: Too many listen, or the server stops.
+        """
+        feed = Feed(dataset_id, position)
+        with self._lock:
+            if len(self._feeds) >= MAX_FEEDS or self._closing.is_set():
+                raise OverloadedError("too many windows listen for events")
+            self._feeds.add(feed)
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._tail, name="events", daemon=True)
+                self._thread.start()
+        self._wake.set()
+        return feed
+
+    def unsubscribe(self, feed: Feed) -> None:
+        """Listen no more."""
+        with self._lock:
+            self._feeds.discard(feed)
+
+    def open_jobs(self, dataset_id: int | None) -> list[ServerSentEvent]:
+        """Jobs that are under way, for whoever begins to listen."""
+        jobs = self._jobs.find(dataset_id=dataset_id, states=OPEN)
+        return [_job_event(job) for job in reversed(jobs)]
+
+    def close(self) -> None:
+        """End every feed, so that the server can stop; may be called twice."""
+        self._closing.set()
+        self._wake.set()
+        for feed in self._listening():
+            feed.end()
+        thread = self._thread
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(5)
+
+    def _listening(self) -> list[Feed]:
+        with self._lock:
+            return list(self._feeds)
+
+    def _tail(self) -> None:
+        awake = False
+        while not self._closing.is_set():
+            feeds = self._listening()
+            if not feeds:
+                awake = False
+                self._wake.wait()
+                self._wake.clear()
+                continue
+            try:
+                self._look(feeds, first=not awake)
+                awake = True
+            except StorageError as error:
+                log.warning("the log could not be read", error=str(error))
+            except Exception:
+                log.exception("events could not be told")
+            self._closing.wait(TICK)
+
+    def _look(self, feeds: list[Feed], *, first: bool) -> None:
+        """Tell each listener what has happened since it was told last."""
+        with self._store.read() as session:
+            newest, solution = newest_entry(session), newest_solution(session)
+            places = {feed.position for feed in feeds if feed.position < newest}
+            changes = {place: read_changes(session, place) for place in places}
+            solved: list[Change] = []
+            if not first and solution > self._solutions:
+                told = {item.group_id for items in changes.values() for item in items}
+                solved = read_solved(session, self._solutions, told)
+        self._solutions = solution
+        for feed in feeds:
+            wanted = [*changes.get(feed.position, []), *solved]
+            feed.position = max(feed.position, newest)
+            feed.offer([_change_event(item) for item in wanted if feed.wants(item.dataset_id)])
+
+    def _tell_job(self, job: Job) -> None:
+        for feed in self._listening():
+            if feed.wants(job.dataset_id):
+                feed.offer([_job_event(job)])
+
+
+def hello(position: int) -> ServerSentEvent:
+    """What a listener gets first: where it stands, should it have to come back."""
+    return ServerSentEvent(comment="listening", id=str(position), retry=RETRY_MS)
+
+
+def _change_event(change: Change) -> ServerSentEvent:
+    identity = None if change.id is None else str(change.id)
+    if change.group_id is None:
+        told = DatasetEvent(dataset=change.dataset, kind=change.kind, actor=change.actor)
+        return ServerSentEvent(event="dataset", data=told, id=identity)
+    group = GroupEvent(
+        group=change.group_id,
+        dataset=change.dataset,
+        etag=change.etag,
+        kind=change.kind,
+        actor=change.actor,
+    )
+    return ServerSentEvent(event="group", data=group, id=identity)
+
+
+def _job_event(job: Job) -> ServerSentEvent:
+    return ServerSentEvent(event="job", data=JobDocument.of(job))

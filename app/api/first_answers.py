@@ -1,0 +1,208 @@
+"""Idempotency-Key: a request that is sent again gets the answer that it got the first time.
+
+What makes an edit happen once is written with the edit itself (``review.idempotency``). This adds
+the first answer, whatever became of the state since, and covers every route that changes something.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import re
+
+import structlog
+from anyio.to_thread import run_sync
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.api.errors import RETRY_SECONDS, status_of
+from app.api.problem import make_problem, problem_response
+from app.api.security.bodies import BYTES
+from app.api.security.origin import SAFE_METHODS
+from app.errors import OverloadedError, ReviewError, StorageError
+from app.store.answers import Answer, find_answer, keep_answer
+from app.store.codecs import canonical, parse
+from app.store.session import Store
+
+log = structlog.get_logger("touchline.api")
+
+HEADER = "Idempotency-Key"
+KEY = re.compile(r"[\x21-\x7e]{1,200}")
+REPLAYED = "Idempotency-Replayed"
+"""Says that an answer is not a new one."""
+MAX_ANSWER_BYTES = 8 * 1024 * 1024
+"""Larger answers are not kept; no route that changes something gives one."""
+_KEPT_HEADERS = ("content-type", "etag", "location", "cache-control")
+PATIENCE = 60.0
+"""Seconds that a repetition waits for the first one to be answered."""
+
+
+class FirstAnswers:
+    """Answers a repetition with the first answer, and the same key with another request with 422.
+
+    Args:
+        app: What answers for the first time.
+        store: Where answers are kept.
+        actor: Whose keys they are.
+    """
+
+    def __init__(self, app: ASGIApp, store: Store, actor: str):
+        self.app, self._store, self._actor = app, store, actor
+        self._under_way: dict[str, asyncio.Event] = {}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One request."""
+        if scope["type"] != "http" or scope["method"] in SAFE_METHODS:
+            await self.app(scope, receive, send)
+            return
+        keys = Headers(scope=scope).getlist(HEADER)
+        if not keys:
+            await self.app(scope, receive, send)
+        elif len(keys) > 1 or not KEY.fullmatch(keys[0]):
+            problem = make_problem(400, f"{HEADER} must be 1 to 200 visible ASCII characters")
+            await problem_response(problem)(scope, receive, send)
+        else:
+            await self._once(keys[0], scope, receive, send)
+
+    async def _once(self, key: str, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            while (first := self._under_way.get(key)) is not None:
+                await asyncio.wait_for(first.wait(), PATIENCE)
+        except TimeoutError:
+            error = OverloadedError("the first request of this key is still being answered")
+            await _refuse(error, scope, receive, send)
+            return
+        done = self._under_way[key] = asyncio.Event()
+        try:
+            await self._answer(key, _Request(scope, receive), send)
+        finally:
+            del self._under_way[key]
+            done.set()
+
+    async def _answer(self, key: str, request: _Request, send: Send) -> None:
+        try:
+            known = await run_sync(self._find, key)
+        except StorageError as error:
+            await _refuse(error, request.scope, request.receive, send)
+            return
+        if known is None:
+            await self._first(key, request, send)
+        else:
+            await _again(known, request, send)
+
+    async def _first(self, key: str, request: _Request, send: Send) -> None:
+        if not request.streamed:
+            await request.read()
+        recorded = _Recorded(send)
+        await self.app(request.scope, request.receive, recorded.send)
+        if recorded.is_kept:
+            try:
+                await run_sync(self._keep, key, recorded.answer(request.digest()))
+            except StorageError as error:
+                # It is sent already; a repetition is answered with the state as it is then.
+                log.warning("an answer could not be kept", error=str(error))
+
+    def _find(self, key: str) -> Answer | None:
+        with self._store.read() as session:
+            return find_answer(session, key, self._actor)
+
+    def _keep(self, key: str, answer: Answer) -> None:
+        with self._store.write() as session:
+            keep_answer(session, key, self._actor, answer)
+
+
+async def _refuse(error: ReviewError, scope: Scope, receive: Receive, send: Send) -> None:
+    problem = make_problem(status_of(error), error.message, hint=error.hint)
+    await problem_response(problem, {"Retry-After": RETRY_SECONDS})(scope, receive, send)
+
+
+async def _again(known: Answer, request: _Request, send: Send) -> None:
+    await request.read()
+    if request.digest() != known.request_digest:
+        problem = make_problem(
+            422, f"this {HEADER} was used for another request", hint="Send a new key with it."
+        )
+        await problem_response(problem)(request.scope, request.receive, send)
+        return
+    headers = [(name.encode(), text.encode("latin-1")) for name, text in known.headers.items()]
+    headers.append((REPLAYED.lower().encode(), b"true"))
+    headers.append((b"content-length", str(len(known.body)).encode()))
+    await send({"type": "http.response.start", "status": known.status, "headers": headers})
+    await send({"type": "http.response.body", "body": known.body})
+
+
+class _Request:
+    """A request and the digest of what it asks for; an upload's body is digested as it passes."""
+
+    def __init__(self, scope: Scope, receive: Receive):
+        self.scope, self._receive = scope, receive
+        kind = Headers(scope=scope).get("content-type", "")
+        self.streamed = kind.strip().lower() == BYTES
+        self._sum = hashlib.sha256()
+        self._body: list[bytes] = []
+        self._ended = self._replayed = False
+
+    async def read(self) -> None:
+        """Read the rest of the body; one that is not streamed can be received once more."""
+        while not self._ended:
+            await self._next()
+
+    async def receive(self) -> Message:
+        """The next message for whoever answers."""
+        if self.streamed or self._replayed:
+            return await self._next()
+        self._replayed = True
+        return {"type": "http.request", "body": b"".join(self._body), "more_body": False}
+
+    def digest(self) -> str:
+        """Of method, address and body; the same JSON in another order is the same."""
+        place = (self.scope["method"], self.scope["path"], self.scope["query_string"].decode())
+        if self.streamed:
+            body = self._sum.hexdigest()
+        else:
+            text = b"".join(self._body)
+            body = canonical(parse(text.decode())) if text else ""
+        return hashlib.sha256(canonical([*place, body]).encode()).hexdigest()
+
+    async def _next(self) -> Message:
+        message = await self._receive()
+        if message["type"] == "http.request":
+            part = message.get("body", b"")
+            if self.streamed:
+                self._sum.update(part)
+            else:
+                self._body.append(part)
+            self._ended = self._ended or not message.get("more_body", False)
+        else:
+            self._ended = True
+        return message
+
+
+class _Recorded:
+    """Passes an answer on and remembers it."""
+
+    def __init__(self, send: Send):
+        self._send = send
+        self._status, self._headers = 0, Headers()
+        self._body = bytearray()
+        self._ended = False
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether it is a whole success; what was refused may be tried again."""
+        return self._ended and 200 <= self._status < 300 and len(self._body) <= MAX_ANSWER_BYTES
+
+    async def send(self, message: Message) -> None:
+        """The next message of the answer."""
+        if message["type"] == "http.response.start":
+            self._status, self._headers = message["status"], Headers(raw=message["headers"])
+        elif message["type"] == "http.response.body":
+            if len(self._body) <= MAX_ANSWER_BYTES:
+                self._body += message.get("body", b"")
+            self._ended = not message.get("more_body", False)
+        await self._send(message)
+
+    def answer(self, digest: str) -> Answer:
+        """What is kept."""
+        headers = {name: self._headers[name] for name in _KEPT_HEADERS if name in self._headers}
+        return Answer(digest, self._status, headers, bytes(self._body))

@@ -1,0 +1,73 @@
+"""Verdicts for every group that a query matches, and their undo."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from app.api.deps import Actor, AppStore, Id, IdempotencyKey
+from app.api.problem import responses
+from app.api.routers.datasets import DatasetPath
+from app.api.schemas.bulk import BatchDocument, BatchList, BulkResult, BulkVerdict, UndoDocument
+from app.review import bulk, bulk_undo
+from app.review.datasets import dataset_id
+
+router = APIRouter(tags=["verdicts"])
+
+DryRun = Annotated[bool, Query(description="Only say what would happen.")]
+
+
+@router.post(
+    "/datasets/{dataset}/verdicts",
+    operation_id="setVerdicts",
+    responses=responses(404, 409, 413, 415),
+)
+def post_verdicts(
+    dataset: DatasetPath,
+    verdict: BulkVerdict,
+    store: AppStore,
+    actor: Actor,
+    key: IdempotencyKey,
+    dry_run: DryRun = False,
+) -> BulkResult:
+    """Judge every group that the query matches, as each of them is when its turn comes.
+
+    Accepting a group that fails a gate needs a note; without one such groups are refused and
+    counted, as are groups that nobody has solved. Groups that have this very verdict already
+    stay as they are.
+    """
+    found = dataset_id(store, dataset)
+    said = (verdict.q, verdict.state, verdict.reason, verdict.note)
+    if dry_run:
+        return BulkResult.planned(bulk.plan_verdicts(store, found, *said))
+    report = bulk.give_verdicts(
+        store, found, *said, actor=actor, expected=verdict.expected, idempotency_key=key
+    )
+    return BulkResult.done(report)
+
+
+@router.get(
+    "/datasets/{dataset}/verdict-batches",
+    operation_id="listVerdictBatches",
+    responses=responses(404),
+)
+def list_batches(
+    dataset: DatasetPath, store: AppStore, limit: Annotated[int, Query(ge=1, le=100)] = 20
+) -> BatchList:
+    """The newest bulk verdicts of a dataset."""
+    batches = bulk.list_batches(store, dataset_id(store, dataset), limit)
+    return BatchList(items=[BatchDocument.of(item) for item in batches])
+
+
+@router.post(
+    "/verdict-batches/{batch}/undo",
+    operation_id="undoVerdictBatch",
+    responses=responses(404, 409),
+)
+def undo_batch(batch: Id, store: AppStore, actor: Actor) -> UndoDocument:
+    """Give each group of a batch the verdict back that it had before; 409 the second time.
+
+    Groups that somebody has judged since keep that verdict.
+    """
+    return UndoDocument(**vars(bulk_undo.undo_batch(store, batch, actor=actor)))

@@ -1,0 +1,181 @@
+"""Evaluations: started, listed, read with their figures and frames, compared."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Path, Query, Response
+
+from app.api.deps import MAX_ID, Actor, AppServices, AppStore, Id, IdempotencyKey
+from app.api.jobs import ACCEPTED, accepted
+from app.api.problem import Responses, responses
+from app.api.schemas.evaluation import (
+    ComparisonDocument,
+    EvaluationBody,
+    EvaluationDocument,
+    EvaluationList,
+    EvaluationRow,
+    FigureDocument,
+    FrameList,
+)
+from app.api.schemas.job import JobDocument
+from app.errors import InputError
+from app.evaluation.comparison import FIELDS
+from app.evaluation.figure import FIGURES
+from app.evaluation.figure_csv import figure_csv
+from app.evaluation.figure_png import figure_png
+from app.evaluation.result import NUMBERS
+from app.review import evaluations as review
+from app.review.evaluation_jobs import request_evaluation
+
+router = APIRouter(tags=["evaluations"])
+
+DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
+FigureName = StrEnum("FigureName", list(FIGURES))  # type: ignore[misc]
+FrameField = StrEnum("FrameField", list(NUMBERS))  # type: ignore[misc]
+CompareField = StrEnum("CompareField", list(FIELDS))  # type: ignore[misc]
+SortField = StrEnum("SortField", [*NUMBERS, *(f"{name}-desc" for name in NUMBERS)])  # type: ignore[misc]
+PLACE_ERROR = CompareField("error_m")
+Limit = Annotated[int, Query(ge=1, le=review.MAX_PAGE)]
+Cursor = Annotated[str | None, Query(max_length=20, description="`next` of the page before.")]
+Bound = Annotated[float | None, Query(ge=-1e9, le=1e9, allow_inf_nan=False)]
+FIGURE_FILES: Responses = {
+    200: {
+        "description": "The figure: its values as JSON or CSV, or drawn as PNG.",
+        "content": {
+            "application/json": {"schema": {"$ref": "#/components/schemas/FigureDocument"}},
+            "text/csv": {"schema": {"type": "string"}},
+            "image/png": {"schema": {"type": "string", "format": "binary"}},
+        },
+    }
+}
+
+
+@router.get(
+    "/datasets/{dataset}/evaluations", operation_id="listEvaluations", responses=responses(404)
+)
+def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
+    """The evaluations of a dataset, the newest first."""
+    found = review.list_evaluations(store, dataset)
+    return EvaluationList(items=[EvaluationRow.of(item) for item in found])
+
+
+@router.post(
+    "/datasets/{dataset}/evaluations",
+    operation_id="startEvaluation",
+    status_code=202,
+    responses={**responses(404, 409, 413, 415), **ACCEPTED},
+)
+def start_evaluation(
+    dataset: DatasetPath,
+    request: EvaluationBody,
+    services: AppServices,
+    actor: Actor,
+    _key: IdempotencyKey,
+    response: Response,
+) -> JobDocument:
+    """Evaluate predictions against a frozen version, or the dataset as it is now.
+
+    The job's result names the evaluation.
+    """
+    job = request_evaluation(services.jobs, services.store, dataset, request.value(), actor=actor)
+    return accepted(job, response)
+
+
+@router.get("/evaluations/{evaluation}", operation_id="getEvaluation", responses=responses(404))
+def get_evaluation(evaluation: Id, store: AppStore) -> EvaluationDocument:
+    """One evaluation: what it pins, its tables, and the names of its figures."""
+    return EvaluationDocument.of(review.get_evaluation(store, evaluation))
+
+
+@router.delete(
+    "/evaluations/{evaluation}",
+    operation_id="deleteEvaluation",
+    status_code=204,
+    responses=responses(404),
+)
+def delete_evaluation(evaluation: Id, store: AppStore) -> None:
+    """Delete an evaluation; its predictions stay."""
+    review.remove_evaluation(store, evaluation)
+
+
+@router.get(
+    "/evaluations/{evaluation}/figures/{figure}.{ending}",
+    operation_id="getFigure",
+    response_class=Response,
+    responses={**responses(404), **FIGURE_FILES},
+)
+def get_figure(
+    evaluation: Id,
+    figure: FigureName,
+    ending: Literal["json", "csv", "png"],
+    store: AppStore,
+) -> Response:
+    """One figure of an evaluation; 404 where the evaluation has no such figure."""
+    found = review.get_figure(store, evaluation, str(figure))
+    if ending == "json":
+        return Response(FigureDocument.of(found).model_dump_json(), media_type="application/json")
+    name = f'attachment; filename="touchline-{evaluation}-{figure}.{ending}"'
+    if ending == "csv":
+        headers = {"Content-Disposition": name}
+        return Response(figure_csv(found), media_type="text/csv; charset=utf-8", headers=headers)
+    inline = {"Content-Disposition": name.replace("attachment", "inline")}
+    return Response(figure_png(found), media_type="image/png", headers=inline)
+
+
+@router.get(
+    "/evaluations/{evaluation}/frames",
+    operation_id="listEvaluationFrames",
+    responses=responses(404),
+)
+def list_frames(
+    evaluation: Id,
+    store: AppStore,
+    field: Annotated[
+        FrameField | None, Query(description="Frames with a value here, in [low, high).")
+    ] = None,
+    low: Bound = None,
+    high: Bound = None,
+    missing: Annotated[
+        bool, Query(description="Frames with a ball and without a value in `field` instead.")
+    ] = False,
+    match: Annotated[str | None, Query(max_length=500)] = None,
+    sort: Annotated[SortField | None, Query()] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
+) -> FrameList:
+    """The frames behind a number: a row's `frames` are parameters of this address."""
+    query = review.FrameQuery(
+        None if field is None else str(field), low, high, missing, match, str(sort or "")
+    )
+    return FrameList.of(review.list_frames(store, evaluation, query, limit, _place(cursor)))
+
+
+@router.get(
+    "/evaluations/{evaluation}/compare",
+    operation_id="compareEvaluations",
+    responses=responses(404),
+)
+def compare_evaluations(
+    evaluation: Id,
+    store: AppStore,
+    other: Annotated[
+        int,
+        Query(alias="with", ge=1, le=MAX_ID, description="The evaluation to compare with."),
+    ],
+    field: Annotated[CompareField, Query(description="Compared frame by frame.")] = PLACE_ERROR,
+    limit: Limit = 50,
+    cursor: Cursor = None,
+) -> ComparisonDocument:
+    """How this evaluation differs from another of the same dataset; changes are this minus that."""
+    found = review.compare(store, other, evaluation, str(field))
+    return ComparisonDocument.of(found, limit, _place(cursor))
+
+
+def _place(cursor: str | None) -> int:
+    if cursor is None:
+        return 0
+    if not (cursor.isascii() and cursor.isdigit() and len(cursor) < 10):
+        raise InputError("the cursor is none of ours", pointer="/cursor")
+    return int(cursor)

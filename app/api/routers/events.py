@@ -1,0 +1,93 @@
+"""Events: a stream of what changes, for every window that is open."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Header, Query, Request
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+
+from app.api.deps import AppServices, Services, get_services
+from app.api.events import Feed, hello
+from app.api.problem import Responses, responses
+from app.api.security.requests import is_head
+from app.review.datasets import get_dataset
+
+router = APIRouter(prefix="/events", tags=["events"])
+
+STREAM: Responses = {
+    200: {
+        "description": "Server-sent events `group`, `job` and `dataset`, without end.",
+        "content": {"text/event-stream": {"schema": {"type": "string"}}},
+    }
+}
+
+
+class Start:
+    """Where a listener begins: all that asks the database, done off the event loop."""
+
+    def __init__(
+        self,
+        services: Annotated[Services, Depends(get_services)],
+        dataset: Annotated[
+            str | None, Query(max_length=200, description="Name or id; default: all datasets.")
+        ] = None,
+        last_event_id: Annotated[
+            str | None,
+            Header(
+                alias="Last-Event-ID",
+                description="`id` of the last event that was seen: what came after it is told "
+                "first. Anything that is no such id counts as none.",
+            ),
+        ] = None,
+    ):
+        self.dataset_id = None if dataset is None else get_dataset(services.store, dataset).id
+        newest = services.events.position()
+        seen = last_event_id or ""
+        known = seen.isascii() and seen.isdigit() and len(seen) < 19 and int(seen) <= newest
+        self.position = int(seen) if known else newest
+
+
+async def begin(services: AppServices, start: Annotated[Start, Depends()]) -> AsyncIterator[Feed]:
+    """A feed for as long as the request lasts."""
+    feed = services.events.subscribe(start.dataset_id, start.position)
+    try:
+        yield feed
+    finally:
+        services.events.unsubscribe(feed)
+
+
+def under_way(
+    services: AppServices,
+    start: Annotated[Start, Depends()],
+    _feed: Annotated[Feed, Depends(begin)],
+) -> list[ServerSentEvent]:
+    """Jobs that are under way, read once the feed hears of what becomes of them."""
+    return services.events.open_jobs(start.dataset_id)
+
+
+@router.get(
+    "",
+    operation_id="listen",
+    response_class=EventSourceResponse,
+    responses={**responses(404), **STREAM},
+)
+async def listen(
+    request: Request,
+    start: Annotated[Start, Depends()],
+    feed: Annotated[Feed, Depends(begin)],
+    jobs: Annotated[list[ServerSentEvent], Depends(under_way)],
+) -> AsyncIterator[ServerSentEvent]:
+    """What changes, as it changes: by anybody, in a browser or on the command line.
+
+    `group`: a group has another ETag. `dataset`: a dataset changed as a whole. `job`: a job began,
+    went on or ended. The stream begins with the jobs that are under way.
+    """
+    yield hello(start.position)
+    for event in jobs:
+        yield event
+    if is_head(request.scope):
+        return
+    async for event in feed.read():
+        yield event

@@ -1,0 +1,54 @@
+"""Imports: carried out as jobs, from uploads or from folders that the operator allows."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from app.api.deps import Actor, AppServices
+from app.api.jobs import ACCEPTED, accepted
+from app.api.problem import responses
+from app.api.schemas.imports import FolderDocument, ImportBody
+from app.api.schemas.job import JobDocument
+from app.review.import_folders import list_folder
+from app.review.import_jobs import request_import
+
+router = APIRouter(prefix="/imports", tags=["imports"])
+
+FolderPath = Annotated[
+    str, Query(max_length=4000, description="`path` of an item; empty for the allowed folders.")
+]
+
+
+@router.get("/folders", operation_id="listImportFolders", responses=responses(404))
+def get_folders(services: AppServices, path: FolderPath = "") -> FolderDocument:
+    """What may be imported from: the operator names folders in TOUCHLINE_IMPORT_FOLDERS."""
+    return FolderDocument.of(list_folder(services.settings, path))
+
+
+@router.post(
+    "",
+    operation_id="startImport",
+    status_code=202,
+    responses={**responses(404, 413, 415, 503), **ACCEPTED},
+)
+def start_import(
+    request: ImportBody,
+    services: AppServices,
+    actor: Actor,
+    response: Response,
+) -> JobDocument:
+    """Read files into a dataset, which is made when there is none of that name.
+
+    The job's result is the report: read, imported, new, changed, unchanged, findings, and what
+    was skipped with file, record and reason. A dry run reports the same and keeps nothing.
+    """
+    job = request_import(
+        services.jobs,
+        services.store,
+        services.settings,
+        request.value(),
+        actor=actor,
+    )
+    return accepted(job, response)

@@ -1,0 +1,68 @@
+"""Jobs: listed, looked at, cancelled."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from app.api.deps import AppServices, Id
+from app.api.problem import responses
+from app.api.schemas.job import JobDocument, JobKind, JobPage, JobState
+from app.errors import InputError
+from app.review.datasets import get_dataset
+
+router = APIRouter(prefix="/jobs", tags=["jobs"])
+
+Limit = Annotated[int, Query(ge=1, le=500)]
+Cursor = Annotated[str | None, Query(max_length=30, description="`next` of the page before.")]
+DatasetFilter = Annotated[
+    str | None, Query(max_length=200, description="Name or id of the dataset; default: all.")
+]
+
+
+@router.get("", operation_id="listJobs", responses=responses(404))
+def list_jobs(
+    services: AppServices,
+    dataset: DatasetFilter = None,
+    kind: Annotated[JobKind | None, Query()] = None,
+    state: Annotated[JobState | None, Query()] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
+) -> JobPage:
+    """Jobs, the newest first."""
+    found = None if dataset is None else get_dataset(services.store, dataset).id
+    jobs = services.jobs.find(
+        dataset_id=found,
+        kinds=[kind] if kind else [],
+        states=[state] if state else [],
+        before=parse_cursor(cursor),
+        limit=limit + 1,
+    )
+    more = str(jobs[limit - 1].id) if len(jobs) > limit else None
+    return JobPage(items=[JobDocument.of(job) for job in jobs[:limit]], next=more)
+
+
+@router.get("/{job}", operation_id="getJob", responses=responses(404))
+def get_job(job: Id, services: AppServices) -> JobDocument:
+    """A job as it stands."""
+    return JobDocument.of(services.jobs.get(job))
+
+
+@router.delete("/{job}", operation_id="cancelJob", responses=responses(404, 409))
+def cancel_job(job: Id, services: AppServices) -> JobDocument:
+    """End a job: one that waits at once, one that runs at its next step; 409 when it is over."""
+    return JobDocument.of(services.jobs.cancel(job))
+
+
+def parse_cursor(cursor: str | None) -> int | None:
+    """The id that a cursor stands for.
+
+    Raises:
+        InputError: It is none of ours.
+    """
+    if cursor is None:
+        return None
+    if not (cursor.isascii() and cursor.isdigit() and len(cursor) < 19):
+        raise InputError("the cursor is none of ours", pointer="/cursor")
+    return int(cursor)

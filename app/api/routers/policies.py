@@ -1,0 +1,123 @@
+"""Policies: those that are shipped, the one that judges a dataset, and the change to another."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Response
+
+from app.api.conflicts import current_state
+from app.api.deps import Actor, AppServices, AppStore, IdempotencyKey, IfMatch
+from app.api.jobs import accepted
+from app.api.problem import Responses, responses
+from app.api.schemas.job import JobDocument
+from app.api.schemas.policy import (
+    PolicyCatalogue,
+    PolicyChange,
+    PolicyFieldDocument,
+    PolicyStateDocument,
+    ShippedPolicyDocument,
+)
+from app.errors import InputError
+from app.review.datasets import get_dataset
+from app.review.policies import change_policy, read_policy
+from app.review.policy_fields import FIELDS
+from app.review.policy_text import CUSTOM, policy_from_yaml, policy_with
+from app.review.solve_job import request_solve
+from app.soccer.policy import POLICIES, Policy
+
+router = APIRouter(tags=["policies"])
+
+DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
+TAGGED = {"ETag": {"description": "The policy's state.", "schema": {"type": "string"}}}
+LOCATED = {"Location": {"description": "Of the job.", "schema": {"type": "string"}}}
+CHANGED: Responses = {
+    202: {
+        "description": "The job that solves what the policy left stale.",
+        "headers": {**TAGGED, **LOCATED},
+    }
+}
+
+
+@router.get("/policies", operation_id="listPolicies", responses=responses())
+def list_policies() -> PolicyCatalogue:
+    """The policies that come with the software, and what can be set in one."""
+    return PolicyCatalogue(
+        items=[ShippedPolicyDocument.of(policy) for policy in POLICIES.values()],
+        fields=[
+            PolicyFieldDocument.model_validate(
+                {name: getattr(field, name) for name in PolicyFieldDocument.model_fields}
+            )
+            for field in FIELDS
+        ],
+    )
+
+
+@router.get(
+    "/datasets/{dataset}/policy",
+    operation_id="getPolicy",
+    responses={**responses(404), 200: {"headers": TAGGED}},
+)
+def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> PolicyStateDocument:
+    """What judges the dataset, and what judged it before."""
+    return _answer(PolicyStateDocument.of(read_policy(store, dataset)), response)
+
+
+@router.put(
+    "/datasets/{dataset}/policy",
+    operation_id="setPolicy",
+    status_code=202,
+    responses={**responses(404, 412, 413, 415, 428), **CHANGED},
+)
+def put_policy(
+    dataset: DatasetPath,
+    change: PolicyChange,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    _key: IdempotencyKey,
+    response: Response,
+) -> JobDocument:
+    """Judge the dataset by another policy.
+
+    What that leaves without a solution is stale and solved by the job; `result.policy` of the
+    answer is the policy as it is now. Only another calibration part calibrates anything anew.
+    """
+    store = services.store
+    present = read_policy(store, dataset)
+    policy = wanted(change, present.policy)
+    with current_state(lambda: PolicyStateDocument.of(read_policy(store, dataset))):
+        state = change_policy(store, present.dataset_id, policy, if_match=if_match, actor=actor)
+    document = _answer(PolicyStateDocument.of(state), response)
+    found = get_dataset(store, state.dataset_id)
+    job = accepted(request_solve(services.jobs, store, found, actor=actor), response)
+    job.result = {"policy": document.model_dump(mode="json")}
+    return job
+
+
+def wanted(change: PolicyChange, present: Policy) -> Policy:
+    """The policy that a request asks for.
+
+    Raises:
+        InputError: It asks for nothing, for two things, or for what cannot be.
+    """
+    if change.yaml is not None:
+        if change.name is not None or change.values is not None:
+            raise InputError("a YAML text stands alone", pointer="/yaml")
+        try:
+            return policy_from_yaml(change.yaml)
+        except InputError as error:
+            raise InputError(error.message, hint=error.hint, pointer="/yaml") from error
+    if change.name is None and change.values is None:
+        raise InputError("name a policy, give thresholds, or send a YAML text")
+    if not change.values and change.name in POLICIES:
+        return POLICIES[change.name]
+    # A shipped policy with another threshold is no longer the one of that name.
+    name = change.name or (CUSTOM if present.name in POLICIES else present.name)
+    return policy_with(present, change.values or {}, name=name, pointer="/values")
+
+
+def _answer(document: PolicyStateDocument, response: Response) -> PolicyStateDocument:
+    response.headers["ETag"] = document.etag
+    response.headers["Cache-Control"] = "private, no-cache"
+    return document

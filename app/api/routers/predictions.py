@@ -1,0 +1,160 @@
+"""Predictions: brought in, listed, thrown away, and accepted by a person."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Response
+
+from app.api.deps import Actor, AppServices, AppStore, Id, IdempotencyKey
+from app.api.jobs import ACCEPTED, accepted
+from app.api.lookup import find_view
+from app.api.problem import responses
+from app.api.schemas.job import JobDocument
+from app.api.schemas.prediction import (
+    AcceptBody,
+    AcceptOutcome,
+    PredictionRequest,
+    PredictionSetDocument,
+    PredictionSetList,
+    ViewPrediction,
+    ViewPredictions,
+    size_of,
+)
+from app.config import Settings
+from app.review import predictions as review
+from app.review.accept import accept, plan_accept
+from app.review.evaluation_jobs import request_accept
+from app.store.uploads import upload_path
+
+router = APIRouter(tags=["predictions"])
+
+DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
+LOCATION = {"Location": {"description": "Of the set.", "schema": {"type": "string"}}}
+
+
+@router.get(
+    "/datasets/{dataset}/predictions", operation_id="listPredictions", responses=responses(404)
+)
+def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList:
+    """The sets of predictions of a dataset, the newest first."""
+    found = review.list_predictions(store, dataset)
+    return PredictionSetList(items=[PredictionSetDocument.of(item) for item in found])
+
+
+@router.post(
+    "/datasets/{dataset}/predictions",
+    operation_id="addPredictions",
+    status_code=201,
+    responses={
+        **responses(404, 409, 413, 415),
+        201: {"headers": LOCATION, "description": "The set, with what could not be read."},
+    },
+)
+def add_predictions(
+    dataset: DatasetPath,
+    request: PredictionRequest,
+    services: AppServices,
+    actor: Actor,
+    _key: IdempotencyKey,
+    response: Response,
+) -> PredictionSetDocument:
+    """Read uploaded files into a new set of predictions.
+
+    What is wrong is left out and listed with file, record and field; frames that the dataset does
+    not have are counted and listed. 400 where nothing can be used. No solve reads predictions.
+    """
+    found = review.add_predictions(
+        services.store,
+        dataset,
+        request.name,
+        _files(services.settings, request),
+        actor=actor,
+    )
+    response.headers["Location"] = f"/api/v1/predictions/{found.id}"
+    return PredictionSetDocument.of(found)
+
+
+@router.post(
+    "/predictions/accept",
+    operation_id="acceptPredictions",
+    response_model=AcceptOutcome,
+    responses={
+        **responses(404, 409, 413, 415),
+        **ACCEPTED,
+        202: {**ACCEPTED[202], "model": JobDocument},
+        200: {"description": "Of a dry run, or of views that were named."},
+    },
+)
+def accept_predictions(
+    request: AcceptBody,
+    services: AppServices,
+    actor: Actor,
+    _key: IdempotencyKey,
+    response: Response,
+) -> AcceptOutcome | Response:
+    """Make annotations of predictions, as edits in the log that can be undone.
+
+    Only the surest prediction of a view counts. Named views are changed at once (200); a query
+    makes a job (202), whose result has `changed`, `groups` and `refused`.
+    """
+    store, value = services.store, request.value()
+    if request.dry_run:
+        return AcceptOutcome.planned(plan_accept(store, request.dataset, value))
+    if request.views is not None:
+        return AcceptOutcome.done(accept(store, request.dataset, value, actor=actor))
+    job = request_accept(services.jobs, store, request.dataset, value, actor=actor)
+    document = accepted(job, response)
+    return Response(
+        document.model_dump_json(),
+        status_code=202,
+        media_type="application/json",
+        headers={"Location": response.headers["Location"]},
+    )
+
+
+@router.get("/predictions/{predictions}", operation_id="getPredictions", responses=responses(404))
+def get_predictions(predictions: Id, store: AppStore) -> PredictionSetDocument:
+    """One set of predictions."""
+    return PredictionSetDocument.of(review.get_predictions(store, predictions))
+
+
+@router.delete(
+    "/predictions/{predictions}",
+    operation_id="deletePredictions",
+    status_code=204,
+    responses=responses(404),
+)
+def delete_predictions(predictions: Id, store: AppStore) -> None:
+    """Throw a set away; evaluations of it stay, and so do balls that were accepted from it."""
+    review.delete_predictions(store, predictions)
+
+
+@router.get(
+    "/views/{view}/predictions", operation_id="getViewPredictions", responses=responses(404)
+)
+def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
+    """What was predicted for a view."""
+    find_view(store, view)
+    found = review.view_predictions(store, view)
+    return ViewPredictions(
+        items=[ViewPrediction.of(item, box) for item, boxes in found for box in boxes]
+    )
+
+
+def _files(settings: Settings, request: PredictionRequest) -> review.PredictionFiles:
+    paths = {
+        name: None if upload is None else upload_path(settings, upload)
+        for name, upload in (
+            ("path", request.upload),
+            ("images", request.images_upload),
+            ("cameras", request.cameras_upload),
+        )
+    }
+    return review.PredictionFiles(
+        **paths,
+        format=request.format,
+        category=request.category,
+        size=size_of(request.size),
+        cameras_size=size_of(request.cameras_size),
+    )

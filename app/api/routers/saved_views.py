@@ -1,0 +1,69 @@
+"""Saved views of the queue, and who has reviewed how much."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+
+from app.api.deps import Actor, AppStore, Id
+from app.api.problem import responses
+from app.api.routers.datasets import DatasetPath
+from app.api.schemas.saved_view import (
+    NewSavedView,
+    ReviewerDocument,
+    ReviewerList,
+    SavedViewDocument,
+    SavedViewList,
+)
+from app.review import reviewers, saved_views
+from app.review.datasets import dataset_id
+
+router = APIRouter(tags=["queue"])
+
+
+@router.get(
+    "/datasets/{dataset}/saved-views", operation_id="listSavedViews", responses=responses(404)
+)
+def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
+    """Queries under names, each with the number of groups that match it now."""
+    found = saved_views.list_saved_views(store, dataset_id(store, dataset))
+    return SavedViewList(items=[SavedViewDocument.of(item) for item in found])
+
+
+@router.post(
+    "/datasets/{dataset}/saved-views",
+    operation_id="saveView",
+    status_code=201,
+    responses={
+        **responses(404, 409, 413, 415),
+        201: {
+            "headers": {"Location": {"description": "Its address.", "schema": {"type": "string"}}},
+            "description": "The saved view.",
+        },
+    },
+)
+def save_view(
+    dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor, response: Response
+) -> SavedViewDocument:
+    """Keep a query under a name; 409 when the name is taken."""
+    saved = saved_views.save_view(store, dataset_id(store, dataset), view.name, view.q, actor=actor)
+    response.headers["Location"] = f"/api/v1/saved-views/{saved.id}"
+    return SavedViewDocument.of(saved)
+
+
+@router.get("/saved-views/{view}", operation_id="getSavedView", responses=responses(404))
+def get_saved_view(view: Id, store: AppStore) -> SavedViewDocument:
+    """One saved view."""
+    return SavedViewDocument.of(saved_views.get_view(store, view))
+
+
+@router.delete("/saved-views/{view}", operation_id="deleteSavedView", responses=responses(404))
+def delete_saved_view(view: Id, store: AppStore) -> SavedViewDocument:
+    """Forget a saved view; the answer is what it was, so that it can be saved again."""
+    return SavedViewDocument.of(saved_views.delete_view(store, view))
+
+
+@router.get("/datasets/{dataset}/reviewers", operation_id="listReviewers", responses=responses(404))
+def list_reviewers(dataset: DatasetPath, store: AppStore) -> ReviewerList:
+    """Who has judged how many groups."""
+    found = reviewers.list_reviewers(store, dataset_id(store, dataset))
+    return ReviewerList(items=[ReviewerDocument.of(item) for item in found])

@@ -1,0 +1,25 @@
+"""Statistics: how the numbers of a dataset are spread."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+
+from app.api.deps import AppStore, QueryText
+from app.api.problem import responses
+from app.api.routers.datasets import DatasetPath
+from app.api.schemas.statistics import StatisticsDocument
+from app.review.datasets import dataset_id
+from app.review.statistics import statistics
+
+router = APIRouter(prefix="/datasets/{dataset}/statistics", tags=["datasets"])
+
+
+@router.get("", operation_id="getStatistics", responses=responses(404))
+def get_statistics(
+    dataset: DatasetPath, store: AppStore, query: QueryText = ""
+) -> StatisticsDocument:
+    """Distances, parallax, uncertainty, sizes, heights and positions, per match and split.
+
+    Every bar carries the query that opens the queue with the groups that it counts.
+    """
+    return StatisticsDocument.of(statistics(store, dataset_id(store, dataset), query))

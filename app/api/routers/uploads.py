@@ -1,0 +1,116 @@
+"""Uploads: sent as plain bytes, listed, deleted."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from anyio import CancelScope, to_thread
+from fastapi import APIRouter, Path, Query, Request, Response
+from starlette.requests import ClientDisconnect
+
+from app.api.deps import AppServices
+from app.api.problem import responses
+from app.api.schemas.upload import UploadDocument, UploadList
+from app.config import Settings
+from app.datasets.guess_format import guess_format
+from app.errors import InputError
+from app.store.uploads import (
+    Upload,
+    UploadWriter,
+    delete_upload,
+    expire_uploads,
+    get_upload,
+    list_uploads,
+    require_size,
+    upload_path,
+)
+
+router = APIRouter(prefix="/uploads", tags=["imports"])
+
+CHUNK = 1024 * 1024
+"""Bytes that are gathered before they are written."""
+UploadId = Annotated[str, Path(max_length=64)]
+FileName = Annotated[
+    str, Query(min_length=1, max_length=255, description="Name of the file; its ending matters.")
+]
+BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "description": "The file.",
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+
+
+@router.post(
+    "",
+    operation_id="uploadFile",
+    status_code=201,
+    openapi_extra=BODY,
+    responses={
+        **responses(413, 415, 507),
+        201: {
+            "description": "The file is on disk.",
+            "headers": {"Location": {"description": "Of it.", "schema": {"type": "string"}}},
+        },
+    },
+)
+async def upload_file(
+    request: Request, services: AppServices, name: FileName, response: Response
+) -> UploadDocument:
+    """Take a file, to import it or its predictions; the same file again is the same upload."""
+    declared = request.headers.get("content-length", "")
+    if declared.isascii() and declared.isdigit() and len(declared) < 19:
+        require_size(services.settings, int(declared))
+    await to_thread.run_sync(expire_uploads, services.settings)
+    upload = await _receive(request, services.settings, name)
+    response.headers["Location"] = f"/api/v1/uploads/{upload.id}"
+    return await to_thread.run_sync(_document, services.settings, upload)
+
+
+async def _receive(request: Request, settings: Settings, name: str) -> Upload:
+    """Write what comes, off the event loop; nothing stays of what does not come whole."""
+    writer = await to_thread.run_sync(UploadWriter, settings, name)
+    try:
+        waiting = bytearray()
+        async for chunk in request.stream():
+            waiting += chunk
+            if len(waiting) >= CHUNK:
+                await to_thread.run_sync(writer.write, bytes(waiting))
+                waiting.clear()
+        await to_thread.run_sync(writer.write, bytes(waiting))
+        return await to_thread.run_sync(writer.finish)
+    except ClientDisconnect:
+        await to_thread.run_sync(writer.abort)
+        raise InputError("the upload was cut off") from None
+    except BaseException:
+        with CancelScope(shield=True):
+            await to_thread.run_sync(writer.abort)
+        raise
+
+
+@router.get("", operation_id="listUploads")
+def get_uploads(services: AppServices) -> UploadList:
+    """Every file that is still here."""
+    settings = services.settings
+    return UploadList(
+        items=[_document(settings, item) for item in list_uploads(settings)],
+        max_bytes=settings.max_upload_bytes,
+        days=settings.upload_days,
+    )
+
+
+@router.get("/{upload}", operation_id="getUpload", responses=responses(404))
+def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
+    """One uploaded file, without its content."""
+    return _document(services.settings, get_upload(services.settings, upload))
+
+
+@router.delete("/{upload}", operation_id="deleteUpload", status_code=204, responses=responses(404))
+def delete_one(upload: UploadId, services: AppServices) -> None:
+    """Delete a file; 400 while a dataset reads its frames from it."""
+    delete_upload(services.settings, upload)
+
+
+def _document(settings: Settings, upload: Upload) -> UploadDocument:
+    return UploadDocument.of(upload, guess_format(upload_path(settings, upload.id)))

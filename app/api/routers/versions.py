@@ -1,0 +1,115 @@
+"""Versions: frozen, listed, compared, verified."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Response
+
+from app.api.deps import MAX_ID, Actor, AppServices, AppStore, Id
+from app.api.jobs import ACCEPTED, accepted
+from app.api.problem import responses
+from app.api.schemas.job import JobDocument
+from app.api.schemas.version import (
+    Changelog,
+    FreezePlanDocument,
+    VersionDiffDocument,
+    VersionDocument,
+    VersionList,
+    VersionManifest,
+    VersionRequest,
+)
+from app.review import version_jobs, versions
+from app.review.freeze import plan_freeze
+from app.review.version_diff import changelog, diff_versions
+from app.review.version_manifest import version_manifest
+
+router = APIRouter(tags=["versions"])
+
+DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
+
+
+@router.get("/datasets/{dataset}/versions", operation_id="listVersions", responses=responses(404))
+def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
+    """The frozen versions of a dataset, newest first."""
+    found = versions.list_versions(store, dataset)
+    return VersionList(items=[VersionDocument.of(item) for item in found])
+
+
+@router.post(
+    "/datasets/{dataset}/versions",
+    operation_id="freezeVersion",
+    status_code=202,
+    response_model=JobDocument,
+    responses={
+        **responses(404, 409, 413, 415),
+        **ACCEPTED,
+        200: {"model": FreezePlanDocument, "description": "Of a dry run: what would be frozen."},
+    },
+)
+def freeze_version(
+    dataset: DatasetPath,
+    request: VersionRequest,
+    services: AppServices,
+    actor: Actor,
+    response: Response,
+) -> JobDocument | Response:
+    """Freeze the dataset as it is into a version that never changes.
+
+    409 when the name is taken or groups that might enter are not solved; 400 when none enters.
+    The job's result names the version.
+    """
+    if request.dry_run:
+        plan = plan_freeze(services.store, dataset, request.value())
+        document = FreezePlanDocument.of(plan)
+        return Response(document.model_dump_json(), media_type="application/json")
+    job = version_jobs.request_freeze(
+        services.jobs, services.store, dataset, request.value(), actor=actor
+    )
+    return accepted(job, response)
+
+
+@router.get("/versions/{version}", operation_id="getVersion", responses=responses(404))
+def get_version(version: Id, store: AppStore) -> VersionDocument:
+    """One version."""
+    return VersionDocument.of(versions.get_version(store, version))
+
+
+@router.get(
+    "/versions/{version}/manifest", operation_id="getVersionManifest", responses=responses(404)
+)
+def get_manifest(version: Id, store: AppStore) -> VersionManifest:
+    """What a version says of itself: counts, settings, licence, overrides, changelog."""
+    return VersionManifest.model_validate(version_manifest(store, version))
+
+
+@router.get("/versions/{version}/changelog", operation_id="getChangelog", responses=responses(404))
+def get_changelog(version: Id, store: AppStore) -> Changelog:
+    """What changed since the version before, in sentences."""
+    found = versions.get_version(store, version)
+    return Changelog(version=found.name, lines=changelog(store, version))
+
+
+@router.get("/versions/{version}/diff", operation_id="diffVersions", responses=responses(404))
+def get_diff(
+    version: Id,
+    store: AppStore,
+    against: Annotated[int, Query(ge=1, le=MAX_ID, description="Id of the older version.")],
+    limit: Annotated[int, Query(ge=0, le=10_000, description="Most items of each list.")] = 500,
+) -> VersionDiffDocument:
+    """What changed in a version against another: groups added, dropped, moved, and why."""
+    return VersionDiffDocument.of(diff_versions(store, against, version), limit)
+
+
+@router.post(
+    "/versions/{version}/verify",
+    operation_id="verifyVersion",
+    status_code=202,
+    responses={**responses(404), **ACCEPTED},
+)
+def verify_version(
+    version: Id, services: AppServices, actor: Actor, response: Response
+) -> JobDocument:
+    """Compute a version from scratch and compare it bit for bit; the job's result reports."""
+    job = version_jobs.request_verify(services.jobs, services.store, version, actor=actor)
+    return accepted(job, response)

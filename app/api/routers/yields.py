@@ -1,0 +1,36 @@
+"""Yields: what a dataset's policy lets through, and what another one would."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+
+from app.api.deps import AppServices
+from app.api.problem import responses
+from app.api.routers.datasets import DatasetPath
+from app.api.schemas.yields import WhatIf, YieldDocument
+from app.review.datasets import dataset_id
+from app.review.yields import get_yield
+
+router = APIRouter(prefix="/datasets/{dataset}/yield", tags=["yield"])
+
+
+@router.get("", operation_id="getYield", responses=responses(404))
+def read_yield(dataset: DatasetPath, services: AppServices) -> YieldDocument:
+    """What the policy lets through: funnel, curves, splits, distances, leakage.
+
+    The first call after a start reads all solutions, which takes seconds for ten thousand
+    groups; from then on the answer follows every change within milliseconds.
+    """
+    found = dataset_id(services.store, dataset)
+    return YieldDocument.of(get_yield(services.yields, found))
+
+
+@router.post("", operation_id="tryPolicy", responses=responses(404, 413, 415))
+def try_policy(dataset: DatasetPath, values: WhatIf, services: AppServices) -> YieldDocument:
+    """What other thresholds would let through; nothing is saved and nothing solved.
+
+    The numbers are those that solving under these thresholds would give. `needs_solving` names
+    the fields for which that cannot be known before.
+    """
+    found = dataset_id(services.store, dataset)
+    return YieldDocument.of(get_yield(services.yields, found, values.values()))

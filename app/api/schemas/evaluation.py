@@ -1,0 +1,391 @@
+"""Evaluations: what to evaluate, and the tables, figures and frames that come of it."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from app.evaluation.comparison import Difference, FrameDifference
+from app.evaluation.figure import Figure
+from app.evaluation.result import FrameResult
+from app.evaluation.table import Cell, Table
+from app.review.evaluations import (
+    Comparison,
+    EvaluationRequest,
+    FramePage,
+    tables_of,
+)
+from app.store.evaluations import StoredEvaluation
+from app.store.value_codec import to_json
+
+SetId = Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
+
+
+class EvaluationBody(BaseModel):
+    """What to evaluate, and against what."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"predictions": 3, "version": 1, "split": "test"}]},
+    )
+
+    name: Annotated[str, Field(max_length=100)] = ""
+    predictions: SetId | None = Field(default=None, description="Boxes, cameras or both.")
+    careful: SetId | None = Field(
+        default=None, description="Careful boxes, for the table of boxes (the paper's table 1)."
+    )
+    version: SetId | None = Field(
+        default=None, description="A frozen version; null: the dataset as it is now."
+    )
+    groups: Literal["passing", "accepted", "all"] = Field(
+        default="passing", description="Without a version: which groups take part."
+    )
+    split: Annotated[str, Field(max_length=50)] | None = Field(
+        default=None, description="Frames of this split alone."
+    )
+    boxes: Literal["optimized", "annotated", "exact"] = Field(
+        default="optimized", description="Which box of the dataset is the truth."
+    )
+    min_score: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.0, description="Detections below take no part in localisation."
+    )
+
+    @model_validator(mode="after")
+    def _something(self) -> EvaluationBody:
+        if self.predictions is None and self.careful is None:
+            raise ValueError("give predictions, careful boxes, or both")
+        return self
+
+    def value(self) -> EvaluationRequest:
+        """What is asked for."""
+        return EvaluationRequest(**self.model_dump())
+
+
+class CellDocument(BaseModel):
+    """One number with its 95 % interval, computed from `count` of `of` items."""
+
+    value: float | None
+    low: float | None
+    high: float | None
+    count: int
+    of: int
+
+    @staticmethod
+    def maybe(cell: Cell | None) -> CellDocument | None:
+        """The document of a cell that may not be there."""
+        return None if cell is None else CellDocument(**vars(cell))
+
+
+class ColumnDocument(BaseModel):
+    """What a column holds; `better` is `higher`, `lower` or empty."""
+
+    name: str
+    label: str
+    unit: str
+    better: str
+
+
+class FramesLink(BaseModel):
+    """The frames behind a row, as parameters of `/evaluations/{id}/frames`."""
+
+    field: str
+    low: float | None
+    high: float | None
+
+
+class RowDocument(BaseModel):
+    """One line of a table, its cells in the order of the columns."""
+
+    name: str
+    label: str
+    cells: list[CellDocument]
+    frames: FramesLink | None
+
+
+class TableDocument(BaseModel):
+    """A table; `note` says over what it was computed."""
+
+    name: str
+    title: str
+    note: str
+    columns: list[ColumnDocument]
+    rows: list[RowDocument]
+
+    @staticmethod
+    def of(table: Table) -> TableDocument:
+        """The document of a table."""
+        return TableDocument.model_validate(to_json(table))
+
+
+class EvaluationRow(BaseModel):
+    """A run in a list, with its headline numbers."""
+
+    id: int
+    name: str
+    dataset: str
+    created: datetime
+    actor: str
+    predictions: int | None
+    careful: int | None
+    version: int | None
+    counts: dict[str, int]
+    headline: dict[str, CellDocument] = Field(
+        description="ap_50, mae_m, mae_percent and p_2m, those that the run has."
+    )
+
+    @staticmethod
+    def values(found: StoredEvaluation) -> dict[str, Any]:
+        """What a row and a whole document share."""
+        return {
+            **{
+                name: getattr(found, name) for name in ("id", "name", "dataset", "created", "actor")
+            },
+            "predictions": found.prediction_set_id,
+            "careful": found.careful_set_id,
+            "version": found.version_id,
+            "counts": found.counts,
+            "headline": _headline(tables_of(found)),
+        }
+
+    @staticmethod
+    def of(found: StoredEvaluation) -> EvaluationRow:
+        """The row of a run."""
+        return EvaluationRow.model_validate(EvaluationRow.values(found))
+
+
+class EvaluationList(BaseModel):
+    """The runs of a dataset, the newest first."""
+
+    items: list[EvaluationRow]
+
+
+class EvaluationDocument(EvaluationRow):
+    """A run, complete but for its figures and frames."""
+
+    pins: dict[str, Any] = Field(
+        description="What makes it repeatable: version or digest of the state, policy, solver and "
+        "software version, digests of the predictions, seed."
+    )
+    tables: list[TableDocument]
+    figures: list[str] = Field(description="Names for `/evaluations/{id}/figures/{name}.json`.")
+
+    @staticmethod
+    def of(found: StoredEvaluation) -> EvaluationDocument:
+        """The document of a run."""
+        return EvaluationDocument.model_validate(
+            {
+                **EvaluationRow.values(found),
+                "pins": found.pins,
+                "tables": found.tables,
+                "figures": list(found.figures),
+            }
+        )
+
+
+class AxisDocument(BaseModel):
+    """What an axis shows; `low` and `high` fix its ends where they are not null."""
+
+    label: str
+    unit: str
+    low: float | None
+    high: float | None
+
+
+class SeriesDocument(BaseModel):
+    """One curve, or one set of points; `low`, `high` and `count` are empty where there are none."""
+
+    name: str
+    label: str
+    kind: Literal["line", "dashed", "points"]
+    x: list[float]
+    y: list[float]
+    low: list[float]
+    high: list[float]
+    count: list[int]
+    color: float | None = Field(description="What the colour stands for, see the panel's `color`.")
+    group_id: int | None
+
+
+class MarkDocument(BaseModel):
+    """A dashed line across a panel."""
+
+    axis: Literal["x", "y"]
+    at: float
+    label: str
+
+
+class PanelDocument(BaseModel):
+    """One pair of axes with its curves."""
+
+    title: str
+    x: AxisDocument
+    y: AxisDocument
+    series: list[SeriesDocument]
+    marks: list[MarkDocument]
+    color: AxisDocument | None
+
+
+class FigureDocument(BaseModel):
+    """A figure: panels side by side."""
+
+    name: str
+    title: str
+    note: str
+    panels: list[PanelDocument]
+
+    @staticmethod
+    def of(figure: Figure) -> FigureDocument:
+        """The document of a figure."""
+        return FigureDocument.model_validate(to_json(figure))
+
+
+class FrameDocument(BaseModel):
+    """One judged frame; null where a number does not exist."""
+
+    frame_id: int = Field(description="Id of the view, below 0 where it is gone.")
+    group_id: int
+    group: str
+    view: str
+    match: str
+    ball: bool = Field(description="Whether the frame shows a ball.")
+    detections: int
+    score: float | None
+    iou: float | None
+    hit_score: float | None
+    hit_iou: float | None
+    distance_m: float | None
+    diameter_px: float | None
+    parallax_degrees: float | None
+    size_error_percent: float | None
+    error_m: float | None
+    error_percent: float | None
+    any_error_m: float | None
+    predicted_error_m: float | None
+    predicted_error_percent: float | None
+    predicted_any_error_m: float | None
+    predicted_jac: float | None
+    box_iou: float | None
+
+    @staticmethod
+    def of(frame: FrameResult) -> FrameDocument:
+        """The document of a frame."""
+        return FrameDocument.model_construct(**vars(frame))
+
+
+class FrameList(BaseModel):
+    """Frames behind a number; `next` is the cursor of the page after this one."""
+
+    items: list[FrameDocument]
+    next: str | None
+    total: int
+
+    @staticmethod
+    def of(page: FramePage) -> FrameList:
+        """The document of a page."""
+        return FrameList(
+            items=[FrameDocument.of(frame) for frame in page.items],
+            next=None if page.next is None else str(page.next),
+            total=page.total,
+        )
+
+
+class DifferenceDocument(BaseModel):
+    """One number of both runs; `change` is the second minus the first."""
+
+    table: str
+    row: str
+    column: str
+    label: str
+    first: CellDocument | None
+    second: CellDocument | None
+    change: float | None
+
+    @staticmethod
+    def of(found: Difference) -> DifferenceDocument:
+        """The document of a difference."""
+        return DifferenceDocument(
+            table=found.table,
+            row=found.row,
+            column=found.column,
+            label=found.label,
+            first=CellDocument.maybe(found.first),
+            second=CellDocument.maybe(found.second),
+            change=found.change,
+        )
+
+
+class FrameDifferenceDocument(BaseModel):
+    """One frame of both runs."""
+
+    first: FrameDocument
+    second: FrameDocument
+    change: float | None
+
+    @staticmethod
+    def of(found: FrameDifference) -> FrameDifferenceDocument:
+        """The document of a frame's difference."""
+        return FrameDifferenceDocument(
+            first=FrameDocument.of(found.first),
+            second=FrameDocument.of(found.second),
+            change=found.change,
+        )
+
+
+class ComparisonDocument(BaseModel):
+    """Two runs of one dataset, number by number and frame by frame."""
+
+    first: EvaluationRow
+    second: EvaluationRow
+    same_truth: bool = Field(
+        description="Same frames, policy, solver and options: the numbers can be compared."
+    )
+    numbers: list[DifferenceDocument]
+    field: str
+    shared: int = Field(description="Frames that both runs judged.")
+    better: int
+    worse: int
+    gained: int = Field(description="Frames that only the second run has a value for.")
+    lost: int
+    mean_change: float | None
+    frames: list[FrameDifferenceDocument] = Field(
+        description="Frames that differ: gained and lost ones, then the largest change first."
+    )
+    next: str | None
+    total: int
+
+    @staticmethod
+    def of(found: Comparison, limit: int, offset: int) -> ComparisonDocument:
+        """The document of a comparison, with one page of its frames."""
+        frames = found.frames.frames
+        shown = frames[offset : offset + limit]
+        more = offset + len(shown) < len(frames)
+        counts = ("field", "shared", "better", "worse", "gained", "lost", "mean_change")
+        return ComparisonDocument(
+            first=EvaluationRow.of(found.first),
+            second=EvaluationRow.of(found.second),
+            same_truth=found.same_truth,
+            numbers=[DifferenceDocument.of(item) for item in found.numbers],
+            **{name: getattr(found.frames, name) for name in counts},
+            frames=[FrameDifferenceDocument.of(item) for item in shown],
+            next=str(offset + len(shown)) if more else None,
+            total=len(frames),
+        )
+
+
+_HEADLINE = (
+    ("detection", "all", "ap_50"),
+    ("localization", "oracle", "mae_m"),
+    ("localization", "oracle", "mae_percent"),
+    ("localization", "oracle", "p_2m"),
+)
+
+
+def _headline(tables: list[Table]) -> dict[str, dict[str, Any]]:
+    found = {table.name: table for table in tables}
+    return {
+        column: vars(found[name].cell(row, column))
+        for name, row, column in _HEADLINE
+        if name in found
+    }

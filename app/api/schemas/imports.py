@@ -1,0 +1,129 @@
+"""Imports: what to read into which dataset, and what may be read."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
+
+from app.review.import_folders import FolderListing
+from app.review.import_jobs import ImportRequest
+
+ImportFormat = Literal[
+    "soccernet-v3",
+    "soccernet-v3d",
+    "issia",
+    "issia-3d",
+    "sn-calibration",
+    "cameras",
+    "gamestate",
+    "coco",
+    "parquet",
+    "touchline",
+]
+Camera = Annotated[int, Field(ge=0, le=999)]
+Offset = Annotated[int, Field(ge=-999_999, le=999_999)]
+Side = Annotated[int, Field(ge=2, le=16_384)]
+
+
+class ImportPlace(BaseModel):
+    """Where files are: exactly one of an upload and a folder."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    upload: Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")] | None = None
+    folder: Annotated[str, Field(min_length=1, max_length=4000)] | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> ImportPlace:
+        if (self.upload is None) == (self.folder is None):
+            raise ValueError("name an upload or a folder, and not both")
+        return self
+
+    def values(self) -> dict[str, str]:
+        """The one that is set."""
+        return {"upload": self.upload} if self.upload else {"folder": self.folder or ""}
+
+
+class ImportOptions(BaseModel):
+    """What the files do not say themselves."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    calibration: Literal["given", "lines"] = Field(
+        default="given", description="Which one counts where a view has a camera and lines."
+    )
+    frame_offset: Offset | dict[Camera, Offset] = Field(
+        default=8, description="ISSIA: XGTF frame minus video frame, for all or by camera."
+    )
+    flipped: list[Camera] = Field(
+        default=[], max_length=100, description="ISSIA: cameras whose videos are mirrored."
+    )
+    size: tuple[Side, Side] | None = Field(
+        default=None, description="Width and height of the annotated images, where files lack it."
+    )
+    lines: ImportPlace | None = Field(
+        default=None, description="ISSIA: line files of the static cameras."
+    )
+
+
+class ImportBody(BaseModel):
+    """What to import."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {
+                    "dataset": "league",
+                    "format": "soccernet-v3",
+                    "source": {"folder": "soccernet/england_epl"},
+                    "dry_run": True,
+                }
+            ]
+        },
+    )
+
+    dataset: Annotated[str, Field(min_length=1, max_length=200)]
+    format: ImportFormat
+    source: ImportPlace
+    options: ImportOptions = ImportOptions()
+    dry_run: StrictBool = Field(default=False, description="Say what would happen, keep nothing.")
+
+    def value(self) -> ImportRequest:
+        """What review carries out; only what was said."""
+        options: dict[str, Any] = self.options.model_dump(
+            mode="json", exclude_defaults=True, exclude={"lines"}
+        )
+        lines = self.options.lines
+        return ImportRequest(
+            self.dataset,
+            self.format,
+            self.source.values(),
+            None if lines is None else lines.values(),
+            options,
+            self.dry_run,
+        )
+
+
+class FolderEntry(BaseModel):
+    """A folder or a file that an import can name."""
+
+    path: str
+    name: str
+    folder: bool
+
+
+class FolderDocument(BaseModel):
+    """What is in a folder that the operator allows; without a path, the folders themselves."""
+
+    path: str
+    format: str | None = Field(description="What it most likely holds.")
+    items: list[FolderEntry]
+    more: bool = Field(description="Whether there is more than is listed.")
+
+    @staticmethod
+    def of(listing: FolderListing) -> FolderDocument:
+        """The document of a listing."""
+        items = [FolderEntry.model_validate(vars(item)) for item in listing.items]
+        return FolderDocument.model_validate({**vars(listing), "items": items})

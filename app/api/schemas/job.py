@@ -1,0 +1,53 @@
+"""Jobs: work that outlasts a request."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field
+
+from app.store.jobs import Job
+
+JobKind = Literal["solve", "import", "export", "freeze", "verify", "evaluate", "detect", "bulk"]
+JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
+
+
+class JobProblem(BaseModel):
+    """Why a job failed."""
+
+    detail: str
+    hint: str | None
+    pointer: str | None
+
+
+class JobDocument(BaseModel):
+    """A job as it stands."""
+
+    id: int
+    kind: JobKind
+    title: str = Field(description="What it is, for people.")
+    dataset: str | None = Field(description="Name of its dataset.")
+    state: JobState
+    done: int
+    total: int | None = Field(description="How much there is to do; null while that is unknown.")
+    sentence: str = Field(description="What it is at, for people.")
+    result: Any = Field(description="What came of it; depends on the kind.")
+    problem: JobProblem | None
+    created: datetime
+    started: datetime | None
+    ended: datetime | None
+    actor: str
+
+    @staticmethod
+    def of(job: Job) -> JobDocument:
+        """The document of a job."""
+        names = JobDocument.model_fields
+        return JobDocument.model_validate({name: getattr(job, name) for name in names})
+
+
+class JobPage(BaseModel):
+    """Jobs, the newest first; ``next`` is the cursor of the next page."""
+
+    items: list[JobDocument]
+    next: str | None

@@ -1,0 +1,246 @@
+"""Predictions: what to read, what was read, and which of them a person accepts."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, model_validator
+
+from app.api.schemas.annotation import BoxNumbers
+from app.review.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
+from app.soccer.frames import ImageSize
+from app.store.predictions import PredictedBox, PredictionSet
+
+Upload = Annotated[str, Field(min_length=1, max_length=64, description="Id of an upload.")]
+Side = Annotated[int, Field(strict=True, ge=2, le=16_384)]
+Size = tuple[Side, Side]
+ViewId = Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
+MAX_VIEWS = 200
+
+
+class PredictionRequest(BaseModel):
+    """Files of predictions: ball boxes, cameras, or both."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [{"name": "yolo11l", "format": "coco", "upload": "9b2f0c6e5d7a4c18"}]
+        },
+    )
+
+    name: Annotated[str, Field(min_length=1, max_length=100, description="Unique in its dataset.")]
+    format: Literal["coco", "yolo", "csv"] = "coco"
+    upload: Upload | None = None
+    images_upload: Upload | None = Field(
+        default=None,
+        description="The COCO document whose images the numbers in COCO results mean.",
+    )
+    cameras_upload: Upload | None = Field(
+        default=None, description="A zip of SoccerNet camera JSON, or one such file."
+    )
+    category: Annotated[int, Field(strict=True, ge=0, le=100_000)] | None = Field(
+        default=None, description="The class that is the ball, where the file has several."
+    )
+    size: Size | None = Field(
+        default=None,
+        description="Width and height of the images that boxes in pixels refer to; null: the "
+        "annotated size of each frame.",
+    )
+    cameras_size: Size | None = Field(default=None, description="The same for the cameras.")
+
+    @model_validator(mode="after")
+    def _something(self) -> PredictionRequest:
+        if self.upload is None and self.cameras_upload is None:
+            raise ValueError("give an upload, a cameras_upload, or both")
+        return self
+
+
+class UnknownFrame(BaseModel):
+    """A frame that a file names and the dataset does not have."""
+
+    frame: str
+    boxes: int
+    problem: str
+
+
+class PredictionProblem(BaseModel):
+    """Something in a file that could not be read, with its place."""
+
+    file: str
+    record: str | None
+    field: str | None
+    problem: str
+
+
+class PredictionReport(BaseModel):
+    """What reading the files met; lists are cut after 100 entries, counts are whole."""
+
+    read: int = Field(default=0, description="Boxes that the file holds.")
+    without_score: int = Field(default=0, description="Boxes that count as sure.")
+    other_classes: int = 0
+    unknown_boxes: int = 0
+    unknown_frames: list[UnknownFrame] = []
+    unknown_cameras: list[UnknownFrame] = []
+    problems: list[PredictionProblem] = []
+    more_problems: int = 0
+    model: str | None = Field(default=None, description="SHA-256 of a detector's model.")
+
+
+class PredictionSetDocument(BaseModel):
+    """A set of predictions."""
+
+    id: int
+    name: str
+    format: Literal["coco", "yolo", "csv", "cameras", "detect"]
+    source: str
+    created: datetime
+    actor: str
+    digest: str
+    frames: int = Field(description="Frames with at least one box.")
+    boxes: int
+    cameras: int
+    unknown: int = Field(description="Frames that the dataset does not have.")
+    report: PredictionReport
+
+    @staticmethod
+    def of(found: PredictionSet) -> PredictionSetDocument:
+        """The document of a set."""
+        values = {name: getattr(found, name) for name in PredictionSetDocument.model_fields}
+        report = {k: v for k, v in found.report.items() if k in PredictionReport.model_fields}
+        return PredictionSetDocument.model_validate({**values, "report": report})
+
+
+class PredictionSetList(BaseModel):
+    """The sets of a dataset, the newest first."""
+
+    items: list[PredictionSetDocument]
+
+
+class ViewPrediction(BaseModel):
+    """A ball that was predicted in a view: no annotation until a person accepts it."""
+
+    id: int
+    predictions: int = Field(description="Id of its set.")
+    name: str = Field(description="Name of its set.")
+    box: BoxNumbers
+    score: float
+
+    @staticmethod
+    def of(found: PredictionSet, box: PredictedBox) -> ViewPrediction:
+        """The document of a box of a set."""
+        return ViewPrediction(
+            id=box.id,
+            predictions=found.id,
+            name=found.name,
+            box=(box.x, box.y, box.width, box.height),
+            score=box.score,
+        )
+
+
+class ViewPredictions(BaseModel):
+    """What was predicted for a view, the newest set first, the surest box first."""
+
+    items: list[ViewPrediction]
+
+
+class AcceptBody(BaseModel):
+    """Which predictions become annotations: the surest one of each view."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"dataset": "sample", "predictions": 3, "q": "gate:ball", "min_score": 0.5},
+                {"dataset": "sample", "predictions": 3, "views": [31], "replace": True},
+            ]
+        },
+    )
+
+    dataset: Annotated[str, Field(max_length=200, description="Name or id.")]
+    predictions: Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
+    q: Annotated[str, Field(max_length=1000)] | None = Field(
+        default=None, description="Groups, as in the queue; accepted by a job."
+    )
+    views: Annotated[list[ViewId], Field(min_length=1, max_length=MAX_VIEWS)] | None = Field(
+        default=None, description="These views, accepted at once."
+    )
+    min_score: Annotated[float, Field(ge=0, le=1)] = 0.0
+    replace: StrictBool = Field(
+        default=False, description="Also where the view has another ball; else it is refused."
+    )
+    dry_run: StrictBool = False
+
+    @model_validator(mode="after")
+    def _one_choice(self) -> AcceptBody:
+        if (self.q is None) == (self.views is None):
+            raise ValueError('give "q" or "views"; an empty "q" means every group')
+        return self
+
+    def value(self) -> AcceptRequest:
+        """What is asked for."""
+        views = None if self.views is None else tuple(self.views)
+        return AcceptRequest(self.predictions, self.q, views, self.min_score, self.replace)
+
+
+class AcceptedView(BaseModel):
+    """A view that would get a ball."""
+
+    view: int
+    key: str
+    group: int
+    group_key: str
+    box: BoxNumbers
+    score: float
+
+
+class AcceptOutcome(BaseModel):
+    """What accepting does, or did.
+
+    `refused` counts views by reason: `below_score`, `annotated`, `the_same`,
+    `changed_meanwhile`.
+    """
+
+    dry_run: bool
+    changed: StrictInt = Field(description="Views that get a ball.")
+    groups: int
+    refused: dict[str, int]
+    sample: list[AcceptedView] = Field(description="The first views of a dry run.")
+
+    @staticmethod
+    def planned(plan: AcceptPlan) -> AcceptOutcome:
+        """Of a dry run."""
+        sample = [
+            AcceptedView(
+                view=item.view_id,
+                key=item.view,
+                group=item.group_id,
+                group_key=item.group,
+                box=(item.box.x, item.box.y, item.box.width, item.box.height),
+                score=item.box.score,
+            )
+            for item in plan.changes[:SHOWN]
+        ]
+        return AcceptOutcome(
+            dry_run=True,
+            changed=len(plan.changes),
+            groups=plan.groups,
+            refused=plan.refused,
+            sample=sample,
+        )
+
+    @staticmethod
+    def done(report: AcceptReport) -> AcceptOutcome:
+        """Of what was done."""
+        return AcceptOutcome(
+            dry_run=False,
+            changed=report.views,
+            groups=report.groups,
+            refused=report.refused,
+            sample=[],
+        )
+
+
+def size_of(size: Size | None) -> ImageSize | None:
+    """A size as a value."""
+    return None if size is None else ImageSize(*size)

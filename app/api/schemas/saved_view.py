@@ -1,0 +1,68 @@
+"""Saved views of the queue, and who has reviewed how much."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.review.reviewers import Reviewer
+from app.review.saved_views import MAX_NAME, SavedView
+
+
+class NewSavedView(BaseModel):
+    """A query and the name that it shall have."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"name": "Nearly there", "q": "jac<0.8 jac>0.75"}]},
+    )
+
+    name: Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
+    q: Annotated[str, Field(max_length=1000)]
+
+
+class SavedViewDocument(BaseModel):
+    """A query under a name that everybody on the dataset sees."""
+
+    id: int
+    name: str
+    q: str
+    by: str
+    created: datetime
+    groups: int = Field(description="How many match now.")
+
+    @staticmethod
+    def of(view: SavedView) -> SavedViewDocument:
+        """The document of a saved view."""
+        same = {name: getattr(view, name) for name in ("id", "name", "created", "groups")}
+        return SavedViewDocument.model_validate({**same, "q": view.query, "by": view.actor})
+
+
+class SavedViewList(BaseModel):
+    """Saved views, by name."""
+
+    items: list[SavedViewDocument]
+
+
+class ReviewerDocument(BaseModel):
+    """One person's verdicts."""
+
+    name: str
+    accepted: int = Field(description="Groups whose verdict is this person's now.")
+    rejected: int
+    deferred: int
+    today: int = Field(description="Groups judged since midnight UTC.")
+    last: datetime = Field(description="Time of the last verdict.")
+
+    @staticmethod
+    def of(reviewer: Reviewer) -> ReviewerDocument:
+        """The document of a reviewer."""
+        return ReviewerDocument.model_validate(vars(reviewer))
+
+
+class ReviewerList(BaseModel):
+    """Everybody who has judged a group, the most active first."""
+
+    items: list[ReviewerDocument]

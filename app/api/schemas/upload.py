@@ -1,0 +1,33 @@
+"""Uploads: files that were sent, and how long they stay."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from pydantic import BaseModel, Field
+
+from app.store.uploads import Upload
+
+
+class UploadDocument(BaseModel):
+    """An uploaded file."""
+
+    id: str = Field(description="Digest of its name and content.")
+    name: str
+    bytes: int
+    created: datetime
+    kept: bool = Field(description="Whether a dataset reads frames from it; it then stays.")
+    format: str | None = Field(description="What it most likely holds, to import it as.")
+
+    @staticmethod
+    def of(upload: Upload, guessed: str | None) -> UploadDocument:
+        """The document of an upload."""
+        return UploadDocument.model_validate({**vars(upload), "format": guessed})
+
+
+class UploadList(BaseModel):
+    """Uploads, the newest first."""
+
+    items: list[UploadDocument]
+    max_bytes: int = Field(description="Largest file that is taken.")
+    days: int = Field(description="After so many days an upload expires.")

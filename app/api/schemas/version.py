@@ -1,0 +1,194 @@
+"""Versions: what to freeze, what was frozen, and what changed between two of them."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt
+
+from app.api.schemas.policy import PolicyDocument
+from app.review.freeze import MAX_LICENCE, MAX_NOTE, FreezePlan, FreezeRequest
+from app.review.split import TEST_CAMERAS, Split
+from app.review.version_diff import VersionDiff
+from app.review.versions import Version
+
+Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+Camera = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class SplitChoice(BaseModel):
+    """How a version is split into train and test."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    kind: Literal["given", "match", "camera"] = Field(
+        default="given", description="As the dataset says; drawn by match; by camera (ISSIA)."
+    )
+    seed: StrictInt = Field(default=0, ge=0, le=2**53, description="Of the draw by match.")
+    test_share: Annotated[
+        float, Field(gt=0, lt=1, description="Of the matches, in the draw by match.")
+    ] = 0.2
+    test_cameras: Annotated[list[Camera], Field(min_length=1, max_length=100)] = list(TEST_CAMERAS)
+
+    def value(self) -> Split:
+        """The split that this asks for."""
+        return Split(self.kind, self.seed, self.test_share, tuple(self.test_cameras))
+
+
+class VersionRequest(BaseModel):
+    """What to freeze, and as what."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [{"name": "v1", "note": "For the benchmark", "split": {"kind": "match"}}]
+        },
+    )
+
+    name: Annotated[str, Field(min_length=1, max_length=100, description="Unique in its dataset.")]
+    note: Annotated[str, Field(max_length=MAX_NOTE)] = ""
+    licence: Annotated[
+        str, Field(max_length=MAX_LICENCE, description="Empty: the terms of the sources.")
+    ] = ""
+    split: SplitChoice = SplitChoice()
+    groups: Literal["accepted", "passing"] = Field(
+        default="accepted",
+        description="What people accepted; or whatever the policy passes and nobody refused.",
+    )
+    dry_run: StrictBool = Field(default=False, description="Count, and freeze nothing.")
+
+    def value(self) -> FreezeRequest:
+        """What the freeze is asked for."""
+        return FreezeRequest(self.name, self.note, self.licence, self.split.value(), self.groups)
+
+
+class FreezePlanDocument(BaseModel):
+    """What a freeze would do."""
+
+    groups: int
+    left_out: dict[str, int] = Field(description="Why the other groups do not enter.")
+    unsolved: int = Field(description="Of those, how many have to be solved first.")
+
+    @staticmethod
+    def of(plan: FreezePlan) -> FreezePlanDocument:
+        """The document of a plan."""
+        return FreezePlanDocument.model_validate(vars(plan))
+
+
+class VersionDocument(BaseModel):
+    """A frozen version."""
+
+    id: int
+    dataset: str
+    name: str
+    hash: str = Field(
+        description="SHA-256 over annotations, verdicts, split, policy and solver version: the "
+        "same on every machine."
+    )
+    created: datetime
+    actor: str
+    note: str
+    licence: str
+    groups: Literal["accepted", "passing"]
+    counts: dict[str, Any] = Field(
+        description="Groups, views, balls, overrides; by split; why groups are not in it."
+    )
+    split: dict[str, Any]
+    policy: PolicyDocument
+    solver_version: str
+    software_version: str
+    previous: int | None = Field(description="Id of the version frozen before.")
+
+    @staticmethod
+    def of(version: Version) -> VersionDocument:
+        """The document of a version."""
+        values = {name: getattr(version, name) for name in VersionDocument.model_fields}
+        changed = {"split": version.split.values(), "policy": PolicyDocument.of(version.policy)}
+        return VersionDocument.model_validate({**values, **changed})
+
+
+class VersionList(BaseModel):
+    """The versions of a dataset, newest first."""
+
+    items: list[VersionDocument]
+
+
+class VersionManifest(BaseModel):
+    """What a version says of itself in every export."""
+
+    dataset: str
+    version: str
+    date: datetime
+    counts: dict[str, Any]
+    settings: dict[str, Any] = Field(description="Policy, solver, groups, split.")
+    licence: str
+    verdicts: dict[str, int]
+    overrides: list[dict[str, Any]] = Field(description="Groups that are in it against a gate.")
+    frozen: dict[str, Any] = Field(description="Hash, note, changelog, rejected groups.")
+
+
+class Changelog(BaseModel):
+    """What changed since the version before."""
+
+    version: str
+    lines: list[str]
+
+
+class VersionName(BaseModel):
+    """Which version."""
+
+    id: int
+    name: str
+    hash: str
+
+
+class PassageDocument(BaseModel):
+    """A group that came or went; ``why`` it was not in the other version."""
+
+    group: str
+    why: str
+
+
+class MoveDocument(BaseModel):
+    """A 3D ball that lies elsewhere; pitch frame, metres."""
+
+    group: str
+    metres: float
+    before: Point
+    after: Point
+
+
+class ChangeDocument(BaseModel):
+    """A group of both versions that is not the same in them."""
+
+    group: str
+    what: list[Literal["annotations", "verdict", "split", "ball"]]
+
+
+class SettingDocument(BaseModel):
+    """A value of policy, solver or split that differs."""
+
+    name: str
+    before: Any
+    after: Any
+
+
+class VersionDiffDocument(BaseModel):
+    """What changed from one version to another; lists may be cut, counts are whole."""
+
+    older: VersionName
+    newer: VersionName
+    same: bool = Field(description="Whether the hashes are equal.")
+    counts: dict[str, int]
+    lines: list[str] = Field(description="In sentences.")
+    added: list[PassageDocument]
+    dropped: list[PassageDocument]
+    moved: list[MoveDocument] = Field(description="The farthest first.")
+    changed: list[ChangeDocument]
+    settings: list[SettingDocument]
+
+    @staticmethod
+    def of(diff: VersionDiff, most: int) -> VersionDiffDocument:
+        """The document of a diff."""
+        return VersionDiffDocument.model_validate(diff.values(most))

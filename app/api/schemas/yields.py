@@ -1,0 +1,209 @@
+"""What a policy lets through, and the values of one that somebody would like to try."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.api.schemas.policy import PolicyDocument
+from app.review.yields import THRESHOLDS, UNSOLVED, Yield
+
+Number = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+LABELS = {
+    UNSOLVED: "Solved",
+    "calibratable": "Calibrated",
+    "jac": "Field lines fit",
+    "two_views": "Two calibrated views",
+    "ball": "Ball in two of them",
+    "baseline": "Cameras apart",
+    "reprojection": "Views meet in one ball",
+    "parallax": "Enough parallax",
+    "sigma": "Certain enough",
+}
+"""What a step of the funnel asks, for people."""
+
+
+class CalibrationValues(BaseModel):
+    """What a view's calibration depends on; only solving again tells what another value does."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    robust_scale_px: Number | None = None
+    distortion_mean: Number | None = None
+    distortion_sigma: Number | None = None
+    check_labels: bool | None = None
+
+
+class WhatIf(BaseModel):
+    """Thresholds to try; those that are absent stay as they are.
+
+    `null` switches a gate off (`min_parallax_degrees`, `max_sigma_m`) and says nothing elsewhere.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"min_jac": 0.8, "min_parallax_degrees": 5.0}]},
+    )
+
+    calibration: CalibrationValues | None = None
+    jac_gamma_percent: Number | None = None
+    min_jac: Number | None = None
+    tau_percent: Number | None = None
+    min_baseline_m: Number | None = None
+    ball_diameter_m: Number | None = None
+    min_parallax_degrees: Number | None = None
+    max_sigma_m: Number | None = None
+    low_parallax_degrees: Number | None = None
+    click_sigma_px: Number | None = None
+    box_sigma_share: Number | None = None
+    below_grass_m: Number | None = None
+    max_height_m: Number | None = None
+    outside_pitch_m: Number | None = None
+    pitch_length_m: Number | None = None
+    pitch_width_m: Number | None = None
+
+    def values(self) -> dict[str, Any]:
+        """The fields of a policy that shall differ."""
+        sent = self.model_dump(exclude_unset=True)
+        calibration = sent.pop("calibration", None) or {}
+        kept = {
+            name: value for name, value in sent.items() if value is not None or name in OPTIONAL
+        }
+        known = {name: value for name, value in calibration.items() if value is not None}
+        return {**kept, "calibration": known}
+
+
+OPTIONAL = frozenset({"min_parallax_degrees", "max_sigma_m"})
+"""Gates that a policy need not ask for."""
+
+
+class FunnelStep(BaseModel):
+    """A gate: how many groups are left after it, and for how many it is the first that fails."""
+
+    gate: str
+    label: str
+    left: int
+    dropped: int
+
+
+class CurveDocument(BaseModel):
+    """Groups with the ball in two or more views that qualify, against the JaC threshold."""
+
+    gamma_percent: float
+    thresholds: list[float]
+    groups: list[int]
+
+
+class SplitYield(BaseModel):
+    """Groups of one split."""
+
+    split: str
+    groups: int
+    passing: int
+
+
+class DistanceYield(BaseModel):
+    """Groups by distance of the ball from the camera of the first view that it comes from."""
+
+    model_config = ConfigDict(serialize_by_alias=True)
+
+    low: float | None = Field(
+        alias="from", description="Metres; null, as `to` is, for groups without a ball."
+    )
+    high: float | None = Field(alias="to", description="null: without an end.")
+    groups: int
+    passing: int
+
+
+class FindingYield(BaseModel):
+    """Groups with a finding that follows from a threshold, though it is no gate."""
+
+    kind: str
+    groups: int
+    passing: int
+
+
+class SplitCount(BaseModel):
+    """Groups of a match in one split."""
+
+    split: str
+    groups: int
+
+
+class Leakage(BaseModel):
+    """A match that lies in several splits."""
+
+    match: str
+    splits: list[SplitCount]
+
+
+class YieldDocument(BaseModel):
+    """What a policy lets through, gate by gate."""
+
+    policy: PolicyDocument = Field(description="The policy that is judged by here.")
+    groups: int
+    passing: int
+    unsolved: int = Field(description="Not solved yet under the present calibration.")
+    funnel: list[FunnelStep] = Field(
+        description="Every group by its first failing gate; the counts lead from all to passing."
+    )
+    given_not_measured: int = Field(
+        description="Groups whose cameras are given and have no lines: gate `jac` passes them."
+    )
+    curves: list[CurveDocument]
+    splits: list[SplitYield]
+    distances: list[DistanceYield]
+    findings: list[FindingYield]
+    leakage: list[Leakage]
+    gained: int = Field(description="Groups that pass and do not under the present policy.")
+    lost: int = Field(description="Groups that pass under the present policy and do not here.")
+    needs_solving: list[str] = Field(
+        description="Fields that were asked for and whose effect only solving again can tell."
+    )
+
+    @staticmethod
+    def of(found: Yield) -> YieldDocument:
+        """The document of a yield."""
+        same = {name: getattr(found, name) for name in _SAME}
+        return YieldDocument(
+            **same,
+            policy=PolicyDocument.of(found.policy),
+            funnel=[FunnelStep(label=LABELS[step.gate], **vars(step)) for step in found.funnel],
+            curves=[
+                CurveDocument(
+                    gamma_percent=curve.gamma_percent,
+                    thresholds=list(THRESHOLDS),
+                    groups=list(curve.groups),
+                )
+                for curve in found.curves
+            ],
+            splits=[
+                SplitYield(split=part.name, groups=part.groups, passing=part.passing)
+                for part in found.splits
+            ],
+            distances=[
+                DistanceYield(
+                    **{"from": part.low, "to": part.high},
+                    groups=part.groups,
+                    passing=part.passing,
+                )
+                for part in found.distances
+            ],
+            findings=[
+                FindingYield(kind=part.name, groups=part.groups, passing=part.passing)
+                for part in found.findings
+            ],
+            leakage=[
+                Leakage(
+                    match=leak.match,
+                    splits=[SplitCount(split=name, groups=count) for name, count in leak.splits],
+                )
+                for leak in found.leakage
+            ],
+            needs_solving=list(found.needs_solving),
+        )
+
+
+_SAME = ("groups", "passing", "unsolved", "given_not_measured", "gained", "lost")

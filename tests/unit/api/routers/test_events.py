@@ -1,0 +1,212 @@
+"""Events, as a browser hears them from a real server."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+import httpx
+import pytest
+import uvicorn
+from fastapi import FastAPI
+
+from app.api import events as module
+from app.api.server import Server, listen
+from app.review.datasets import set_policy
+from app.review.edit import IncludeView
+from app.review.submit import load, submit
+from app.review.verdict import set_verdict
+from app.soccer.policy import STRICT
+
+SECONDS = 20
+EVENTS = "/api/v1/events"
+
+
+@pytest.fixture
+def served(app: FastAPI) -> Iterator[tuple[str, Server]]:
+    """Address and server of a real socket."""
+    app.state.services.settings.allowed_hosts.append("127.0.0.1")
+    with listen("127.0.0.1", 0) as (socket, address):
+        server = Server(uvicorn.Config(app, log_level="critical", lifespan="off"), app)
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [socket]})
+        thread.start()
+        yield address, server
+        server.should_exit = True
+        thread.join(SECONDS)
+        assert not thread.is_alive()
+
+
+class Stream:
+    """The events of an open stream, one after the other."""
+
+    def __init__(self, answer: httpx.Response):
+        self.answer, self.lines = answer, answer.iter_lines()
+        self.last_id: str | None = None
+
+    def next(self) -> tuple[str, Any]:
+        """Name and data of the next event."""
+        fields: dict[str, str] = {}
+        for line in self.lines:
+            name, _, value = line.partition(": ")
+            if line and name:
+                fields[name] = value
+            elif "id" in fields:
+                self.last_id = fields["id"]
+            if not line and "event" in fields:
+                return fields["event"], json.loads(fields["data"])
+            if not line:
+                fields = {}
+        raise EOFError
+
+    def until(self, wanted: Callable[[str, Any], bool]) -> Any:
+        """Data of the next event that is wanted."""
+        while True:
+            name, data = self.next()
+            if wanted(name, data):
+                return data
+
+
+@contextmanager
+def opened(address: str, headers: dict[str, str] | None = None, **params: str) -> Iterator[Stream]:
+    with (
+        httpx.Client(base_url=address, timeout=SECONDS) as client,
+        client.stream("GET", EVENTS, params=params, headers=headers) as answer,
+    ):
+        assert answer.status_code == 200, answer.read()
+        yield Stream(answer)
+
+
+class TestListen:
+    def test_a_verdict_is_told_with_the_new_etag(self, app, served) -> None:
+        store, (address, _) = app.state.services.store, served
+        with opened(address, dataset="broadcast") as stream:
+            assert stream.answer.headers["content-type"].startswith("text/event-stream")
+            state = set_verdict(store, 1, "deferred", if_match=load(store, 1).etag, actor="bob")
+            name, data = stream.next()
+            assert (name, data) == (
+                "group",
+                {
+                    "group": 1,
+                    "dataset": "broadcast",
+                    "etag": state.etag,
+                    "kind": "verdict",
+                    "actor": "bob",
+                },
+            )
+
+    def test_another_dataset_is_not_told_of(self, app, served) -> None:
+        store, (address, _) = app.state.services.store, served
+        with opened(address, dataset="static") as stream:
+            set_verdict(store, 1, "deferred", if_match=load(store, 1).etag, actor="bob")
+            set_verdict(store, 4, "deferred", if_match=load(store, 4).etag, actor="bob")
+            assert stream.next()[1]["group"] == 4
+
+    def test_who_comes_back_misses_nothing_and_hears_nothing_twice(self, app, served) -> None:
+        store, (address, _) = app.state.services.store, served
+        with opened(address) as stream:
+            edit = IncludeView("7.png", False)
+            edited = submit(store, 1, edit, if_match=load(store, 1).etag, actor="bob")
+            assert stream.next()[1]["etag"] == edited.etag
+            last = stream.last_id
+        # Nobody listens; meanwhile:
+        judged = set_verdict(store, 2, "deferred", if_match=load(store, 2).etag, actor="bob")
+        with opened(address, {"Last-Event-ID": last}) as stream:
+            assert stream.next()[1]["etag"] == judged.etag
+        for odd in ("x", "-1", "9" * 30, "999999"):
+            with opened(address, {"Last-Event-ID": odd}) as stream:
+                set_policy(store, "static", STRICT, actor="bob")
+                assert stream.next() == (
+                    "dataset",
+                    {"dataset": "static", "kind": "policy", "actor": "bob"},
+                )
+
+    def test_a_job_is_told_of_from_its_beginning_to_its_end(self, app, served) -> None:
+        jobs, (address, _) = app.state.services.jobs, served
+        finish = threading.Event()
+
+        def work(progress: Any) -> int:
+            while not finish.wait(0.01):
+                progress(3, 9, "At it.")
+            return 5
+
+        waiting = jobs.submit("bulk", "Work", work, dataset_id=1, actor="bob")
+        with opened(address, dataset="broadcast") as stream:
+            going = stream.until(lambda name, data: name == "job" and data["total"])
+            assert (going["id"], going["state"], going["done"]) == (waiting.id, "running", 3)
+            finish.set()
+            ended = stream.until(lambda name, data: name == "job" and data["ended"])
+            assert (ended["state"], ended["result"]) == ("done", 5)
+
+    def test_a_solution_that_arrives_is_told(self, app, served) -> None:
+        services, (address, _) = app.state.services, served
+        with opened(address, dataset="broadcast") as stream:
+            set_policy(services.store, "broadcast", STRICT, actor="bob")
+            assert stream.next()[0] == "dataset"
+            from app.review.recompute import solve_dataset
+
+            solve_dataset(services.store, "broadcast")
+            told = {stream.until(lambda name, _: name == "group")["group"] for _ in range(3)}
+            assert told == {1, 2, 3}
+
+    def test_head_ends(self, served) -> None:
+        answer = httpx.head(f"{served[0]}{EVENTS}", timeout=SECONDS)
+        assert (answer.status_code, answer.content) == (200, b"")
+
+    def test_an_unknown_dataset_is_404_and_one_listener_too_many_503(
+        self, served, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        address, _ = served
+        answer = httpx.get(f"{address}{EVENTS}", params={"dataset": "nothing"})
+        assert answer.status_code == 404
+        monkeypatch.setattr(module, "MAX_FEEDS", 1)
+        with opened(address):
+            refused = httpx.get(f"{address}{EVENTS}", timeout=SECONDS)
+            assert (refused.status_code, refused.headers["retry-after"]) == (503, "5")
+
+    def test_idle_streams_take_no_thread_from_other_requests(self, app, served) -> None:
+        address, _ = served
+        with ExitStack() as stack:
+            client = stack.enter_context(httpx.Client(base_url=address, timeout=SECONDS))
+            for _ in range(45):
+                stack.enter_context(client.stream("GET", EVENTS))
+            assert client.get("/api/v1/groups/1").status_code == 200
+        end = time.monotonic() + SECONDS
+        while app.state.services.events._feeds and time.monotonic() < end:
+            time.sleep(0.01)
+        assert not app.state.services.events._feeds
+
+
+class TestStop:
+    def test_open_streams_end_and_the_server_stops_soon(self, app, served) -> None:
+        address, server = served
+        with opened(address) as stream:
+            set_policy(app.state.services.store, "static", STRICT, actor="bob")
+            stream.next()
+            start = time.monotonic()
+            server.should_exit = True
+            with pytest.raises(EOFError):
+                stream.next()
+            assert time.monotonic() - start < 2
+
+
+class TestFeed:
+    def test_who_does_not_keep_up_is_let_go_and_comes_back(
+        self, app, served, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "MAX_WAITING", 2)
+        store, (address, _) = app.state.services.store, served
+        with opened(address) as stream:
+            set_policy(store, "static", STRICT, actor="bob")
+            stream.next()
+            seen = stream.last_id
+            feed = next(iter(app.state.services.events._feeds))
+            feed.offer([module.hello(1)] * 3)
+            with pytest.raises(EOFError):
+                stream.next()
+        set_policy(store, "broadcast", STRICT, actor="bob")
+        with opened(address, {"Last-Event-ID": seen}) as stream:
+            assert stream.next()[1]["dataset"] == "broadcast"

@@ -1,0 +1,171 @@
+"""Exports over HTTP: asked for, waited for, listed, fetched and deleted."""
+
+from __future__ import annotations
+
+import io
+import threading
+import zipfile
+from typing import Any, get_args
+
+import pytest
+
+from app.api.routers import exports as module
+from app.api.schemas.export import Format
+from app.review.export_formats import FORMATS
+from app.review.jobs import Jobs
+
+SECONDS = 30
+API = "/api/v1/exports"
+ORDER = {"dataset": "broadcast", "format": "cameras", "all": True}
+
+
+def test_every_format_can_be_asked_for() -> None:
+    assert set(get_args(Format)) == set(FORMATS)
+
+
+@pytest.fixture
+def busy(app: Any) -> Any:
+    """The worker is held until the event is set."""
+    started, finish = threading.Event(), threading.Event()
+
+    def work(progress: Any) -> None:
+        started.set()
+        assert finish.wait(SECONDS)
+
+    app.state.services.jobs.submit("bulk", "Work", work, actor="bob")
+    assert started.wait(SECONDS)
+    yield finish
+    finish.set()
+
+
+class TestMakeExport:
+    def test_is_a_job_and_its_zip_can_be_asked_for_at_once(self, app, api) -> None:
+        answer = api.post(API, json=ORDER)
+        job = answer.json()
+        assert answer.status_code == 202
+        assert answer.headers["location"] == f"/api/v1/jobs/{job['id']}"
+        assert (job["kind"], job["dataset"], job["content"]) == (
+            "export",
+            "broadcast",
+            f"{API}/{job['id']}/content",
+        )
+        content = api.get(job["content"])
+        assert content.headers["content-type"] == "application/zip"
+        with zipfile.ZipFile(io.BytesIO(content.content)) as archive:
+            assert "manifest.json" in archive.namelist()
+        document = api.get(f"{API}/{job['id']}").json()
+        assert (document["status"], document["counts"]["cameras"]) == ("ready", 2)
+        assert document["bytes"] == len(content.content)
+        done = api.get(f"/api/v1/jobs/{job['id']}").json()
+        assert (done["state"], done["done"], done["total"]) == ("done", 3, 3)
+        assert done["result"]["content"] == document["content"]
+
+    def test_what_cannot_be_is_refused_at_once(self, app, api) -> None:
+        nothing = api.post(API, json={**ORDER, "all": False})
+        assert (nothing.status_code, "accepted" in nothing.json()["detail"]) == (400, True)
+        assert api.post(API, json={**ORDER, "dataset": "x"}).status_code == 404
+        assert api.post(API, json={**ORDER, "all": False, "version": 7}).status_code == 404
+        assert app.state.services.jobs.find() == []
+
+    def test_what_fails_while_it_is_written_says_why_and_leaves_nothing(
+        self, app, api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def broken(*arguments: object, **options: object) -> None:
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr("app.datasets.output.write_zip", broken)
+        job = api.post(API, json=ORDER).json()
+        failed = app.state.services.jobs.wait(job["id"], SECONDS)
+        assert failed.state == "failed"
+        document = api.get(f"{API}/{job['id']}").json()
+        assert (document["status"], document["content"]) == ("failed", None)
+        assert "No space left" in document["error"]
+        content = api.get(job["content"])
+        assert content.status_code == 409
+        assert "No space left" in content.json()["detail"]
+        assert list(app.state.services.exports.folder.iterdir()) == []
+
+
+class TestListExports:
+    def test_gives_the_newest_first_with_those_under_way(self, app, api, busy) -> None:
+        ids = [str(api.post(API, json=ORDER).json()["id"]) for _ in range(3)]
+        page = api.get(API, params={"limit": 2}).json()
+        assert [item["id"] for item in page["items"]] == ids[:0:-1]
+        assert {item["status"] for item in page["items"]} == {"waiting"}
+        rest = api.get(API, params={"limit": 2, "cursor": page["next"]}).json()
+        assert ([item["id"] for item in rest["items"]], rest["next"]) == ([ids[0]], None)
+        assert api.get(API, params={"dataset": "static"}).json()["items"] == []
+        busy.set()
+        app.state.services.jobs.wait(int(ids[2]), SECONDS)
+        assert {item["status"] for item in api.get(API).json()["items"]} == {"ready"}
+
+
+class TestGetContent:
+    def test_does_not_wait_forever(self, api, busy, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(module, "PATIENCE", 0.1)
+        job = api.post(API, json=ORDER).json()
+        answer = api.get(job["content"])
+        assert (answer.status_code, "still being written" in answer.text) == (409, True)
+
+    def test_of_what_is_no_export_is_404(self, app, api, busy) -> None:
+        (other,) = app.state.services.jobs.find()
+        for name in (other.id, 99, "x", "0" * 32, "1" * 30):
+            assert api.get(f"{API}/{name}/content").status_code == 404
+            assert api.get(f"{API}/{name}").status_code == 404
+
+
+class TestCancel:
+    def test_leaves_no_file(self, app, api, monkeypatch: pytest.MonkeyPatch) -> None:
+        from app.review import export
+
+        jobs: Jobs = app.state.services.jobs
+        plain, started = export.write_format, threading.Event()
+
+        def slow(*arguments: Any, **options: Any) -> Any:
+            started.set()
+            assert cancelled.wait(SECONDS)
+            return plain(*arguments, **options)
+
+        cancelled = threading.Event()
+        monkeypatch.setattr(export, "write_format", slow)
+        job = api.post(API, json=ORDER).json()
+        assert started.wait(SECONDS)
+        assert api.delete(f"/api/v1/jobs/{job['id']}").status_code == 200
+        cancelled.set()
+        assert jobs.wait(job["id"], SECONDS).state == "cancelled"
+        assert list(app.state.services.exports.folder.iterdir()) == []
+        assert api.get(f"{API}/{job['id']}").json()["status"] == "cancelled"
+
+
+class TestDeleteExport:
+    def test_takes_the_file_away(self, app, api) -> None:
+        job = api.post(API, json=ORDER).json()
+        assert api.get(job["content"]).status_code == 200
+        assert api.delete(f"{API}/{job['id']}").status_code == 204
+        assert api.get(job["content"]).status_code == 404
+        assert api.get(f"{API}/{job['id']}").json()["status"] == "gone"
+        assert api.delete(f"{API}/{job['id']}").status_code == 404
+        assert list(app.state.services.exports.folder.iterdir()) == []
+
+    def test_of_one_that_is_being_written_is_409(self, api, busy) -> None:
+        job = api.post(API, json=ORDER).json()
+        assert api.delete(f"{API}/{job['id']}").status_code == 409
+
+
+class TestRestart:
+    def test_an_export_that_was_under_way_is_written_by_the_next_server(
+        self, app, api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        # The first server still believes that it is to write it.
+        monkeypatch.setattr(module, "PATIENCE", 0.1)
+        from app.api.export_job import resume_exports
+
+        services = app.state.services
+        services.jobs._closing.set()
+        job = api.post(API, json=ORDER).json()
+        again = Jobs(services.store)
+        resume_exports(again, services.store, services.exports)
+        again.start()
+        assert again.wait(job["id"], SECONDS).state == "done"
+        again.close()
+        assert api.get(job["content"]).status_code == 200

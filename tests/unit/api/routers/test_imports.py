@@ -1,0 +1,159 @@
+"""Imports over HTTP."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.datasets.soccernet_v3 import write_soccernet_v3
+from app.review.datasets import get_dataset
+from app.review.import_jobs import resume_imports
+from app.soccer.group import Group
+from app.store.jobs import NewJob, insert_job, update_job
+from app.store.log import read_log
+from app.store.uploads import get_upload
+
+API = "/api/v1/imports"
+SECONDS = 30
+
+
+@pytest.fixture
+def tree(app: Any, tmp_path: Path, group: Group) -> Path:
+    """An allowed folder with one match in SoccerNet-v3 layout."""
+    root = tmp_path / "data"
+    root.mkdir()
+    write_soccernet_v3(root, [group])
+    object.__setattr__(app.state.services.settings, "import_folders", [root])
+    return root
+
+
+def body(**changes: Any) -> dict[str, Any]:
+    return {"dataset": "fresh", "format": "soccernet-v3", "source": {"folder": "data"}} | changes
+
+
+def finished(app: Any, answer: Any) -> Any:
+    assert answer.status_code == 202, answer.text
+    assert answer.headers["location"] == f"/api/v1/jobs/{answer.json()['id']}"
+    return app.state.services.jobs.wait(answer.json()["id"], SECONDS)
+
+
+class TestStartImport:
+    def test_a_folder_becomes_a_dataset_and_the_job_reports(self, app, api, tree) -> None:
+        (tree / "x").mkdir()
+        (tree / "x" / "Labels-v3.json").write_text("{")
+        job = finished(app, api.post(API, json=body()))
+        result = job.result
+        assert (job.state, job.kind) == ("done", "import")
+        assert (result["read"], result["imported"], result["new"]) == (1, 1, 1)
+        (skipped,) = result["skipped"]
+        assert skipped["file"] == "x/Labels-v3.json"
+        assert str(tree) not in str(result)
+        assert get_dataset(app.state.services.store, "fresh").groups == 1
+
+    def test_what_is_new_is_solved_afterwards(self, app, api, tree) -> None:
+        finished(app, api.post(API, json=body()))
+        jobs = app.state.services.jobs
+        (solving,) = jobs.find(kinds=["solve"])
+        jobs.wait(solving.id, SECONDS)
+        assert get_dataset(app.state.services.store, "fresh").solved == 1
+
+    def test_a_dry_run_says_the_same_and_keeps_nothing(self, app, api, tree) -> None:
+        dry = finished(app, api.post(API, json=body(dry_run=True))).result
+        assert [item["name"] for item in api.get("/api/v1/datasets").json()["items"]] == [
+            "broadcast", "static",
+        ]  # fmt: skip
+        done = finished(app, api.post(API, json=body())).result
+        assert {**dry, "dry_run": False} == done
+
+    def test_an_upload_is_read_in_place_and_stays(self, app, api, tree) -> None:
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w") as archive:
+            for path in tree.rglob("*.json"):
+                archive.write(path, path.relative_to(tree))
+        headers = {"Content-Type": "application/octet-stream"}
+        upload = api.post(
+            "/api/v1/uploads", params={"name": "m.zip"}, content=packed.getvalue(), headers=headers
+        ).json()
+        source = {"upload": upload["id"]}
+        job = finished(app, api.post(API, json=body(source=source)))
+        assert job.result["new"] == 1
+        services = app.state.services
+        assert get_upload(services.settings, upload["id"]).kept
+        with services.store.read() as session:
+            sources = {e.body.get("source") for e in read_log(session) if e.kind == "import"}
+        assert "m.zip" in sources
+
+    def test_the_same_key_gives_the_same_job(self, app, api, tree) -> None:
+        headers = {"Idempotency-Key": "once"}
+        first = api.post(API, json=body(), headers=headers)
+        again = api.post(API, json=body(), headers=headers)
+        other = api.post(API, json=body(dataset="other"), headers=headers)
+        assert first.json()["id"] == again.json()["id"]
+        assert other.status_code == 422
+        finished(app, first)
+        later = api.post(API, json=body(), headers=headers)
+        assert later.json()["id"] == first.json()["id"]
+        assert len(app.state.services.jobs.find(kinds=["import"])) == 1
+
+    @pytest.mark.parametrize(
+        ("changes", "status"),
+        [
+            ({"source": {"folder": "nowhere"}}, 404),
+            ({"source": {"folder": "data/../x"}}, 400),
+            ({"source": {"upload": "a" * 32}}, 404),
+            ({"source": {"upload": "../../etc"}}, 422),
+            ({"source": {}}, 422),
+            ({"source": {"folder": "data", "upload": "a" * 32}}, 422),
+            ({"source": {"url": "http://169.254.169.254/"}}, 422),
+            ({"format": "yolo"}, 422),
+            ({"dataset": "a/b"}, 400),
+            ({"options": {"size": [0, 5]}}, 422),
+            ({"options": {"calibration": "guess"}}, 422),
+            ({"options": {"lines": {"folder": "nowhere"}}, "format": "issia"}, 404),
+        ],
+    )
+    def test_what_cannot_be_is_refused_at_once(self, app, api, tree, changes, status) -> None:
+        answer = api.post(API, json=body(**changes))
+        assert answer.status_code == status, answer.text
+        assert app.state.services.jobs.find(kinds=["import"]) == []
+
+    def test_an_import_that_a_server_left_is_taken_up(self, app, api, tree) -> None:
+        services = app.state.services
+        request = {
+            "dataset": "fresh", "format": "soccernet-v3", "source": {"folder": "data"},
+            "lines": None, "options": {}, "dry_run": False,
+        }  # fmt: skip
+        with services.store.write() as session:
+            identity = insert_job(session, NewJob("import", "Import", "ann", None, request))
+            update_job(session, identity, state="running")
+        resume_imports(services.jobs, services.store, services.settings)
+        services.jobs.start()
+        job = services.jobs.wait(identity, SECONDS)
+        assert (job.state, job.result["new"]) == ("done", 1)
+
+
+class TestListImportFolders:
+    def test_walks_what_the_operator_allows(self, api, tree) -> None:
+        roots = api.get(f"{API}/folders").json()
+        assert roots == {
+            "path": "",
+            "format": None,
+            "items": [{"path": "data", "name": "data", "folder": True}],
+            "more": False,
+        }
+        inside = api.get(f"{API}/folders", params={"path": "data"}).json()
+        assert [item["path"] for item in inside["items"]] == ["data/league"]
+        assert inside["format"] == "soccernet-v3"
+
+    @pytest.mark.parametrize("path", ["data/..", "..", "data/%2e%2e", "/etc", "data\\.."])
+    def test_leads_nowhere_else(self, api, tree, path: str) -> None:
+        answer = api.get(f"{API}/folders", params={"path": path})
+        assert answer.status_code == 400
+        assert "/tmp" not in answer.text
+
+    def test_without_allowed_folders_the_list_is_empty(self, api) -> None:
+        assert api.get(f"{API}/folders").json()["items"] == []

@@ -1,0 +1,71 @@
+"""Uploads over HTTP."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+API = "/api/v1/uploads"
+BYTES = {"Content-Type": "application/octet-stream"}
+
+
+def send(api: Any, content: Any = b"{}", name: str = "labels.json", **headers: str) -> Any:
+    return api.post(API, params={"name": name}, content=content, headers={**BYTES, **headers})
+
+
+class TestUploadFile:
+    def test_is_streamed_to_disk_and_found_again(self, app, api) -> None:
+        def chunks() -> Iterator[bytes]:
+            for _ in range(40):
+                yield b"0123456789" * 10_000
+
+        answer = send(api, chunks(), "ISSIA-3D.csv")
+        assert answer.status_code == 201
+        body = answer.json()
+        assert (body["name"], body["bytes"], body["kept"]) == ("ISSIA-3D.csv", 4_000_000, False)
+        assert body["format"] == "issia-3d"
+        assert answer.headers["location"] == f"{API}/{body['id']}"
+        assert api.get(answer.headers["location"]).json() == body
+        listed = api.get(API).json()
+        assert listed["items"] == [body]
+        folder = app.state.services.settings.uploads
+        assert (folder / body["id"] / "ISSIA-3D.csv").stat().st_size == 4_000_000
+
+    def test_again_it_is_the_same_one(self, api) -> None:
+        assert send(api).json() == send(api).json()
+
+    def test_too_many_bytes_are_413_and_leave_nothing(self, app, api) -> None:
+        object.__setattr__(app.state.services.settings, "max_upload_bytes", 1000)
+        assert send(api, b"x" * 1001).status_code == 413
+
+        def chunks() -> Iterator[bytes]:
+            for _ in range(20):
+                yield b"x" * 100
+
+        assert send(api, chunks()).status_code == 413
+        folder = app.state.services.settings.uploads
+        assert list(folder.rglob("*")) == []
+
+    def test_only_bytes_with_a_name_are_taken(self, api) -> None:
+        for kind in ("application/json", "text/plain", "multipart/form-data; boundary=x"):
+            answer = send(api, **{"Content-Type": kind})
+            assert answer.status_code == 415
+            assert answer.json()["hint"] == "Send Content-Type: application/octet-stream."
+        assert api.post(API, content=b"x", headers=BYTES).status_code == 422
+        assert send(api, name="..").status_code == 400
+        assert send(api, b"").status_code == 400
+
+    def test_other_routes_take_no_bytes(self, api) -> None:
+        answer = api.post("/api/v1/imports", content=b"x", headers=BYTES)
+        assert answer.status_code == 415
+
+    def test_a_page_of_another_site_sends_nothing(self, api) -> None:
+        assert send(api, Origin="http://evil.example").status_code == 403
+
+
+class TestDeleteUpload:
+    def test_deletes_it_and_then_it_is_404(self, api) -> None:
+        place = send(api).headers["location"]
+        assert api.delete(place).status_code == 204
+        assert api.delete(place).status_code == 404
+        assert api.get(place).status_code == 404

@@ -1,0 +1,219 @@
+"""Idempotency-Key: the first answer again, whatever became of the state since."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import httpx
+import pytest
+import uvicorn
+from sqlalchemy import update
+from structlog.testing import capture_logs
+
+from app.api import first_answers as module
+from app.api.first_answers import FirstAnswers
+from app.api.server import Server, listen
+from app.errors import StorageError
+from app.store.job_models import AnswerModel
+
+API = "/api/v1"
+VERDICT = f"{API}/groups/1/verdict"
+KEY = {"Idempotency-Key": "one"}
+
+
+def accept(api: Any, key: dict[str, str] = KEY, state: str = "deferred", **options: Any) -> Any:
+    etag = options.get("etag") or api.get(f"{API}/groups/1").headers["etag"]
+    return api.put(VERDICT, json={"state": state}, headers={"If-Match": etag, **key})
+
+
+class TestRepetition:
+    def test_gets_the_first_answer_after_others_have_changed_the_state(self, api) -> None:
+        first = accept(api)
+        accept(api, {}, "unreviewed")
+        again = accept(api)
+        assert again.content == first.content
+        assert (again.status_code, again.json()["verdict"]["state"]) == (200, "deferred")
+        for name in ("etag", "content-type", "cache-control"):
+            assert again.headers[name] == first.headers[name]
+        assert again.headers["idempotency-replayed"] == "true"
+        assert "idempotency-replayed" not in first.headers
+        assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"
+
+    def test_is_known_by_what_it_says_and_not_by_how_it_is_written(self, api) -> None:
+        body = '{"state": "rejected", "reason": "sides_confused"}'
+        other = '{"reason":"sides_confused",\n"state":"rejected"}'
+        etag = api.get(f"{API}/groups/1").headers["etag"]
+        headers = {"If-Match": etag, "Content-Type": "application/json", **KEY}
+        first = api.put(VERDICT, content=body, headers=headers)
+        assert first.status_code == 200
+        assert api.put(VERDICT, content=other, headers=headers).content == first.content
+
+    @pytest.mark.parametrize(
+        ("method", "path", "body"),
+        [
+            ("PUT", VERDICT, {"state": "unreviewed"}),
+            ("PUT", f"{API}/groups/2/verdict", {"state": "deferred"}),
+            ("PUT", f"{VERDICT}?x=1", {"state": "deferred"}),
+            ("POST", f"{API}/groups/1/undo", None),
+        ],
+    )
+    def test_of_another_request_under_the_same_key_is_422(self, api, method, path, body) -> None:
+        assert accept(api).status_code == 200
+        etag = api.get(f"{API}/groups/1").headers["etag"]
+        answer = api.request(method, path, json=body, headers={"If-Match": etag, **KEY})
+        assert answer.status_code == 422
+        assert "Idempotency-Key" in answer.json()["detail"]
+        assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "deferred"
+
+    def test_of_what_was_refused_is_tried_again(self, api) -> None:
+        assert accept(api, etag='"stale-0"').status_code == 412
+        assert accept(api).status_code == 200
+
+    def test_starts_no_second_job(self, app, api) -> None:
+        order = {"dataset": "broadcast", "format": "cameras", "all": True}
+        first = api.post(f"{API}/exports", json=order, headers=KEY)
+        app.state.services.jobs.wait(first.json()["id"], 20)
+        again = api.post(f"{API}/exports", json=order, headers=KEY)
+        assert (again.status_code, again.content) == (202, first.content)
+        assert again.headers["location"] == first.headers["location"]
+        assert len(app.state.services.jobs.find()) == 1
+
+    def test_undoes_a_static_camera_once(self, api) -> None:
+        group = api.get(f"{API}/groups/4").json()
+        station = group["views"][0]["station"]
+        path = f"{API}/stations/{station['id']}"
+        for count in (3, 4):
+            points = [{"x": 10.0 * n, "y": 50.0 + n} for n in range(count)]
+            etag = api.get(path).headers["etag"]
+            body = {"lines": {"Side line top": points}}
+            api.patch(f"{path}/lines", json=body, headers={"If-Match": etag})
+        headers = {"If-Match": api.get(path).headers["etag"], **KEY}
+        first = api.post(f"{path}/undo", headers=headers)
+        again = api.post(f"{path}/undo", headers=headers)
+        assert (first.status_code, again.content) == (200, first.content)
+        assert len(api.get(path).json()["lines"]["Side line top"]) == 3
+
+    def test_after_a_day_is_a_request_of_its_own_that_still_changes_nothing_twice(
+        self, app, api
+    ) -> None:
+        accept(api)
+        accept(api, {}, "unreviewed")
+        with app.state.services.store.write() as session:
+            session.execute(update(AnswerModel).values(at="2020-01-01"))
+        accept(api, {"Idempotency-Key": "two"}, "unreviewed")
+        again = accept(api)
+        assert again.json()["verdict"]["state"] == "unreviewed"
+        assert "idempotency-replayed" not in again.headers
+
+
+class TestKey:
+    @pytest.mark.parametrize("key", [" ", "a b", "a" * 201, "\xe4"])
+    def test_must_be_short_and_visible(self, api, key: str) -> None:
+        answer = accept(api, {"Idempotency-Key": key.encode("latin-1")})
+        assert answer.status_code == 400
+        assert answer.json()["detail"].startswith("Idempotency-Key must be")
+
+    def test_is_taken_by_every_route_that_changes_something(self, app) -> None:
+        for path, operations in app.openapi()["paths"].items():
+            for method, operation in operations.items():
+                names = [item["name"] for item in operation["parameters"]]
+                assert names.count("Idempotency-Key") == (method != "get"), (method, path)
+
+
+class TestFailure:
+    def test_an_answer_that_cannot_be_kept_is_given_all_the_same(
+        self, api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def full(*_: object) -> None:
+            raise StorageError("the disk is full")
+
+        monkeypatch.setattr(module, "keep_answer", full)
+        with capture_logs() as logs:
+            assert accept(api).status_code == 200
+        assert [entry["event"] for entry in logs] == ["an answer could not be kept"]
+        assert accept(api).json()["verdict"]["state"] == "deferred"
+
+    def test_a_database_that_does_not_answer_is_503_and_nothing_is_done(
+        self, api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def busy(*_: object) -> None:
+            raise StorageError("the database is busy")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "find_answer", busy)
+            answer = accept(api)
+        assert (answer.status_code, answer.headers["retry-after"]) == (503, "5")
+        assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"
+
+
+class TestTwins:
+    @pytest.fixture
+    def address(self, app) -> Iterator[str]:
+        with listen("127.0.0.1", 0) as (socket, address):
+            server = Server(uvicorn.Config(app, log_level="critical", lifespan="off"), app)
+            thread = threading.Thread(target=server.run, kwargs={"sockets": [socket]})
+            thread.start()
+            yield address
+            server.should_exit = True
+            thread.join(20)
+
+    def test_sent_at_the_same_time_one_is_carried_out_and_both_are_answered(
+        self, app, api, address: str
+    ) -> None:
+        etag = api.get(f"{API}/groups/1").headers["etag"]
+
+        def send(_: int) -> httpx.Response:
+            headers = {"If-Match": etag, **KEY}
+            return httpx.put(
+                f"{address}{VERDICT}", json={"state": "deferred"}, headers=headers, timeout=30
+            )
+
+        with ThreadPoolExecutor(6) as pool:
+            answers = list(pool.map(send, range(6)))
+        assert {answer.status_code for answer in answers} == {200}
+        assert len({answer.content for answer in answers}) == 1
+        assert sum("idempotency-replayed" in answer.headers for answer in answers) == 5
+        assert len(api.get(f"{API}/groups/1/history").json()["items"]) == 2
+
+
+class TestStreamed:
+    def test_an_upload_is_known_by_its_bytes_which_are_not_held(self, app) -> None:
+        parts: list[int] = []
+
+        async def upload(scope: Any, receive: Any, send: Any) -> None:
+            more = True
+            while more:
+                message = await receive()
+                parts.append(len(message["body"]))
+                more = message["more_body"]
+            await send({"type": "http.response.start", "status": 201, "headers": []})
+            await send({"type": "http.response.body", "body": str(len(parts)).encode()})
+
+        middleware = FirstAnswers(upload, app.state.services.store, "local")
+
+        async def call(chunks: list[bytes]) -> list[dict[str, Any]]:
+            sent: list[dict[str, Any]] = []
+            waiting = list(chunks)
+
+            async def receive() -> dict[str, Any]:
+                body = waiting.pop(0)
+                return {"type": "http.request", "body": body, "more_body": bool(waiting)}
+
+            async def send(message: dict[str, Any]) -> None:
+                sent.append(message)
+
+            headers = [(b"idempotency-key", b"u"), (b"content-type", b"application/octet-stream")]
+            scope = {"type": "http", "method": "POST", "path": "/u", "query_string": b""}
+            await middleware({**scope, "headers": headers}, receive, send)
+            return sent
+
+        first = asyncio.run(call([b"ab", b"c"]))
+        again = asyncio.run(call([b"a", b"bc"]))
+        other = asyncio.run(call([b"abd"]))
+        assert parts == [2, 1]
+        assert [found[0]["status"] for found in (first, again, other)] == [201, 201, 422]
+        assert again[1]["body"] == first[1]["body"] == b"2"
