@@ -16,17 +16,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from app.dataset_commands import commands as dataset_commands
 from app.errors import ReviewError
+from app.evaluation_commands import commands as evaluation_commands
 from app.line_commands import commands as line_commands
 from app.options import (
     Json,
     Workers,
-    parse_cameras,
-    parse_frame_offset,
-    parse_size,
     read_settings,
     require_local,
+    typed_source,
 )
+from app.policy_commands import commands as policy_commands
+from app.policy_commands import read_policy_option
 from app.pool import process_pool
 from app.terminal import (
     complain,
@@ -38,6 +40,7 @@ from app.terminal import (
     say,
     show_progress,
 )
+from app.version_commands import commands as version_commands
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -53,25 +56,41 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(line_commands)
+app.add_typer(dataset_commands, name="datasets")
+app.add_typer(policy_commands, name="policy")
+app.add_typer(version_commands)
+app.add_typer(evaluation_commands)
 
 
 class Format(StrEnum):
     """What can be imported."""
 
     SOCCERNET_V3 = "soccernet-v3"
+    SOCCERNET_V3D = "soccernet-v3d"
     ISSIA = "issia"
+    ISSIA_3D = "issia-3d"
     SN_CALIBRATION = "sn-calibration"
     CAMERAS = "cameras"
+    GAMESTATE = "gamestate"
+    COCO = "coco"
+    PARQUET = "parquet"
+    TOUCHLINE = "touchline"
 
 
 class ExportFormat(StrEnum):
     """What can be exported."""
 
     SOCCERNET_V3D = "soccernet-v3d"
+    SOCCERNET_V3 = "soccernet-v3"
     ISSIA_3D = "issia-3d"
+    ISSIA = "issia"
     CAMERAS = "cameras"
     SN_CALIBRATION = "sn-calibration"
-    SOCCERNET_V3 = "soccernet-v3"
+    GAMESTATE = "gamestate"
+    COCO = "coco"
+    YOLO = "yolo"
+    PARQUET = "parquet"
+    TOUCHLINE = "touchline"
 
 
 class Calibration(StrEnum):
@@ -79,13 +98,6 @@ class Calibration(StrEnum):
 
     GIVEN = "given"
     LINES = "lines"
-
-
-class PolicyName(StrEnum):
-    """By which thresholds a dataset is judged."""
-
-    PAPER = "paper"
-    STRICT = "strict"
 
 
 class Boxes(StrEnum):
@@ -134,7 +146,9 @@ def serve(
             _write_sample(settings.home / SAMPLE)
             _fill(settings, SAMPLE, settings.home / SAMPLE, None)
         with listen(settings.host, settings.port) as (socket, address):
-            application = create_app(settings)
+            # One processor is left for the requests.
+            workers = max(1, settings.workers - 1)
+            application = create_app(settings, pool=lambda: process_pool(workers))
             say(f"Touchline is at {address}")
             run(application, socket)
 
@@ -157,26 +171,30 @@ def import_(
     size: Annotated[
         str | None, typer.Option("--size", metavar="WxH", help="Default 960x540; ISSIA 1920x1080.")
     ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would happen, and keep nothing.")
+    ] = False,
     json_: Json = False,
 ) -> None:
     """Read files into a dataset; doing it again changes nothing.
 
-    FORMAT is soccernet-v3, issia, sn-calibration or cameras.
+    FORMAT is soccernet-v3, soccernet-v3d, issia, issia-3d, sn-calibration, cameras, gamestate,
+    coco, parquet or touchline; docs/formats.md says what each of them holds.
     """
-    default = "1920x1080" if format_ is Format.ISSIA else "960x540"
-    values: dict[str, Any] = {
-        "size": parse_size(size or default),
-        "lines": None if lines is None else lines.resolve(),
-        "calibration": calibration.value,
-        "frame_offset": parse_frame_offset(frame_offset),
-        "flipped": parse_cameras(flip),
-    }
-    from app.sources import Source, import_source
+    source = typed_source(
+        format_.value,
+        path,
+        lines=lines,
+        calibration=calibration.value,
+        frame_offset=frame_offset,
+        flip=flip,
+        size=size,
+    )
+    from app.review.sources import import_source
 
-    source = Source(format_.value, path.resolve(), **values)
     settings = read_settings()
     with _store(settings) as store, show_progress("Importing") as progress:
-        imported = import_source(store, dataset, source, settings, progress)
+        imported = import_source(store, dataset, source, settings, progress, dry_run=dry_run)
     print_import(imported.values(), json_)
     if not imported.something:
         complain(f"nothing could be imported from {path}")
@@ -187,24 +205,27 @@ def import_(
 def solve(
     dataset: Dataset,
     policy: Annotated[
-        PolicyName | None,
-        typer.Option(help="Judge the dataset by this policy from now on."),
+        str | None,
+        typer.Option(
+            metavar="paper|strict|FILE.yaml", help="Judge the dataset by this policy from now on."
+        ),
     ] = None,
     workers: Workers = None,
     json_: Json = False,
 ) -> None:
     """Compute what is missing or out of date; can be interrupted at any time."""
-    from app.api.policies import choose_policy
+    from app.review.policies import change_policy
     from app.review.recompute import solve_dataset
 
+    chosen = None if policy is None else read_policy_option(policy)
     settings = read_settings()
     with (
         _store(settings) as store,
         _executor(workers or settings.workers) as executor,
         show_progress("Solving") as progress,
     ):
-        if policy is not None:
-            choose_policy(store, dataset, policy.value)
+        if chosen is not None:
+            change_policy(store, dataset, chosen, if_match=None, actor="local")
         report = solve_dataset(store, dataset, executor, progress)
     print_values(vars(report), json_)
 
@@ -234,9 +255,12 @@ def export(
     ] = False,
     boxes: Annotated[Boxes, typer.Option(help="Which ball box is written.")] = Boxes.OPTIMIZED,
     images: Annotated[Images, typer.Option(help="What happens to frames.")] = Images.NONE,
+    version: Annotated[
+        str | None, typer.Option(help="A frozen version (name, id or hash): always the same bytes.")
+    ] = None,
     json_: Json = False,
 ) -> None:
-    """Write accepted groups, or all of them, with a manifest."""
+    """Write accepted groups, all of them, or a frozen version, with a manifest."""
     from app.review.export import export as run_export
 
     with _store(read_settings()) as store, show_progress("Exporting") as progress:
@@ -248,6 +272,7 @@ def export(
             everything=everything,
             boxes=boxes.value,
             images=images.value,
+            version=version,
             progress=progress,
         )
     print_export({**vars(report), "out": str(report.out)}, json_)
@@ -358,9 +383,9 @@ def _progress_of(settings: Settings, dataset: str) -> dict[str, Any]:
 def _fill(settings: Settings, dataset: str, folder: Path, workers: int | None) -> None:
     """Import a folder in SoccerNet-v3 layout, and solve it."""
     from app.review.recompute import solve_dataset
-    from app.sources import Source, import_source
+    from app.review.sources import Source, import_source
 
-    source = Source("soccernet-v3", folder.resolve(), parse_size("1280x720"))
+    source = Source("soccernet-v3", folder.resolve())
     with _store(settings) as store:
         with show_progress("Importing") as progress:
             import_source(store, dataset, source, settings, progress)

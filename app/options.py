@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from app.config import Settings
+    from app.review.sources import Source
     from app.soccer.frames import ImageSize
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout.")]
@@ -44,6 +47,30 @@ def require_local(settings: Settings) -> None:
             "everybody who reaches it may change everything. Use 127.0.0.1, or set "
             "TOUCHLINE_ALLOWED_HOSTS to the names that it shall answer to."
         )
+
+
+def typed_source(
+    format_: str,
+    path: Path,
+    *,
+    lines: Path | None,
+    calibration: str,
+    frame_offset: str,
+    flip: str,
+    size: str | None,
+) -> Source:
+    """What an import reads, from the texts of a command line."""
+    from app.review.sources import Source
+
+    return Source(
+        format_,
+        path.resolve(),
+        size=None if size is None else parse_size(size),
+        lines=None if lines is None else lines.resolve(),
+        calibration=calibration,
+        frame_offset=parse_frame_offset(frame_offset),
+        flipped=parse_cameras(flip),
+    )
 
 
 def parse_size(text: str) -> ImageSize:

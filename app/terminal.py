@@ -84,11 +84,11 @@ def print_import(values: Mapping[str, Any], as_json: bool) -> None:
     if as_json:
         print_json(values)
         return
-    problems = values["problems"]
-    hidden = {"problems", "remarks", "more_problems"}
+    skipped = values["skipped"]
+    hidden = {"skipped", "remarks", "more_skipped"}
     shown = {name: value for name, value in values.items() if name not in hidden}
-    print_values({**shown, "problems": len(problems) + values["more_problems"]}, False)
-    for problem in problems:
+    print_values({**shown, "skipped": len(skipped) + values["more_skipped"]}, False)
+    for problem in skipped:
         place = ", ".join(problem[part] for part in ("file", "record", "field") if problem[part])
         say(f"  {place}: {problem['problem']}")
     for remark in values["remarks"]:

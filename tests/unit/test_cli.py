@@ -75,9 +75,9 @@ class TestImport:
         report = json.loads(out)
         assert code == 0
         assert (report["new"], report["changed"], report["unchanged"]) == (2, 0, 0)
-        places = {(Path(item["file"]).name, item["record"]) for item in report["problems"]}
+        places = {(Path(item["file"]).name, item["record"]) for item in report["skipped"]}
         assert places >= {("00003.json", None)}
-        assert any("Midfield stripe" in str(item) for item in report["problems"])
+        assert any("Midfield stripe" in str(item) for item in report["skipped"])
 
     def test_doing_it_again_changes_nothing(self, run: Run, line_files: Path) -> None:
         run("import", "sn-calibration", line_files, "--dataset", "sn")
@@ -90,6 +90,22 @@ class TestImport:
         code, out, _ = run("import", "sn-calibration", line_files, "--dataset", "sn")
         assert code == 0
         assert "00003.json: " in out.replace(", ", ": ")
+
+    def test_a_dry_run_says_the_same_and_keeps_nothing(self, run: Run, line_files: Path) -> None:
+        command = ("import", "sn-calibration", line_files, "--dataset", "sn", "--json")
+        dry = json.loads(run(*command, "--dry-run")[1])
+        assert run("findings", "--dataset", "sn")[0] == 1
+        assert json.loads(run(*command)[1]) == dry
+
+    def test_every_format_goes_out_and_comes_in_again(
+        self, run: Run, line_files: Path, tmp_path: Path
+    ) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "sn")
+        for name in ("sn-calibration", "gamestate", "coco", "parquet"):
+            out = tmp_path / f"{name}.zip"
+            assert run("export", "--dataset", "sn", "--format", name, "--all", out)[0] == 0
+            code, told, err = run("import", name, out, "--dataset", name, "--json")
+            assert (code, json.loads(told)["new"]) == (0, 2), err
 
     def test_nothing_to_import_is_a_failure(self, run: Run, tmp_path: Path) -> None:
         (tmp_path / "empty").mkdir()

@@ -1,0 +1,122 @@
+"""The ISSIA set through import, solve, freeze, export and verify, in two homes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import zipfile
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+from app.config import Settings
+from app.datasets.archive import DEFAULT_LIMITS
+from app.datasets.issia import IssiaOptions, read_issia
+from app.datasets.report import Report
+from app.review.carry_in import carry_in
+from app.review.export import export
+from app.review.freeze import FreezeRequest, freeze
+from app.review.ingest import ingest
+from app.review.recompute import solve_dataset
+from app.review.split import Split
+from app.review.submit import load
+from app.review.verdict import set_verdict
+from app.review.verify import verify
+from app.store.models import GroupModel
+from app.store.session import Store
+
+DATA = (
+    Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
+    / "issia"
+)
+pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real data in {DATA}")
+
+FROZEN = FreezeRequest("v1", groups="passing", split=Split("camera"))
+ODD = "1200"
+"""The frame whose ball lies ten metres below the grass."""
+
+
+@pytest.fixture(scope="module")
+def homes(tmp_path_factory: pytest.TempPathFactory):
+    """A home that imported the files, and one to which everything was carried from it."""
+    one, two = (
+        Store.open(Settings(home=tmp_path_factory.mktemp(name) / "home")) for name in ("a", "b")
+    )
+    ingest(one, "issia", read_issia(DATA, IssiaOptions(), Report()), source="x", actor="ann")
+    solve_dataset(one, "issia")
+    reject(one)
+    carried = tmp_path_factory.mktemp("carried") / "issia.zip"
+    export(one, "issia", "touchline", carried)
+    report = Report()
+    carry_in(two, "other", carried, report, DEFAULT_LIMITS, source="a", actor="ben")
+    assert report.problems == []
+    solve_dataset(two, "other")
+    yield one, two
+    one.close()
+    two.close()
+
+
+def reject(store: Store) -> None:
+    """A person looks at the odd frame and says no."""
+    with store.read() as session:
+        number = session.scalar(select(GroupModel.id).where(GroupModel.key == ODD))
+    etag = load(store, number).etag
+    set_verdict(store, number, "rejected", "other", "below the grass", if_match=etag, actor="ann")
+
+
+@pytest.fixture(scope="module")
+def versions(homes):
+    one, two = homes
+    return (
+        freeze(one, "issia", FROZEN, actor="ann"),
+        freeze(two, "other", FROZEN, actor="ben"),
+    )
+
+
+class TestFreeze:
+    def test_two_homes_freeze_the_same_hash(self, versions) -> None:
+        assert versions[0].hash == versions[1].hash
+        assert versions[0].counts["groups"] == 1687
+        assert versions[0].counts["left_out"]["rejected: other"] == 1
+
+    def test_cameras_one_and_two_test(self, versions) -> None:
+        splits = versions[0].counts["splits"]
+        assert splits["test"]["views"] + splits["train"]["views"] == versions[0].counts["views"]
+        assert splits["test"]["groups"] > 300
+
+
+class TestExport:
+    def test_of_a_version_is_the_same_bytes_in_both_homes_but_for_names_and_dates(
+        self, homes, versions, tmp_path
+    ) -> None:
+        files = []
+        for store, version in zip(homes, versions, strict=True):
+            out = tmp_path / f"{version.dataset}.zip"
+            export(store, version.dataset, "issia-3d", out, version="v1")
+            files.append(content(out))
+        export(homes[0], "issia", "issia-3d", tmp_path / "again.zip", version="v1")
+        assert (tmp_path / "again.zip").read_bytes() == (tmp_path / "issia.zip").read_bytes()
+        assert {name: text for name, text in files[0].items() if name != "manifest.json"} == {
+            name: text for name, text in files[1].items() if name != "manifest.json"
+        }
+        manifest = json.loads(files[0]["manifest.json"])
+        assert manifest["frozen"]["hash"] == versions[0].hash
+        assert manifest["frozen"]["rejected"][0]["group"] == ODD
+        rows = list(csv.DictReader(io.StringIO(files[0]["ISSIA-3D.csv"].decode())))
+        assert len(rows) == 1687
+        assert ODD not in {row["frame"] for row in rows}
+
+
+class TestVerify:
+    def test_from_scratch_everything_comes_out_the_same(self, homes, versions) -> None:
+        report = verify(homes[1], versions[1].id)
+        assert report.ok, report.values()
+        assert report.equal == 1687
+
+
+def content(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
