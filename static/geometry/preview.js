@@ -73,7 +73,7 @@ export function previewBall(group, solution) {
 }
 
 /** @param {GroupDocument} group @param {SolutionJson} solution @returns {Seen[]} */
-function seenBalls(group, solution) {
+export function seenBalls(group, solution) {
 	return group.views.flatMap((view) => {
 		const solved = solution.views.find((candidate) => candidate.view === view.key);
 		const ball = ballOf(view);
@@ -139,7 +139,7 @@ function largestParallax(seen, valid, point) {
 }
 
 /** @param {Seen} seen @param {PitchPoint} point @param {number} phi @returns {BallFitJson} */
-function fitBall({ view, camera, center }, point, phi) {
+export function fitBall({ view, camera, center }, point, phi) {
 	const image = project(camera, point);
 	const optimized = optimizedBall(camera, center, point, phi);
 	const error = image && Math.hypot(image.x - center.x, image.y - center.y);

@@ -1,0 +1,71 @@
+// @ts-check
+/** Staged edits: steps away from what is saved, taken back and made again before anything is sent. */
+
+import { changesBetween, sameLines } from './line_changes.js';
+
+/** @import {LinesJson, PointJson} from '../api/types.js' */
+
+/** @typedef {{readonly lines: LinesJson, readonly label: string, readonly run: string}} Step */
+/**
+ * @typedef {object} Staging
+ * @property {LinesJson} base what is saved
+ * @property {Step[]} steps what was done, also what was taken back since
+ * @property {number} at how many steps are in force
+ */
+
+/** @param {LinesJson} base @returns {Staging} */
+export function begin(base) {
+	return { base, steps: [], at: 0 };
+}
+
+/** The lines with every step in force. @param {Staging} staging @returns {LinesJson} */
+export function linesOf({ base, steps, at }) {
+	return at > 0 ? steps[at - 1].lines : base;
+}
+
+/**
+ * One step more; steps that were taken back are gone.
+ *
+ * @param {Staging} staging @param {LinesJson} lines @param {string} label
+ * @param {string} [run] steps of the same run, such as nudges of one point, are one step
+ * @returns {Staging}
+ */
+export function stage(staging, lines, label, run = '') {
+	if (sameLines(linesOf(staging), lines)) return staging;
+	const kept = staging.steps.slice(0, staging.at);
+	if (run && kept.at(-1)?.run === run) kept.pop();
+	return { base: staging.base, steps: [...kept, { lines, label, run }], at: kept.length + 1 };
+}
+
+/** @param {Staging} staging @returns {Staging} */
+export function stepBack(staging) {
+	return { ...staging, at: Math.max(0, staging.at - 1) };
+}
+
+/** @param {Staging} staging @returns {Staging} */
+export function stepForward(staging) {
+	return { ...staging, at: Math.min(staging.steps.length, staging.at + 1) };
+}
+
+/** What would be sent. @param {Staging} staging @returns {Record<string, PointJson[] | null>} */
+export function changesOf(staging) {
+	return changesBetween(staging.base, linesOf(staging));
+}
+
+/**
+ * The same changes on top of what somebody else has saved meanwhile. Markings that were not
+ * changed here are theirs.
+ *
+ * @param {Staging} staging @param {LinesJson} base
+ * @returns {Staging}
+ */
+export function rebase(staging, base) {
+	if (sameLines(staging.base, base)) return staging;
+	/** @type {LinesJson} */
+	const lines = { ...base };
+	for (const [marking, points] of Object.entries(changesOf(staging))) {
+		if (points) lines[marking] = points;
+		else delete lines[marking];
+	}
+	return stage(begin(base), lines, 'Changes made before theirs');
+}

@@ -1,0 +1,82 @@
+// @ts-check
+/** The camera of the view: its numbers with their uncertainty, what is odd, where it comes from. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { chooseCalibration } from '../../api/calibration.js';
+import { ApiError } from '../../api/problem.js';
+import { fixed } from '../../lib/format.js';
+import { document, takeOver, unsaved } from '../../state/group.js';
+import { announce, complain } from '../../state/notice.js';
+import { watchSolving } from '../../state/solving.js';
+import { cameraNumbers, oddities } from './camera_numbers.js';
+
+/** @import {SolutionJson, ViewJson} from '../../api/types.js' */
+/** @import {ViewPicture} from '../../overlays/scene.js' */
+
+/** @typedef {'given' | 'lines'} Source */
+
+/** @param {ViewJson} view @param {Source} source */
+async function choose(view, source) {
+	const present = document.value;
+	if (!present || view.station.calibration === source) return;
+	try {
+		takeOver(await chooseCalibration(present, view, source));
+		announce(source === 'given' ? 'The given calibration counts.' : 'The lines count.');
+		if (view.station.shared) watchSolving(present.dataset.name);
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		complain(`Not changed: ${error.message}`);
+	}
+}
+
+/** @param {{view: ViewJson}} props */
+function SourceChoice({ view }) {
+	const [busy, setBusy] = useState(false);
+	// The choice builds on the state that the writes before it make.
+	const off = busy || unsaved.value > 0 ? 'Wait until the last change is saved' : null;
+	const { has_given: given, calibration } = view.station;
+	if (!given) return html`<p class="camera-card__source">From the annotated lines; none was given.</p>`;
+	const sources = /** @type {{source: Source, label: string}[]} */ ([
+		{ source: 'given', label: 'Given camera' }, { source: 'lines', label: 'From lines' },
+	]);
+	return html`
+		<div class="segments" role="group" aria-label="Which calibration counts">
+			${sources.map(({ source, label }) => html`
+				<button
+					key=${source} class="button" type="button" aria-pressed=${calibration === source} aria-disabled=${off !== null}
+					title=${off ?? (source === 'given' ? 'Use the camera that came with the dataset' : 'Find the camera from the annotated lines')}
+					onClick=${async () => {
+						if (off) return;
+						setBusy(true);
+						await choose(view, source);
+						setBusy(false);
+					}}
+				>${label}</button>`)}
+		</div>
+	`;
+}
+
+/** @param {{picture: ViewPicture, solution: SolutionJson | null}} props */
+export function CameraCard({ picture, solution }) {
+	const { view, solved } = picture;
+	const calibration = solved?.calibration ?? null;
+	const odd = oddities(solution, view.key, calibration);
+	return html`
+		<section class="card strip-card camera-card" aria-label="Camera">
+			<h2>Camera<span class="card__aside" data-grade=${odd.length ? 'warn' : 'ok'}>${odd.length ? '! look at this' : '✓ plausible'}</span></h2>
+			<div class="editor__scroll" tabindex="0" role="group" aria-label="Camera in numbers">
+				<${SourceChoice} view=${view} />
+				<dl class="camera-card__numbers">
+					${cameraNumbers(calibration, view.width).map(({ name, label, value, digits, unit, sigma }) => html`
+						<div key=${name}>
+							<dt>${label}</dt>
+							<dd data-number=${name}>${fixed(value, digits, unit)}${sigma === null ? null : html`<small>±${fixed(sigma, digits === 0 ? 0 : Math.max(digits, 2))}</small>`}</dd>
+						</div>`)}
+				</dl>
+				${odd.map((sentence) => html`<p class="camera-card__odd" data-grade="warn">${sentence}</p>`)}
+			</div>
+		</section>
+	`;
+}

@@ -1,0 +1,75 @@
+// @ts-check
+/** A camera in the numbers that people judge it by, and what is odd about them. */
+
+/** @import {CalibrationJson, CameraJson, FindingJson, SolutionJson} from '../../api/types.js' */
+
+/** @typedef {{name: string, label: string, value: number | null, digits: number, unit: string, sigma: number | null}} CameraNumber */
+
+/** Kinds of findings that speak about a camera. */
+const ABOUT_CAMERAS = new Set(['implausible_camera', 'under_constrained', 'sides_swapped', 'view_disagrees']);
+
+/**
+ * @param {CalibrationJson | null} calibration @param {number} width of the image, pixels
+ * @returns {CameraNumber[]}
+ */
+export function cameraNumbers(calibration, width) {
+	const camera = calibration?.camera ?? null;
+	const sigma = sigmaOf(calibration);
+	const focal = camera ? camera.x_focal_length : null;
+	const [x, y, z] = camera?.position_meters ?? [null, null, null];
+	/** @param {string} name @param {string} label @param {number | null} value @param {number} digits @param {string} unit @returns {CameraNumber} */
+	const row = (name, label, value, digits, unit) => ({ name, label, value, digits, unit, sigma: sigma[name] ?? null });
+	return [
+		row('pan', 'Pan', camera?.pan_degrees ?? null, 2, '°'),
+		row('tilt', 'Tilt', camera?.tilt_degrees ?? null, 2, '°'),
+		row('roll', 'Roll', camera?.roll_degrees ?? null, 2, '°'),
+		row('x', 'x', x, 2, ' m'),
+		row('y', 'y', y, 2, ' m'),
+		row('height', 'Height', z === null ? null : -z, 2, ' m'),
+		row('focal', 'Focal length', focal, 0, ' px'),
+		row('field', 'Field of view', focal ? fieldOf(focal, width) : null, 1, '°'),
+		row('k1', 'Distortion k1', camera ? k1Of(camera) : null, 3, ''),
+	];
+}
+
+/** Horizontal field of view, degrees. @param {number} focal @param {number} width pixels */
+function fieldOf(focal, width) {
+	return (360 / Math.PI) * Math.atan(width / (2 * focal));
+}
+
+/** @param {CameraJson} camera */
+function k1Of({ radial_distortion: radial }) {
+	return radial?.[0] ?? 0;
+}
+
+/**
+ * Standard deviations by name, where the server tells them.
+ *
+ * @param {CalibrationJson | null} calibration
+ * @returns {Record<string, number | null>}
+ */
+function sigmaOf(calibration) {
+	const sigma = calibration?.sigma;
+	if (!sigma) return {};
+	const [x, y, height] = sigma.position_meters;
+	return {
+		pan: sigma.pan_degrees, tilt: sigma.tilt_degrees, roll: sigma.roll_degrees, x, y, height,
+		focal: sigma.focal_px, k1: sigma.k1,
+	};
+}
+
+/**
+ * What is odd about the camera of a view; nothing when it is as cameras are.
+ *
+ * @param {SolutionJson | null} solution @param {string} view @param {CalibrationJson | null} calibration
+ * @returns {string[]}
+ */
+export function oddities(solution, view, calibration) {
+	const told = (solution?.findings ?? []).filter((/** @type {FindingJson} */ finding) => (
+		finding.view === view && ABOUT_CAMERAS.has(finding.kind)
+	)).map(({ sentence }) => sentence);
+	const open = calibration?.unobservable ?? [];
+	if (open.length > 0) told.push(`The lines do not determine ${open.join(', ')}.`);
+	if (calibration && !calibration.camera) told.push(calibration.reason ?? 'The lines do not determine a camera.');
+	return told;
+}

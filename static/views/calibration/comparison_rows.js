@@ -1,0 +1,92 @@
+// @ts-check
+/** Before and after: what the staged lines change, number by number. */
+
+import { gradeBelow, gradeOfJac } from '../../geometry/residual.js';
+import { fixed, pixels } from '../../lib/format.js';
+
+/** @import {GroupDocument, SolutionJson, ViewSolutionJson} from '../../api/types.js' */
+/** @import {Grade} from '../../geometry/residual.js' */
+
+/** @typedef {{name: string, label: string, before: string, after: string, change: 'better' | 'worse' | 'same' | 'other'}} ComparedRow */
+/** @typedef {(solution: SolutionJson | null, solved: ViewSolutionJson | null) => number | null | undefined} Reading */
+/**
+ * @typedef {object} Measure
+ * @property {string} name
+ * @property {string} label
+ * @property {Reading} read
+ * @property {(value: number | null | undefined) => string} say
+ * @property {1 | -1 | 0} better 1: more is better, -1: less is better
+ * @property {number} step changes below this are none
+ */
+
+/** @param {ViewSolutionJson | null} solved */
+function worstLine(solved) {
+	const all = (solved?.calibration.markings ?? []).flatMap(({ largest_px: px }) => (px === null ? [] : [px]));
+	return all.length ? Math.max(...all) : null;
+}
+
+/** @param {number} digits @param {string} [unit] @returns {Measure['say']} */
+const to = (digits, unit = '') => (value) => fixed(value, digits, unit);
+
+/** @type {Measure[]} */
+const MEASURES = [
+	...['0.5', '1', '2'].map((gamma) => /** @type {Measure} */ ({
+		name: `jac ${gamma}`, label: `JaC ${gamma} %`, read: (_, solved) => solved?.calibration.jac?.[gamma],
+		say: to(2), better: 1, step: 0.005,
+	})),
+	{ name: 'median', label: 'Median point', read: (_, solved) => solved?.calibration.error_px, say: to(2, ' px'), better: -1, step: 0.005 },
+	{ name: 'worst', label: 'Worst point', read: (_, solved) => worstLine(solved), say: to(1, ' px'), better: -1, step: 0.05 },
+	{ name: 'ball', label: 'Ball here', read: (_, solved) => solved?.ball?.error_px, say: (value) => `${pixels(value)} px`, better: -1, step: 0.05 },
+	{ name: 'ratio', label: 'Ball Ø ratio', read: (_, solved) => solved?.ball?.size_ratio, say: to(2, '×'), better: 0, step: 0.005 },
+	{ name: 'gates', label: 'Gates passed', read: (solution) => solution?.gates.filter(({ active, passed }) => active && passed).length, say: to(0), better: 1, step: 0.5 },
+	{ name: 'views', label: 'Views used', read: (solution) => solution?.ball?.views.length ?? 0, say: to(0), better: 1, step: 0.5 },
+	{ name: 'x', label: 'Ball x', read: (solution) => solution?.ball?.point[0], say: to(2, ' m'), better: 0, step: 0.005 },
+	{ name: 'y', label: 'Ball y', read: (solution) => solution?.ball?.point[1], say: to(2, ' m'), better: 0, step: 0.005 },
+	{ name: 'height', label: 'Ball height', read: (solution) => solution?.ball?.height_m, say: to(2, ' m'), better: 0, step: 0.005 },
+	{ name: 'sigma', label: 'σ', read: (solution) => solution?.ball?.sigma_m, say: to(3, ' m'), better: -1, step: 0.0005 },
+	{ name: 'parallax', label: 'Parallax', read: (solution) => solution?.ball?.parallax_degrees, say: to(1, '°'), better: 0, step: 0.05 },
+];
+
+/**
+ * @param {string} view key
+ * @param {SolutionJson | null} before @param {SolutionJson | null} after
+ * @returns {ComparedRow[]}
+ */
+export function comparedRows(view, before, after) {
+	/** @param {SolutionJson | null} solution */
+	const solvedOf = (solution) => solution?.views.find((one) => one.view === view) ?? null;
+	const [old, next] = [solvedOf(before), solvedOf(after)];
+	return MEASURES.map((measure) => {
+		const [a, b] = [measure.read(before, old), measure.read(after, next)];
+		return {
+			name: measure.name, label: measure.label, before: measure.say(a), after: measure.say(b), change: changeOf(measure, a, b),
+		};
+	});
+}
+
+/** @param {Measure} measure @param {number | null | undefined} a @param {number | null | undefined} b @returns {ComparedRow['change']} */
+function changeOf({ better, step }, a, b) {
+	const [had, has] = [a ?? null, b ?? null];
+	if (had === null || has === null) return had === has ? 'same' : had === null ? 'better' : 'worse';
+	const off = has - had;
+	if (Math.abs(off) < step) return 'same';
+	if (better === 0) return 'other';
+	return off * better > 0 ? 'better' : 'worse';
+}
+
+/**
+ * The one sentence above the table.
+ *
+ * @param {GroupDocument} group @param {string} view @param {SolutionJson | null} solution
+ * @returns {{text: string, grade: Grade}}
+ */
+export function summaryOf(group, view, solution) {
+	const solved = solution?.views.find((one) => one.view === view);
+	const jac = solved?.calibration.jac?.['0.5'];
+	if (!solution || !solved) return { text: 'Not solved yet.', grade: 'unseen' };
+	if (!solved.calibration.camera) return { text: 'No camera from these lines.', grade: 'bad' };
+	if (solution.passes) return { text: 'The group passes every gate.', grade: 'ok' };
+	const failing = solution.first_failing;
+	if (failing) return { text: `Fails ${failing.gate.replaceAll('_', ' ')}: ${failing.sentence}`, grade: 'bad' };
+	return { text: 'Calibrated.', grade: jac === undefined ? gradeBelow(null, 1) : gradeOfJac(jac, group.policy.min_jac) };
+}

@@ -1,0 +1,109 @@
+// @ts-check
+/** The view in hand, large: its frame, its lines, the camera before and after. */
+
+import { html } from 'htm/preact';
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+import Konva from 'konva/lib/Core.js';
+
+import { useSize } from '../../lib/hooks.js';
+import { ImageStage } from '../../overlays/stage.js';
+import { changed, choice, hovered, lines, mode } from '../../state/calibration.js';
+import { loadImage } from '../../state/images.js';
+import { fitPanel, panPanel, viewportOf, zoomPanel } from '../../state/viewports.js';
+import { gain, overlaysHidden, projections } from '../../state/workspace.js';
+import { PanelCaption } from '../panel_caption.js';
+import { drawEditorMarks } from './marks.js';
+import { panelKey } from './panel_key.js';
+import { attachEditor } from './pointer.js';
+
+/** @import {CalibrationJson} from '../../api/types.js' */
+/** @import {ViewPicture} from '../../overlays/scene.js' */
+/** @import {EditorMarks} from './marks.js' */
+
+/** @param {string | null} url */
+function useImage(url) {
+	const [loaded, setLoaded] = useState(/** @type {{url: string | null, image: HTMLImageElement | null}} */ ({ url: null, image: null }));
+	useEffect(() => {
+		let wanted = true;
+		if (url) loadImage(url).then((image) => { if (wanted) setLoaded({ url, image }); }, () => {});
+		return () => { wanted = false; };
+	}, [url]);
+	return loaded.url === url ? loaded.image : null;
+}
+
+/** The stage of the review screen with the editor's marks on top. */
+class EditorStage extends ImageStage {
+	/** @param {HTMLDivElement} container */
+	constructor(container) {
+		super(container);
+		/** @type {EditorMarks | null} */
+		this.marks = null;
+		this.above.add(new Konva.Shape({
+			listening: false,
+			sceneFunc: (context) => {
+				if (this.marks && !this.scene?.hidden) drawEditorMarks(context._context, this.marks);
+			},
+		}));
+	}
+}
+
+/** @param {{picture: ViewPicture, before: CalibrationJson | null}} props */
+export function EditorImage({ picture, before }) {
+	const { view } = picture;
+	const [ref, size] = useSize();
+	const stage = useRef(/** @type {EditorStage | null} */ (null));
+	const image = useImage(view.image);
+	const key = panelKey(view.letter);
+	const viewport = viewportOf(key, view, size);
+	const now = useRef({ view, size, viewport, picture });
+	now.current = { view, size, viewport, picture };
+
+	useEffect(() => {
+		const element = /** @type {HTMLDivElement} */ (ref.current);
+		const made = new EditorStage(element);
+		stage.current = made;
+		const detach = attachEditor(element, {
+			viewport: () => now.current.viewport,
+			fits: () => now.current.picture.markings,
+			pan: (dx, dy) => panPanel(panelKey(now.current.view.letter), dx, dy),
+			zoom: (at, factor) => {
+				const { view: v, size: s } = now.current;
+				zoomPanel(panelKey(v.letter), v, s, at, factor);
+			},
+		});
+		return () => { detach(); made.destroy(); };
+	}, []);
+	useEffect(() => () => fitPanel(key), [key]);
+	useEffect(() => stage.current?.show(image), [image]);
+
+	const chosen = choice.value;
+	const saved = useMemo(() => (
+		changed.value ? (before?.markings ?? []).map(({ polyline }) => polyline.map(([x, y]) => ({ x, y }))) : []
+	), [changed.value, before]);
+	useEffect(() => {
+		const drawn = stage.current;
+		if (size.width === 0 || !drawn) return;
+		drawn.resize(size.width, size.height);
+		drawn.marks = {
+			viewport, lines: lines.value, fits: picture.markings, saved, choice: chosen, hovered: hovered.value,
+		};
+		drawn.draw({
+			picture, viewport, hidden: overlaysHidden.value, projections: projections.value, boxes: false,
+			gain: gain.value, rays: false,
+			selected: chosen && { kind: 'point', view: view.key, marking: chosen.marking, index: chosen.index ?? -1 },
+		});
+	}, [
+		picture, viewport.scale, viewport.left, viewport.top, size.width, size.height, saved, chosen, hovered.value,
+		overlaysHidden.value, projections.value, gain.value,
+	]);
+
+	const drawing = mode.value === 'draw' && chosen;
+	return html`
+		<figure class="image-panel editor__panel" data-view=${view.letter} data-focused="true" tabindex="0" aria-label=${`View ${view.letter}, ${view.label}`}>
+			<div class="image-panel__stage" data-ready=${Boolean(image)} data-mode=${mode.value} ref=${ref}></div>
+			${view.image ? null : html`<p class="image-panel__missing">No frame · the lines can be edited</p>`}
+			<${PanelCaption} picture=${picture} />
+			${drawing ? html`<p class="editor__hint" role="status">Click to set points on <strong>${chosen.marking}</strong> · Esc when done</p>` : null}
+		</figure>
+	`;
+}

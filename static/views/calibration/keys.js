@@ -1,0 +1,98 @@
+// @ts-check
+/** Keys of the calibration editor. */
+
+import { navigate } from '../../lib/router.js';
+import {
+	choice, discardStaged, held, lines, mode, redo, undo, view,
+} from '../../state/calibration.js';
+import { group } from '../../state/group.js';
+import { reviewAddress } from '../../state/navigation.js';
+import { announce, dismiss, notice } from '../../state/notice.js';
+import { fitPanel, isZoomed, zoomTo } from '../../state/viewports.js';
+import { cycleGain, gain, overlaysHidden, projections } from '../../state/workspace.js';
+import {
+	deleteChosen, deleteMarking, insertPoint, nudgePoint, save, stepMarking, stepPoint, swapAllSides, toggleDrawing,
+	toggleRelabelling,
+} from './actions.js';
+import { editorAddress } from '../../state/editor_address.js';
+import { panelKey } from './panel_key.js';
+
+/** @import {Binding} from '../../lib/keys.js' */
+
+const CLOSE = 6;
+
+/** Leave one thing at a time, the editor last. */
+function escape() {
+	const at = group.value;
+	if (held.value) held.value = null;
+	else if (mode.value !== 'select') mode.value = 'select';
+	else if (choice.value) choice.value = null;
+	else if (notice.value) dismiss();
+	else if (at) navigate(reviewAddress(at.id));
+}
+
+/** Zoom to the point in hand; the second time show the image whole. */
+function zoomToPoint() {
+	const at = view.value;
+	const chosen = choice.value;
+	const point = chosen && lines.value[chosen.marking]?.[chosen.index ?? 0];
+	const stage = document.querySelector('.editor__panel .image-panel__stage');
+	if (!at || !stage) return;
+	if (isZoomed(panelKey(at.letter)) || !point) fitPanel(panelKey(at.letter));
+	else {
+		const { width, height } = stage.getBoundingClientRect();
+		zoomTo(panelKey(at.letter), { width, height }, point, CLOSE);
+	}
+}
+
+/** @param {number} index */
+function goToView(index) {
+	const [at, other] = [group.value, group.value?.views[index]];
+	if (at && other) navigate(editorAddress(at.id, other.key), { replace: true });
+	else announce(`There is no view ${index + 1}.`);
+}
+
+const hasPoint = () => choice.value !== null && choice.value.index !== null;
+/** Arrows scroll where something that scrolls has the focus. */
+const notScrolling = () => hasPoint() && !document.activeElement?.closest('.editor__scroll');
+
+/** @param {string} name @param {number} x @param {number} y @returns {Binding} */
+function arrow(name, x, y) {
+	return {
+		keys: [`Arrow${name}`, `Shift+Arrow${name}`, `Alt+Arrow${name}`], group: 'Edit', shown: 'hidden',
+		label: `Move the point ${name.toLowerCase()}`, when: notScrolling,
+		run: ({ shiftKey, altKey }) => {
+			const step = altKey ? 0.1 : shiftKey ? 5 : 1;
+			nudgePoint(x * step, y * step);
+		},
+	};
+}
+
+/** @type {Binding[]} */
+export const EDITOR_KEYS = [
+	{ keys: ['n'], label: 'Draw: set points on the marking', group: 'Edit', run: toggleDrawing },
+	{ keys: ['i'], label: 'Insert a point after the one in hand', group: 'Edit', run: insertPoint },
+	{ keys: ['r'], label: 'Relabel the marking', group: 'Edit', run: toggleRelabelling },
+	{ keys: ['m'], label: 'Swap sides', group: 'Edit', run: swapAllSides },
+	{ keys: ['Delete', 'Backspace'], label: 'Delete the point, or the marking', group: 'Edit', run: deleteChosen },
+	{ keys: ['Shift+Delete', 'Shift+Backspace'], label: 'Delete the marking', group: 'Edit', run: deleteMarking },
+	{ keys: [], label: 'Move by 1 px; Shift 5 px; Alt 0.1 px', group: 'Edit', shown: '← ↑ → ↓', run: () => {} },
+	arrow('Left', -1, 0), arrow('Right', 1, 0), arrow('Up', 0, -1), arrow('Down', 0, 1),
+	{ keys: ['.'], label: 'Next point', group: 'Choose', run: () => stepPoint(1) },
+	{ keys: [','], label: 'Previous point', group: 'Choose', run: () => stepPoint(-1) },
+	{ keys: [']'], label: 'Next marking', group: 'Choose', run: () => stepMarking(1) },
+	{ keys: ['['], label: 'Previous marking', group: 'Choose', run: () => stepMarking(-1) },
+	...['1', '2', '3', '4', '5', '6'].map((digit, i) => ({
+		keys: [digit], label: 'Another view', group: 'Choose', shown: i === 0 ? '1 … 6' : 'hidden', run: () => goToView(i),
+	})),
+	{ keys: ['z'], label: 'Zoom to the point; again: whole image', group: 'View', run: zoomToPoint },
+	{ keys: ['0'], label: 'Whole image', group: 'View', run: () => { if (view.value) fitPanel(panelKey(view.value.letter)); } },
+	{ keys: ['h'], label: 'Hide or show everything drawn', group: 'View', run: () => { overlaysHidden.value = !overlaysHidden.value; } },
+	{ keys: ['p'], label: 'Projected lines', group: 'View', run: () => { projections.value = !projections.value; } },
+	{ keys: ['w'], label: 'Residual whiskers × 1, 5, 20', group: 'View', run: () => { cycleGain(); announce(`Whiskers times ${gain.value}.`); } },
+	{ keys: ['Ctrl+s', 'Ctrl+Enter'], label: 'Save everything staged as one edit', group: 'Save', typing: true, run: save },
+	{ keys: ['Ctrl+z'], label: 'Undo: staged edits first', group: 'Save', run: undo },
+	{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Redo', group: 'Save', run: redo },
+	{ keys: ['Ctrl+Delete', 'Ctrl+Backspace'], label: 'Drop everything staged', group: 'Save', run: discardStaged },
+	{ keys: ['Escape'], label: 'Leave; at last back to the review', group: 'Save', typing: true, run: escape },
+];

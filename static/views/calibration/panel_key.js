@@ -1,0 +1,7 @@
+// @ts-check
+/** The editor's zoom is kept apart from that of the review screen. */
+
+/** @param {string} letter @returns {string} */
+export function panelKey(letter) {
+	return `editor ${letter}`;
+}

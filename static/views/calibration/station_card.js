@@ -1,0 +1,28 @@
+// @ts-check
+/** What an edit of a static camera reaches: all its views, solved again one after the other. */
+
+import { html } from 'htm/preact';
+
+import { count } from '../../lib/format.js';
+import { solving } from '../../state/solving.js';
+
+/** @import {StationDetail} from '../../api/calibration.js' */
+/** @import {ViewJson} from '../../api/types.js' */
+
+/** @param {{view: ViewJson, station: StationDetail | null, dataset: string}} props */
+export function StationCard({ view, station, dataset }) {
+	if (!view.station.shared) return null;
+	const work = solving.value?.dataset === dataset ? solving.value : null;
+	const all = station ? `all ${count(station.groups)} groups` : 'all groups';
+	return html`
+		<section class="card station-card" aria-label="Static camera">
+			<h2>Static camera ${view.station.key}</h2>
+			<p>What is saved here changes its view in <strong>${all}</strong>. This group is shown at once, the others are solved in the background.</p>
+			${work ? html`
+				<p class="station-card__work" role="status">
+					<span>${work.sentence}${work.total ? ` ${count(work.done)} of ${count(work.total)}` : ''}</span>
+					<progress max=${work.total || 1} value=${work.over ? (work.total || 1) : work.done} aria-label="Groups solved"></progress>
+				</p>` : null}
+		</section>
+	`;
+}

@@ -1,0 +1,122 @@
+// @ts-check
+/** The 3D view, its labels and presets. Loaded when somebody asks for it. */
+
+import { html } from 'htm/preact';
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+
+import { colours } from '../../lib/colours.js';
+import { fixed } from '../../lib/format.js';
+import { useKeys, useSize } from '../../lib/hooks.js';
+import { useFrames } from '../../state/frames.js';
+import { goToPreset, lookThrough, standpoint, toggleScene } from '../../state/scene3d.js';
+import { attachOrbit } from './gestures.js';
+import { sceneKeys } from './keys.js';
+import { readPalette } from './palette.js';
+import { SceneStage } from './stage.js';
+import { presetOrbit } from './standpoints.js';
+import { SceneTable } from './table.js';
+import { sceneOf } from './values.js';
+
+/** @import {GroupDocument, SolutionJson} from '../../api/types.js' */
+/** @import {Preset} from '../../state/scene3d.js' */
+/** @import {Place} from './stage.js' */
+/** @import {SceneValues} from './values.js' */
+
+/** @type {{preset: Preset, label: string, key: string}[]} */
+const PRESETS = [
+	{ preset: 'whole', label: 'Whole', key: '0' },
+	{ preset: 'top', label: 'Top', key: '7' },
+	{ preset: 'side', label: 'Side', key: '8' },
+	{ preset: 'goal', label: 'Goal', key: '9' },
+	{ preset: 'ball', label: 'Ball', key: 'Z' },
+];
+
+const calm = matchMedia('(prefers-reduced-motion: reduce)');
+
+/** Move the labels to where their things are drawn. @param {HTMLElement | null} layer @param {Place[]} places */
+function placeLabels(layer, places) {
+	for (const { name, x, y, shown } of places) {
+		const label = /** @type {HTMLElement | null | undefined} */ (layer?.querySelector(`[data-label="${name}"]`));
+		if (!label) continue;
+		label.hidden = !shown;
+		label.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+	}
+}
+
+/** @param {{scene: SceneValues, images: Map<string, HTMLImageElement>}} props */
+function Stage({ scene, images }) {
+	const [ref, size] = useSize();
+	const labels = useRef(/** @type {HTMLDivElement | null} */ (null));
+	const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
+	const [stage, setStage] = useState(/** @type {SceneStage | null} */ (null));
+	const [missing, setMissing] = useState(false);
+
+	useEffect(() => {
+		const element = /** @type {HTMLCanvasElement} */ (canvas.current);
+		const context = element.getContext('webgl2', { antialias: true });
+		if (!context) {
+			setMissing(true);
+			return undefined;
+		}
+		const made = new SceneStage(element, context, (places) => placeLabels(labels.current, places));
+		const detach = attachOrbit(element, made);
+		setStage(made);
+		return () => { detach(); made.destroy(); };
+	}, []);
+
+	const theme = colours.value;
+	useEffect(() => {
+		if (stage && size.width > 0) stage.resize(size.width, size.height);
+	}, [stage, size.width, size.height]);
+	useEffect(() => stage?.show(scene, readPalette(), images), [stage, scene, images, theme]);
+	const at = standpoint.value;
+	const ready = stage !== null && size.width > 0;
+	useEffect(() => {
+		if (!stage || !ready) return;
+		if (at.kind === 'camera') stage.lookThrough(at.letter);
+		else stage.goTo(presetOrbit(at.preset, scene, stage.aspect), !calm.matches);
+	}, [stage, ready, at, scene.stands.length]);
+	const keys = useMemo(() => sceneKeys(() => stage), [stage]);
+	useKeys(keys);
+
+	return html`
+		<div class="scene3d__stage" ref=${ref} data-ready=${ready}>
+			<canvas ref=${canvas} role="img" tabindex="0" aria-label="The scene in 3D. Arrow keys turn it, plus and minus come closer. The table says the same in words."></canvas>
+			${missing ? html`<p class="scene3d__missing" role="status">This browser shows no 3D graphics (WebGL 2). The table below says the same in words.</p>` : html`
+				<div class="scene3d__labels" ref=${labels}>
+					${scene.stands.map(({ letter, label }) => html`
+						<button key=${letter} class="scene3d__camera letter" type="button" data-letter=${letter} data-label=${letter} title=${`Look through ${label}`} aria-label=${`Look through camera ${letter}`} onClick=${() => lookThrough(letter)}>${letter}</button>`)}
+					${scene.ball || scene.best ? html`<span class="scene3d__height" data-label="ball">${fixed((scene.best ?? scene.ball)?.height, 2, ' m')}</span>` : null}
+				</div>`}
+		</div>
+	`;
+}
+
+/** @param {{group: GroupDocument, solution: SolutionJson | null}} props */
+export function ScenePanel({ group, solution }) {
+	const scene = useMemo(() => sceneOf(group, solution), [group.id, group.views, solution]);
+	const frames = useFrames(group.views);
+	const images = useMemo(() => new Map(group.views.flatMap(({ key, letter }) => {
+		const frame = frames.get(key);
+		return frame ? [[letter, frame]] : [];
+	})), [frames]);
+	const at = standpoint.value;
+	const hasBall = scene.ball !== null || scene.best !== null;
+	return html`
+		<${Stage} scene=${scene} images=${images} />
+		<div class="scene3d__toolbar" role="toolbar" aria-label="Standpoints">
+			${PRESETS.map(({ preset, label, key }) => {
+				const off = preset === 'ball' && !hasBall;
+				return html`
+					<button
+						key=${preset} class="button" type="button" aria-pressed=${at.kind === 'preset' && at.preset === preset}
+						aria-disabled=${off} title=${off ? 'There is no 3D ball' : `${label} (${key})`}
+						onClick=${() => { if (!off) goToPreset(preset); }}
+					>${label} <kbd>${key}</kbd></button>`;
+			})}
+			<span class="scene3d__through">${at.kind === 'camera' ? `Through camera ${at.letter}` : ''}</span>
+			<button class="button" type="button" onClick=${toggleScene}>Images <kbd>\\</kbd></button>
+		</div>
+		<${SceneTable} scene=${scene} />
+	`;
+}

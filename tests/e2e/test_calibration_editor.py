@@ -1,0 +1,310 @@
+"""The calibration editor: lines staged, previewed, saved as one edit, and taken back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.soccer.pitch import MARKINGS
+from tests.e2e.film import FRAMES
+from tests.e2e.screen import passing, submitted
+from tests.e2e.test_access import CUT_OFF, NESTED_SCROLLERS, SIZES, serious
+
+OpenPage = Callable[..., Page]
+Document = dict[str, Any]
+
+
+class Editor:
+    """The editor of one view of a passing group, with what the server has."""
+
+    def __init__(self, page: Page, address: str, group: int, place: int):
+        self.page, self.address, self.group = page, address, group
+        self.key = self.document()["views"][place]["key"]
+        page.goto(f"{address}/review/{group}/calibration?view={self.key}")
+        page.wait_for_selector(".editor__panel canvas")
+        expect(page.locator(".line-table tbody tr[data-marking]").first).to_be_visible()
+
+    def document(self) -> Document:
+        """The group as the server has it."""
+        answer = self.page.request.get(f"{self.address}/api/v1/groups/{self.group}")
+        assert answer.ok
+        document: Document = answer.json()
+        return document
+
+    @property
+    def view(self) -> Document:
+        """The view as the server has it."""
+        views: list[Document] = self.document()["views"]
+        return next(view for view in views if view["key"] == self.key)
+
+    @property
+    def lines(self) -> Document:
+        """Its lines as the server has them."""
+        lines: Document = self.view["lines"]
+        return lines
+
+    def press(self, *keys: str) -> None:
+        """Press keys one after the other."""
+        for key in keys:
+            self.page.keyboard.press(key)
+
+    def choose(self, marking: str) -> None:
+        """Choose a marking in the diagram, by keyboard as others do by pointer."""
+        self.page.locator(f'.diagram__marking[data-marking="{marking}"]').focus()
+        self.page.keyboard.press("Enter")
+        expect(self.page.locator(".marking-card h2")).to_have_text(marking)
+
+    def drawn(self) -> dict[str, int]:
+        """Markings of the table and how many points each has."""
+        rows = self.page.locator(".line-table tbody tr[data-marking]")
+        found: dict[str, int] = rows.evaluate_all(
+            "rows => Object.fromEntries(rows.map((row) => [row.dataset.marking,"
+            " parseInt(row.cells[2].textContent, 10)]))"
+        )
+        return {marking: count for marking, count in found.items() if count}
+
+    def staged(self, count: int) -> None:
+        """Wait until that many markings are staged."""
+        text = "Nothing is staged." if count == 0 else f"{count} marking"
+        expect(self.page.locator(".commit__state")).to_contain_text(text)
+
+    def previewed(self) -> None:
+        """Wait until the numbers on screen belong to the lines on screen."""
+        expect(self.page.locator('section[aria-label="Before and after"]')).to_have_attribute(
+            "aria-busy", "false"
+        )
+
+    def compared(self, name: str) -> tuple[str, str, str]:
+        """Before, after, and which of the two is better."""
+        row = self.page.locator(f'[data-compared="{name}"]')
+        before, after = row.locator("td").all_inner_texts()[:2]
+        return before, after, row.get_attribute("data-change") or ""
+
+    def saved(self) -> None:
+        """Wait until the last write was answered."""
+        expect(self.page.locator('.save[data-unsaved="0"]')).to_contain_text(
+            "Saved", timeout=60_000
+        )
+
+    def to_screen(self, x: float, y: float) -> tuple[float, float]:
+        """Where an image point stands in the window, while the image is shown whole."""
+        box = self.page.locator(".editor__panel .image-panel__stage").bounding_box()
+        assert box is not None
+        view = self.view
+        scale = min(box["width"] / view["width"], box["height"] / view["height"])
+        left = box["x"] + (box["width"] - view["width"] * scale) / 2
+        top = box["y"] + (box["height"] - view["height"] * scale) / 2
+        return left + (x + 0.5) * scale, top + (y + 0.5) * scale
+
+
+@pytest.fixture
+def editor(open_page: OpenPage, server: str) -> Iterator[Editor]:
+    """The editor of a broadcast view; its lines are put back afterwards."""
+    page = open_page(None)
+    opened = Editor(page, server, passing(page, 0), 0)
+    before = opened.lines
+    yield opened
+    after = opened.document()
+    now = opened.lines
+    if now != before:
+        gone: dict[str, Any] = dict.fromkeys(now.keys() - before.keys())
+        answer = page.request.patch(
+            f"{server}/api/v1/views/{opened.view['id']}/lines",
+            data={"lines": {**before, **gone}},
+            headers={"If-Match": after["etag"]},
+        )
+        assert answer.ok
+
+
+def longest(lines: Document) -> str:
+    """The marking with the most points."""
+    return max(sorted(lines), key=lambda marking: len(lines[marking]))
+
+
+def absent_from(lines: Document) -> str:
+    """A marking that is not drawn."""
+    return next(marking for marking in MARKINGS if marking not in lines)
+
+
+class TestStaging:
+    def test_several_edits_are_previewed_and_saved_as_one(self, editor: Editor) -> None:
+        before = editor.lines
+        first, second = sorted(before)[:2]
+        writes = submitted(editor.page)
+        editor.choose(first)
+        editor.press(".", "Shift+ArrowDown", "Shift+ArrowDown", "Shift+ArrowDown")
+        editor.staged(1)
+        editor.choose(second)
+        editor.press("Delete")
+        editor.staged(2)
+        editor.previewed()
+        old, new, change = editor.compared("worst")
+        assert (old != new, change) == (True, "worse")
+        assert editor.lines == before
+        assert writes == []
+        editor.press("Control+s")
+        editor.saved()
+        assert len(writes) == 1
+        moved = editor.lines[first][0]
+        assert moved["y"] == pytest.approx(before[first][0]["y"] + 15, abs=1e-9)
+        assert second not in editor.lines
+        editor.staged(0)
+        editor.press("Control+z")
+        expect(editor.page.locator(f'tr[data-marking="{second}"] td').nth(1)).to_have_text(
+            str(len(before[second]))
+        )
+        editor.saved()
+        assert editor.lines == before
+
+    def test_steps_are_taken_back_one_by_one_and_survive_a_reload(self, editor: Editor) -> None:
+        before = editor.lines
+        marking = longest(before)
+        editor.choose(marking)
+        editor.press(".", "Delete", "Delete")
+        assert editor.drawn()[marking] == len(before[marking]) - 2
+        editor.press("Control+z")
+        assert editor.drawn()[marking] == len(before[marking]) - 1
+        editor.page.on("dialog", lambda dialog: dialog.accept())
+        editor.page.reload()
+        editor.staged(1)
+        assert editor.drawn()[marking] == len(before[marking]) - 1
+        editor.press("Control+Delete")
+        editor.staged(0)
+        assert editor.drawn() == {name: len(points) for name, points in before.items()}
+        assert editor.lines == before
+
+    def test_sides_are_swapped_before_anything_is_saved(self, editor: Editor) -> None:
+        before = editor.drawn()
+        editor.press("m")
+        editor.previewed()
+        swapped = editor.drawn()
+        assert sum(swapped.values()) == sum(before.values())
+        assert swapped.keys() != before.keys()
+        # The fit is the same from the other side; the ball is not.
+        assert editor.compared("jac 0.5")[2] == "same"
+        assert editor.compared("ball")[2] == "worse"
+        editor.press("m")
+        editor.staged(0)
+        assert editor.drawn() == before
+
+    def test_a_marking_is_relabelled_in_the_diagram(self, editor: Editor) -> None:
+        before = editor.drawn()
+        marking = longest(editor.lines)
+        other = absent_from(editor.lines)
+        editor.choose(marking)
+        editor.press("r")
+        expect(editor.page.locator(".diagram")).to_have_attribute("data-mode", "relabel")
+        editor.choose(other)
+        after = editor.drawn()
+        assert after[other] == before[marking]
+        assert marking not in after
+        editor.press("Control+Delete")
+
+
+class TestPointer:
+    def test_a_point_is_dragged_with_live_numbers(self, editor: Editor) -> None:
+        lines = editor.lines
+        marking = longest(lines)
+        editor.choose(marking)
+        index = len(lines[marking]) // 2
+        x, y = editor.to_screen(lines[marking][index]["x"], lines[marking][index]["y"])
+        mouse = editor.page.mouse
+        mouse.move(x, y)
+        mouse.down()
+        mouse.move(x + 8, y + 30, steps=4)
+        editor.previewed()
+        assert editor.compared("worst")[2] == "worse"
+        mouse.up()
+        editor.staged(1)
+        assert editor.lines == lines
+        editor.press("Control+z")
+        editor.staged(0)
+
+    def test_a_new_marking_is_drawn_by_clicks(self, editor: Editor) -> None:
+        view = editor.view
+        absent = absent_from(view["lines"])
+        editor.choose(absent)
+        expect(editor.page.locator(".editor__hint")).to_contain_text(absent)
+        for share in (0.3, 0.5, 0.7):
+            x, y = editor.to_screen(view["width"] * share, view["height"] * 0.93)
+            editor.page.mouse.click(x, y)
+        expect(editor.page.locator(".points li")).to_have_count(3)
+        assert editor.drawn()[absent] == 3
+        editor.press("Escape", "Control+Delete")
+        editor.staged(0)
+
+    def test_a_line_lights_up_on_both_sides(self, editor: Editor) -> None:
+        marking = longest(editor.lines)
+        row = editor.page.locator(f'tr[data-marking="{marking}"]')
+        shape = editor.page.locator(f'.diagram__marking[data-marking="{marking}"]')
+        row.hover()
+        expect(shape).to_have_attribute("data-lit", "true")
+        points = editor.lines[marking]
+        editor.page.mouse.move(*editor.to_screen(points[0]["x"], points[0]["y"]))
+        expect(editor.page.locator('[data-lit="true"]').first).to_be_visible()
+
+
+class TestStation:
+    def test_an_edit_reaches_all_views_of_the_camera(self, open_page: OpenPage, film: str) -> None:
+        page = open_page(None)
+        timeline = page.request.get(f"{film}/api/v1/datasets/film/timeline").json()
+        editor = Editor(page, film, timeline["id"][0], 2)
+        expect(page.locator(".station-card")).to_contain_text("all 37 groups")
+        before = editor.lines
+        marking = longest(before)
+        page.get_by_role("button", name="From lines").click()
+        expect(page.get_by_role("button", name="From lines")).to_have_attribute(
+            "aria-pressed", "true"
+        )
+        editor.choose(marking)
+        editor.press(".", "Shift+ArrowDown")
+        editor.staged(1)
+        editor.press("Control+s")
+        editor.saved()
+        expect(page.locator(".station-card__work")).to_be_visible()
+        other = page.request.get(f"{film}/api/v1/groups/{timeline['id'][20]}").json()
+        changed = next(view for view in other["views"] if view["key"] == editor.key)
+        assert changed["lines"] == editor.lines != before
+        editor.press("Control+z")
+        editor.staged(0)
+        page.wait_for_function(
+            """async ([address, group, key, y, marking]) => {
+              const answer = await fetch(`${address}/api/v1/groups/${group}`);
+              const { views } = await answer.json();
+              return views.find((view) => view.key === key).lines[marking][0].y === y;
+            }""",
+            arg=[film, editor.group, editor.key, before[marking][0]["y"], marking],
+        )
+        editor.saved()
+        page.get_by_role("button", name="Given camera").click()
+        expect(page.get_by_role("button", name="Given camera")).to_have_attribute(
+            "aria-pressed", "true"
+        )
+        assert FRAMES[0] == timeline["frame"][0]
+
+
+class TestAccess:
+    @pytest.mark.parametrize("scheme", ["dark", "light"])
+    def test_axe_finds_nothing_serious(self, open_page: OpenPage, server: str, scheme: str) -> None:
+        page = open_page(None, scheme=scheme)
+        editor = Editor(page, server, passing(page, 0), 0)
+        editor.choose(longest(editor.lines))
+        editor.press(".", "Shift+ArrowDown")
+        editor.staged(1)
+        editor.previewed()
+        assert serious(page) == []
+
+    @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+    def test_nothing_is_cut_off(
+        self, open_page: OpenPage, film: str, size: tuple[int, int]
+    ) -> None:
+        page = open_page(None, size={"width": size[0], "height": size[1]})
+        timeline = page.request.get(f"{film}/api/v1/datasets/film/timeline").json()
+        editor = Editor(page, film, timeline["id"][5], 2)
+        editor.press("]", ".")
+        scrolled = ".editor__scroll, .points"
+        assert page.evaluate(CUT_OFF.replace(".rail__scroll,", f".rail__scroll, {scrolled},")) == []
+        assert page.evaluate(NESTED_SCROLLERS) == []

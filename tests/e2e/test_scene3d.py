@@ -1,0 +1,134 @@
+"""The 3D view: it shows what the solution says, lets one look through cameras, and leaves nothing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.screen import Screen, passing
+from tests.e2e.test_access import serious
+
+OpenPage = Callable[..., Page]
+MORE_THAN_CHROMIUM_KEEPS = 18
+"""Times the view is opened: sixteen contexts that nobody gave back make Chromium complain."""
+
+
+def show(page: Page) -> None:
+    """Open the 3D view."""
+    page.keyboard.press("\\")
+    page.wait_for_selector('.scene3d__stage[data-ready="true"]')
+
+
+def colours(page: Page) -> int:
+    """How many different colours the canvas shows."""
+    picture = page.locator(".scene3d__stage").screenshot()
+    pixels = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+    return len(np.unique(pixels.reshape(-1, 3), axis=0))
+
+
+def numbers(page: Page, thing: str) -> list[float]:
+    """x, y and height of a row of the table."""
+    cells = page.locator(f'.scene3d__table [data-thing="{thing}"] td').all_inner_texts()
+    return [float(text.replace("−", "-")) for text in cells]
+
+
+def label(page: Page, name: str) -> tuple[float, float]:
+    """Where a label stands in the panel, CSS pixels."""
+    style = page.locator(f'[data-label="{name}"]').get_attribute("style") or ""
+    found = re.search(r"translate\(([-\d.]+)px, ([-\d.]+)px\)", style)
+    assert found is not None, style
+    return float(found[1]), float(found[2])
+
+
+class TestScene:
+    def test_says_in_words_what_the_solution_says(self, review: Callable[..., Screen]) -> None:
+        screen = review(0)
+        show(screen.page)
+        solution: dict[str, Any] = screen.document()["solution"]
+        x, y, z = solution["ball"]["point"]
+        assert numbers(screen.page, "mean") == pytest.approx([x, y, -z], abs=0.006)
+        for view, solved in zip(screen.document()["views"], solution["views"], strict=True):
+            x, y, z = solved["calibration"]["camera"]["position_meters"]
+            row = numbers(screen.page, f"camera {view['letter']}")
+            assert row == pytest.approx([x, y, -z], abs=0.006)
+        assert screen.page.locator('[data-thing^="pair"]').count() == len(solution["pairs"])
+
+    def test_draws_the_scene_and_other_sides_of_it(self, review: Callable[..., Screen]) -> None:
+        page = review(0).page
+        show(page)
+        expect(page.locator('[data-label="A"]')).to_be_visible()
+        assert colours(page) > 30
+        before = label(page, "ball")
+        page.keyboard.press("7")
+        expect(page.get_by_role("button", name="Top 7")).to_have_attribute("aria-pressed", "true")
+        page.wait_for_function(
+            "style => document.querySelector('[data-label=ball]').style.transform !== style",
+            arg=f"translate({before[0]:.1f}px, {before[1]:.1f}px)",
+        )
+
+    def test_a_camera_shows_the_ball_where_its_image_does(
+        self, review: Callable[..., Screen]
+    ) -> None:
+        screen = review(0)
+        page = screen.page
+        show(page)
+        document = screen.document()
+        pairs = zip(document["views"], document["solution"]["views"], strict=True)
+        view, solved = next((view, solved) for view, solved in pairs if solved["ball"])
+        page.get_by_role("button", name=f"Look through camera {view['letter']}").click()
+        expect(page.locator(".scene3d__through")).to_have_text(f"Through camera {view['letter']}")
+        box = page.locator(".scene3d__stage").bounding_box()
+        assert box is not None
+        scale = min(box["width"] / view["width"], box["height"] / view["height"])
+        u, v = solved["ball"]["reprojected"]
+        left = (box["width"] - view["width"] * scale) / 2
+        top = (box["height"] - view["height"] * scale) / 2
+        # The picture is straightened, so the lens may move the ball a little.
+        lens = abs(solved["calibration"]["camera"]["radial_distortion"][0])
+        allowed = 2 + 0.1 * lens * box["width"]
+        page.wait_for_function(
+            """([x, y, allowed]) => {
+              const found = /translate\\(([-\\d.]+)px, ([-\\d.]+)px\\)/.exec(
+                document.querySelector('[data-label="ball"]').style.transform);
+              return Math.hypot(Number(found[1]) - x, Number(found[2]) - y) < allowed;
+            }""",
+            arg=[left + (u + 0.5) * scale, top + (v + 0.5) * scale, allowed],
+        )
+        page.keyboard.press("Escape")
+        expect(page.locator(".scene3d__through")).to_have_text("")
+        page.keyboard.press("Escape")
+        page.wait_for_selector(".image-panel__stage[data-ready=true]")
+
+    def test_can_be_opened_again_and_again(self, review: Callable[..., Screen]) -> None:
+        page = review(0).page
+        for _ in range(MORE_THAN_CHROMIUM_KEEPS):
+            show(page)
+            page.keyboard.press("\\")
+            page.wait_for_selector(".image-panel__stage")
+
+    def test_says_so_where_there_is_no_webgl(self, open_page: OpenPage) -> None:
+        page = open_page(None)
+        page.add_init_script(
+            "const get = HTMLCanvasElement.prototype.getContext;"
+            "HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {"
+            "  return kind === 'webgl2' ? null : get.call(this, kind, ...rest); };"
+        )
+        page.goto(f"/review/{passing(page, 0)}")
+        Screen(page).ready()
+        page.keyboard.press("\\")
+        expect(page.locator(".scene3d__stage .scene3d__missing")).to_contain_text("no 3D graphics")
+        assert len(numbers(page, "mean")) == 3
+
+    @pytest.mark.parametrize("scheme", ["dark", "light"])
+    def test_axe_finds_nothing_serious(self, open_page: OpenPage, scheme: str) -> None:
+        page = open_page(None, scheme=scheme)
+        page.goto(f"/review/{passing(page, 0)}")
+        Screen(page).ready()
+        show(page)
+        assert serious(page) == []
