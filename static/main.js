@@ -8,13 +8,21 @@ import { html, render } from 'htm/preact';
 import { startKeys } from './lib/keys.js';
 import { startRouter } from './lib/router.js';
 import { startArrivals } from './state/arrival.js';
-import { unsaved } from './state/group.js';
+import { draft } from './state/group.js';
+import { startInsight } from './state/insight.js';
+import { startLive } from './state/live.js';
+import { lasting, outbox } from './state/outbox.js';
+import { startSending } from './state/sending.js';
 import { App } from './views/app.js';
 
 addEventListener('beforeunload', (event) => {
-	if (unsaved.value > 0) event.preventDefault();
+	// What is in the outbox comes back with the page; what is in hand does not.
+	if (draft.value || (!lasting.value && outbox.value.length > 0)) event.preventDefault();
 });
 startRouter();
 startArrivals();
+startSending();
+startInsight();
+startLive();
 startKeys();
 render(html`<${App} />`, /** @type {HTMLElement} */ (document.querySelector('.app')));

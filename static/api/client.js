@@ -11,12 +11,23 @@ import { ApiError } from './problem.js';
 
 const ROOT = '/api/v1';
 
+/** @typedef {{method?: string, body?: unknown, etag?: string, key?: string, signal?: AbortSignal}} RequestOptions */
+
 /**
- * @param {string} path below the API's root, or absolute
- * @param {{method?: string, body?: unknown, etag?: string, key?: string, signal?: AbortSignal}} [options]
+ * @param {string} path below the API's root, or absolute @param {RequestOptions} [options]
  * @returns {Promise<any>}
  */
-async function request(path, { method = 'GET', body, etag, key, signal } = {}) {
+export async function request(path, options) {
+	return (await requestTagged(path, options)).json;
+}
+
+/**
+ * The same with the ETag of what was answered, for what is replaced as a whole.
+ *
+ * @param {string} path @param {RequestOptions} [options]
+ * @returns {Promise<{json: any, etag: string}>}
+ */
+export async function requestTagged(path, { method = 'GET', body, etag, key, signal } = {}) {
 	/** @type {Record<string, string>} */
 	const headers = { accept: 'application/json' };
 	if (body !== undefined) headers['content-type'] = 'application/json';
@@ -33,11 +44,11 @@ async function request(path, { method = 'GET', body, etag, key, signal } = {}) {
 	}
 	const json = await response.json().catch(() => null);
 	if (!response.ok) throw new ApiError(response.status, json);
-	return json;
+	return { json, etag: response.headers.get('etag') ?? '' };
 }
 
-/** @param {Record<string, string | number | null | undefined>} values */
-function query(values) {
+/** @param {Record<string, string | number | null | undefined>} values @returns {string} "?…", or "" */
+export function queryText(values) {
 	const search = new URLSearchParams();
 	for (const [name, value] of Object.entries(values)) {
 		if (value !== null && value !== undefined && value !== '') search.set(name, String(value));
@@ -47,7 +58,7 @@ function query(values) {
 }
 
 /** A key that lets the server recognise the same request sent twice. */
-function idempotencyKey() {
+export function idempotencyKey() {
 	const bytes = crypto.getRandomValues(new Uint8Array(16));
 	return Array.from(bytes, (byte) => byte.toString(16).padStart(2, '0')).join('');
 }
@@ -59,7 +70,7 @@ export function getDatasets() {
 
 /** @param {number} dataset @param {string} q @param {AbortSignal} [signal] @returns {Promise<any>} */
 export function getSummary(dataset, q, signal) {
-	return request(`/datasets/${dataset}/summary${query({ q })}`, { signal });
+	return request(`/datasets/${dataset}/summary${queryText({ q })}`, { signal });
 }
 
 /**
@@ -68,7 +79,7 @@ export function getSummary(dataset, q, signal) {
  * @returns {Promise<GroupPage>}
  */
 export function getGroups(options, signal) {
-	return request(`/groups${query(options)}`, { signal });
+	return request(`/groups${queryText(options)}`, { signal });
 }
 
 /** @param {number} id @returns {Promise<GroupDocument>} */
@@ -78,18 +89,7 @@ export function getGroup(id) {
 
 /** @param {number} id @param {string} q @returns {Promise<Neighbours>} */
 export function getNeighbours(id, q) {
-	return request(`/groups/${id}/neighbours${query({ q })}`);
-}
-
-/**
- * One edit; the answer is the group as it is then.
- *
- * @param {{path: string, body: unknown}} edit
- * @param {string} etag
- * @returns {Promise<GroupDocument>}
- */
-export function patch({ path, body }, etag) {
-	return request(path, { method: 'PATCH', body, etag, key: idempotencyKey() });
+	return request(`/groups/${id}/neighbours${queryText({ q })}`);
 }
 
 /**
@@ -102,40 +102,10 @@ export function preview(id, body, signal) {
 	return request(`/groups/${id}/preview`, { method: 'POST', body, signal });
 }
 
-/**
- * Take the last edit of a group back, or make it again.
- *
- * @param {'undo' | 'redo'} verb @param {number} id @param {string} etag
- * @returns {Promise<GroupDocument>}
- */
-export function turnBack(verb, id, etag) {
-	return request(`/groups/${id}/${verb}`, { method: 'POST', etag, key: idempotencyKey() });
-}
+/** @typedef {{dataset: string, format: string, all: boolean, boxes: string, images?: string, version?: number | null}} ExportRequest */
 
 /**
- * The same for a static camera; the answer is the group.
- *
- * @param {'undo' | 'redo'} verb @param {number} station @param {number} group
- * @param {string} etag of the station
- * @returns {Promise<GroupDocument>}
- */
-export function turnBackStation(verb, station, group, etag) {
-	const path = `/stations/${station}/${verb}${query({ group })}`;
-	return request(path, { method: 'POST', etag, key: idempotencyKey() });
-}
-
-/**
- * @param {number} id
- * @param {{state: string, reason: string | null, note: string | null}} verdict
- * @param {string} etag
- * @returns {Promise<GroupDocument>}
- */
-export function putVerdict(id, verdict, etag) {
-	return request(`/groups/${id}/verdict`, { method: 'PUT', body: verdict, etag });
-}
-
-/**
- * @param {{dataset: string, format: string, all: boolean, boxes: string}} body
+ * @param {ExportRequest} body
  * @returns {Promise<ExportJson>}
  */
 export function postExport(body) {
@@ -145,4 +115,30 @@ export function postExport(body) {
 /** @param {string | number} id @returns {Promise<ExportJson>} */
 export function getExport(id) {
 	return request(`/exports/${id}`);
+}
+
+/**
+ * Send a file as it is. `fetch` cannot tell how far an upload is, hence the older interface.
+ *
+ * @param {string} path below the API's root @param {Blob} file
+ * @param {(share: number) => void} progress @param {AbortSignal} [signal]
+ * @returns {Promise<any>}
+ */
+export function upload(path, file, progress, signal) {
+	return new Promise((resolve, reject) => {
+		const sending = new XMLHttpRequest();
+		sending.open('POST', ROOT + path);
+		sending.setRequestHeader('accept', 'application/json');
+		sending.setRequestHeader('content-type', 'application/octet-stream');
+		sending.responseType = 'json';
+		sending.upload.onprogress = ({ loaded, total }) => progress(total ? loaded / total : 0);
+		sending.onload = () => {
+			if (sending.status < 400) resolve(sending.response);
+			else reject(new ApiError(sending.status, sending.response));
+		};
+		sending.onerror = () => reject(new ApiError(0, null));
+		sending.onabort = () => reject(signal?.reason);
+		signal?.addEventListener('abort', () => sending.abort(), { once: true });
+		sending.send(file);
+	});
 }

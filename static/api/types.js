@@ -70,9 +70,20 @@
  */
 
 /**
+ * @typedef {object} CameraSigmaJson one standard deviation of each number
+ * @property {number} pan_degrees
+ * @property {number} tilt_degrees
+ * @property {number} roll_degrees
+ * @property {[number, number, number]} position_meters
+ * @property {number} focal_px
+ * @property {number} k1
+ */
+
+/**
  * @typedef {object} CalibrationJson
  * @property {string} source
  * @property {CameraJson | null} camera
+ * @property {CameraSigmaJson | null} [sigma] how well the lines determine it
  * @property {string | null} reason
  * @property {{[gamma: string]: number} | null} jac
  * @property {number | null} error_px
@@ -135,6 +146,7 @@
  * @property {string | null} marking
  * @property {string | null} to
  * @property {number | null} index
+ * @property {PairJson | null} [point] where a point would have to stand, image pixels
  */
 
 /**
@@ -161,6 +173,16 @@
  */
 
 /**
+ * @typedef {object} BestBallJson the most likely point over all views
+ * @property {[number, number, number]} point
+ * @property {number} height_m
+ * @property {number} sigma_m
+ * @property {number[]} covariance
+ * @property {string[]} views
+ * @property {string[]} [contradicting] views that speak against it
+ */
+
+/**
  * @typedef {object} SolutionJson
  * @property {boolean} passes
  * @property {FailingJson | null} first_failing
@@ -168,6 +190,7 @@
  * @property {ViewSolutionJson[]} views
  * @property {PairSolutionJson[]} pairs
  * @property {Ball3DJson | null} ball
+ * @property {BestBallJson | null} [best_ball]
  * @property {FindingJson[]} findings
  */
 
@@ -199,6 +222,7 @@
  * @property {{id: number, name: string}} dataset
  * @property {string} key
  * @property {string} label
+ * @property {string} match
  * @property {{length: number, width: number}} pitch
  * @property {number} revision
  * @property {string} etag
@@ -225,7 +249,11 @@
  * @property {number | null} sigma_m
  * @property {number | null} parallax_degrees
  * @property {number | null} size_ratio
+ * @property {number | null} margin
  * @property {number} views
+ * @property {string} split
+ * @property {string | null} reviewer
+ * @property {boolean} fixed
  * @property {string[]} findings
  * @property {string | null} thumbnail
  */
@@ -243,6 +271,8 @@
  * @property {number} rejected
  * @property {number} deferred
  * @property {number} unreviewed
+ * @property {PolicyJson} policy
+ * @property {string} created
  */
 
 /** @typedef {{low: number, high: number, counts: number[], log?: boolean}} Histogram */

@@ -40,6 +40,11 @@ export function count(value) {
 	return value.toLocaleString('en-GB');
 }
 
+/** 1, "group" -> "1 group"; 12764 -> "12,764 groups". @param {number} n @param {string} noun */
+export function plural(n, noun) {
+	return `${count(n)} ${noun}${n === 1 ? '' : 's'}`;
+}
+
 /** "bad_field_lines" -> "bad field lines". @param {string} name */
 export function words(name) {
 	return name.replaceAll('_', ' ');

@@ -1,6 +1,8 @@
 // @ts-check
 /** The keyboard: one list of bindings for each page, from which the help is written too. */
 
+import { stored } from './storage.js';
+
 /**
  * @typedef {object} Binding
  * @property {string[]} keys chords such as "a", "Ctrl+Enter", "Shift+1", "ArrowLeft"
@@ -10,10 +12,19 @@
  * @property {string} [shown] how the help writes the keys, when not as they stand
  * @property {boolean} [typing] also works while a field has the focus
  * @property {() => boolean} [when] otherwise the key is left to the browser
+ * @property {{start: () => void, end: () => void}} [hold] what holding the key does; `run` is then
+ *   the tap, and comes when the key is let go
+ * @property {boolean} [once] a key held down does it once
  */
 
 /** @type {Set<readonly Binding[]>} */
 const scopes = new Set();
+
+/** Whether single letters do anything; they surprise whoever speaks to the computer. */
+export const lettersOn = stored('keys-letters', true);
+
+/** Keys that the person chose, by `idOf` a binding. */
+export const chosenKeys = stored('keys-chosen', /** @type {Record<string, string[]>} */ ({}));
 
 /** Every binding that works now. @returns {Binding[]} */
 export function activeBindings() {
@@ -29,6 +40,38 @@ export function activeBindings() {
 export function bind(bindings) {
 	scopes.add(bindings);
 	return () => { scopes.delete(bindings); };
+}
+
+/** The name under which a person's choice for a binding is kept. @param {Binding} binding */
+export function idOf({ group, label }) {
+	return `${group}: ${label}`;
+}
+
+/** The keys that do it now: the person's, else ours. @param {Binding} binding @returns {string[]} */
+export function keysOf(binding) {
+	const chosen = chosenKeys.value[idOf(binding)];
+	return chosen ?? binding.keys;
+}
+
+/** Whether a person may choose other keys for it. @param {Binding} binding */
+export function isEditable(binding) {
+	return binding.shown === undefined && binding.keys.length > 0 && !binding.keys.includes('Escape');
+}
+
+/**
+ * Take another key for a binding; null: ours again.
+ *
+ * @param {Binding} binding @param {string | null} chord
+ * @returns {Binding | null} who has that key already, in which case nothing changes
+ */
+export function chooseKey(binding, chord) {
+	const holder = chord === null ? undefined : activeBindings().find((other) => (
+		idOf(other) !== idOf(binding) && keysOf(other).includes(chord)
+	));
+	if (holder) return holder;
+	const { [idOf(binding)]: _, ...rest } = chosenKeys.value;
+	chosenKeys.value = chord === null ? rest : { ...rest, [idOf(binding)]: [chord] };
+	return null;
 }
 
 /**
@@ -52,6 +95,11 @@ export function chordOf(event) {
 	return [...parts, key].join('+');
 }
 
+/** Whether a chord is a letter alone, with or without Shift. @param {string} chord */
+export function isLetter(chord) {
+	return /^(?:Shift\+)?\p{L}$/u.test(chord);
+}
+
 /** @param {EventTarget | null} target */
 function isTyping(target) {
 	if (!(target instanceof HTMLElement)) return false;
@@ -68,23 +116,69 @@ function isPress(event) {
 	return pressable && (event.key === 'Enter' || event.key === ' ') && !event.ctrlKey;
 }
 
+/** Arrows move a slider that has the focus. @param {KeyboardEvent} event */
+function isSliding(event) {
+	return event.target instanceof HTMLInputElement && event.target.type === 'range'
+		&& /^(?:Arrow|Page|Home|End)/.test(event.key);
+}
+
 /** @param {KeyboardEvent} event */
 function dispatch(event) {
 	if (event.defaultPrevented || event.isComposing) return;
-	if (document.querySelector('dialog[open]') || isPress(event)) return;
+	if (document.querySelector('dialog[open], [popover]:popover-open') || isPress(event) || isSliding(event)) return;
 	const chord = chordOf(event);
+	if (!lettersOn.value && isLetter(chord)) return;
 	const typing = isTyping(event.target);
 	// The newest scope wins.
 	for (const bindings of [...scopes].reverse()) {
-		const found = bindings.find((binding) => binding.keys.includes(chord));
-		if (!found || (typing && !found.typing) || found.when?.() === false) continue;
+		const found = bindings.find((binding) => (
+			keysOf(binding).includes(chord) && (!typing || binding.typing) && binding.when?.() !== false
+		));
+		if (!found) continue;
 		event.preventDefault();
-		found.run(event);
+		if (found.hold) press(found, event);
+		else if (!event.repeat || !found.once) found.run(event);
 		return;
 	}
+}
+
+/** How long a key is down before it counts as held. */
+const HOLD = 260;
+
+/** @type {{code: string, binding: Binding, timer: ReturnType<typeof setTimeout>, held: boolean} | null} */
+let pressed = null;
+
+/** @param {Binding} binding @param {KeyboardEvent} event */
+function press(binding, event) {
+	if (event.repeat || pressed) return;
+	const timer = setTimeout(() => {
+		if (pressed) pressed.held = true;
+		binding.hold?.start();
+	}, HOLD);
+	pressed = { code: event.code, binding, timer, held: false };
+}
+
+/** The key that is down was let go. @param {KeyboardEvent} event */
+function release(event) {
+	if (pressed?.code !== event.code) return;
+	const { binding, timer, held } = pressed;
+	pressed = null;
+	clearTimeout(timer);
+	if (held) binding.hold?.end();
+	else binding.run(event);
+}
+
+/** Another window has the keyboard now: nothing is held any more. */
+function letGo() {
+	if (!pressed) return;
+	clearTimeout(pressed.timer);
+	if (pressed.held) pressed.binding.hold?.end();
+	pressed = null;
 }
 
 /** Listen to the keyboard. */
 export function startKeys() {
 	addEventListener('keydown', dispatch);
+	addEventListener('keyup', release);
+	addEventListener('blur', letGo);
 }

@@ -13,16 +13,39 @@ function here() {
 /** Where the person is. */
 export const place = signal(here());
 
-/** @typedef {{page: 'queue'} | {page: 'review', group: number | null} | {page: 'unknown'}} Page */
+/** @typedef {'yield' | 'policy' | 'statistics' | 'versions' | 'evaluation'} DatasetPage */
+/** @typedef {'queue' | 'datasets' | 'import' | 'jobs' | 'exports' | 'unknown'} PlainPage */
+/** @typedef {{page: PlainPage} | {page: 'review', group: number | null} | {page: 'calibration', group: number} | {page: DatasetPage, dataset: string}} Page */
+
+const PLAIN = /** @type {{[path: string]: PlainPage}} */ ({
+	'/': 'queue', '/groups': 'queue', '/datasets': 'datasets', '/import': 'import', '/jobs': 'jobs', '/exports': 'exports',
+});
+const OF_DATASET = /^\/datasets\/([^/]+)\/(yield|policy|statistics|versions|evaluation)\/?$/;
 
 /** Which page that is. */
 export const page = computed(/** @returns {Page} */ () => {
 	const { path } = place.value;
-	if (path === '/' || path === '/groups') return { page: 'queue' };
+	if (Object.hasOwn(PLAIN, path)) return { page: PLAIN[path] };
 	const review = /^\/review(?:\/(\d+))?\/?$/.exec(path);
 	if (review) return { page: 'review', group: review[1] ? Number(review[1]) : null };
+	const editor = /^\/review\/(\d+)\/calibration\/?$/.exec(path);
+	if (editor) return { page: 'calibration', group: Number(editor[1]) };
+	const found = OF_DATASET.exec(path);
+	if (found) return { page: /** @type {DatasetPage} */ (found[2]), dataset: textOf(found[1]) };
 	return { page: 'unknown' };
 });
+
+/** The name of the dataset that the path speaks of, or "". */
+export const pageDataset = computed(() => ('dataset' in page.value ? page.value.dataset : ''));
+
+/** @param {string} part of a path @returns {string} */
+function textOf(part) {
+	try {
+		return decodeURIComponent(part);
+	} catch {
+		return part;
+	}
+}
 
 /** @param {string} name @returns {string} */
 export function param(name) {

@@ -9,14 +9,15 @@ import { effect, signal } from '@preact/signals';
  * @template T
  * @param {string} name
  * @param {T} initial
+ * @param {'localStorage' | 'sessionStorage'} [area] the second lasts as long as the tab
  * @returns {import('@preact/signals').Signal<T>}
  */
-export function stored(name, initial) {
+export function stored(name, initial, area = 'localStorage') {
 	const key = `touchline.${name}`;
-	const value = signal(readStored(key, initial));
+	const value = signal(readStored(key, initial, area));
 	effect(() => {
 		try {
-			localStorage.setItem(key, JSON.stringify(value.value));
+			globalThis[area].setItem(key, JSON.stringify(value.value));
 		} catch {
 			// Private windows may refuse; the setting then lasts as long as the page.
 		}
@@ -24,10 +25,14 @@ export function stored(name, initial) {
 	return value;
 }
 
-/** @template T @param {string} key @param {T} initial @returns {T} */
-function readStored(key, initial) {
+/**
+ * @template T
+ * @param {string} key @param {T} initial @param {'localStorage' | 'sessionStorage'} area
+ * @returns {T}
+ */
+function readStored(key, initial, area) {
 	try {
-		const text = localStorage.getItem(key);
+		const text = globalThis[area].getItem(key);
 		const value = text === null ? initial : JSON.parse(text);
 		return typeof value === typeof initial ? value : initial;
 	} catch {

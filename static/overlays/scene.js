@@ -6,6 +6,7 @@ import { cameraFromJson } from '../geometry/camera.js';
 import { epipolarSegment } from '../geometry/epipolar.js';
 import { ballCenter, ballOf, diagonal } from '../geometry/preview.js';
 import { residualsOf } from '../geometry/residual.js';
+import { pinsOf } from '../lib/pins.js';
 
 /** @import {BallFitJson, GroupDocument, SolutionJson, ViewJson, ViewSolutionJson} from '../api/types.js' */
 /** @import {ImagePoint} from '../geometry/camera.js' */
@@ -14,6 +15,7 @@ import { residualsOf } from '../geometry/residual.js';
 /** @import {Selection} from '../state/workspace.js' */
 
 /** @typedef {{letter: string, points: ImagePoint[]}} Epipolar */
+/** @typedef {{at: ImagePoint, text: string}} Pin */
 /**
  * @typedef {object} ViewPicture
  * @property {ViewJson} view
@@ -24,6 +26,7 @@ import { residualsOf } from '../geometry/residual.js';
  * @property {MarkingResiduals[]} markings
  * @property {ImagePoint[]} outline of the 3D ball
  * @property {Epipolar[]} epipolars rays of the other views' balls
+ * @property {Pin[]} pins notes that stand at a place of this view
  */
 /**
  * @typedef {object} Scene
@@ -35,6 +38,7 @@ import { residualsOf } from '../geometry/residual.js';
  * @property {boolean} boxes
  * @property {number} gain
  * @property {boolean} rays
+ * @property {import('../state/conflict.js').Field[]} [ghosts] what a conflict keeps beside what is shown
  */
 
 /**
@@ -65,6 +69,7 @@ export function picturesOf(group, solution, saved) {
 			markings: residualsOf(view.lines, solved?.calibration.markings ?? [], gamma, live),
 			outline: camera && point ? ballOutline(camera, point, group.policy.ball_diameter_m) : [],
 			epipolars: camera ? epipolarsInto(group, view, cameras) : [],
+			pins: pinsOf(group.verdict.note, view.letter),
 		};
 	});
 }

@@ -6,7 +6,9 @@ import { Image as KonvaImage } from 'konva/lib/shapes/Image.js';
 
 import { colours } from '../lib/colours.js';
 import { drawBall, drawEpipolars } from './ball.js';
+import { drawGhosts } from './ghosts.js';
 import { drawMarkings } from './markings.js';
+import { drawPins } from './pins.js';
 import { drawPoints, drawSelectedPoint, drawWhiskers } from './points.js';
 
 /** @import {Scene} from './scene.js' */
@@ -48,6 +50,11 @@ export class ImageStage {
 		this.below.batchDraw();
 	}
 
+	/** Brightness and contrast of the frame alone. @param {string} filter as CSS writes it */
+	adjust(filter) {
+		this.below.getNativeCanvasElement().style.filter = filter;
+	}
+
 	/** @param {Scene} scene */
 	draw(scene) {
 		const { viewport, picture } = scene;
@@ -74,8 +81,8 @@ export class ImageStage {
 	}
 }
 
-/** @param {CanvasRenderingContext2D} context @param {Scene} scene */
-function drawOverlays(context, scene) {
+/** Everything that stands on a frame. @param {CanvasRenderingContext2D} context @param {Scene} scene */
+export function drawOverlays(context, scene) {
 	context.save();
 	if (scene.projections) drawMarkings(context, scene);
 	if (scene.projections) drawWhiskers(context, scene);
@@ -83,5 +90,7 @@ function drawOverlays(context, scene) {
 	drawPoints(context, scene);
 	drawBall(context, scene);
 	drawSelectedPoint(context, scene);
+	drawGhosts(context, scene);
+	drawPins(context, scene);
 	context.restore();
 }

@@ -6,7 +6,7 @@ import { effect, untracked } from '@preact/signals';
 import { ApiError } from '../api/problem.js';
 import { navigate, page } from '../lib/router.js';
 import { dataset, failure, loadDatasets } from './datasets.js';
-import { open } from './group.js';
+import { document, open } from './group.js';
 import { currentId, firstGroup, lastGroup, locate, query, reviewAddress } from './navigation.js';
 import { complain } from './notice.js';
 import { resetForGroup } from './workspace.js';
@@ -17,7 +17,8 @@ async function enter(id) {
 		await Promise.all([open(id), locate(id)]);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
-		if (currentId() !== id) return;
+		// While the server is away what is known stays on screen; the save state says so.
+		if (currentId() !== id || (error.status === 0 && document.value?.id === id)) return;
 		if (error.status === 404) lastGroup.value = 0;
 		complain(`Group ${id} cannot be shown: ${error.message}`, {
 			label: 'Open the queue', run: () => navigate('/groups'),

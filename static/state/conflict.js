@@ -1,24 +1,135 @@
 // @ts-check
-/** Somebody else was first: whose edit counts. */
+/** Somebody else was first: whose edit counts, field by field. */
 
-import { conflict, save, submit, takeOver } from './group.js';
+import { batch, computed } from '@preact/signals';
+
+import { viewOf } from './edits.js';
+import { document, submit, submitVerdict } from './group.js';
 import { announce } from './notice.js';
+import { discard, outbox } from './outbox.js';
 
-/** Make my edit again on top of theirs. */
-export function keepMine() {
-	const present = conflict.value;
-	if (!present) return;
-	conflict.value = null;
-	takeOver(present.theirs);
-	submit(present.edit);
+/** @import {GroupDocument} from '../api/types.js' */
+/** @import {Edit} from './edits.js' */
+/** @import {Item, Verdict} from './outbox.js' */
+
+/**
+ * @typedef {object} Field one thing that both could have changed
+ * @property {string} key
+ * @property {string} name in words
+ * @property {string | null} view
+ * @property {unknown} base what both found
+ * @property {unknown} mine
+ * @property {unknown} theirs as it is now
+ * @property {boolean} overlaps whether they changed it too, to something else
+ * @property {Edit | null} edit that makes mine of theirs
+ * @property {Verdict | null} verdict
+ */
+/** @typedef {{fields: Field[], mergeable: boolean}} Conflict */
+
+/** Writes of any group that wait for the person. */
+export const held = computed(() => outbox.value.filter((item) => item.held));
+
+/** What is to be decided about the group on screen; null when nothing. */
+export const conflict = computed(() => {
+	const theirs = document.value;
+	const own = theirs ? held.value.filter(({ group }) => group === theirs.id) : [];
+	return theirs && own.length ? conflictOf(theirs, own) : null;
+});
+
+/** @param {GroupDocument} theirs @param {Item[]} own @returns {Conflict} */
+export function conflictOf(theirs, own) {
+	/** @type {Map<string, Field>} */
+	const fields = new Map();
+	for (const item of own) {
+		for (const field of fieldsOf(theirs, item)) {
+			// Of several edits of one thing the first knows what was there and the last what I want.
+			const base = fields.get(field.key)?.base ?? field.base;
+			fields.set(field.key, { ...field, base, overlaps: overlap(base, field.mine, field.theirs) });
+		}
+	}
+	const all = [...fields.values()];
+	const apart = all.filter(({ overlaps }) => !overlaps).length;
+	return { fields: all, mergeable: apart > 0 && apart < all.length };
 }
 
-/** Drop my edit and go on with theirs. */
+/** @param {GroupDocument} theirs @param {Item} item @returns {Field[]} */
+function fieldsOf(theirs, { edit, verdict, base }) {
+	if (verdict) {
+		const { state, reason, note } = theirs.verdict;
+		return [{
+			...BLANK, key: 'verdict', name: 'Verdict', verdict, mine: verdict,
+			base: pick(base?.verdict), theirs: { state, reason, note },
+		}];
+	}
+	if (!edit || !theirs.views.some(({ key }) => key === edit.view)) return [];
+	const view = viewOf(theirs, edit.view);
+	const about = { ...BLANK, view: edit.view };
+	if (edit.kind === 'include') {
+		return [{
+			...about, key: `include ${view.key}`, name: `View ${view.letter} used`, edit,
+			base: base?.included, mine: edit.included, theirs: view.included,
+		}];
+	}
+	if (edit.kind === 'ball') {
+		return [{
+			...about, key: `ball ${view.key}`, name: `Ball of ${view.letter}`, edit,
+			base: base?.balls, mine: edit.ball ? [edit.ball] : [], theirs: view.balls,
+		}];
+	}
+	return Object.entries(edit.lines).map(([marking, points]) => ({
+		...about, key: `line ${view.key} ${marking}`, name: `${marking} of ${view.letter}`,
+		edit: { kind: 'lines', view: view.key, lines: { [marking]: points } },
+		base: base?.lines[marking] ?? null, mine: points, theirs: view.lines[marking] ?? null,
+	}));
+}
+
+/** @type {Field} */
+const BLANK = {
+	key: '', name: '', view: null, base: null, mine: null, theirs: null, overlaps: false,
+	edit: null, verdict: null,
+};
+
+/** @param {Verdict | undefined} verdict */
+function pick(verdict) {
+	return verdict && { state: verdict.state, reason: verdict.reason, note: verdict.note };
+}
+
+/** @param {unknown} base @param {unknown} mine @param {unknown} theirs */
+function overlap(base, mine, theirs) {
+	return !same(base, theirs) && !same(mine, theirs);
+}
+
+/** @param {unknown} a @param {unknown} b */
+function same(a, b) {
+	return JSON.stringify(a) === JSON.stringify(b);
+}
+
+/** Make my edits again on top of theirs. */
+export function keepMine() {
+	resolve((field) => !same(field.mine, field.theirs), 'Yours counts.');
+}
+
+/** Make again what they did not touch; where both changed the same, theirs stays. */
+export function mergeBoth() {
+	resolve((field) => !field.overlaps && !same(field.mine, field.theirs), 'Both were kept.');
+}
+
+/** Drop my edits and go on with theirs. */
 export function takeTheirs() {
+	resolve(() => false, 'Your edit was dropped.');
+}
+
+/** @param {(field: Field) => boolean} wanted @param {string} said */
+function resolve(wanted, said) {
 	const present = conflict.value;
+	const id = document.value?.id;
 	if (!present) return;
-	conflict.value = null;
-	takeOver(present.theirs);
-	save.value = { state: 'saved', at: save.value.at };
-	announce('Your edit was dropped.');
+	batch(() => {
+		discard((item) => item.held && item.group === id);
+		for (const field of present.fields.filter(wanted)) {
+			if (field.edit) submit(field.edit);
+			if (field.verdict) submitVerdict(field.verdict);
+		}
+	});
+	announce(said);
 }

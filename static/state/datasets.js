@@ -5,7 +5,7 @@ import { computed, signal } from '@preact/signals';
 
 import { getDatasets } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
-import { param } from '../lib/router.js';
+import { pageDataset, param } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
@@ -21,7 +21,7 @@ const remembered = stored('dataset', '');
 /** The dataset of the address bar, else the last one used, else the first. */
 export const dataset = computed(() => {
 	const all = datasets.value ?? [];
-	const named = param('dataset');
+	const named = pageDataset.value || param('dataset');
 	if (named) return all.find((one) => one.name === named) ?? null;
 	return all.find((one) => one.name === remembered.value) ?? all[0] ?? null;
 });

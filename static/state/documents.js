@@ -26,6 +26,11 @@ export function remember(document) {
 	if (documents.size > KEPT && oldest !== undefined) documents.delete(oldest);
 }
 
+/** Read a group again before it is shown. @param {number} id */
+export function forget(id) {
+	documents.delete(id);
+}
+
 /** @param {number} id @returns {Promise<GroupDocument>} */
 export function load(id) {
 	const present = loading.get(id);

@@ -142,9 +142,13 @@ export function editOfFix(group, fix) {
 	if (!view) return null;
 	if (fix.action === 'exclude_view') return { kind: 'include', view: view.key, included: false };
 	if (fix.action === 'swap_sides') return swapSides(view);
+	if (fix.action === 'move_ball') return fix.point ? putBall(view, fix.point) : null;
 	const points = fix.marking ? view.lines[fix.marking] : undefined;
 	if (fix.action === 'pick_ball' && fix.index !== null) return pickBall(view, fix.index);
 	if (!fix.marking || !points) return null;
+	if (fix.action === 'move_point' && fix.index !== null && fix.point) {
+		return movePoint(view, fix.marking, fix.index, { x: fix.point[0], y: fix.point[1] });
+	}
 	if (fix.action === 'drop_marking') {
 		return { kind: 'lines', view: view.key, lines: { [fix.marking]: null } };
 	}
@@ -156,14 +160,29 @@ export function editOfFix(group, fix) {
 	return { kind: 'lines', view: view.key, lines: { [fix.marking]: null, [fix.to]: merged } };
 }
 
+/**
+ * The ball of a view at another place, as large as it is; null where the picture does not reach.
+ *
+ * @param {ViewJson} view @param {[number, number]} to
+ * @returns {BallEdit | null}
+ */
+function putBall(view, [x, y]) {
+	const [ball] = view.balls;
+	if (!ball || view.balls.length > 1 || x < 0 || y < 0 || x >= view.width || y >= view.height) return null;
+	const { box } = ball;
+	const placed = box ? { box: /** @type {BallJson['box']} */ ([x - box[2] / 2, y - box[3] / 2, box[2], box[3]]) }
+		: { point: /** @type {BallJson['point']} */ ([x, y]) };
+	return { kind: 'ball', view: view.key, ball: { ...ball, ...placed, out_of_view: false } };
+}
+
 /** @param {ViewJson} view @param {number} index @returns {BallEdit | null} */
 function pickBall(view, index) {
 	const ball = view.balls[index];
 	return ball ? { kind: 'ball', view: view.key, ball } : null;
 }
 
-/** @param {ViewJson} view @returns {LinesEdit} */
-function swapSides(view) {
+/** Every marking of a view under its twin's name. @param {ViewJson} view @returns {LinesEdit} */
+export function swapSides(view) {
 	/** @type {Record<string, PointJson[] | null>} */
 	const lines = Object.fromEntries(Object.keys(view.lines).map((marking) => [marking, null]));
 	for (const [marking, points] of Object.entries(view.lines)) lines[twinMarking(marking)] = points;

@@ -2,33 +2,41 @@
 /** Making an export and waiting for it. */
 
 import { getExport, postExport } from '../api/client.js';
+import { getJob } from '../api/jobs.js';
+import { follow } from './jobs.js';
 
+/** @import {JobJson} from '../api/jobs.js' */
 /** @import {ExportJson} from '../api/types.js' */
-
-const POLL = 500;
 
 export const FORMATS = [
 	{ name: 'soccernet-v3d', label: 'SoccerNet-v3D', note: 'SNv3D.csv, splits and Labels-v3D.json' },
+	{ name: 'soccernet-v3', label: 'SoccerNet-v3', note: 'Labels-v3.json with your edits' },
 	{ name: 'issia-3d', label: 'ISSIA-3D', note: 'ISSIA-3D.csv and issia_calibration.json' },
+	{ name: 'issia', label: 'ISSIA', note: 'one XGTF for each camera, and its lines' },
+	{ name: 'coco', label: 'COCO', note: 'one JSON for each split, the 3D ball in extra fields' },
+	{ name: 'yolo', label: 'YOLO', note: 'data.yaml and one text file for each image' },
+	{ name: 'parquet', label: 'Parquet', note: 'views.parquet, one row for each view' },
+	{ name: 'gamestate', label: 'Game state', note: 'Labels-GameState.json for each sequence' },
+	{ name: 'touchline', label: 'Touchline', note: 'edits and verdicts, for another installation' },
 	{ name: 'cameras', label: 'Cameras', note: 'one camera JSON for each view' },
 	{ name: 'sn-calibration', label: 'sn-calibration lines', note: 'one line JSON for each view' },
-	{ name: 'soccernet-v3', label: 'SoccerNet-v3', note: 'Labels-v3.json with your edits' },
 ];
 
 /**
  * Make an export and wait until it can be fetched.
  *
- * @param {{dataset: string, format: string, all: boolean, boxes: string}} options
+ * @param {import('../api/client.js').ExportRequest} options
+ * @param {(job: JobJson) => void} seen each time its job has moved
+ * @param {AbortSignal} [signal]
  * @returns {Promise<ExportJson>}
  */
-export async function makeExport(options) {
-	let made = await postExport(options);
-	while (!made.content && !['failed', 'error'].includes(made.status)) {
-		await new Promise((resolve) => { setTimeout(resolve, POLL); });
-		made = await getExport(made.id);
-	}
-	if (!made.content) throw new Error(made.error ?? 'The export failed.');
-	return made;
+export async function makeExport(options, seen, signal) {
+	const { id } = await postExport(options);
+	// Asked for once more: a small one is written before anybody listens.
+	const job = await follow(await getJob(Number(id), signal), seen, signal);
+	if (job.state === 'failed') throw new Error(job.problem?.detail ?? 'The export failed.');
+	if (job.state === 'cancelled') throw new Error('The export was cancelled.');
+	return getExport(id);
 }
 
 /** Let the browser save a file of the server. @param {string} url */

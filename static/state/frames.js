@@ -1,9 +1,9 @@
 // @ts-check
 /** Frames as pixels, for those who sample them. */
 
-import { useEffect, useState } from 'preact/hooks';
+import { useLayoutEffect, useState } from 'preact/hooks';
 
-import { loadImage } from './images.js';
+import { decoded, loadImage } from './images.js';
 
 /** @import {ViewJson} from '../api/types.js' */
 
@@ -22,11 +22,15 @@ const pixels = new Map();
 export function useFrames(views) {
 	const [frames, setFrames] = useState(/** @type {Map<string, HTMLImageElement>} */ (new Map()));
 	const urls = views.map((view) => view.image).join(' ');
-	useEffect(() => {
+	useLayoutEffect(() => {
 		let wanted = true;
-		setFrames(new Map());
+		const there = new Map(views.flatMap(({ key, image }) => {
+			const frame = decoded(image);
+			return frame ? [[key, frame]] : [];
+		}));
+		setFrames(there);
 		for (const { key, image } of views) {
-			if (!image) continue;
+			if (!image || there.has(key)) continue;
 			loadImage(image).then(
 				(frame) => { if (wanted) setFrames((present) => new Map(present).set(key, frame)); },
 				() => {},
@@ -37,13 +41,46 @@ export function useFrames(views) {
 	return frames;
 }
 
+/** Run something once nothing more urgent is to be done; the function returned calls it off. @param {() => void} work */
+function whenIdle(work) {
+	if (typeof requestIdleCallback !== 'function') {
+		const timer = setTimeout(work, 60);
+		return () => clearTimeout(timer);
+	}
+	const handle = requestIdleCallback(work, { timeout: 400 });
+	return () => cancelIdleCallback(handle);
+}
+
+/**
+ * The pixels of frames, by view key, as they are read: one at a time and between other work, for
+ * reading one takes longer than drawing a group.
+ *
+ * @param {Map<string, HTMLImageElement>} frames
+ * @returns {Map<string, ImageData>}
+ */
+export function usePixels(frames) {
+	const [read, setRead] = useState(0);
+	useLayoutEffect(() => {
+		// More than are kept would push each other out for ever.
+		const next = [...frames.values()].slice(0, KEPT).find((frame) => !pixels.has(frame));
+		return next && whenIdle(() => {
+			pixelsOf(next);
+			setRead(read + 1);
+		});
+	}, [frames, read]);
+	return new Map([...frames].flatMap(([key, frame]) => {
+		const data = pixels.get(frame);
+		return data ? [[key, data]] : [];
+	}));
+}
+
 /**
  * The pixels of a frame, read once.
  *
  * @param {HTMLImageElement} frame
  * @returns {ImageData}
  */
-export function pixelsOf(frame) {
+function pixelsOf(frame) {
 	const present = pixels.get(frame);
 	if (present) return present;
 	const canvas = new OffscreenCanvas(frame.naturalWidth, frame.naturalHeight);

@@ -1,52 +1,56 @@
 // @ts-check
 /**
- * The group on screen: what the server last said, the edits on their way, the edit in hand.
+ * The group on screen: what the server last said, the writes on their way, the edit in hand.
  *
  * The document is replaced, never changed. What people see is the document with the edits laid
  * over it, so an answer that arrives in the middle of a drag disturbs nothing.
  */
 
-import { computed, signal } from '@preact/signals';
+import { batch, computed, signal } from '@preact/signals';
 
 import * as client from '../api/client.js';
 import { ApiError } from '../api/problem.js';
 import { previewBall } from '../geometry/preview.js';
 import { latest } from '../lib/latest.js';
 import { known, load, remember } from './documents.js';
-import { applyEdit, describe, previewBody, requestOf, sameTarget, stationOf } from './edits.js';
+import { applyEdit, describe, previewBody, requestOf, sameTarget, stationOf, viewOf } from './edits.js';
+import { lastAction } from './last_action.js';
 import { announce, complain } from './notice.js';
+import { discard, enqueue, outbox, revise } from './outbox.js';
+import { hearFrom, isAway, wake } from './sending.js';
 import { resetForGroup } from './workspace.js';
 
 /** @import {GroupDocument, SolutionJson} from '../api/types.js' */
 /** @import {Edit} from './edits.js' */
-
-/** @typedef {{state: 'saved' | 'saving' | 'failed', at: number | null}} Save */
-/** @typedef {{edit: Edit, theirs: GroupDocument, sentence: string}} Conflict */
+/** @import {Base, Item, Verdict} from './outbox.js' */
 
 const PREVIEW_INTERVAL = 100;
 
 /** The group as the server last gave it. */
 export const document = signal(/** @type {GroupDocument | null} */ (null));
-/** Edits that were sent and not answered yet. */
-export const pending = signal(/** @type {Edit[]} */ ([]));
 /** The edit in hand while something is dragged. */
 export const draft = signal(/** @type {Edit | null} */ (null));
 /** What the server expects of the edits not yet saved. */
 const expected = signal(/** @type {SolutionJson | null} */ (null));
-export const save = signal(/** @type {Save} */ ({ state: 'saved', at: null }));
-export const conflict = signal(/** @type {Conflict | null} */ (null));
 
-/** Writes on their way, those of groups left behind included. */
-const writes = signal(0);
-/** What would be lost if the page were closed now. */
-export const unsaved = computed(() => writes.value + (draft.value ? 1 : 0));
+/** What the person said about this group and the server has not answered yet. */
+const own = computed(() => outbox.value.filter(({ group: id, held }) => id === document.value?.id && !held));
+/** Edits of this group that the server has not answered yet. */
+export const pending = computed(() => own.value.flatMap(({ edit }) => (edit ? [edit] : [])));
+
+/** Everything that the server does not have yet. */
+export const unsaved = computed(() => outbox.value.length + (draft.value ? 1 : 0));
 
 const edits = computed(() => (draft.value ? [...pending.value, draft.value] : pending.value));
 
-/** The group as people see it, edits included. */
-export const group = computed(() => (
-	document.value && edits.value.reduce(applyEdit, document.value)
-));
+/** The group as people see it, edits and verdict included. */
+export const group = computed(() => {
+	const base = document.value;
+	if (!base) return null;
+	const said = own.value.findLast(({ verdict }) => verdict)?.verdict;
+	const edited = edits.value.reduce(applyEdit, base);
+	return said ? { ...edited, verdict: { ...base.verdict, ...said, stale: false } } : edited;
+});
 
 /** The solution that fits `group`: the server's, with the ball computed here while it moves. */
 export const solution = computed(() => {
@@ -60,7 +64,7 @@ export const isPreview = computed(() => edits.value.length > 0);
 
 const asking = latest(PREVIEW_INTERVAL, async (/** @type {Edit} */ edit, abort) => {
 	const id = document.value?.id;
-	if (id === undefined) return;
+	if (id === undefined || isAway.value) return;
 	try {
 		const answer = await client.preview(id, previewBody(edit), abort);
 		if (id === document.value?.id && edits.value.length > 0) expected.value = answer.solution;
@@ -78,10 +82,13 @@ const asking = latest(PREVIEW_INTERVAL, async (/** @type {Edit} */ edit, abort) 
 export async function open(id) {
 	if (document.value?.id !== id) turnTo(id);
 	wanted = id;
-	const loaded = await load(id);
-	if (wanted !== id) return;
-	const untouched = edits.value.length === 0 && document.value?.etag !== loaded.etag;
-	if (document.value === null || untouched) show(loaded);
+	try {
+		const loaded = await load(id);
+		if (wanted === id) renew(loaded);
+	} catch (error) {
+		// What is known can be worked on while the server is away.
+		if (!(error instanceof ApiError) || error.status !== 0 || document.value?.id !== id) throw error;
+	}
 }
 
 /** The group that the person asked for last; answers about others come too late. */
@@ -97,12 +104,19 @@ function turnTo(id) {
 /** @param {GroupDocument | null} next */
 function show(next) {
 	asking.cancel();
-	document.value = next;
-	pending.value = [];
-	draft.value = null;
-	expected.value = null;
-	conflict.value = null;
-	if (save.value.state === 'failed') save.value = { state: 'saved', at: null };
+	batch(() => {
+		document.value = next;
+		draft.value = null;
+		expected.value = null;
+	});
+}
+
+/** Show a newer state of the group on screen, unless the person is in the middle of something. @param {GroupDocument} newer */
+export function renew(newer) {
+	const present = document.value;
+	if (present && present.id !== newer.id) return;
+	const untouched = own.value.length === 0 && draft.value === null && present?.etag !== newer.etag;
+	if (present === null || untouched) show(newer);
 }
 
 /** Lay an edit over the group without saving it. @param {Edit} edit */
@@ -124,23 +138,51 @@ export function settle() {
 	if (draft.value) submit(draft.value);
 }
 
-/** Save an edit. @param {Edit} edit @returns {Promise<void>} */
+/** Save an edit. @param {Edit} edit */
 export function submit(edit) {
 	const at = document.value;
-	if (!at) return Promise.resolve();
-	draft.value = null;
-	pending.value = [...pending.value, edit];
-	return queued(at.id, (present) => sendEdit(present, edit), edit);
+	if (!at) return;
+	const shown = pending.value.reduce(applyEdit, at);
+	batch(() => {
+		draft.value = null;
+		lastAction.value = { kind: 'edit', group: at.id };
+		enqueue({
+			...requestOf(at, edit), group: at.id, method: 'PATCH', station: stationOf(at, edit), edit,
+			verdict: null, base: baseOf(shown, edit.view),
+		});
+	});
+	wake();
 }
 
-/** @param {GroupDocument} present @param {Edit} edit */
-async function sendEdit(present, edit) {
-	const { etag, ...rest } = requestOf(present, edit);
-	const answer = await client.patch(rest, etag);
-	const station = stationOf(present, edit);
-	lastStation.value = station === null ? null : { group: present.id, station };
-	announce(`${describe(present, edit)}, saved.`);
-	return answer;
+/** Save a verdict. @param {Verdict} verdict */
+export function submitVerdict(verdict) {
+	const at = document.value;
+	if (!at) return;
+	enqueue({
+		path: `/groups/${at.id}/verdict`, body: verdict, etag: at.etag, group: at.id, method: 'PUT',
+		station: null, edit: null, verdict, base: baseOf(at, at.views[0]?.key),
+	});
+	wake();
+}
+
+/** Take the last edit back, or make it again. @param {'undo' | 'redo'} verb */
+export function submitTurn(verb) {
+	const at = document.value;
+	if (!at) return;
+	const last = lastStation.value?.group === at.id ? lastStation.value.station : null;
+	const station = at.views.find((view) => view.station.id === last)?.station;
+	enqueue({
+		path: station ? `/stations/${station.id}/${verb}?group=${at.id}` : `/groups/${at.id}/${verb}`,
+		body: undefined, etag: station?.etag ?? at.etag, group: at.id, method: 'POST',
+		station: station?.id ?? null, edit: null, verdict: null, base: null,
+	});
+	wake();
+}
+
+/** What an edit or verdict found. @param {GroupDocument} at @param {string} key @returns {Base} */
+function baseOf(at, key) {
+	const { lines, balls, included } = viewOf(at, key);
+	return { lines, balls, included, verdict: at.verdict };
 }
 
 /**
@@ -149,65 +191,48 @@ async function sendEdit(present, edit) {
  */
 export const lastStation = signal(/** @type {{group: number, station: number} | null} */ (null));
 
-/** @type {Promise<void>} */
-let chain = Promise.resolve();
-
-/**
- * One write after the other: each needs the ETag that the one before has made.
- *
- * @param {number} id
- * @param {(present: GroupDocument) => Promise<GroupDocument>} send
- * @param {Edit | null} [edit]
- * @returns {Promise<void>}
- */
-export function queued(id, send, edit = null) {
-	writes.value += 1;
-	chain = chain.then(() => write(id, send, edit)).finally(() => { writes.value -= 1; });
-	return chain;
+/** @param {Item} item @param {GroupDocument} answer */
+function delivered(item, answer) {
+	batch(() => {
+		discard(({ id }) => id === item.id);
+		// What follows builds on what this one has made.
+		revise((other) => (other.group === item.group && !other.held
+			? { ...other, etag: etagFor(other, answer) } : other));
+		takeOver(answer);
+		if (pending.value.length === 0 && !draft.value) expected.value = null;
+		if (item.edit) lastStation.value = item.station === null ? null : { group: item.group, station: item.station };
+	});
+	if (item.edit) announce(`${describe(answer, item.edit)}, saved.`);
+	else if (item.method === 'POST') announce(item.path.includes('/undo') ? 'Undone.' : 'Done again.');
 }
 
-/**
- * @param {number} id
- * @param {(present: GroupDocument) => Promise<GroupDocument>} send
- * @param {Edit | null} edit
- */
-async function write(id, send, edit) {
-	const present = known(id) ?? (await load(id).catch(() => null));
-	// An edit whose predecessor failed was taken back with it.
-	if (!present || (edit && document.value?.id === id && !pending.value.includes(edit))) return;
-	save.value = { state: 'saving', at: save.value.at };
-	try {
-		accept(await send(present), edit);
-	} catch (error) {
-		refuse(id, error, edit);
-	}
+/** @param {Item} item @param {GroupDocument} answer */
+function etagFor({ station, etag }, answer) {
+	if (station === null) return answer.etag;
+	return answer.views.find((view) => view.station.id === station)?.station.etag ?? etag;
 }
 
-/** @param {GroupDocument} answer @param {Edit | null} edit */
-function accept(answer, edit) {
-	remember(answer);
-	save.value = { state: 'saved', at: Date.now() };
-	if (document.value?.id !== answer.id) return;
-	document.value = answer;
-	pending.value = pending.value.filter((other) => other !== edit);
-	if (pending.value.length === 0 && !draft.value) expected.value = null;
-}
-
-/** @param {number} id @param {unknown} error @param {Edit | null} edit */
-function refuse(id, error, edit) {
-	if (!(error instanceof ApiError)) throw error;
-	save.value = { state: 'failed', at: save.value.at };
-	if (document.value?.id === id) {
-		pending.value = [];
+/** @param {Item} item @param {ApiError} error */
+function refused(item, error) {
+	const conflicting = error.isConflict && (item.edit !== null || item.verdict !== null);
+	batch(() => {
+		// What was said on top of it falls with it, or waits with it.
+		if (conflicting) revise((other) => (other.group === item.group ? { ...other, held: true } : other));
+		else discard((other) => other.group === item.group && !other.held);
 		expected.value = null;
-		if (error.isConflict && edit && isGroup(error.current)) {
-			remember(error.current);
-			conflict.value = { edit, theirs: error.current, sentence: error.message };
-			return;
-		}
-	}
-	if (isGroup(error.current)) takeOver(error.current);
-	complain(`Not saved: ${error.message}`);
+		if (isGroup(error.current)) takeOver(error.current);
+	});
+	if (error.isConflict && !isGroup(error.current)) load(item.group).then(renew, () => {});
+	if (!conflicting) complain(`Not saved: ${error.message}`);
+	listener(item, error);
+}
+
+/** @type {(item: Item, error: ApiError) => void} */
+let listener = () => {};
+
+/** Hear of refused writes, to bring their group back. @param {typeof listener} one */
+export function onRefused(one) {
+	listener = one;
 }
 
 /** @param {any} body @returns {body is GroupDocument} */
@@ -215,8 +240,10 @@ function isGroup(body) {
 	return Array.isArray(body?.views);
 }
 
-/** Go on from what somebody else made of the group. @param {GroupDocument} theirs */
-export function takeOver(theirs) {
-	remember(theirs);
-	if (document.value?.id === theirs.id) document.value = theirs;
+/** Go on from a newer state of a group. @param {GroupDocument} newer */
+export function takeOver(newer) {
+	remember(newer);
+	if (document.value?.id === newer.id) document.value = newer;
 }
+
+hearFrom({ delivered, refused });

@@ -3,38 +3,54 @@
 
 import { computed } from '@preact/signals';
 
-import * as client from '../api/client.js';
-import { document, lastStation, pending, queued } from './group.js';
-import { announce } from './notice.js';
+import { document, lastStation, pending, submitTurn } from './group.js';
+import { lastAction } from './last_action.js';
+import { announce, complain } from './notice.js';
+import { discard, outbox } from './outbox.js';
+import { isAway, wake } from './sending.js';
+import { takeVerdictBack } from './verdicts.js';
 
 const ownStation = computed(() => (
 	lastStation.value?.group === document.value?.id ? (lastStation.value?.station ?? null) : null
 ));
-export const canUndo = computed(() => Boolean(document.value?.can_undo) || ownStation.value !== null);
+/** What undo would take back, in words; null when there is nothing. */
+export const undoable = computed(() => {
+	const last = lastAction.value;
+	if (last?.kind === 'verdict') return `Take back the verdict on group ${last.number}`;
+	const edited = document.value?.can_undo || ownStation.value !== null || pending.value.length > 0;
+	return edited ? 'Undo the last edit of this group' : null;
+});
 export const canRedo = computed(() => Boolean(document.value?.can_redo) || ownStation.value !== null);
 
-/** Take back the last edit of this group, whoever made it. */
+/** Take back the verdict just given, else the last edit of this group, whoever made it. */
 export function undo() {
-	if (canUndo.value || pending.value.length > 0) turnBack('undo', 'Undone.');
-	else announce('Nothing to undo.');
+	if (lastAction.value?.kind === 'verdict') takeVerdictBack();
+	else if (undoable.value === null) announce('Nothing to undo.');
+	else if (isAway.value) undoUnsent();
+	else submitTurn('undo');
 }
 
 /** Make the undone edit again. */
 export function redo() {
-	if (canRedo.value) turnBack('redo', 'Done again.');
-	else announce('Nothing to redo.');
+	if (!canRedo.value) announce('Nothing to redo.');
+	else if (isAway.value) complain('Redo needs the server, which cannot be reached.');
+	else submitTurn('redo');
 }
 
-/** @param {'undo' | 'redo'} verb @param {string} said */
-function turnBack(verb, said) {
-	const at = document.value;
-	if (!at) return;
-	queued(at.id, async (present) => {
-		const station = present.views.find((view) => view.station.id === ownStation.value)?.station;
-		const answer = station
-			? await client.turnBackStation(verb, station.id, present.id, station.etag ?? '')
-			: await client.turnBack(verb, present.id, present.etag);
-		announce(said);
-		return answer;
-	});
+/** While the server is away only what it never saw can be taken back. */
+function undoUnsent() {
+	const own = outbox.value.filter(({ group, edit }) => group === document.value?.id && edit);
+	const last = own.at(-1);
+	if (!last) {
+		complain('Undo needs the server, which cannot be reached.');
+		return;
+	}
+	// The first of all may have reached the server, only its answer did not reach us.
+	if (last === outbox.value[0]) {
+		submitTurn('undo');
+		return;
+	}
+	discard(({ id }) => id === last.id);
+	announce('Undone.');
+	wake();
 }

@@ -18,9 +18,20 @@ export function loadImage(url) {
 	images.delete(url);
 	images.set(url, loading);
 	const oldest = images.keys().next().value;
-	if (images.size > KEPT && oldest !== undefined) images.delete(oldest);
+	if (images.size > KEPT && oldest !== undefined) {
+		images.delete(oldest);
+		ready.delete(oldest);
+	}
 	if (!kept) loading.catch(() => images.delete(url));
 	return loading;
+}
+
+/** Those that are decoded. @type {Map<string, HTMLImageElement>} */
+const ready = new Map();
+
+/** The image at an address, if it can be drawn now. @param {string | null} url @returns {HTMLImageElement | null} */
+export function decoded(url) {
+	return (url && ready.get(url)) || null;
 }
 
 /** @param {string} url */
@@ -28,5 +39,6 @@ async function decode(url) {
 	const image = new Image();
 	image.src = url;
 	await image.decode();
+	if (images.has(url)) ready.set(url, image);
 	return image;
 }

@@ -4,11 +4,12 @@
 import { computed, signal } from '@preact/signals';
 
 import { getGroups, getNeighbours } from '../api/client.js';
+import { ApiError } from '../api/problem.js';
 import { address, navigate, page, param } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 import { prefetch } from './documents.js';
 import { settle } from './group.js';
-import { announce, dismiss } from './notice.js';
+import { announce, complain, dismiss } from './notice.js';
 
 /** @import {Neighbours} from '../api/types.js' */
 
@@ -83,13 +84,80 @@ async function go(step, otherwise) {
 		id = beside(from, step);
 	}
 	if (id === undefined) {
-		announce(otherwise);
-		return false;
+		const unknown = neighbours.value?.id !== from;
+		announce(unknown ? 'The queue cannot be read while the server is away.' : otherwise);
+		return unknown;
 	}
+	leaveFor(id);
+	return true;
+}
+
+/** @param {number} id */
+function leaveFor(id) {
 	settle();
 	dismiss();
 	navigate(reviewAddress(id));
-	return true;
+}
+
+/** Groups that a person should look at: those with a finding. */
+const FLAGGED = '-finding:none';
+
+/**
+ * Go several groups on or back, as far as there are any.
+ *
+ * @param {1 | -1} step @param {number} count more than one
+ */
+export function goBy(step, count) {
+	return far(step < 0 ? 'This is the first group of the queue.' : 'This is the last group of the queue.', (from) => (
+		distant(from, step, count)
+	));
+}
+
+/** Go to the next or previous group of this queue that has a finding. @param {1 | -1} step */
+export function goFlagged(step) {
+	const words = step > 0 ? 'after' : 'before';
+	return far(`No flagged group comes ${words} this one.`, async (from) => {
+		const found = await getNeighbours(from, `${query.value} ${FLAGGED}`.trim());
+		return (step > 0 ? found.next : found.previous)[0];
+	});
+}
+
+/**
+ * Go where the server says; meanwhile the person may have gone elsewhere, which then counts.
+ *
+ * @param {string} otherwise @param {(from: number) => Promise<number | undefined>} find
+ */
+async function far(otherwise, find) {
+	const from = currentId();
+	if (from === null) return;
+	try {
+		const id = await find(from);
+		if (currentId() !== from) return;
+		if (id === undefined) announce(otherwise);
+		else leaveFor(id);
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		complain(`The queue cannot be read: ${error.message}`);
+	}
+}
+
+/**
+ * The group so many places away, or the last one before the end of the queue.
+ *
+ * @param {number} from @param {1 | -1} step @param {number} count
+ * @returns {Promise<number | undefined>}
+ */
+async function distant(from, step, count) {
+	let at = from;
+	let left = count;
+	while (left > 0) {
+		const found = await getNeighbours(at, query.value);
+		const beyond = (step > 0 ? found.next : found.previous).slice(0, left);
+		if (beyond.length === 0) break;
+		at = beyond[beyond.length - 1];
+		left -= beyond.length;
+	}
+	return at === from ? undefined : at;
 }
 
 /** The group beside another one, as far as the queue is known. @param {number | null} from @param {1 | -1} step */

@@ -3,15 +3,13 @@
 
 import { signal } from '@preact/signals';
 
-import * as client from '../api/client.js';
 import { navigate } from '../lib/router.js';
-import { known, remember } from './documents.js';
-import { document, queued, settle } from './group.js';
+import { conflict } from './conflict.js';
+import { document, group, onRefused, open, settle, submitVerdict } from './group.js';
+import { lastAction } from './last_action.js';
 import { currentId, goNext, query, queueAddress, reviewAddress } from './navigation.js';
 import { announce, inform } from './notice.js';
 import { asking } from './workspace.js';
-
-/** @import {GroupDocument, VerdictJson} from '../api/types.js' */
 
 /** Reasons to reject, in the order of their digits. */
 export const REASONS = [
@@ -23,6 +21,9 @@ export const REASONS = [
 	{ name: 'duplicate_view', label: 'Duplicate view' },
 	{ name: 'other', label: 'Other…' },
 ];
+
+/** The server takes no longer note. */
+const MAX_NOTE = 2000;
 
 /** The reason last used, for `X X`. */
 export const lastReason = signal(/** @type {string | null} */ (null));
@@ -73,14 +74,21 @@ export function cancelAsking() {
 function decide(state, reason, note) {
 	const group = document.value;
 	if (!group) return;
+	if (conflict.value) {
+		announce('First choose whose edit counts.');
+		return;
+	}
 	asking.value = null;
 	if (reason) lastReason.value = reason;
 	settle();
-	const before = group.verdict;
-	overlay(group, { ...before, state, reason, note, stale: false, at: new Date().toISOString() });
+	const { state: was, reason: because, note: said } = group.verdict;
+	lastAction.value = {
+		kind: 'verdict', group: group.id, number: group.number,
+		before: { state: was, reason: because, note: said },
+	};
+	submitVerdict({ state, reason, note });
 	announce(`Group ${group.number} ${state}.`);
 	leave(group.dataset.name);
-	queued(group.id, (present) => put(present, { state, reason, note }, before));
 }
 
 /** On to the next group, or back to the queue when that was the last one. @param {string} dataset */
@@ -91,25 +99,31 @@ async function leave(dataset) {
 	});
 }
 
-/**
- * @param {GroupDocument} present
- * @param {{state: string, reason: string | null, note: string | null}} verdict
- * @param {VerdictJson} before
- */
-async function put(present, verdict, before) {
-	try {
-		return await client.putVerdict(present.id, verdict, present.etag);
-	} catch (error) {
-		// Bring the group back to the screen as it was; the caller says why.
-		overlay(known(present.id) ?? present, before);
-		if (currentId() !== present.id) navigate(reviewAddress(present.id));
-		throw error;
-	}
+/** Keep a note with the verdict that the group has; the group stays on screen. @param {string} text */
+export function addNote(text) {
+	const present = group.value?.verdict;
+	if (!present) return;
+	asking.value = null;
+	const note = [present.note, text].filter(Boolean).join('\n').slice(0, MAX_NOTE);
+	submitVerdict({ state: present.state, reason: present.reason, note });
+	announce('Note saved.');
 }
 
-/** @param {GroupDocument} group @param {VerdictJson} verdict */
-function overlay(group, verdict) {
-	const next = { ...group, verdict };
-	remember(next);
-	if (document.value?.id === next.id) document.value = next;
+/** Take the last verdict of this window back, and return to its group. */
+export async function takeVerdictBack() {
+	const last = lastAction.value;
+	if (last?.kind !== 'verdict') return;
+	lastAction.value = null;
+	navigate(reviewAddress(last.group));
+	if (document.value?.id !== last.group) await open(last.group);
+	if (document.value?.id !== last.group) return;
+	submitVerdict(last.before);
+	announce(`The verdict on group ${last.number} was taken back.`);
 }
+
+// A verdict that was refused brings its group back to the screen; the notice says why.
+onRefused(({ verdict, group: id }) => {
+	if (!verdict) return;
+	lastAction.value = null;
+	if (currentId() !== id) navigate(reviewAddress(id));
+});

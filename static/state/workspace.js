@@ -18,18 +18,43 @@ export const maximised = signal(/** @type {string | null} */ (null));
 /** The object that keys move. */
 export const selected = signal(/** @type {Selection | null} */ (null));
 /** What the person is asked before a verdict can be given; null when nothing. */
-export const asking = signal(/** @type {null | 'reason' | 'note' | 'override'} */ (null));
+export const asking = signal(/** @type {null | 'reason' | 'note' | 'override' | 'pin'} */ (null));
 /** Whether Tab walks through the objects of the focused view. */
 export const editing = signal(false);
+
+/** @typedef {{letter: string, view: string, at: {x: number, y: number}}} PointerPlace   image pixels */
+/** What the pointer is over; null when that is no view. */
+export const pointerPlace = signal(/** @type {PointerPlace | null} */ (null));
+/** Where a note belongs while it is asked for. */
+export const pinPlace = signal(/** @type {PointerPlace | null} */ (null));
+/** Whether the magnifying glass is held. */
+export const loupe = signal(false);
+/** What a click draws; null when nothing. `ask`: the person chooses what. */
+export const drawing = signal(
+	/** @type {{view: string, what: 'ask' | 'ball' | 'line', marking: string} | null} */ (null),
+);
 
 export const overlaysHidden = signal(false);
 export const projections = stored('projections', true);
 export const boxes = stored('boxes', true);
 export const gain = stored('whisker-gain', 5);
+/** Which 3D ball is drawn and measured: the paper's mean of pairs, or the most likely point. */
+export const estimator = stored('estimator', /** @type {'mean' | 'best'} */ ('mean'));
+/** Whether the gates show what they ask of the group, and by how much. */
+export const gatesOpen = stored('gates-open', false);
+/** Whether every view is as large as the main camera's. */
+export const equalViews = stored('equal-views', false);
 export const stripCollapsed = stored('strip-collapsed', false);
 
-/** Whether the page of keys is shown. */
-export const helpOpen = signal(false);
+/** Which opening of the page of keys is shown; 0: none. */
+export const helpOpen = signal(0);
+let openings = 0;
+
+/** Show the page of keys, though one that was just left may still be closing. */
+export function openHelp() {
+	openings += 1;
+	helpOpen.value = openings;
+}
 
 /** The next whisker gain. */
 export function cycleGain() {
@@ -53,4 +78,6 @@ export function resetForGroup() {
 	selected.value = null;
 	editing.value = false;
 	asking.value = null;
+	drawing.value = null;
+	pinPlace.value = null;
 }

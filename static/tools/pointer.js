@@ -6,7 +6,7 @@ import { dragOf } from './drags.js';
 import { hitTest } from './hit.js';
 
 /** @import {ViewJson} from '../api/types.js' */
-/** @import {ScreenPoint, Viewport} from '../geometry/viewport.js' */
+/** @import {ImagePoint, ScreenPoint, Viewport} from '../geometry/viewport.js' */
 /** @import {Selection} from '../state/workspace.js' */
 /** @import {Drag} from './drags.js' */
 /** @import {Hit} from './hit.js' */
@@ -17,6 +17,10 @@ import { hitTest } from './hit.js';
  * @property {() => Viewport} viewport
  * @property {() => Selection | null} selected
  * @property {() => boolean} enabled whether things can be taken hold of
+ * @property {() => boolean} draws whether a click draws
+ * @property {(at: ImagePoint) => void} draw
+ * @property {(at: ScreenPoint) => void} insert put a point on the line there
+ * @property {(at: ImagePoint | null) => void} over where the pointer is; null: elsewhere
  * @property {(hit: Hit | null) => void} select
  * @property {(dx: number, dy: number) => void} pan
  * @property {(at: ScreenPoint, factor: number) => void} zoom
@@ -31,7 +35,7 @@ const CLICK = 3;
  * @returns {() => void}
  */
 export function attachPointer(element, panel) {
-	/** @type {{id: number, start: ScreenPoint, last: ScreenPoint, drag: Drag | null, moved: boolean} | null} */
+	/** @type {{id: number, start: ScreenPoint, last: ScreenPoint, drag: Drag | null, moved: boolean, draws: boolean} | null} */
 	let gesture = null;
 
 	/** @param {MouseEvent} event @returns {ScreenPoint} */
@@ -50,10 +54,15 @@ export function attachPointer(element, panel) {
 	function down(event) {
 		if (gesture || event.button > 1) return;
 		const start = at(event);
+		if (event.button === 0 && event.altKey && panel.enabled()) {
+			panel.insert(start);
+			return;
+		}
 		const hit = event.button === 0 ? hitAt(start) : null;
-		panel.select(hit);
+		const draws = event.button === 0 && !hit && panel.draws();
+		if (!draws) panel.select(hit);
 		const drag = hit && dragOf(panel.view(), hit, toImage(panel.viewport(), start));
-		gesture = { id: event.pointerId, start, last: start, drag, moved: false };
+		gesture = { id: event.pointerId, start, last: start, drag, moved: false, draws };
 		element.setPointerCapture(event.pointerId);
 		element.dataset.cursor = drag ? 'moving' : 'panning';
 	}
@@ -61,8 +70,9 @@ export function attachPointer(element, panel) {
 	/** @param {PointerEvent} event */
 	function move(event) {
 		const place = at(event);
+		panel.over(toImage(panel.viewport(), place));
 		if (!gesture) {
-			element.dataset.cursor = hitAt(place) ? 'movable' : 'idle';
+			element.dataset.cursor = hitAt(place) ? 'movable' : panel.draws() ? 'drawing' : 'idle';
 			return;
 		}
 		if (event.pointerId !== gesture.id) return;
@@ -76,10 +86,15 @@ export function attachPointer(element, panel) {
 	/** @param {PointerEvent} event */
 	function up(event) {
 		if (event.pointerId !== gesture?.id) return;
-		const { drag, moved } = gesture;
+		const { drag, moved, draws } = gesture;
 		gesture = null;
 		element.dataset.cursor = 'idle';
 		if (drag && moved) drag.end();
+		if (draws && !moved) panel.draw(toImage(panel.viewport(), at(event)));
+	}
+
+	function left() {
+		panel.over(null);
 	}
 
 	/** @param {PointerEvent} event */
@@ -109,6 +124,7 @@ export function attachPointer(element, panel) {
 	element.addEventListener('pointermove', move);
 	element.addEventListener('pointerup', up);
 	element.addEventListener('pointercancel', lost);
+	element.addEventListener('pointerleave', left);
 	element.addEventListener('wheel', wheel, { passive: false });
 	addEventListener('keydown', key, true);
 	return () => {
@@ -116,6 +132,7 @@ export function attachPointer(element, panel) {
 		element.removeEventListener('pointermove', move);
 		element.removeEventListener('pointerup', up);
 		element.removeEventListener('pointercancel', lost);
+		element.removeEventListener('pointerleave', left);
 		element.removeEventListener('wheel', wheel);
 		removeEventListener('keydown', key, true);
 	};

@@ -2,19 +2,28 @@
 /** Which page is shown. */
 
 import { html } from 'htm/preact';
+import { useEffect } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
+import { lazy } from '../lib/lazy.js';
 import { page } from '../lib/router.js';
-import { helpOpen } from '../state/workspace.js';
+import { openPalette, paletteOpen } from '../state/palette.js';
+import { openHelp } from '../state/workspace.js';
 import { Announcer } from './bars.js';
 import { Help } from './help.js';
-import { QueuePage } from './queue_page.js';
+import { LazyPage, loadPage } from './lazy_page.js';
 import { ReviewPage } from './review_page.js';
+
+/** Milliseconds. */
+const FETCH_AHEAD_AFTER = 1500;
 
 /** @type {import('../lib/keys.js').Binding[]} */
 const GLOBAL_KEYS = [
-	{ keys: ['?', 'Shift+?'], label: 'This page', group: 'Everywhere', shown: '?', run: () => { helpOpen.value = true; } },
+	{ keys: ['?', 'Shift+?'], label: 'This page', group: 'Everywhere', shown: '?', run: openHelp },
+	{ keys: ['Ctrl+k'], label: 'Go to a page, dataset, group or action', group: 'Everywhere', typing: true, run: openPalette },
 ];
+
+const Palette = lazy(async () => (await import('./palette.js')).Palette);
 
 function UnknownPage() {
 	return html`
@@ -27,12 +36,23 @@ function UnknownPage() {
 
 function Page() {
 	const { page: name } = page.value;
-	if (name === 'queue') return html`<${QueuePage} />`;
 	if (name === 'review') return html`<${ReviewPage} />`;
-	return html`<${UnknownPage} />`;
+	if (name === 'unknown') return html`<${UnknownPage} />`;
+	return html`<${LazyPage} name=${name} />`;
+}
+
+/** What is one key away is fetched once the first screen stands. */
+function fetchAhead() {
+	Promise.all([import('./palette.js'), loadPage('queue')]).catch(() => {
+		// It is asked for again, and complained about, when somebody goes there.
+	});
 }
 
 export function App() {
 	useKeys(GLOBAL_KEYS);
-	return html`<${Page} /><${Help} /><${Announcer} />`;
+	useEffect(() => {
+		const timer = setTimeout(fetchAhead, FETCH_AHEAD_AFTER);
+		return () => clearTimeout(timer);
+	}, []);
+	return html`<${Page} /><${Help} />${paletteOpen.value ? html`<${Palette} key=${paletteOpen.value} />` : null}<${Announcer} />`;
 }

@@ -1,10 +1,8 @@
 // @ts-check
-/** Bars below the header: what went wrong, and whose edit counts. They block nothing. */
+/** Bars below the header: what went wrong. They block nothing. */
 
 import { html } from 'htm/preact';
 
-import { keepMine, takeTheirs } from '../state/conflict.js';
-import { conflict } from '../state/group.js';
 import { announced, dismiss, notice } from '../state/notice.js';
 
 export function NoticeBar() {
@@ -16,18 +14,6 @@ export function NoticeBar() {
 			<p>${text}</p>
 			${action ? html`<button class="button" type="button" onClick=${() => { dismiss(); action.run(); }}>${action.label}</button>` : null}
 			<button class="button" type="button" onClick=${dismiss}>Dismiss <kbd>Esc</kbd></button>
-		</div>
-	`;
-}
-
-export function ConflictBar() {
-	const present = conflict.value;
-	if (!present) return null;
-	return html`
-		<div class="bar" data-tone="warn" role="alert">
-			<p><strong>Somebody else changed this group first.</strong> ${present.sentence} Theirs is shown; yours is kept until you choose.</p>
-			<button class="button" type="button" onClick=${keepMine}>Keep mine</button>
-			<button class="button" type="button" onClick=${takeTheirs}>Take theirs</button>
 		</div>
 	`;
 }

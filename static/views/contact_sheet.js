@@ -11,6 +11,7 @@ import { colours } from '../lib/colours.js';
 import { fixed, pixels } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
 import { drawBall } from '../overlays/ball.js';
+import { filterOf } from '../state/adjustments.js';
 import { useFrames } from '../state/frames.js';
 import { focusView } from '../state/workspace.js';
 import { Letter } from './letter.js';
@@ -70,6 +71,7 @@ function Crop({ picture, policy, side, frame }) {
 	const { view, ball } = picture;
 	const part = windowOf(picture, policy);
 	const theme = colours.value;
+	const filter = filterOf(view.letter);
 	const draw = useCallback((/** @type {CanvasRenderingContext2D} */ context) => {
 		context.fillStyle = theme.stage;
 		context.fillRect(0, 0, side, side);
@@ -82,12 +84,14 @@ function Crop({ picture, policy, side, frame }) {
 		};
 		if (frame) {
 			context.imageSmoothingEnabled = false;
+			context.filter = filter;
 			context.drawImage(frame, viewport.left, viewport.top, view.width * scale, view.height * scale);
+			context.filter = 'none';
 		}
 		drawBall(context, {
 			picture, viewport, selected: null, hidden: false, projections: false, boxes: true, gain: 1, rays: false,
 		});
-	}, [picture, side, frame, theme]);
+	}, [picture, side, frame, theme, filter]);
 	return html`
 		<li class="crop" style=${{ width: `${side}px` }}>
 			<button class="crop__button" type="button" title=${`Focus view ${view.letter}`} onClick=${() => focusView(view.letter)}>

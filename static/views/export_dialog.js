@@ -7,8 +7,11 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import { count, words } from '../lib/format.js';
 import { dataset, loadDatasets } from '../state/datasets.js';
 import { download, FORMATS, makeExport } from '../state/exports.js';
+import { JobProgress } from './job_progress.js';
 
+/** @import {JobJson} from '../api/jobs.js' */
 /** @import {DatasetJson, ExportJson} from '../api/types.js' */
+/** @import {VersionJson} from '../api/versions.js' */
 
 /** @param {{legend: string, name: string, options: {name: string, label: string, note: string}[]}} props */
 function Choice({ legend, name, options }) {
@@ -49,49 +52,60 @@ function Result({ made }) {
 	`;
 }
 
-/** @param {{one: DatasetJson, onClose: () => void}} props */
-function ExportForm({ one, onClose }) {
+/** @param {{one: DatasetJson, version?: VersionJson | null, onClose: () => void}} props `version`: its groups, as they were frozen */
+export function ExportDialog({ one, version = null, onClose }) {
 	const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
+	const closed = useRef(new AbortController());
 	const [state, setState] = useState(
-		/** @type {{busy: boolean, made: ExportJson | null, error: string | null}} */
-		({ busy: false, made: null, error: null }),
+		/** @type {{busy: boolean, job: JobJson | null, made: ExportJson | null, error: string | null}} */
+		({ busy: false, job: null, made: null, error: null }),
 	);
 	useEffect(() => {
 		dialog.current?.showModal();
 		loadDatasets();
+		return () => closed.current.abort();
 	}, []);
 	/** @param {SubmitEvent} event */
 	async function send(event) {
 		event.preventDefault();
+		if (state.busy) return;
 		const form = new FormData(/** @type {HTMLFormElement} */ (event.currentTarget));
-		setState({ busy: true, made: null, error: null });
+		setState({ busy: true, job: null, made: null, error: null });
 		try {
 			const made = await makeExport({
 				dataset: one.name,
 				format: String(form.get('format')),
 				all: form.get('groups') === 'all',
 				boxes: String(form.get('boxes')),
-			});
-			setState({ busy: false, made, error: null });
+				images: form.get('images') ? 'copy' : 'none',
+				version: version?.id ?? null,
+			}, (job) => setState((before) => ({ ...before, job })), closed.current.signal);
+			// Whoever closed the dialog finds the export among the jobs.
+			if (closed.current.signal.aborted) return;
+			setState({ busy: false, job: null, made, error: null });
 			if (made.content) download(made.content);
 		} catch (error) {
-			setState({ busy: false, made: null, error: error instanceof Error ? error.message : String(error) });
+			if (closed.current.signal.aborted) return;
+			setState({ busy: false, job: null, made: null, error: error instanceof Error ? error.message : String(error) });
 		}
 	}
 	return html`
 		<dialog class="dialog" ref=${dialog} aria-labelledby="export-title" onClose=${onClose}>
 			<form onSubmit=${send}>
 				<header class="dialog__header">
-					<h2 id="export-title">Export ${one.name}</h2>
+					<h2 id="export-title">Export ${one.name}${version ? `, version ${version.name}` : ''}</h2>
 					<button class="button" type="button" onClick=${() => dialog.current?.close()}>Close <kbd>Esc</kbd></button>
 				</header>
 				<div class="export">
 					<${Choice} legend="Format" name="format" options=${FORMATS} />
 					<div class="export__column">
-						<${Choice} legend="Groups" name="groups" options=${groupChoices(one)} />
+						${version ? html`<p class="note">${count(version.counts.groups)} groups as they were frozen: always the same bytes.</p>`
+							: html`<${Choice} legend="Groups" name="groups" options=${groupChoices(one)} />`}
 						<${Choice} legend="Ball boxes" name="boxes" options=${BOXES} />
+						<label class="form__check"><input type="checkbox" name="images" />Copy the frames into the zip</label>
 					</div>
 				</div>
+				${state.job ? html`<${JobProgress} job=${state.job} />` : null}
 				${state.error ? html`<p class="export__error" role="alert">${state.error}</p>` : null}
 				${state.made ? html`<${Result} made=${state.made} />` : null}
 				<p class="dialog__buttons">
@@ -108,6 +122,6 @@ export function ExportButton() {
 	if (!one) return null;
 	return html`
 		<button class="button" type="button" onClick=${() => setOpen(true)}>Export…</button>
-		${open ? html`<${ExportForm} one=${one} onClose=${() => setOpen(false)} />` : null}
+		${open ? html`<${ExportDialog} one=${one} onClose=${() => setOpen(false)} />` : null}
 	`;
 }

@@ -1,26 +1,52 @@
 // @ts-check
-/** The bar on top: where one is, and what is saved. */
+/** The bar on top: where one is, the way to every other place, and what is saved. */
 
 import { html } from 'htm/preact';
 
 import { dataset } from '../state/datasets.js';
+import { document as shownGroup } from '../state/group.js';
 import { lastGroup, query, queueAddress, reviewAddress } from '../state/navigation.js';
-import { helpOpen } from '../state/workspace.js';
+import { openHelp } from '../state/workspace.js';
+import { DatasetMenu, pageAddress } from './dataset_menu.js';
 
 /** @import {ComponentChildren} from 'preact' */
 
-/** @param {{current: 'review' | 'queue', children?: ComponentChildren}} props */
-export function Header({ current, children }) {
+/** The pages of a dataset that stand in the header; the menu has them all. */
+const PAGES = [
+	{ name: 'yield', label: 'Yield' },
+	{ name: 'versions', label: 'Versions' },
+	{ name: 'evaluation', label: 'Evaluation' },
+];
+
+/** @param {{current: string, name: string}} props */
+function Navigation({ current, name }) {
 	const review = lastGroup.value ? reviewAddress(lastGroup.value) : '/review';
+	/** @param {string} page */
+	const mark = (page) => (current === page ? 'page' : undefined);
+	return html`
+		<nav class="header__nav" aria-label="Pages">
+			<a href=${review} aria-current=${mark('review')}>Review</a>
+			<a href=${queueAddress(name, query.value)} aria-current=${mark('queue')}>Queue</a>
+			${PAGES.map((page) => html`
+				<a
+					key=${page.name} class="header__optional" aria-current=${mark(page.name)}
+					href=${name ? pageAddress(name, page.name) : '/datasets'}
+				>${page.label}</a>`)}
+		</nav>
+	`;
+}
+
+/** @param {{current: string, children?: ComponentChildren}} props `current` names the page */
+export function Header({ current, children }) {
+	const group = current === 'review' || current === 'calibration' ? shownGroup.value : null;
+	const name = group?.dataset.name ?? dataset.value?.name ?? '';
 	return html`
 		<header class="header">
 			<a class="header__brand" href="/groups">Touchline</a>
-			<nav class="header__nav" aria-label="Pages">
-				<a href=${review} aria-current=${current === 'review' ? 'page' : undefined}>Review</a>
-				<a href=${queueAddress(dataset.value?.name ?? '', query.value)} aria-current=${current === 'queue' ? 'page' : undefined}>Queue</a>
-			</nav>
-			${children}
-			<button class="header__help" type="button" aria-label="Keys" title="Keys" onClick=${() => { helpOpen.value = true; }}><kbd>?</kbd></button>
+			<${DatasetMenu} current=${current} name=${name} />
+			<${Navigation} current=${current} name=${name} />
+			${children ?? html`<span class="header__middle"></span>`}
+			<button class="header__help" type="button" aria-label="Keys" title="Keys" onClick=${openHelp}><kbd>?</kbd></button>
 		</header>
 	`;
 }

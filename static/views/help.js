@@ -1,17 +1,21 @@
 // @ts-check
-/** The page of keys, written from the bindings themselves. */
+/** The page of keys, written from the bindings themselves; keys are chosen here too. */
 
 import { html } from 'htm/preact';
-import { useEffect, useRef } from 'preact/hooks';
+import { useLayoutEffect, useRef, useState } from 'preact/hooks';
 
-import { activeBindings } from '../lib/keys.js';
+import {
+	activeBindings, chooseKey, chordOf, chosenKeys, idOf, isEditable, keysOf, lettersOn,
+} from '../lib/keys.js';
 import { helpOpen } from '../state/workspace.js';
 
 /** @import {Binding} from '../lib/keys.js' */
 
 const SYMBOLS = /** @type {Record<string, string>} */ ({
-	Escape: 'Esc', Delete: 'Del', ArrowUp: '↑', ArrowDown: '↓', Backspace: '⌫',
+	Escape: 'Esc', Delete: 'Del', ArrowUp: '↑', ArrowDown: '↓', ArrowLeft: '←', ArrowRight: '→',
+	Backspace: '⌫', ' ': 'Space',
 });
+const MODIFIERS = new Set(['Shift', 'Control', 'Alt', 'Meta']);
 
 /** @param {string} chord */
 function written(chord) {
@@ -20,7 +24,7 @@ function written(chord) {
 
 /** @param {Binding} binding @returns {string[]} */
 function shownKeys(binding) {
-	return binding.shown ? [binding.shown] : binding.keys.map(written);
+	return binding.shown ? [binding.shown] : keysOf(binding).map(written);
 }
 
 /** @returns {Map<string, Binding[]>} */
@@ -34,30 +38,74 @@ function grouped() {
 	return groups;
 }
 
-function KeyPage() {
-	const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
-	useEffect(() => dialog.current?.showModal(), []);
+/** A binding whose key is being chosen. @param {{binding: Binding, onEnd: () => void}} props */
+function KeyField({ binding, onEnd }) {
+	const [taken, setTaken] = useState('');
+	const field = useRef(/** @type {HTMLButtonElement | null} */ (null));
+	useLayoutEffect(() => field.current?.focus(), []);
+	/** @param {KeyboardEvent} event */
+	function key(event) {
+		if (event.key === 'Tab' || MODIFIERS.has(event.key)) return;
+		event.preventDefault();
+		event.stopPropagation();
+		if (event.key === 'Escape') {
+			onEnd();
+			return;
+		}
+		const holder = chooseKey(binding, chordOf(event));
+		if (holder) setTaken(`${written(chordOf(event))} is “${holder.label}”`);
+		else onEnd();
+	}
 	return html`
-		<dialog class="dialog dialog--wide" ref=${dialog} aria-labelledby="help-title" onClose=${() => { helpOpen.value = false; }}>
+		<button class="key-field" type="button" ref=${field} onKeyDown=${key} onBlur=${onEnd} aria-label=${`Press the key for “${binding.label}”`}>
+			${taken || 'Press a key…'}
+		</button>
+	`;
+}
+
+/** @param {{binding: Binding, chosen: string | null, onChoose: (id: string | null) => void}} props */
+function KeyRow({ binding, chosen, onChoose }) {
+	const id = idOf(binding);
+	const own = id in chosenKeys.value;
+	return html`
+		<div>
+			<dt>${chosen === id ? html`<${KeyField} binding=${binding} onEnd=${() => onChoose(null)} />`
+				: shownKeys(binding).map((keys) => (isEditable(binding)
+					? html`<button class="key" type="button" title="Choose another key" aria-label=${`${keys}: choose another key for “${binding.label}”`} onClick=${() => onChoose(id)}><kbd>${keys}</kbd></button>`
+					: html`<kbd>${keys}</kbd> `))}</dt>
+			<dd>${binding.label}${own ? html` <button class="link-button" type="button" onClick=${() => chooseKey(binding, null)}>reset</button>` : null}</dd>
+		</div>
+	`;
+}
+
+/** @param {{opening: number}} props */
+function KeyPage({ opening }) {
+	const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
+	const [chosen, setChosen] = useState(/** @type {string | null} */ (null));
+	useLayoutEffect(() => dialog.current?.showModal(), []);
+	return html`
+		<dialog class="dialog dialog--wide" ref=${dialog} aria-labelledby="help-title" onClose=${() => { if (helpOpen.value === opening) helpOpen.value = 0; }}>
 			<header class="dialog__header">
 				<h2 id="help-title">Keys</h2>
-				<form method="dialog"><button class="button" type="submit">Close <kbd>Esc</kbd></button></form>
+				<label class="help__switch">
+					<input type="checkbox" checked=${lettersOn.value} onChange=${() => { lettersOn.value = !lettersOn.value; }} />
+					Single letters do something
+				</label>
+				<form method="dialog"><button class="button" type="submit" autofocus>Close <kbd>Esc</kbd></button></form>
 			</header>
 			<div class="help">
 				${[...grouped()].map(([name, bindings]) => html`
 					<section key=${name}>
 						<h3>${name}</h3>
-						<dl>
-							${bindings.map((binding) => html`
-								<div><dt>${shownKeys(binding).map((keys) => html`<kbd>${keys}</kbd> `)}</dt><dd>${binding.label}</dd></div>`)}
-						</dl>
+						<dl>${bindings.map((binding) => html`<${KeyRow} key=${idOf(binding)} binding=${binding} chosen=${chosen} onChoose=${setChosen} />`)}</dl>
 					</section>`)}
 			</div>
-			<p class="help__note">Wheel zooms about the pointer, dragging the picture pans, a double click shows one view alone. Drag a line point or the ball to move it; select the ball to resize its box by the corners.</p>
+			<p class="help__note">Click a key to choose another. The wheel zooms about the pointer, dragging the picture pans, a double click shows one view alone. Drag a line point or the ball to move it; select the ball to resize its box by the corners.</p>
 		</dialog>
 	`;
 }
 
 export function Help() {
-	return helpOpen.value ? html`<${KeyPage} />` : null;
+	const opening = helpOpen.value;
+	return opening ? html`<${KeyPage} key=${opening} opening=${opening} />` : null;
 }

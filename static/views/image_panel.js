@@ -2,23 +2,32 @@
 /** One view of the group: its frame with everything drawn on it. */
 
 import { html } from 'htm/preact';
-import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
 
 import { useSize } from '../lib/hooks.js';
 import { ImageStage } from '../overlays/stage.js';
+import { filterOf } from '../state/adjustments.js';
+import { conflict } from '../state/conflict.js';
+import { drawAt, insertAt } from '../state/drawing.js';
 import { draft } from '../state/group.js';
-import { loadImage } from '../state/images.js';
+import { decoded, loadImage } from '../state/images.js';
 import { panPanel, viewportOf, zoomPanel } from '../state/viewports.js';
 import {
-	boxes, editing, focused, focusView, gain, maximised, overlaysHidden, projections, selected,
-	toggleMaximised,
+	boxes, drawing, editing, focused, focusView, gain, overlaysHidden, pointerPlace, projections,
+	selected, toggleMaximised,
 } from '../state/workspace.js';
 import { attachPointer } from '../tools/pointer.js';
+import { ClassChooser } from './class_chooser.js';
+import { DrawingChip } from './drawing_chip.js';
 import { ObjectList } from './object_list.js';
 import { PanelCaption } from './panel_caption.js';
+import { PanelTools } from './panel_tools.js';
 
 /** @import {ViewPicture} from '../overlays/scene.js' */
 /** @import {Hit} from '../tools/hit.js' */
+
+/** @type {import('../state/conflict.js').Field[]} */
+const NO_GHOSTS = [];
 
 /** The frame of a view: undefined while it loads, null when there is none. @param {string | null} url */
 function useFrame(url) {
@@ -36,7 +45,8 @@ function useFrame(url) {
 		}
 		return () => { wanted = false; };
 	}, [url]);
-	return frame.url === url ? frame : { url, image: null, error: false };
+	// A frame that was loaded ahead is there in the same moment as its group.
+	return frame.url === url ? frame : { url, image: decoded(url), error: false };
 }
 
 /** @param {string} key @param {Hit | null} hit @returns {import('../state/workspace.js').Selection | null} */
@@ -46,8 +56,8 @@ function selectionOf(key, hit) {
 	return { kind: 'ball', view: key };
 }
 
-/** @param {{picture: ViewPicture}} props */
-export function ImagePanel({ picture }) {
+/** @param {{picture: ViewPicture, first: boolean}} props */
+export function ImagePanel({ picture, first }) {
 	const { view } = picture;
 	const { letter } = view;
 	const [ref, size] = useSize();
@@ -58,7 +68,7 @@ export function ImagePanel({ picture }) {
 	const latestProps = useRef(now);
 	latestProps.current = now;
 
-	useEffect(() => {
+	useLayoutEffect(() => {
 		const element = /** @type {HTMLDivElement} */ (ref.current);
 		const made = new ImageStage(element);
 		stage.current = made;
@@ -67,6 +77,17 @@ export function ImagePanel({ picture }) {
 			viewport: () => latestProps.current.viewport,
 			selected: () => selected.value,
 			enabled: () => !overlaysHidden.value,
+			draws: () => {
+				const present = drawing.value;
+				return present?.view === latestProps.current.view.key && present.what !== 'ask';
+			},
+			draw: (at) => drawAt(latestProps.current.view, at),
+			insert: (at) => insertAt(latestProps.current.view, latestProps.current.viewport, at),
+			over: (at) => {
+				const { letter: name, key } = latestProps.current.view;
+				if (at) pointerPlace.value = { letter: name, view: key, at };
+				else if (pointerPlace.peek()?.letter === name) pointerPlace.value = null;
+			},
 			select: (hit) => {
 				focusView(latestProps.current.view.letter);
 				selected.value = selectionOf(latestProps.current.view.key, hit);
@@ -80,20 +101,29 @@ export function ImagePanel({ picture }) {
 		return () => { detach(); made.destroy(); };
 	}, []);
 
-	useEffect(() => stage.current?.show(frame.image), [frame.image]);
+	useLayoutEffect(() => stage.current?.show(frame.image), [frame.image]);
 	const rays = draft.value?.kind === 'ball' || selected.value?.kind === 'ball';
 	const scene = useMemo(() => ({
 		picture, viewport, rays, selected: selected.value, hidden: overlaysHidden.value,
 		projections: projections.value, boxes: boxes.value, gain: gain.value,
+		ghosts: conflict.value?.fields ?? NO_GHOSTS,
 	}), [
 		picture, viewport.scale, viewport.left, viewport.top, rays, selected.value,
-		overlaysHidden.value, projections.value, boxes.value, gain.value,
+		overlaysHidden.value, projections.value, boxes.value, gain.value, conflict.value,
 	]);
-	useEffect(() => {
+	const filter = filterOf(letter);
+	useLayoutEffect(() => stage.current?.adjust(filter), [filter]);
+	useLayoutEffect(() => {
 		if (size.width === 0 || !stage.current) return;
 		stage.current.resize(size.width, size.height);
 		stage.current.draw(scene);
 	}, [scene, size.width, size.height]);
+
+	/** Twice on the picture, not on what stands on it, and not while clicks draw. @param {MouseEvent} event */
+	function maximise({ target }) {
+		if (drawing.value || !(target instanceof Element) || !target.closest('.image-panel__stage')) return;
+		toggleMaximised(letter);
+	}
 
 	const isFocused = focused.value === letter;
 	return html`
@@ -105,21 +135,15 @@ export function ImagePanel({ picture }) {
 			tabindex="0"
 			aria-label=${`View ${letter}, ${view.label}. Enter to edit its objects.`}
 			onFocus=${() => focusView(letter)}
-			onDblClick=${() => toggleMaximised(letter)}
+			onDblClick=${maximise}
 		>
-			<div class="image-panel__stage" data-ready=${Boolean(frame.image)} ref=${ref}></div>
+			<div class="image-panel__stage" data-ready=${Boolean(frame.image)} data-frame=${frame.image ? view.id : undefined} ref=${ref}></div>
 			${view.image ? null : html`<p class="image-panel__missing">No frame · lines and ball can be edited</p>`}
 			${frame.error ? html`<p class="image-panel__missing">The frame of this view cannot be read.</p>` : null}
 			<${PanelCaption} picture=${picture} />
-			<button
-				class="image-panel__maximise icon-button" type="button"
-				aria-label=${maximised.value ? 'Show all views' : `Show only view ${letter}`}
-				title=${maximised.value ? 'Show all views' : 'Show only this view'}
-				onClick=${() => toggleMaximised(letter)}
-			>
-				<svg viewBox="0 0 16 16" aria-hidden="true"><path d=${maximised.value
-					? 'M7 3v4H3M9 13V9h4' : 'M9 3h4v4M7 13H3V9'} /></svg>
-			</button>
+			<${PanelTools} picture=${picture} first=${first} />
+			<${DrawingChip} view=${view.key} />
+			${drawing.value?.view === view.key && drawing.value.what === 'ask' ? html`<${ClassChooser} picture=${picture} />` : null}
 			${isFocused && editing.value ? html`<${ObjectList} picture=${picture} />` : html`
 				<button
 					class="image-panel__edit" type="button"

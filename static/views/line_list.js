@@ -9,7 +9,7 @@ import { colours } from '../lib/colours.js';
 import { fixed, pixels } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
 import { drawStrip } from '../overlays/line_strip.js';
-import { pixelsOf, useFrames } from '../state/frames.js';
+import { useFrames, usePixels } from '../state/frames.js';
 import { focusView, selected } from '../state/workspace.js';
 import { Letter } from './letter.js';
 
@@ -45,15 +45,14 @@ function selectWorst({ picture, marking }) {
 	selected.value = { kind: 'point', view: picture.view.key, marking: marking.marking, index };
 }
 
-/** @param {{row: Row, width: number, frame: HTMLImageElement | undefined}} props */
-function Strip({ row, width, frame }) {
+/** @param {{row: Row, width: number, pixels: ImageData | undefined}} props */
+function Strip({ row, width, pixels: data }) {
 	const { picture, marking } = row;
 	const theme = colours.value;
 	const draw = useCallback((/** @type {CanvasRenderingContext2D} */ context) => {
-		const data = frame ? pixelsOf(frame) : null;
 		const scale = data ? data.width / picture.view.width : 1;
-		drawStrip(context, { width, height: STRIP }, marking, data, scale);
-	}, [marking, width, frame, theme]);
+		drawStrip(context, { width, height: STRIP }, marking, data ?? null, scale);
+	}, [marking, width, data, theme]);
 	return html`
 		<li class="line-row">
 			<button type="button" onClick=${() => selectWorst(row)} title=${`Select the worst point of ${marking.marking}`}>
@@ -71,7 +70,7 @@ function Strip({ row, width, frame }) {
 /** @param {{pictures: ViewPicture[]}} props */
 export function LineList({ pictures }) {
 	const [ref, size] = useSize();
-	const frames = useFrames(pictures.map(({ view }) => view));
+	const read = usePixels(useFrames(pictures.map(({ view }) => view)));
 	const rows = rowsOf(pictures);
 	const narrow = size.width < 330;
 	const fitting = Math.max(1, Math.min(MOST, Math.floor(size.height / ROW)));
@@ -85,7 +84,7 @@ export function LineList({ pictures }) {
 				${size.width < 100 ? null : shown.map((row) => html`
 					<${Strip}
 						key=${`${row.picture.view.key} ${row.marking.marking}`} row=${row}
-						width=${Math.max(24, size.width - (narrow ? 190 : 232))} frame=${frames.get(row.picture.view.key)}
+						width=${Math.max(24, size.width - (narrow ? 190 : 232))} pixels=${read.get(row.picture.view.key)}
 					/>`)}
 			</ul>
 		</section>

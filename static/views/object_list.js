@@ -2,7 +2,7 @@
 /** The objects of a view as a list: what the canvas shows, for keyboards and screen readers. */
 
 import { html } from 'htm/preact';
-import { useEffect, useRef } from 'preact/hooks';
+import { useLayoutEffect, useRef } from 'preact/hooks';
 
 import { ballOf } from '../geometry/preview.js';
 import { fixed, pixels } from '../lib/format.js';
@@ -42,7 +42,8 @@ function ObjectButton({ picture, object }) {
 export function ObjectList({ picture }) {
 	const list = useRef(/** @type {HTMLUListElement | null} */ (null));
 	const objects = objectsOf(picture.view);
-	useEffect(() => {
+	// Before the next key: an arrow pressed right after Enter already moves the first object.
+	useLayoutEffect(() => {
 		const at = list.current?.querySelector('[aria-pressed="true"]') ?? list.current?.querySelector('button');
 		if (at instanceof HTMLElement) at.focus();
 	}, []);

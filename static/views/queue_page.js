@@ -2,7 +2,7 @@
 /** The queue: what to review, in which order, and how far one is. */
 
 import { html } from 'htm/preact';
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useRef } from 'preact/hooks';
 
 import { count } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
@@ -10,64 +10,21 @@ import { navigate, param } from '../lib/router.js';
 import { dataset, datasets, failure, loadDatasets, useDataset } from '../state/datasets.js';
 import { neighbours, queueAddress } from '../state/navigation.js';
 import { activeRow, closeQueue, openQueue, queue } from '../state/queue.js';
+import { followQueue } from '../state/queue_live.js';
 import { NoticeBar } from './bars.js';
 import { ExportButton } from './export_dialog.js';
 import { Header } from './header.js';
 import { Histograms } from './histograms.js';
 import { ProgressCard } from './progress_card.js';
+import { QueryBox } from './query_box.js';
 import { QueueEmpty } from './queue_empty.js';
 import { QueueTable } from './queue_table.js';
-
-const TYPING_PAUSE = 250;
+import { QueueTools } from './queue_tools.js';
 
 /** Put the query into the address bar; the rest follows from there. @param {string} q */
 function setQuery(q) {
 	const name = dataset.value?.name ?? '';
 	navigate(queueAddress(name, q.trim()), { replace: true });
-}
-
-/** @param {{field: import('preact').RefObject<HTMLInputElement>}} props */
-function QueryBox({ field }) {
-	const asked = param('q');
-	const [text, setText] = useState(asked);
-	useEffect(() => {
-		if (document.activeElement !== field.current) setText(asked);
-	}, [asked]);
-	useEffect(() => {
-		if (text.trim() === asked) return undefined;
-		const timer = setTimeout(() => setQuery(text), TYPING_PAUSE);
-		return () => clearTimeout(timer);
-	}, [text]);
-	/** @param {KeyboardEvent} event */
-	function key(event) {
-		if (event.key === 'Enter') setQuery(text);
-		if (event.key === 'Enter' || event.key === 'Escape') field.current?.blur();
-	}
-	return html`
-		<input
-			class="field field--query" type="search" ref=${field} value=${text} spellcheck=${false}
-			aria-label="Query" placeholder="status:unreviewed jac<0.95 sort:value" autocomplete="off"
-			aria-invalid=${queue.value.error?.status === 400}
-			onInput=${(/** @type {InputEvent} */ event) => setText(/** @type {HTMLInputElement} */ (event.target).value)}
-			onKeyDown=${key}
-		/>
-	`;
-}
-
-function DatasetChoice() {
-	const all = datasets.value ?? [];
-	if (all.length < 2) return null;
-	/** @param {Event} event */
-	function choose(event) {
-		const { value } = /** @type {HTMLSelectElement} */ (event.target);
-		useDataset(value);
-		navigate(queueAddress(value, param('q')));
-	}
-	return html`
-		<select class="field field--select" aria-label="Dataset" value=${dataset.value?.name} onChange=${choose}>
-			${all.map(({ name }) => html`<option key=${name} value=${name}>${name}</option>`)}
-		</select>
-	`;
 }
 
 /** @param {{field: import('preact').RefObject<HTMLInputElement>}} props */
@@ -78,8 +35,7 @@ function QueueHeader({ field }) {
 	return html`
 		<${Header} current="queue">
 			<div class="header__middle">
-				<${DatasetChoice} />
-				<${QueryBox} field=${field} />
+				<${QueryBox} field=${field} invalid=${queue.value.error?.status === 400} onQuery=${setQuery} />
 			</div>
 			<span class="save" data-state=${error ? 'failed' : 'saved'} role="status">
 				<span class="save__dot" aria-hidden="true"></span>
@@ -109,6 +65,7 @@ export function QueuePage() {
 		useDataset(one.name);
 		openQueue({ id: one.id, name: one.name }, q);
 	}, [one?.id, q]);
+	useEffect(() => (one ? followQueue(one) : undefined), [one?.id]);
 	const { loaded, total, error } = queue.value;
 	const nothing = failure.value !== null
 		|| (datasets.value !== null && (!one || (loaded && (total === 0 || error !== null))));
@@ -119,7 +76,8 @@ export function QueuePage() {
 			<main class="queue__main">
 				<h1 class="hidden-text">Queue</h1>
 				${one ? html`
-					<div class="queue__cards"><${Histograms} q=${q} onQuery=${setQuery} /><${ProgressCard} dataset=${one} /></div>` : null}
+					<div class="queue__cards"><${Histograms} q=${q} onQuery=${setQuery} /><${ProgressCard} dataset=${one} /></div>
+					<${QueueTools} dataset=${one} q=${q} onQuery=${setQuery} />` : null}
 				${nothing ? html`<${QueueEmpty} q=${q} />` : html`<${QueueTable} q=${q} onQuery=${setQuery} />`}
 			</main>
 		</div>

@@ -30,6 +30,19 @@ function gateOf(row) {
 	return { title: GATE_TITLES[gate] ?? words(gate), detail: sentence };
 }
 
+/** Who decided, and why it was rejected. @param {GroupRow} row */
+function byWhom(row) {
+	if (row.status === 'unreviewed') return '';
+	return [row.reviewer, row.fixed ? 'fixed' : ''].filter(Boolean).join(' · ');
+}
+
+/** How far the failing gate, or the nearest one, is from its threshold. @param {GroupRow} row */
+function margin(row) {
+	if (row.margin === null) return '–';
+	const size = Math.abs(row.margin);
+	return `${row.margin > 0 ? '+' : ''}${fixed(row.margin, size >= 99.5 ? 0 : size >= 9.95 ? 1 : 2)}`;
+}
+
 /** @param {{row: GroupRow, q: string, active: boolean}} props */
 function Cells({ row, q, active }) {
 	const { status, text } = statusOf(row);
@@ -44,15 +57,19 @@ function Cells({ row, q, active }) {
 		</div>
 		<div role="gridcell" class="queue-cell">
 			<span class="pill" data-status=${status}><span aria-hidden="true">${GLYPHS[status] ?? ''}</span> ${text}</span>
+			<span class="queue-cell__sub queue-cell__by">${byWhom(row)}</span>
 		</div>
 		<div role="gridcell" class="queue-cell queue-cell--two" data-passes=${row.passes === true}>
 			<span>${title}</span><span class="queue-cell__sub">${detail}</span>
 		</div>
+		<div role="gridcell" class="queue-cell" data-numeric="true" data-short=${row.margin !== null && row.margin < 0}>${margin(row)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.min_jac, 2)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${pixels(row.error_px)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.sigma_m, 2)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.parallax_degrees, 0, '°')}</div>
+		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.size_ratio, 2)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${row.views}</div>
+		<div role="gridcell" class="queue-cell" data-narrow="true">${row.split || '–'}</div>
 		<div role="gridcell" class="queue-cell"><span class="queue-cell__findings">${row.findings.map(words).join(', ')}</span></div>
 	`;
 }

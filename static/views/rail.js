@@ -8,6 +8,7 @@ import { Gates } from './gates.js';
 import { PairTable } from './pair_table.js';
 import { VerdictButtons } from './verdict_buttons.js';
 import { VerdictCard } from './verdict_card.js';
+import { ViewLines } from './view_lines.js';
 import { ViewTable } from './view_table.js';
 
 /** @import {GroupDocument, SolutionJson} from '../api/types.js' */
@@ -29,6 +30,7 @@ export function Rail({ group, solution, pictures, live }) {
 					<${PairTable} group=${group} solution=${solution} />
 					<${Findings} group=${group} solution=${solution} />
 				` : null}
+				<${ViewLines} group=${group} pictures=${pictures} />
 			</div>
 			<${VerdictButtons} group=${group} />
 		</aside>

@@ -6,29 +6,68 @@ import { useEffect, useState } from 'preact/hooks';
 
 import { ago, count } from '../lib/format.js';
 import { useNow } from '../lib/hooks.js';
-import { document as groupDocument, save, unsaved } from '../state/group.js';
-import { canRedo, canUndo, redo, undo } from '../state/history.js';
-import { goNext, goPrevious, neighbours, query, queueAddress } from '../state/navigation.js';
+import { held } from '../state/conflict.js';
+import { document as groupDocument, unsaved } from '../state/group.js';
+import { canRedo, redo, undo, undoable } from '../state/history.js';
+import { goNext, goPrevious, neighbours, query, queueAddress, reviewAddress } from '../state/navigation.js';
+import { changedElsewhere } from '../state/live.js';
+import { lasting } from '../state/outbox.js';
+import { isAway, isSending, savedAt, waiting, wake, wasRefused } from '../state/sending.js';
 import { Header } from './header.js';
 
 /** Saving is worth a word only when it takes long enough to wonder. */
 const SPINNER_AFTER = 300;
+/** How long a change that was made elsewhere is news, ms. */
+const NEWS = 8000;
 
-function SaveState() {
+/** @returns {{state: 'saved' | 'saving' | 'away' | 'failed', words: (now: number) => string}} */
+function saveState() {
+	const here = waiting.value.length;
+	if (isAway.value && here > 0) {
+		return { state: 'away', words: () => `Offline · ${here} ${here === 1 ? 'change waits' : 'changes wait'}` };
+	}
+	if (held.value.length > 0) return { state: 'failed', words: () => 'Not saved: conflict' };
+	if (here > 0 || isSending.value) return { state: 'saving', words: () => 'Saving…' };
+	if (wasRefused.value) return { state: 'failed', words: () => 'Not saved' };
+	const news = changedElsewhere.value;
+	const fresh = (/** @type {number} */ now) => news !== null && news.group === groupDocument.value?.id
+		&& news.at > (savedAt.value ?? 0) && now - news.at < NEWS;
+	const at = savedAt.value;
+	if (fresh(Date.now())) {
+		const who = news?.actor && news.actor !== 'local' ? `by ${news.actor}` : 'elsewhere';
+		return { state: 'saved', words: () => `Changed ${who} just now` };
+	}
+	return { state: 'saved', words: (now) => (at === null ? 'No changes' : `Saved ${ago(at, now)}`) };
+}
+
+/** The way back to a group whose conflict waits. */
+function ConflictLink() {
+	const other = held.value.find(({ group }) => group !== groupDocument.value?.id);
+	if (!other) return null;
+	return html`<a class="save__conflict" href=${reviewAddress(other.group)}>Resolve conflict</a>`;
+}
+
+export function SaveState() {
 	const now = useNow(1000);
-	const { state, at } = save.value;
+	const { state, words } = saveState();
 	const [slow, setSlow] = useState(false);
 	useEffect(() => {
 		const timer = setTimeout(() => setSlow(state === 'saving'), state === 'saving' ? SPINNER_AFTER : 0);
 		return () => clearTimeout(timer);
 	}, [state]);
-	const text = state === 'failed' ? 'Not saved' : slow ? 'Saving…'
-		: at === null ? 'No changes' : `Saved ${ago(at, now)}`;
+	// A write that is answered at once is not worth a flicker.
+	const quick = state === 'saving' && !slow;
+	const text = quick ? (savedAt.value === null ? 'No changes' : `Saved ${ago(savedAt.value, now)}`) : words(now);
+	const title = state !== 'away' ? '' : lasting.value
+		? 'Kept in this browser and sent when the server can be reached'
+		: 'This browser keeps nothing: do not close the page';
 	return html`
-		<span class="save" data-state=${state === 'saving' && !slow ? 'saved' : state} data-unsaved=${unsaved.value}>
+		<${ConflictLink} />
+		<span class="save" data-state=${quick ? 'saved' : state} data-unsaved=${unsaved.value} title=${title}>
 			<span class="save__dot" aria-hidden="true"></span>${text}
-			<span class="hidden-text" role="status" aria-live="polite">${state === 'failed' ? 'Not saved' : ''}</span>
+			<span class="hidden-text" role="status" aria-live="polite">${state === 'failed' || state === 'away' ? words(now) : ''}</span>
 		</span>
+		${state === 'away' ? html`<button class="button button--small" type="button" onClick=${() => wake()}>Try now</button>` : null}
 	`;
 }
 
@@ -68,7 +107,7 @@ export function ReviewHeader() {
 			</div>
 			<${SaveState} />
 			<${HeaderButton} label="Undo" keys="Ctrl Z" run=${undo} path="M6 3 3 6l3 3M3 6h6a4 4 0 0 1 0 8H6"
-				reason=${canUndo.value ? null : 'Nothing to undo in this group'} />
+				reason=${undoable.value ? null : 'Nothing to undo in this group'} />
 			<${HeaderButton} label="Redo" keys="Ctrl Shift Z" run=${redo} path="m10 3 3 3-3 3M13 6H7a4 4 0 0 0 0 8h3"
 				reason=${canRedo.value ? null : 'Nothing to redo in this group'} />
 		<//>

@@ -2,22 +2,31 @@
 /** What the keys of the review screen do. */
 
 import { ballCenter, ballOf } from '../geometry/preview.js';
+import { toggleOccluded, toggleOutOfView } from '../state/ball_edits.js';
+import { drawHere, endDrawing, startDrawing } from '../state/drawing.js';
+import { swapSides } from '../state/edits.js';
 import { draft, group, submit, withdraw } from '../state/group.js';
 import { redo, undo } from '../state/history.js';
-import { goNext, goPrevious } from '../state/navigation.js';
+import { goBy, goFlagged, goNext, goPrevious } from '../state/navigation.js';
 import { announce, dismiss, notice } from '../state/notice.js';
+import { revertSelected } from '../state/revert.js';
 import { accept, askReason, cancelAsking, defer } from '../state/verdicts.js';
 import { fitAll, fitPanel, isZoomed, zoomTo } from '../state/viewports.js';
 import {
-	asking, boxes, cycleGain, editing, focused, focusView, gain, maximised, overlaysHidden,
-	projections, selected, stripCollapsed, toggleMaximised,
+	asking, boxes, cycleGain, drawing, editing, equalViews, estimator, focused, focusView, gain,
+	gatesOpen, loupe, maximised, overlaysHidden, pinPlace, pointerPlace, projections, selected,
+	stripCollapsed, toggleMaximised,
 } from '../state/workspace.js';
 import { deleteSelected, nudge, nudgeDiameter } from '../tools/nudge.js';
+import { EDITOR_DOOR } from './calibration/open.js';
+import { SCENE_KEYS } from './scene3d/scene3d.js';
 
 /** @import {Binding} from '../lib/keys.js' */
 
 /** Screen pixels per image pixel when zoomed to the ball. */
 const BALL_SCALE = 8;
+/** Groups that V and C pass. */
+const FAR = 10;
 const DIGITS = ['1', '2', '3', '4', '5', '6'];
 
 /** @param {number} index @returns {string | null} letter of the view in that place */
@@ -42,6 +51,7 @@ function toggleIncluded(index) {
 /** Leave one thing at a time. */
 function escape() {
 	if (asking.value) cancelAsking();
+	else if (drawing.value) endDrawing();
 	else if (draft.value) withdraw();
 	else if (editing.value) editing.value = false;
 	else if (selected.value) selected.value = null;
@@ -70,6 +80,62 @@ function say(word, on) {
 }
 
 const isSelected = () => selected.value !== null;
+const isDrawing = () => drawing.value !== null && drawing.value.what !== 'ask';
+
+/** The view that keys speak about: that of the selected object, else the focused one. */
+function viewInHand() {
+	const object = selected.value;
+	return group.value?.views.find((view) => (object ? view.key === object.view : view.letter === focused.value));
+}
+
+/** Change the ball of the view in hand. @param {typeof toggleOccluded} change @param {string} otherwise */
+function changeBall(change, otherwise) {
+	const view = viewInHand();
+	const edit = view && change(view);
+	if (!view) return;
+	if (edit) submit(edit);
+	else announce(`${otherwise} ${view.letter}.`);
+}
+
+/** Left becomes right in the focused view, for labels that somebody took from the other end. */
+function swapFocused() {
+	const view = group.value?.views.find(({ letter }) => letter === focused.value);
+	if (!view) return;
+	if (Object.keys(view.lines).length === 0) announce(`View ${view.letter} has no lines.`);
+	else submit(swapSides(view));
+}
+
+/** A verdict on one view: whether the group is made of it. @param {boolean} included */
+function judgeView(included) {
+	const view = group.value?.views.find(({ letter }) => letter === focused.value);
+	if (!view) return;
+	if (view.included === included) announce(`View ${view.letter} is ${included ? 'used' : 'left out'} already.`);
+	else submit({ kind: 'include', view: view.key, included });
+}
+
+/** Which 3D ball is looked at. */
+function cycleEstimator() {
+	estimator.value = estimator.value === 'mean' ? 'best' : 'mean';
+	announce(estimator.value === 'mean' ? 'Mean of pairs.' : 'Most likely point.');
+}
+
+/** Ask for a note at the pointer. */
+function askNote() {
+	pinPlace.value = pointerPlace.value;
+	asking.value = 'pin';
+}
+
+/** Show the gates with all that they say. */
+function showGates() {
+	gatesOpen.value = !gatesOpen.value;
+	document.querySelector('.gates')?.scrollIntoView({ block: 'nearest' });
+	say('Details of the gates', gatesOpen.value);
+}
+
+function flipOverlays() {
+	overlaysHidden.value = !overlaysHidden.value;
+	say('Overlays', !overlaysHidden.value);
+}
 
 /** @param {string} arrow @param {number} x @param {number} y @returns {Binding} */
 function arrowKey(arrow, x, y) {
@@ -85,12 +151,19 @@ const VERDICT = [
 	{ keys: ['a', 'Ctrl+Enter'], label: 'Accept and next', group: 'Verdict', run: accept },
 	{ keys: ['x'], label: 'Reject; then a digit for the reason', group: 'Verdict', run: askReason },
 	{ keys: ['s'], label: 'Defer and next', group: 'Verdict', run: defer },
+	{ keys: ['Shift+a'], label: 'Use the focused view', group: 'Verdict', run: () => judgeView(true) },
+	{ keys: ['Shift+x'], label: 'Leave the focused view out', group: 'Verdict', run: () => judgeView(false) },
+	{ keys: ['Shift+n'], label: 'Note at the pointer', group: 'Verdict', run: askNote },
 ];
 
 /** @type {Binding[]} */
 const NAVIGATE = [
 	{ keys: ['f'], label: 'Next group', group: 'Navigate', run: () => { goNext(); } },
 	{ keys: ['d'], label: 'Previous group', group: 'Navigate', run: () => { goPrevious(); } },
+	{ keys: ['v'], label: 'Ten groups on', group: 'Navigate', run: () => { goBy(1, FAR); } },
+	{ keys: ['c'], label: 'Ten groups back', group: 'Navigate', run: () => { goBy(-1, FAR); } },
+	{ keys: ['r'], label: 'Next flagged group', group: 'Navigate', run: () => { goFlagged(1); } },
+	{ keys: ['e'], label: 'Previous flagged group', group: 'Navigate', run: () => { goFlagged(-1); } },
 ];
 
 /** @type {Binding[]} */
@@ -103,11 +176,15 @@ const VIEW = [
 		keys: [`Shift+${digit}`], label: 'Use a view or leave it out', group: 'View',
 		shown: i === 0 ? 'Shift + 1 … 6' : 'hidden', run: () => toggleIncluded(i),
 	})),
-	{ keys: ['z'], label: 'Zoom to the ball; again: whole image', group: 'View', run: zoomToBall },
+	{
+		keys: ['z'], label: 'Zoom to the ball, again: whole image; held: magnifying glass', group: 'View',
+		run: zoomToBall,
+		hold: { start: () => { loupe.value = true; }, end: () => { loupe.value = false; } },
+	},
 	{ keys: ['0'], label: 'Show images whole', group: 'View', run: fitAll },
 	{
-		keys: ['h'], label: 'Hide or show everything drawn', group: 'View',
-		run: () => { overlaysHidden.value = !overlaysHidden.value; say('Overlays', !overlaysHidden.value); },
+		keys: ['h'], label: 'Hide or show everything drawn; held: peek below', group: 'View',
+		run: flipOverlays, hold: { start: flipOverlays, end: flipOverlays },
 	},
 	{
 		keys: ['p'], label: 'Projected lines', group: 'View',
@@ -121,6 +198,12 @@ const VIEW = [
 		keys: ['w'], label: 'Residual whiskers × 1, 5, 20', group: 'View',
 		run: () => { cycleGain(); announce(`Whiskers times ${gain.value}.`); },
 	},
+	{ keys: ['t'], label: '3D ball: mean of pairs, or most likely point', group: 'View', run: cycleEstimator },
+	{ keys: ['g'], label: 'Gates: what they ask and by how much', group: 'View', run: showGates },
+	{
+		keys: ['Shift+l'], label: 'Main camera large, or all views equal', group: 'View',
+		run: () => { equalViews.value = !equalViews.value; },
+	},
 	{
 		keys: ['l'], label: 'Fold the strip below', group: 'View',
 		run: () => { stripCollapsed.value = !stripCollapsed.value; },
@@ -129,6 +212,14 @@ const VIEW = [
 
 /** @type {Binding[]} */
 const EDIT = [
+	{ keys: ['n'], label: 'Draw a ball, a marking, or a point more', group: 'Edit', run: () => startDrawing() },
+	{
+		keys: ['Enter'], label: 'Put a point at the pointer', group: 'Edit', shown: 'hidden',
+		when: isDrawing, run: drawHere,
+	},
+	{
+		keys: [], label: 'Put a point on the line there', group: 'Edit', shown: 'Alt click', run: () => {},
+	},
 	{
 		keys: ['Enter'], label: 'Walk through the objects of the view', group: 'Edit',
 		when: () => !editing.value,
@@ -146,8 +237,18 @@ const EDIT = [
 		keys: ['Delete', 'Backspace'], label: 'Delete the selected object', group: 'Edit',
 		when: isSelected, run: deleteSelected,
 	},
+	{
+		keys: ['q'], label: 'Ball occluded, or not', group: 'Edit',
+		run: () => changeBall(toggleOccluded, 'There is no ball in view'),
+	},
+	{
+		keys: ['o'], label: 'Ball out of view, or not', group: 'Edit',
+		run: () => changeBall(toggleOutOfView, ''),
+	},
+	{ keys: ['u'], label: 'Give the selected object back what it was', group: 'Edit', run: () => { revertSelected(); } },
+	{ keys: ['m'], label: 'Swap left and right in the focused view', group: 'Edit', run: swapFocused },
 	{ keys: ['Ctrl+z'], label: 'Undo', group: 'Edit', run: undo },
 	{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Redo', group: 'Edit', run: redo },
 ];
 
-export const REVIEW_KEYS = [...VERDICT, ...NAVIGATE, ...VIEW, ...EDIT];
+export const REVIEW_KEYS = [...VERDICT, ...NAVIGATE, ...VIEW, ...SCENE_KEYS, ...EDITOR_DOOR, ...EDIT];

@@ -5,14 +5,19 @@ import { html } from 'htm/preact';
 import { useEffect, useMemo } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
+import { withBestBall } from '../geometry/estimator.js';
 import { picturesOf } from '../overlays/scene.js';
 import { document, group, isPreview, solution } from '../state/group.js';
-import { focused, maximised, stripCollapsed } from '../state/workspace.js';
-import { ConflictBar, NoticeBar } from './bars.js';
+import { sceneShown } from '../state/scene3d.js';
+import { estimator, focused, maximised, stripCollapsed } from '../state/workspace.js';
+import { NoticeBar } from './bars.js';
+import { ConflictBar } from './conflict_bar.js';
 import { ImageGrid } from './image_grid.js';
+import { Loupe } from './loupe.js';
 import { Rail } from './rail.js';
 import { ReviewHeader } from './review_header.js';
 import { REVIEW_KEYS } from './review_keys.js';
+import { Scene3D } from './scene3d/scene3d.js';
 import { BottomStrip } from './strip.js';
 
 /** What is focused or shown alone must exist in this group. @param {string[]} letters */
@@ -23,18 +28,22 @@ function keepWithin(letters) {
 
 function Workspace() {
 	const shown = group.value;
-	const solved = solution.value;
 	const live = isPreview.value;
+	const best = estimator.value === 'best' && !live;
+	const found = solution.value;
+	// While something moves the browser computes the mean of pairs and nothing else.
+	const solved = useMemo(() => (best && shown && found ? withBestBall(shown, found) : found), [best, shown, found]);
 	const saved = document.value;
 	const pictures = useMemo(() => (shown ? picturesOf(shown, solved, saved) : []), [shown, solved, saved]);
 	useEffect(() => keepWithin(pictures.map(({ view }) => view.letter)), [pictures]);
 	if (!shown) return html`<main class="review__empty" aria-busy="true"><p>Loading…</p></main>`;
 	return html`
 		<main class="review__main" data-collapsed=${stripCollapsed.value} data-count=${maximised.value ? 1 : pictures.length}>
-			<${ImageGrid} pictures=${pictures} />
+			${sceneShown.value ? html`<${Scene3D} group=${shown} solution=${found} />` : html`<${ImageGrid} pictures=${pictures} />`}
 			<${BottomStrip} group=${shown} solution=${solved} pictures=${pictures} />
 		</main>
 		<${Rail} group=${shown} solution=${solved} pictures=${pictures} live=${live} />
+		<${Loupe} pictures=${pictures} />
 	`;
 }
 

@@ -2,13 +2,14 @@
 /** Accept, reject with a reason, defer: buttons, with what they ask beside them. */
 
 import { html } from 'htm/preact';
-import { useEffect, useRef } from 'preact/hooks';
+import { useLayoutEffect, useRef } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
 import {
-	accept, answer, askReason, cancelAsking, defer, lastReason, reject, REASONS,
+	accept, addNote, answer, askReason, cancelAsking, defer, lastReason, reject, REASONS,
 } from '../state/verdicts.js';
-import { asking } from '../state/workspace.js';
+import { asking, pinPlace } from '../state/workspace.js';
+import { pinText } from '../lib/pins.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
 
@@ -45,15 +46,16 @@ function ReasonList() {
 	`;
 }
 
-/** @param {{title: string, button: string}} props */
-function NoteForm({ title, button }) {
+/** @param {{title: string, button: string, onNote?: (note: string) => void}} props */
+function NoteForm({ title, button, onNote = answer }) {
 	const field = useRef(/** @type {HTMLInputElement | null} */ (null));
-	useEffect(() => field.current?.focus(), []);
+	// Before the next key: who types at once must not find the letters doing something else.
+	useLayoutEffect(() => field.current?.focus(), []);
 	/** @param {SubmitEvent} event */
 	function send(event) {
 		event.preventDefault();
 		const note = field.current?.value.trim();
-		if (note) answer(note);
+		if (note) onNote(note);
 		else field.current?.focus();
 	}
 	/** @param {KeyboardEvent} event */
@@ -72,10 +74,22 @@ function NoteForm({ title, button }) {
 	`;
 }
 
+/** A note, at the place that the pointer had. */
+function PinForm() {
+	const place = pinPlace.value;
+	const where = place ? ` at ${place.letter} ${Math.round(place.at.x)}, ${Math.round(place.at.y)}` : '';
+	return html`
+		<${NoteForm}
+			title=${`Note${where}`} button="Save"
+			onNote=${(/** @type {string} */ text) => addNote(place ? pinText(place.letter, place.at, text) : text)}
+		/>`;
+}
+
 /** @param {{group: GroupDocument}} props */
 function Ask({ group }) {
 	if (asking.value === 'reason') return html`<${ReasonList} />`;
 	if (asking.value === 'note') return html`<${NoteForm} title="What is wrong with it?" button="Reject" />`;
+	if (asking.value === 'pin') return html`<${PinForm} />`;
 	if (asking.value !== 'override') return null;
 	const failing = group.solution?.first_failing;
 	const title = `Accept although ${failing ? `a gate fails (${failing.sentence})` : 'a gate fails'}? Say why.`;

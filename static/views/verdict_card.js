@@ -54,7 +54,8 @@ function verdictText({ state, reason, note, by }) {
 	const named = REASONS.find(({ name }) => name === reason);
 	const why = named && named.name !== 'other' ? named.label.toLowerCase() : '';
 	const who = by && by !== 'local' ? `by ${by}` : '';
-	return [capital(state), why, note ? `“${note}”` : '', who].filter(Boolean).join(' · ');
+	const said = note ? `“${note.replaceAll('\n', ' · ')}”` : '';
+	return [state === 'unreviewed' ? 'Note' : capital(state), why, said, who].filter(Boolean).join(' · ');
 }
 
 /** @param {{group: GroupDocument, solution: SolutionJson | null, live: boolean}} props */
@@ -66,7 +67,7 @@ export function VerdictCard({ group, solution, live }) {
 			<p class="verdict-card__over">${over}</p>
 			<h1>${title}</h1>
 			<p class="verdict-card__text">${text}</p>
-			${verdict.state === 'unreviewed' ? null : html`
+			${verdict.state === 'unreviewed' && !verdict.note ? null : html`
 				<p class="verdict-card__verdict">
 					<span class="pill" data-status=${verdict.state}>${verdictText(verdict)}</span>
 					${verdict.stale ? html`<span class="pill" data-status="stale">stale: changed since</span>` : null}

@@ -9,18 +9,29 @@ import sys
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, sync_playwright
+from playwright.sync_api import (
+    Browser,
+    BrowserContext,
+    ConsoleMessage,
+    Page,
+    expect,
+    sync_playwright,
+)
 
+from tests.e2e.film import write_film
 from tests.e2e.install_chromium import ADVICE, find_chromium
+from tests.e2e.screen import Screen, passing
 
 ROOT = Path(__file__).resolve().parents[2]
 GROUPS = 14
 SIZE = {"width": 1440, "height": 900}
 START_SECONDS = 60.0
+SOFTWARE_GRAPHICS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 
 def _chromium() -> str:
@@ -68,6 +79,24 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def server(home: Path) -> Iterator[str]:
     """Address of a server over the home."""
+    with _serving(home) as address:
+        yield address
+
+
+@pytest.fixture(scope="session")
+def film(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Address of a server over a home of its own: a short film by six static cameras."""
+    home = tmp_path_factory.mktemp("film-home")
+    folder = write_film(tmp_path_factory.mktemp("film"))
+    _touchline("migrate", home=home)
+    _touchline("import", "issia", str(folder), "--dataset", "film", home=home)
+    _touchline("solve", "--dataset", "film", "--workers", "1", home=home)
+    with _serving(home) as address:
+        yield address
+
+
+@contextmanager
+def _serving(home: Path) -> Iterator[str]:
     port = _free_port()
     address = f"http://127.0.0.1:{port}"
     with (home / "server.log").open("wb") as log:
@@ -99,10 +128,15 @@ def _wait_for(address: str, process: subprocess.Popen[bytes], log: Path) -> None
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
+def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
     """Chromium, for one module: while Playwright runs, no other test can run an event loop."""
+    # On a busy machine five seconds are little.
+    expect.set_options(timeout=20_000)
     with sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=_chromium())
+        # Where there is no graphics card the 3D view is drawn by the processor, which costs time.
+        drawn = request.module.__name__.endswith("scene3d")
+        arguments = SOFTWARE_GRAPHICS if drawn else []
+        launched = playwright.chromium.launch(executable_path=_chromium(), args=arguments)
         yield launched
         launched.close()
 
@@ -170,3 +204,17 @@ def open_page(browser: Browser, server: str, console: Console) -> Iterator[OpenP
     yield open_one
     for context in contexts:
         context.close()
+
+
+@pytest.fixture
+def review(open_page: OpenPage) -> Callable[..., Screen]:
+    """A function that opens the review screen of a passing group."""
+
+    def open_group(place: int) -> Screen:
+        page = open_page(None)
+        page.goto(f"/review/{passing(page, place)}")
+        screen = Screen(page)
+        screen.ready()
+        return screen
+
+    return open_group

@@ -1,0 +1,30 @@
+// @ts-check
+/** Requests about the exports there are. */
+
+import { queryText, request } from './client.js';
+
+/** @import {Counts} from './types.js' */
+
+/**
+ * @typedef {object} ExportRow
+ * @property {string} id
+ * @property {'waiting' | 'running' | 'ready' | 'failed' | 'cancelled' | 'gone'} status
+ * @property {{dataset: string, format: string, all: boolean, version: string | number | null, boxes: string, images: string}} request
+ * @property {string} created
+ * @property {string | null} content
+ * @property {number | null} bytes
+ * @property {Counts | null} counts
+ * @property {Counts | null} left_out
+ * @property {string[] | null} missing_images
+ * @property {string | null} error
+ */
+
+/** @param {{dataset?: string, limit?: number, cursor?: string | null}} options @param {AbortSignal} [signal] @returns {Promise<{items: ExportRow[], next: string | null}>} */
+export function getExports(options, signal) {
+	return request(`/exports${queryText(options)}`, { signal });
+}
+
+/** @param {string} id */
+export function deleteExport(id) {
+	return request(`/exports/${id}`, { method: 'DELETE' });
+}

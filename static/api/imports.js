@@ -1,0 +1,42 @@
+// @ts-check
+/** Requests that bring files in: uploads, folders, imports. */
+
+import { idempotencyKey, queryText, request, upload } from './client.js';
+
+/** @import {JobJson} from './jobs.js' */
+
+/** @typedef {{id: string, name: string, bytes: number, format: string | null}} UploadJson   `format`: what it most likely holds */
+/** @typedef {{upload: string} | {folder: string}} ImportSource */
+/** @typedef {{dataset: string, format: string, source: ImportSource, options: {[name: string]: any}, dry_run: boolean}} ImportRequest */
+
+/**
+ * @typedef {object} ImportReport
+ * @property {number} read
+ * @property {number} imported
+ * @property {number} new
+ * @property {number} changed
+ * @property {number} unchanged
+ * @property {{file: string, record: string | null, field: string | null, problem: string}[]} skipped
+ * @property {number} findings
+ * @property {{[name: string]: number}} [counts]
+ * @property {number} [more_skipped]
+ * @property {any[]} [remarks]
+ */
+
+/** @typedef {{name: string, path: string, folder: boolean}} FolderEntry */
+/** @typedef {{path: string, format: string | null, items: FolderEntry[], more: boolean}} FolderJson */
+
+/** @param {File} file @param {(share: number) => void} progress @param {AbortSignal} [signal] @returns {Promise<UploadJson>} */
+export function postUpload(file, progress, signal) {
+	return upload(`/uploads${queryText({ name: file.name })}`, file, progress, signal);
+}
+
+/** The folders that the operator allowed, or what lies in one. @param {string} path "": the allowed ones @param {AbortSignal} [signal] @returns {Promise<FolderJson>} */
+export function getFolders(path, signal) {
+	return request(`/imports/folders${queryText({ path })}`, { signal });
+}
+
+/** @param {ImportRequest} body @returns {Promise<JobJson>} */
+export function postImport(body) {
+	return request('/imports', { method: 'POST', body, key: idempotencyKey() });
+}

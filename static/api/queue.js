@@ -1,0 +1,63 @@
+// @ts-check
+/** Requests about many groups at once: bulk verdicts, saved views, reviewers. */
+
+import { idempotencyKey, request } from './client.js';
+
+/** @typedef {{q: string, state: string, reason: string | null, note: string | null, expected?: number}} BulkRequest   `expected`: how many the person saw */
+/** @typedef {{reason: string, groups: number}} RefusedJson */
+
+/**
+ * @typedef {object} BulkPreview
+ * @property {number} matches
+ * @property {number} would_change
+ * @property {RefusedJson[]} refused
+ * @property {{id: number, key: string}[]} sample
+ */
+
+/** @typedef {{batch: number | null, changed: number, refused: RefusedJson[]}} BulkResult */
+/** @typedef {{id: number, name: string, q: string, by: string, groups: number}} SavedView */
+
+/**
+ * @typedef {object} ReviewerJson
+ * @property {string} name
+ * @property {number} accepted
+ * @property {number} rejected
+ * @property {number} deferred
+ * @property {number} today
+ * @property {string | null} last
+ */
+
+/** @param {number} dataset @param {BulkRequest} body @param {AbortSignal} signal @returns {Promise<BulkPreview>} */
+export function previewVerdicts(dataset, body, signal) {
+	return request(`/datasets/${dataset}/verdicts?dry_run=true`, { method: 'POST', body, signal });
+}
+
+/** @param {number} dataset @param {BulkRequest} body @returns {Promise<BulkResult>} */
+export function postVerdicts(dataset, body) {
+	return request(`/datasets/${dataset}/verdicts?dry_run=false`, { method: 'POST', body, key: idempotencyKey() });
+}
+
+/** @param {number} batch @returns {Promise<{restored: number, kept: number}>} */
+export function undoVerdicts(batch) {
+	return request(`/verdict-batches/${batch}/undo`, { method: 'POST', key: idempotencyKey() });
+}
+
+/** @param {number} dataset @param {AbortSignal} [signal] @returns {Promise<{items: SavedView[]}>} */
+export function getSavedViews(dataset, signal) {
+	return request(`/datasets/${dataset}/saved-views`, { signal });
+}
+
+/** @param {number} dataset @param {{name: string, q: string}} body @returns {Promise<SavedView>} */
+export function postSavedView(dataset, body) {
+	return request(`/datasets/${dataset}/saved-views`, { method: 'POST', body, key: idempotencyKey() });
+}
+
+/** @param {number} id */
+export function deleteSavedView(id) {
+	return request(`/saved-views/${id}`, { method: 'DELETE' });
+}
+
+/** @param {number} dataset @param {AbortSignal} [signal] @returns {Promise<{items: ReviewerJson[]}>} */
+export function getReviewers(dataset, signal) {
+	return request(`/datasets/${dataset}/reviewers`, { signal });
+}

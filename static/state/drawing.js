@@ -1,0 +1,106 @@
+// @ts-check
+/** Drawing what is missing: a ball, a marking, a point more. Every click is saved at once. */
+
+import { toImage } from '../geometry/viewport.js';
+import { addPoint, markingAt } from './line_edits.js';
+import { expectedDiameter, newBall } from './ball_edits.js';
+import { group, solution, submit } from './group.js';
+import { announce } from './notice.js';
+import { drawing, focused, pointerPlace, selected } from './workspace.js';
+
+/** @import {PointJson, ViewJson} from '../api/types.js' */
+/** @import {ScreenPoint, Viewport} from '../geometry/viewport.js' */
+
+/** CSS pixels within which a line is meant. */
+const REACH = 9;
+
+/** @returns {ViewJson | undefined} the view under the pointer, else the focused one */
+function targetView() {
+	const letter = pointerPlace.value?.letter ?? focused.value;
+	return group.value?.views.find((view) => view.letter === letter);
+}
+
+/** Begin to draw; the marking of the selected point is gone on with, else one chooses. @param {string} [letter] */
+export function startDrawing(letter) {
+	const view = letter ? group.value?.views.find((one) => one.letter === letter) : targetView();
+	if (!view) return;
+	focused.value = view.letter;
+	const object = selected.value;
+	const goesOn = object?.kind === 'point' && object.view === view.key;
+	drawing.value = goesOn ? { view: view.key, what: 'line', marking: object.marking }
+		: { view: view.key, what: 'ask', marking: '' };
+}
+
+/** Stop drawing. */
+export function endDrawing() {
+	drawing.value = null;
+}
+
+/** What is drawn was chosen: the ball where the pointer is, a marking click by click. @param {string | null} marking null: the ball */
+export function chooseDrawing(marking) {
+	const present = drawing.value;
+	const view = group.value?.views.find(({ key }) => key === present?.view);
+	if (!view) return;
+	if (marking === null) {
+		drawing.value = { view: view.key, what: 'ball', marking: '' };
+		const over = pointerPlace.value;
+		// Where the pointer is not over the view, a click says where.
+		if (over?.view === view.key) drawAt(view, over.at);
+		else announce('Click where the ball is, or press Enter.');
+		return;
+	}
+	drawing.value = { view: view.key, what: 'line', marking };
+	announce(`Drawing ${marking}. Click, or press Enter, to add a point; Escape ends.`);
+}
+
+/** Draw what is being drawn at a place of a view. @param {ViewJson} view @param {PointJson} at */
+export function drawAt(view, at) {
+	const present = drawing.value;
+	if (!present || present.view !== view.key || !group.value || !within(view, at)) return;
+	if (present.what === 'ball') {
+		submit(newBall(view, at, expectedDiameter(group.value, solution.value, view)));
+		selected.value = { kind: 'ball', view: view.key };
+		drawing.value = null;
+	} else if (present.what === 'line') {
+		putPoint(view, present.marking, at);
+	}
+}
+
+/** Draw at the pointer, else in the middle of what the view shows. */
+export function drawHere() {
+	const view = group.value?.views.find(({ key }) => key === drawing.value?.view);
+	if (!view) return;
+	const over = pointerPlace.value;
+	drawAt(view, over?.view === view.key ? over.at : likelyPlace(view));
+}
+
+/** Where a person without a pointer begins: at the 3D ball, else in the middle. @param {ViewJson} view */
+function likelyPlace(view) {
+	const fit = solution.value?.views.find((solved) => solved.view === view.key)?.ball;
+	if (drawing.value?.what === 'ball' && fit?.reprojected) return { x: fit.reprojected[0], y: fit.reprojected[1] };
+	return { x: (view.width - 1) / 2, y: (view.height - 1) / 2 };
+}
+
+/**
+ * Put a point on the line under a place.
+ *
+ * @param {ViewJson} view @param {Viewport} viewport @param {ScreenPoint} place
+ */
+export function insertAt(view, viewport, place) {
+	const at = toImage(viewport, place);
+	const marking = markingAt(view, at, REACH / viewport.scale);
+	if (marking) putPoint(view, marking, at);
+	else announce('There is no line here.');
+}
+
+/** @param {ViewJson} view @param {string} marking @param {PointJson} at */
+function putPoint(view, marking, at) {
+	const { edit, index } = addPoint(view, marking, at);
+	submit(edit);
+	selected.value = { kind: 'point', view: view.key, marking, index };
+}
+
+/** @param {ViewJson} view @param {PointJson} at */
+function within(view, { x, y }) {
+	return x >= -0.5 && y >= -0.5 && x <= view.width - 0.5 && y <= view.height - 0.5;
+}

@@ -1,0 +1,36 @@
+// @ts-check
+/** Values that a dataset has, for completion: its splits, matches and reviewers. */
+
+import { signal } from '@preact/signals';
+
+import { getReviewers } from '../api/queue.js';
+import { ApiError } from '../api/problem.js';
+import { getStatistics } from '../api/statistics.js';
+import { dataset } from './datasets.js';
+
+/** @import {Facets} from './completion.js' */
+
+export const facets = signal(/** @type {Facets} */ ({}));
+
+let known = 0;
+
+/** Read them, once for each dataset. */
+export async function loadFacets() {
+	const one = dataset.value;
+	if (!one || known === one.id) return;
+	known = one.id;
+	facets.value = {};
+	try {
+		const [statistics, reviewers] = await Promise.all([getStatistics(one.id, ''), getReviewers(one.id)]);
+		if (known !== one.id) return;
+		facets.value = {
+			split: statistics.splits.map(({ split }) => split),
+			match: statistics.matches.map(({ match }) => match),
+			reviewer: reviewers.items.map(({ name }) => name),
+		};
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		// Completion does without; the next focus tries again.
+		known = 0;
+	}
+}

@@ -1,0 +1,52 @@
+// @ts-check
+/** What can be imported, and what each format does not say itself. */
+
+/** @typedef {{name: string, label: string, hint: string, kind: 'size' | 'calibration' | 'offset' | 'cameras'}} FormatOption */
+/** @typedef {{name: string, label: string, note: string, options: FormatOption[], lines?: boolean}} ImportFormat   `lines`: static cameras, whose lines are files of their own */
+
+/** @type {FormatOption} */
+const CALIBRATION = { name: 'calibration', label: 'Where there are a given camera and lines', hint: 'which of them counts', kind: 'calibration' };
+/** @type {FormatOption} */
+const SIZE = { name: 'size', label: 'Size of the images', hint: 'width x height, for example 960x540; empty: the usual one', kind: 'size' };
+/** @type {FormatOption[]} */
+const STATIC = [
+	CALIBRATION, SIZE,
+	{ name: 'frame_offset', label: 'Frame offset', hint: 'number in the ground truth minus number in the video: 8, or by camera 1:8,2:9', kind: 'offset' },
+	{ name: 'flipped', label: 'Mirrored cameras', hint: 'numbers, for example 2,6', kind: 'cameras' },
+];
+
+/** @type {ImportFormat[]} */
+export const IMPORT_FORMATS = [
+	{ name: 'soccernet-v3', label: 'SoccerNet-v3', note: 'a tree or zip with Labels-v3.json', options: [] },
+	{ name: 'soccernet-v3d', label: 'SoccerNet-v3D', note: 'Labels-v3D.json or SNv3D.csv with its splits', options: [CALIBRATION] },
+	{ name: 'issia', label: 'ISSIA', note: 'XGTF ground truth of the static cameras', options: STATIC, lines: true },
+	{ name: 'issia-3d', label: 'ISSIA-3D', note: 'ISSIA-3D.csv and issia_calibration.json', options: STATIC, lines: true },
+	{ name: 'sn-calibration', label: 'sn-calibration', note: 'one line JSON for each frame', options: [CALIBRATION, SIZE] },
+	{ name: 'cameras', label: 'Cameras', note: 'camera JSON for frames that are there', options: [] },
+	{ name: 'gamestate', label: 'sn-gamestate', note: 'Labels-GameState.json', options: [CALIBRATION] },
+	{ name: 'coco', label: 'COCO', note: 'as Touchline exports it', options: [CALIBRATION] },
+	{ name: 'parquet', label: 'Parquet', note: 'as Touchline exports it', options: [] },
+];
+
+/**
+ * What a person typed, as the server wants it; what cannot be read goes as it is, and the
+ * server says what is wrong with it.
+ *
+ * @param {FormatOption} option @param {string} text
+ * @returns {unknown} undefined: nothing was said
+ */
+export function optionValue({ kind }, text) {
+	const said = text.trim();
+	if (!said) return undefined;
+	if (kind === 'size') {
+		const found = /^(\d+)\s*[x×,]\s*(\d+)$/.exec(said);
+		return found ? [Number(found[1]), Number(found[2])] : said;
+	}
+	if (kind === 'cameras') return said.split(/[\s,]+/).map((one) => (/^\d+$/.test(one) ? Number(one) : one));
+	if (kind === 'offset') {
+		if (/^-?\d+$/.test(said)) return Number(said);
+		const pairs = said.split(/[\s,]+/).map((pair) => pair.split(':'));
+		return Object.fromEntries(pairs.map(([camera, offset]) => [camera, /^-?\d+$/.test(offset ?? '') ? Number(offset) : offset ?? null]));
+	}
+	return said;
+}

@@ -1,0 +1,115 @@
+// @ts-check
+/**
+ * What the server can say about a group beyond its solution: what would make it pass, and how
+ * much each marking matters. Asked for once a person stays with a group, and kept for its state.
+ */
+
+import { effect, signal, untracked } from '@preact/signals';
+
+import { request } from '../api/client.js';
+import { ApiError } from '../api/problem.js';
+import { document, isPreview } from './group.js';
+import { focused } from './workspace.js';
+
+/** @import {FixJson, GroupDocument} from '../api/types.js' */
+
+/**
+ * @typedef {object} Remedy
+ * @property {string} gate
+ * @property {string | null} view
+ * @property {string} sentence
+ * @property {FixJson} edit
+ * @property {number | null} value of the gate with the edit
+ * @property {boolean} passes whether the whole group would pass
+ */
+/**
+ * @typedef {object} Influence what the view would be without a marking
+ * @property {string} marking
+ * @property {Record<string, number>} jac
+ * @property {Record<string, number> | null} jac_without
+ * @property {number | null} largest_px
+ * @property {number | null} largest_px_without
+ */
+/** @template T @typedef {{key: string, items: T[]}} Known   key: what was asked about */
+
+/** People who go through easy groups stay shorter than this. */
+const STAY = 350;
+const KEPT = 40;
+
+/** What would make the group on screen pass; null until it is known. */
+export const remedies = signal(/** @type {Known<Remedy> | null} */ (null));
+/** How much each marking of the focused view matters; null until it is known. */
+export const influence = signal(/** @type {Known<Influence> | null} */ (null));
+
+/** @type {Map<string, Known<any>>} */
+const kept = new Map();
+/** Addresses that this server does not have. @type {Set<string>} */
+const absent = new Set();
+
+/**
+ * @param {'remedies' | 'influence'} what @param {string} path @param {string} key @param {AbortSignal} signal
+ * @returns {Promise<Known<any> | null>}
+ */
+async function ask(what, path, key, signal) {
+	const present = kept.get(key);
+	if (present || absent.has(what)) return present ?? null;
+	try {
+		const found = { key, items: (await request(path, { signal })).items };
+		kept.set(key, found);
+		const oldest = kept.keys().next().value;
+		if (kept.size > KEPT && oldest !== undefined) kept.delete(oldest);
+		return found;
+	} catch (error) {
+		if (signal.aborted) return null;
+		if (!(error instanceof ApiError)) throw error;
+		if (error.status === 404 || error.status === 405) absent.add(what);
+		return null;
+	}
+}
+
+/** Whether a person would want to know what to do about it. @param {GroupDocument} group */
+function needsHelp({ solution }) {
+	return solution !== null && (!solution.passes || solution.views.some(({ failed }) => failed !== null));
+}
+
+/**
+ * Ask after a while, unless the group has changed by then.
+ *
+ * @template T
+ * @param {'remedies' | 'influence'} what @param {string} path @param {string} key
+ * @param {import('@preact/signals').Signal<Known<T> | null>} into
+ */
+function askLater(what, path, key, into) {
+	const controller = new AbortController();
+	if (into.value?.key !== key) into.value = kept.get(key) ?? null;
+	const timer = setTimeout(async () => {
+		const found = await ask(what, path, key, controller.signal);
+		if (found && !controller.signal.aborted) into.value = found;
+	}, STAY);
+	return () => {
+		clearTimeout(timer);
+		controller.abort();
+	};
+}
+
+/** Follow the group and the view that the person looks at. */
+export function startInsight() {
+	effect(() => {
+		const at = document.value;
+		if (!at || isPreview.value || !needsHelp(at)) {
+			remedies.value = null;
+			return undefined;
+		}
+		return untracked(() => askLater('remedies', `/groups/${at.id}/remedies`, `remedies ${at.id} ${at.etag}`, remedies));
+	});
+	effect(() => {
+		const at = document.value;
+		const view = at?.views.find(({ letter }) => letter === focused.value);
+		const solved = at?.solution?.views.find((one) => one.view === view?.key);
+		if (!at || !view || isPreview.value || !solved?.calibration.camera || Object.keys(view.lines).length === 0) {
+			influence.value = null;
+			return undefined;
+		}
+		return untracked(() => askLater('influence', `/views/${view.id}/influence`, `influence ${view.id} ${at.etag}`, influence));
+	});
+}

@@ -1,0 +1,77 @@
+// @ts-check
+/** Jobs as they stand: told by the server, asked for where it cannot tell. */
+
+import { connected, listen } from '../api/events.js';
+import { getJob } from '../api/jobs.js';
+import { ApiError } from '../api/problem.js';
+
+/** @import {JobJson} from '../api/jobs.js' */
+
+const ASK = 700;
+const ASK_ALL_THE_SAME = 4000;
+
+/** @param {JobJson} job */
+export function isOver(job) {
+	return job.state === 'done' || job.state === 'failed' || job.state === 'cancelled';
+}
+
+/** How far a job is, 0 to 1; null while nobody knows. @param {JobJson} job */
+export function shareOf(job) {
+	if (job.state === 'done') return 1;
+	return job.total ? Math.min(1, job.done / job.total) : null;
+}
+
+/**
+ * Follow a job to its end.
+ *
+ * @param {JobJson} job @param {(job: JobJson) => void} seen each time it has moved
+ * @param {AbortSignal} [signal]
+ * @returns {Promise<JobJson>} the job when it is over
+ */
+export async function follow(job, seen, signal) {
+	let present = job;
+	let wake = () => {};
+	const stop = listen('job', (/** @type {JobJson} */ told) => {
+		if (told.id !== job.id || isOver(present)) return;
+		present = told;
+		seen(present);
+		wake();
+	});
+	seen(present);
+	try {
+		while (!isOver(present) && !signal?.aborted) {
+			const pause = connected.value ? ASK_ALL_THE_SAME : ASK;
+			await new Promise((resolve) => { wake = () => resolve(null); setTimeout(wake, pause); });
+			if (isOver(present) || signal?.aborted) break;
+			present = await asked(present, signal);
+			seen(present);
+		}
+	} finally {
+		stop();
+	}
+	return present;
+}
+
+/** The job as the server knows it; unchanged while it cannot be reached. @param {JobJson} job @param {AbortSignal} [signal] */
+async function asked(job, signal) {
+	try {
+		return await getJob(job.id, signal);
+	} catch (error) {
+		if (signal?.aborted || (error instanceof ApiError && error.status === 0)) return job;
+		throw error;
+	}
+}
+
+/**
+ * The result of a request that may have started a job.
+ *
+ * @param {any} answer a job, or the result itself
+ * @param {(job: JobJson) => void} [seen]
+ * @returns {Promise<any>}
+ */
+export async function resultOf(answer, seen = () => {}) {
+	if (!answer || typeof answer.kind !== 'string' || typeof answer.state !== 'string') return answer;
+	const over = await follow(answer, seen);
+	if (over.state === 'done') return over.result;
+	throw new Error(over.problem?.detail ?? `The job was ${over.state}.`);
+}

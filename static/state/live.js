@@ -1,0 +1,59 @@
+// @ts-check
+/** What changes elsewhere appears here: in another window, by another person, from a script. */
+
+import { effect, signal, untracked } from '@preact/signals';
+
+import { listen } from '../api/events.js';
+import { ApiError } from '../api/problem.js';
+import { page } from '../lib/router.js';
+import { forget, known, load } from './documents.js';
+import { document, draft, renew } from './group.js';
+import { announce } from './notice.js';
+import { outbox } from './outbox.js';
+
+/** @typedef {{group: number, etag: string | null, actor: string | null}} Told */
+
+/** The last change of the group on screen that was made elsewhere. */
+export const changedElsewhere = signal(/** @type {{group: number, actor: string | null, at: number} | null} */ (null));
+
+/** What was told of the group on screen and is not shown yet. @type {Told | null} */
+let open = null;
+
+/** @param {Told} told */
+function heard(told) {
+	const present = known(told.group);
+	if (!present || present.etag === told.etag) return;
+	if (told.group !== document.value?.id) {
+		forget(told.group);
+		return;
+	}
+	open = told;
+	catchUp();
+}
+
+/** Show what was told, once the person has nothing in hand and nothing on its way. */
+async function catchUp() {
+	const told = open;
+	const at = document.value;
+	if (!told || !at || draft.value || outbox.value.some(({ group, held }) => group === at.id && !held)) return;
+	open = null;
+	if (told.group !== at.id || told.etag === at.etag) return;
+	try {
+		const newer = await load(told.group);
+		if (newer.etag === at.etag) return;
+		renew(newer);
+		changedElsewhere.value = { group: at.id, actor: told.actor, at: Date.now() };
+		announce('This group was changed elsewhere and is shown as it is now.');
+	} catch (error) {
+		// The next visit reads it again.
+		if (!(error instanceof ApiError)) throw error;
+	}
+}
+
+/** Listen while a group is on screen. */
+export function startLive() {
+	effect(() => (page.value.page === 'review' ? untracked(() => listen('group', heard)) : undefined));
+	effect(() => {
+		if (draft.value === null && outbox.value && document.value) untracked(catchUp);
+	});
+}

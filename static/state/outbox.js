@@ -1,0 +1,116 @@
+// @ts-check
+/**
+ * Writes that the server has not answered yet. They are kept in the browser's database until it
+ * has, so that neither a lost network nor a reload loses one.
+ */
+
+import { signal } from '@preact/signals';
+import { openDB } from 'idb';
+
+import { idempotencyKey } from '../api/client.js';
+
+/** @import {BallJson, PointJson, VerdictJson} from '../api/types.js' */
+/** @import {Edit} from './edits.js' */
+
+/** @typedef {{state: string, reason: string | null, note: string | null}} Verdict */
+/** @typedef {{lines: Record<string, PointJson[] | null>, balls: BallJson[], included: boolean, verdict: VerdictJson}} Base */
+/**
+ * @typedef {object} Item
+ * @property {string} id idempotency key: sent twice it counts once
+ * @property {string} tab the tab that looks after it
+ * @property {number} at when it was made, for the order
+ * @property {number} group
+ * @property {string} path
+ * @property {'PATCH' | 'PUT' | 'POST'} method
+ * @property {unknown} body
+ * @property {string} etag the state that it builds on
+ * @property {number | null} station the static camera whose state that is, else the group's
+ * @property {Edit | null} edit
+ * @property {Verdict | null} verdict
+ * @property {Base | null} base what the edit or verdict found
+ * @property {boolean} held somebody else was first; it waits for the person to choose
+ */
+
+const STORE = 'writes';
+
+/** Those of this tab, in their order. */
+export const outbox = signal(/** @type {Item[]} */ ([]));
+/** Whether what waits would survive the end of the page. */
+export const lasting = signal(true);
+
+const tab = idempotencyKey();
+
+/** @type {Promise<import('idb').IDBPDatabase | null> | null} */
+let opened = null;
+
+/** The database; null where the browser has none for us. */
+function database() {
+	opened ??= openDB('touchline', 1, {
+		upgrade: (db) => { db.createObjectStore(STORE, { keyPath: 'id' }); },
+	}).catch(() => {
+		lasting.value = false;
+		return null;
+	});
+	return opened;
+}
+
+/** @param {(db: import('idb').IDBPDatabase) => Promise<unknown>} work */
+async function inDatabase(work) {
+	const db = await database();
+	if (db) await work(db).catch(() => { lasting.value = false; });
+}
+
+/** Put a write last. @param {Omit<Item, 'id' | 'tab' | 'at' | 'held'>} write @returns {Item} */
+export function enqueue(write) {
+	const at = performance.timeOrigin + performance.now();
+	const item = { ...write, id: idempotencyKey(), tab, at, held: false };
+	outbox.value = [...outbox.value, item];
+	inDatabase((db) => db.put(STORE, item));
+	return item;
+}
+
+/** Change some writes. @param {(item: Item) => Item} change the same value where nothing changes */
+export function revise(change) {
+	const next = outbox.value.map(change);
+	const changed = next.filter((item, i) => item !== outbox.value[i]);
+	if (changed.length === 0) return;
+	outbox.value = next;
+	inDatabase((db) => Promise.all(changed.map((item) => db.put(STORE, item))));
+}
+
+/** Forget writes. @param {(item: Item) => boolean} which */
+export function discard(which) {
+	const gone = outbox.value.filter(which);
+	if (gone.length === 0) return;
+	outbox.value = outbox.value.filter((item) => !gone.includes(item));
+	inDatabase((db) => Promise.all(gone.map(({ id }) => db.delete(STORE, id))));
+}
+
+/** Say that this tab lives, so that no other sends what it looks after. */
+export function claimTab() {
+	navigator.locks?.request(lockOf(tab), () => new Promise(() => {}));
+}
+
+/**
+ * Take over what tabs have left that are gone, a reload's predecessor among them.
+ *
+ * @returns {Promise<number>} how many
+ */
+export async function adopt() {
+	const db = await database();
+	const kept = /** @type {Item[]} */ ((await db?.getAll(STORE).catch(() => [])) ?? []);
+	const held = (await navigator.locks?.query())?.held ?? [];
+	const alive = new Set(held.map(({ name }) => name));
+	const own = new Set(outbox.value.map(({ id }) => id));
+	const orphans = kept.filter((item) => item.tab !== tab && !own.has(item.id) && !alive.has(lockOf(item.tab)));
+	if (orphans.length === 0) return 0;
+	const adopted = orphans.map((item) => ({ ...item, tab })).sort((a, b) => a.at - b.at);
+	outbox.value = [...adopted, ...outbox.value];
+	await inDatabase((one) => Promise.all(adopted.map((item) => one.put(STORE, item))));
+	return adopted.length;
+}
+
+/** @param {string} name */
+function lockOf(name) {
+	return `touchline-tab-${name}`;
+}

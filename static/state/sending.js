@@ -1,0 +1,105 @@
+// @ts-check
+/** One write after the other to the server: each needs the state that the one before has made. */
+
+import { computed, signal } from '@preact/signals';
+
+import { request } from '../api/client.js';
+import { ApiError } from '../api/problem.js';
+import { adopt, claimTab, outbox } from './outbox.js';
+
+/** @import {GroupDocument} from '../api/types.js' */
+/** @import {Item} from './outbox.js' */
+
+/**
+ * @typedef {object} Receiver who hears what became of a write
+ * @property {(item: Item, answer: GroupDocument) => void} delivered
+ * @property {(item: Item, error: ApiError) => void} refused
+ */
+
+/** Proxies answer so while the server behind them is away. */
+const AWAY = new Set([0, 502, 504]);
+const FIRST_RETRY = 1500;
+const LAST_RETRY = 30_000;
+
+/** Whether the server could not be reached when it was last asked for a write. */
+export const isAway = signal(false);
+/** Whether a write is on its way now. */
+export const isSending = signal(false);
+/** When the last write was answered, ms. */
+export const savedAt = signal(/** @type {number | null} */ (null));
+/** Whether the last answer was a refusal. */
+export const wasRefused = signal(false);
+
+/** Writes that wait for the server, and not for the person. */
+export const waiting = computed(() => outbox.value.filter(({ held }) => !held));
+
+/** @type {Receiver} */
+let receiver = { delivered: () => {}, refused: () => {} };
+/** @type {ReturnType<typeof setTimeout> | undefined} */
+let timer;
+let pause = FIRST_RETRY;
+
+/** @param {Receiver} one */
+export function hearFrom(one) {
+	receiver = one;
+}
+
+/** Look after what waits, now and from now on; takes over what an earlier page has left. */
+export function startSending() {
+	claimTab();
+	addEventListener('online', takeUp);
+	takeUp();
+	// The page before this one may not be quite gone yet.
+	setTimeout(takeUp, 2000);
+}
+
+async function takeUp() {
+	await adopt();
+	pause = FIRST_RETRY;
+	wake();
+}
+
+/** Send what waits, unless that is being done. */
+export async function wake() {
+	clearTimeout(timer);
+	if (isSending.value) return;
+	isSending.value = true;
+	try {
+		for (let next = waiting.value[0]; next; next = waiting.value[0]) {
+			if (!(await send(next))) break;
+		}
+	} finally {
+		isSending.value = false;
+	}
+}
+
+/** @param {Item} item @returns {Promise<boolean>} false when the server is away */
+async function send({ id, path, method, body, etag, ...rest }) {
+	const item = { id, path, method, body, etag, ...rest };
+	try {
+		const answer = await request(path, { method, body, etag, key: id });
+		isAway.value = false;
+		wasRefused.value = false;
+		savedAt.value = Date.now();
+		pause = FIRST_RETRY;
+		receiver.delivered(item, answer);
+		return true;
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		if (AWAY.has(error.status)) {
+			tryLater();
+			return false;
+		}
+		isAway.value = false;
+		wasRefused.value = true;
+		receiver.refused(item, error);
+		return true;
+	}
+}
+
+function tryLater() {
+	isAway.value = true;
+	// Where the browser knows that there is no network it will say when there is.
+	if (navigator.onLine) timer = setTimeout(wake, pause);
+	pause = Math.min(LAST_RETRY, 2 * pause);
+}

@@ -1,0 +1,37 @@
+// @ts-check
+/** Other thresholds tried out: what they would let through, as fast as they are moved. */
+
+import { useEffect, useMemo, useState } from 'preact/hooks';
+
+import { askYield } from '../api/policies.js';
+import { ApiError } from '../api/problem.js';
+import { latest } from '../lib/latest.js';
+
+/** @import {Values, YieldJson} from '../api/policies.js' */
+
+/** One frame: the newest position of a slider is asked for, the ones before it are not. */
+const PAUSE = 16;
+
+/**
+ * The yield of the thresholds that are on screen; the last answer stays until the next.
+ *
+ * @param {number} dataset @param {Values} values those that differ from the saved policy
+ * @param {string} hash of the saved policy
+ * @returns {{answer: YieldJson | null, error: ApiError | null}}
+ */
+export function useWhatIf(dataset, values, hash) {
+	const [state, setState] = useState(/** @type {{answer: YieldJson | null, error: ApiError | null}} */ ({ answer: null, error: null }));
+	const asking = useMemo(() => latest(PAUSE, async (/** @type {Values} */ asked, signal) => {
+		try {
+			const answer = await askYield(dataset, asked, signal);
+			if (!signal.aborted) setState({ answer, error: null });
+		} catch (error) {
+			if (signal.aborted) return;
+			if (!(error instanceof ApiError)) throw error;
+			setState((before) => ({ ...before, error }));
+		}
+	}), [dataset]);
+	useEffect(() => { asking.run(values); }, [asking, values, hash]);
+	useEffect(() => () => asking.cancel(), [asking]);
+	return state;
+}

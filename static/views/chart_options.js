@@ -1,0 +1,98 @@
+// @ts-check
+/** How a chart is drawn. */
+
+/** @import uPlot from 'uplot' */
+/** @import {ChartColour} from '../lib/chart_colours.js' */
+/** @import {ChartProps, Curve} from './chart.js' */
+
+const FONT = '12px Inter, system-ui, "DejaVu Sans", sans-serif';
+
+/** @typedef {{current: ChartProps}} Props */
+
+/** @param {Curve} curve @param {Record<ChartColour, string>} colours @returns {uPlot.Series} */
+function seriesOf({ label, colour, dash, points }, colours) {
+	const stroke = colours[colour];
+	if (points) return { label, stroke, paths: () => null, points: { show: true, size: 7, fill: stroke, stroke } };
+	return { label, stroke, width: 2, dash, spanGaps: true, points: { show: false } };
+}
+
+/** @param {string} label @param {Record<ChartColour, string>} colours @returns {uPlot.Axis} */
+function axis(label, colours) {
+	const lines = { stroke: colours['chart-grid'], width: 1 };
+	return { label, labelFont: FONT, font: FONT, stroke: colours.muted, labelSize: 20, grid: lines, ticks: { ...lines, size: 4 } };
+}
+
+/** The vertical line of a threshold, and the intervals of the values. @param {uPlot} plot @param {ChartProps} props @param {Record<ChartColour, string>} colours */
+function drawOver(plot, { marker, curves }, colours) {
+	const { ctx, bbox } = plot;
+	ctx.save();
+	curves.forEach((curve) => drawIntervals(plot, curve, colours[curve.colour]));
+	if (marker !== null && marker !== undefined) {
+		const left = plot.valToPos(marker, 'x', true);
+		ctx.strokeStyle = colours.bad;
+		ctx.lineWidth = 1.5 * devicePixelRatio;
+		ctx.setLineDash([5 * devicePixelRatio, 4 * devicePixelRatio]);
+		ctx.beginPath();
+		ctx.moveTo(left, bbox.top);
+		ctx.lineTo(left, bbox.top + bbox.height);
+		ctx.stroke();
+	}
+	ctx.restore();
+}
+
+/** @param {uPlot} plot @param {Curve} curve @param {string} colour */
+function drawIntervals(plot, { low, high }, colour) {
+	if (!low || !high) return;
+	const { ctx, data } = plot;
+	ctx.strokeStyle = colour;
+	ctx.lineWidth = devicePixelRatio;
+	ctx.setLineDash([]);
+	ctx.beginPath();
+	data[0].forEach((place, index) => {
+		const [from, to] = [low[index], high[index]];
+		if (from === null || from === undefined || to === null || to === undefined) return;
+		const left = plot.valToPos(place, 'x', true);
+		ctx.moveTo(left, plot.valToPos(from, 'y', true));
+		ctx.lineTo(left, plot.valToPos(to, 'y', true));
+	});
+	ctx.stroke();
+}
+
+/** @param {[number | null, number | null] | undefined} asked @param {number} low @param {number} high @returns {uPlot.Range.MinMax} */
+function rangeY(asked, low, high) {
+	const room = high > low ? (high - low) * 0.06 : Math.max(1, Math.abs(high) * 0.1);
+	return [asked?.[0] ?? low - room, asked?.[1] ?? high + room];
+}
+
+/**
+ * @param {Props} props always the newest, so that a change needs no new plot
+ * @param {{width: number, height: number, colours: Record<ChartColour, string>, setAt: (at: number | null) => void}} frame
+ * @returns {uPlot.Options}
+ */
+export function chartOptions(props, { width, height, colours, setAt }) {
+	const { curves, xLabel, yLabel } = props.current;
+	return {
+		width,
+		height,
+		legend: { show: false },
+		padding: [10, 12, 0, 0],
+		cursor: { y: false, drag: { x: false, y: false }, points: { size: 6 } },
+		scales: {
+			x: { time: false, range: (_plot, low, high) => props.current.xRange ?? [low, high > low ? high : low + 1] },
+			y: { range: (_plot, low, high) => rangeY(props.current.yRange, low ?? 0, high ?? 1) },
+		},
+		axes: [{ ...axis(xLabel, colours), size: 34 }, { ...axis(yLabel, colours), size: 52 }],
+		series: [{}, ...curves.map((curve) => seriesOf(curve, colours))],
+		hooks: {
+			draw: [(plot) => drawOver(plot, props.current, colours)],
+			setCursor: [(plot) => setAt(plot.cursor.idx ?? null)],
+			ready: [(plot) => {
+				plot.over.addEventListener('click', () => {
+					const { idx, top } = plot.cursor;
+					if (idx === null || idx === undefined) return;
+					props.current.onPick?.(idx, top === undefined ? null : plot.posToVal(top, 'y'));
+				});
+			}],
+		},
+	};
+}

@@ -1,0 +1,76 @@
+// @ts-check
+/** Whose edit counts: before, theirs and mine of everything that I changed. It blocks nothing. */
+
+import { html } from 'htm/preact';
+
+import { ballCenter } from '../geometry/preview.js';
+import { fixed, pixels } from '../lib/format.js';
+import { conflict, keepMine, mergeBoth, takeTheirs } from '../state/conflict.js';
+
+/** @import {BallJson, PointJson} from '../api/types.js' */
+/** @import {Field} from '../state/conflict.js' */
+
+/**
+ * One side of a field, in words.
+ *
+ * @param {Field} field @param {any} value @param {any} base
+ * @returns {string}
+ */
+function wordsFor(field, value, base) {
+	if (field.verdict) return value?.state ?? '';
+	if (field.key.startsWith('include')) return value ? 'used' : 'left out';
+	if (field.key.startsWith('ball')) return ballWords(value?.[0], base?.[0]);
+	return lineWords(value, base);
+}
+
+/** @param {BallJson | undefined} ball @param {BallJson | undefined} base */
+function ballWords(ball, base) {
+	const center = ball && ballCenter(ball);
+	if (!ball || !center) return ball?.out_of_view ? 'out of view' : 'no ball';
+	const size = ball.box ? `Ø ${fixed((ball.box[2] + ball.box[3]) / 2, 1)} px` : 'point';
+	const from = base && base !== ball ? ballCenter(base) : null;
+	const moved = from ? Math.hypot(center.x - from.x, center.y - from.y) : 0;
+	const hidden = ball.occluded ? ', occluded' : '';
+	return `${size}${moved > 0.005 ? `, moved ${pixels(moved)} px` : ''}${hidden}`;
+}
+
+/** @param {PointJson[] | null} points @param {PointJson[] | null} base */
+function lineWords(points, base) {
+	if (!points) return 'not drawn';
+	const count = `${points.length} ${points.length === 1 ? 'point' : 'points'}`;
+	if (!base || base === points || base.length !== points.length) return count;
+	const moved = Math.max(...points.map((point, i) => Math.hypot(point.x - base[i].x, point.y - base[i].y)));
+	return moved > 0.005 ? `${count}, moved ${pixels(moved)} px` : count;
+}
+
+/** @param {{field: Field}} props */
+function FieldRow({ field }) {
+	return html`
+		<tr data-overlaps=${field.overlaps}>
+			<th scope="row">${field.name}</th>
+			<td>${wordsFor(field, field.base, null)}</td>
+			<td>${wordsFor(field, field.theirs, field.base)}</td>
+			<td>${wordsFor(field, field.mine, field.base)}</td>
+			<td>${field.overlaps ? 'both changed it' : 'only you changed it'}</td>
+		</tr>
+	`;
+}
+
+export function ConflictBar() {
+	const present = conflict.value;
+	if (!present) return null;
+	return html`
+		<section class="bar conflict" data-tone="warn" role="alert" aria-label="Conflict">
+			<div class="conflict__words">
+				<p><strong>Somebody else changed this group first.</strong> Theirs is drawn, yours is dotted beside it and kept until you choose.</p>
+				<table class="conflict__fields">
+					<thead><tr><th scope="col">what</th><th scope="col">before</th><th scope="col">theirs</th><th scope="col">yours</th><th scope="col"><span class="hidden-text">overlap</span></th></tr></thead>
+					<tbody>${present.fields.map((field) => html`<${FieldRow} key=${field.key} field=${field} />`)}</tbody>
+				</table>
+			</div>
+			<button class="button button--primary" type="button" onClick=${keepMine}>Keep mine</button>
+			<button class="button" type="button" onClick=${takeTheirs}>Take theirs</button>
+			${present.mergeable ? html`<button class="button" type="button" onClick=${mergeBoth}>Merge what does not overlap</button>` : null}
+		</section>
+	`;
+}

@@ -1,0 +1,56 @@
+// @ts-check
+/** Deleting a dataset: only whoever types its name means it. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { deleteDataset, previewDeletion } from '../api/datasets.js';
+import { count, words } from '../lib/format.js';
+import { sentenceOf, useResource } from '../lib/resource.js';
+import { loadDatasets } from '../state/datasets.js';
+import { announce } from '../state/notice.js';
+import { FormDialog } from './dialog.js';
+
+/** @import {DatasetJson} from '../api/types.js' */
+
+/** @param {{one: DatasetJson, onClose: () => void}} props */
+export function DeleteDataset({ one, onClose }) {
+	const [typed, setTyped] = useState('');
+	const [state, setState] = useState({ busy: false, error: '' });
+	const preview = useResource((signal) => previewDeletion(one.id, signal), [one.id]);
+	const counts = Object.entries(preview.value?.counts ?? {}).filter(([, n]) => n > 0);
+	const meant = typed === one.name;
+	async function send() {
+		if (!meant || state.busy) return;
+		setState({ busy: true, error: '' });
+		try {
+			await deleteDataset(one.id, typed);
+			await loadDatasets();
+			announce(`Dataset ${one.name} is deleted.`);
+			onClose();
+		} catch (error) {
+			setState({ busy: false, error: sentenceOf(error) });
+		}
+	}
+	return html`
+		<${FormDialog}
+			title=${`Delete ${one.name}?`} onClose=${onClose} onSubmit=${send}
+			buttons=${html`
+				<button
+					class="button button--danger" type="submit" aria-disabled=${!meant || state.busy}
+					title=${meant ? '' : 'Type the name of the dataset first'}
+				>${state.busy ? 'Deleting…' : 'Delete for good'}</button>`}
+		>
+			<p><strong>${one.name}</strong> goes with every edit, verdict, frozen version, prediction and evaluation. Frames on disk stay. This cannot be undone.</p>
+			${counts.length ? html`<dl class="number-list">${counts.map(([name, n]) => html`<div key=${name}><dt>${words(name)}</dt><dd>${count(n)}</dd></div>`)}</dl>` : null}
+			<div class="form__row">
+				<label for="delete-name">Type <strong>${one.name}</strong> to go on</label>
+				<input
+					class="field" id="delete-name" autocomplete="off" spellcheck=${false} value=${typed}
+					onInput=${(/** @type {InputEvent} */ event) => setTyped(/** @type {HTMLInputElement} */ (event.target).value)}
+				/>
+			</div>
+			${state.error ? html`<p class="form__error" role="alert">${state.error}</p>` : null}
+		<//>
+	`;
+}

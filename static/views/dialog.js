@@ -1,0 +1,39 @@
+// @ts-check
+/** A dialog that asks: title, form, buttons. */
+
+import { html } from 'htm/preact';
+import { useEffect, useRef } from 'preact/hooks';
+
+/** @import {ComponentChildren} from 'preact' */
+
+/**
+ * @param {{
+ *   title: string, onClose: () => void, onSubmit: (form: FormData) => void,
+ *   buttons: ComponentChildren, wide?: boolean, children?: ComponentChildren
+ * }} props
+ */
+export function FormDialog({ title, onClose, onSubmit, buttons, wide = false, children }) {
+	const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
+	useEffect(() => {
+		dialog.current?.showModal();
+		// The first thing that is asked, not the way out.
+		/** @type {HTMLElement | null | undefined} */ (dialog.current?.querySelector('input:checked, input:not([type="radio"]), select, textarea'))?.focus();
+	}, []);
+	/** @param {SubmitEvent} event */
+	function send(event) {
+		event.preventDefault();
+		onSubmit(new FormData(/** @type {HTMLFormElement} */ (event.currentTarget)));
+	}
+	return html`
+		<dialog class=${wide ? 'dialog dialog--wide' : 'dialog'} ref=${dialog} aria-labelledby="dialog-title" onClose=${onClose}>
+			<form class="form" onSubmit=${send}>
+				<header class="dialog__header">
+					<h2 id="dialog-title">${title}</h2>
+					<button class="button" type="button" onClick=${() => dialog.current?.close()}>Close <kbd>Esc</kbd></button>
+				</header>
+				${children}
+				<p class="dialog__buttons">${buttons}</p>
+			</form>
+		</dialog>
+	`;
+}

@@ -1,0 +1,69 @@
+// @ts-check
+/** The frames behind a number; each opens its group. */
+
+import { html } from 'htm/preact';
+import { useEffect, useState } from 'preact/hooks';
+
+import { getFrames } from '../../api/evaluations.js';
+import { ApiError } from '../../api/problem.js';
+import { count, fixed } from '../../lib/format.js';
+import { sentenceOf } from '../../lib/resource.js';
+import { reviewAddress } from '../../state/navigation.js';
+import { number } from './cell.js';
+
+/** @import {FrameJson, FrameQuery} from '../../api/evaluations.js' */
+
+const COLUMNS = [
+	{ field: 'score', label: 'score' }, { field: 'iou', label: 'IoU' }, { field: 'error_m', label: 'error, m' },
+	{ field: 'error_percent', label: 'error, %' }, { field: 'distance_m', label: 'distance, m' },
+	{ field: 'diameter_px', label: 'Ø, px' }, { field: 'parallax_degrees', label: 'β, °' }, { field: 'predicted_jac', label: 'JaC' },
+];
+
+/** @param {{frame: FrameJson, columns: typeof COLUMNS}} props */
+function Row({ frame, columns }) {
+	return html`
+		<tr>
+			<th scope="row">${frame.group_id > 0 ? html`<a href=${reviewAddress(frame.group_id, '')}>${frame.group}</a>` : frame.group}<small>${frame.view}</small></th>
+			${columns.map(({ field }) => html`<td key=${field} data-numeric="true">${frame[field] === null || frame[field] === undefined ? '–' : number(frame[field])}</td>`)}
+		</tr>
+	`;
+}
+
+/** Pages of frames. @param {number} evaluation @param {FrameQuery} query */
+function useFrames(evaluation, query) {
+	const [state, setState] = useState(/** @type {{items: FrameJson[], next: string | null, total: number, error: ApiError | null}} */ ({ items: [], next: null, total: 0, error: null }));
+	/** @param {FrameJson[]} before @param {string | null} cursor */
+	async function read(before, cursor) {
+		try {
+			const found = await getFrames(evaluation, { ...query, cursor });
+			setState({ items: [...before, ...found.items], next: found.next, total: found.total, error: null });
+		} catch (error) {
+			if (!(error instanceof ApiError)) throw error;
+			setState((old) => ({ ...old, error }));
+		}
+	}
+	useEffect(() => { read([], null); }, [evaluation, JSON.stringify(query)]);
+	return { ...state, more: () => read(state.items, state.next) };
+}
+
+/** @param {{evaluation: number, query: FrameQuery, title: string, sort: (sort: string) => void, onClose: () => void}} props */
+export function FramesCard({ evaluation, query, title, sort, onClose }) {
+	const { items, next, total, error, more } = useFrames(evaluation, query);
+	const columns = COLUMNS.filter(({ field }) => items.some((frame) => frame[field] !== null && frame[field] !== undefined));
+	/** @param {string} field */
+	const turn = (field) => sort(query.sort === `${field}-desc` ? field : `${field}-desc`);
+	return html`
+		<section class="card card--flush" aria-labelledby="frames-title">
+			<h2 id="frames-title">Frames · ${title} <span class="card__aside">${count(total)} <button class="link-button" type="button" onClick=${onClose}>Close<span class="hidden-text"> the frames</span></button></span></h2>
+			${error ? html`<p class="form__error" role="alert">${sentenceOf(error)}</p>` : null}
+			<div class="table__scroll" tabindex="0" role="region" aria-label=${`Frames, ${title}`}>
+				<table class="table">
+					<thead><tr><th>group and view</th>${columns.map(({ field, label }) => html`
+						<th key=${field} data-numeric="true" aria-sort=${query.sort === field ? 'ascending' : query.sort === `${field}-desc` ? 'descending' : 'none'}><button class="table__sort" type="button" onClick=${() => turn(field)}>${label}${query.sort === field ? ' ↑' : query.sort === `${field}-desc` ? ' ↓' : ''}</button></th>`)}</tr></thead>
+					<tbody>${items.map((frame) => html`<${Row} key=${frame.frame_id} frame=${frame} columns=${columns} />`)}</tbody>
+				</table>
+			</div>
+			${next ? html`<p class="yield__note"><button class="button" type="button" onClick=${more}>More frames</button> ${fixed(items.length, 0)} of ${count(total)}</p>` : null}
+		</section>
+	`;
+}

@@ -1,0 +1,122 @@
+// @ts-check
+/** Sets of predictions: uploaded, looked at, accepted, thrown away. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { deletePredictions, postPredictions } from '../../api/evaluations.js';
+import { count, plural } from '../../lib/format.js';
+import { sentenceOf } from '../../lib/resource.js';
+import { FormDialog } from '../dialog.js';
+import { UploadField } from '../source_choice.js';
+import { When } from '../when.js';
+import { AcceptPredictions } from './accept_predictions.js';
+
+/** @import {PredictionSet} from '../../api/evaluations.js' */
+/** @import {UploadJson} from '../../api/imports.js' */
+/** @import {DatasetJson} from '../../api/types.js' */
+
+const FORMATS = [
+	{ name: 'coco', label: 'COCO results', note: 'JSON with boxes and scores' },
+	{ name: 'yolo', label: 'YOLO', note: 'a zip of txt files' },
+	{ name: 'csv', label: 'CSV', note: 'as SNv3D.csv' },
+];
+
+/** @param {{set: PredictionSet}} props */
+function Report({ set }) {
+	const { report } = set;
+	const frames = [...(report.unknown_frames ?? []), ...(report.unknown_cameras ?? [])];
+	const problems = report.problems ?? [];
+	if (frames.length === 0 && problems.length === 0) return null;
+	return html`
+		<details class="prediction-set__report">
+			<summary>${[set.unknown ? plural(set.unknown, 'unknown frame') : '', problems.length ? plural(problems.length + (report.more_problems ?? 0), 'problem') : ''].filter(Boolean).join(', ') || 'Report'}</summary>
+			<ul>
+				${frames.map((one) => html`<li key=${one.frame}><span class="mono">${one.frame}</span> <small class="note">${one.problem}</small></li>`)}
+				${problems.map((/** @type {any} */ one, /** @type {number} */ index) => html`<li key=${index}><span class="mono">${[one.file, one.record, one.field].filter(Boolean).join(' · ')}</span> <small class="note">${one.problem}</small></li>`)}
+			</ul>
+		</details>
+	`;
+}
+
+/** @param {{one: DatasetJson, onClose: () => void, onAdded: () => void}} props */
+function UploadDialog({ one, onClose, onAdded }) {
+	const [name, setName] = useState('');
+	const [files, setFiles] = useState(/** @type {{boxes: string | null, cameras: string | null}} */ ({ boxes: null, cameras: null }));
+	const [state, setState] = useState({ busy: false, error: '' });
+	const why = state.busy ? 'Under way' : !name.trim() ? 'Name the predictions' : !files.boxes && !files.cameras ? 'Choose a file first' : '';
+	/** @param {FormData} form */
+	async function send(form) {
+		if (why) return;
+		setState({ busy: true, error: '' });
+		try {
+			await postPredictions(one.id, { name: name.trim(), format: String(form.get('format')), upload: files.boxes, cameras_upload: files.cameras });
+			onAdded();
+			onClose();
+		} catch (error) {
+			setState({ busy: false, error: sentenceOf(error) });
+		}
+	}
+	/** @param {'boxes' | 'cameras'} kind */
+	const took = (kind) => (/** @type {UploadJson | null} */ sent) => {
+		setFiles((before) => ({ ...before, [kind]: sent?.id ?? null }));
+		if (sent) setName((before) => before || sent.name.replace(/\.[a-z]+$/i, ''));
+	};
+	return html`
+		<${FormDialog}
+			title=${`Upload predictions for ${one.name}`} onClose=${onClose} onSubmit=${send}
+			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${state.busy ? 'Reading…' : 'Add predictions'}</button>`}
+		>
+			<fieldset class="choice choice--row">
+				<legend>Format of the boxes</legend>
+				${FORMATS.map((format, index) => html`<label key=${format.name}><input type="radio" name="format" value=${format.name} defaultChecked=${index === 0} /><span>${format.label}<small>${format.note}</small></span></label>`)}
+			</fieldset>
+			<${UploadField} id="prediction-boxes" label="Ball boxes" onUploaded=${took('boxes')} />
+			<${UploadField} id="prediction-cameras" label="Predicted cameras, where there are any" hint="a zip of SoccerNet camera JSON" onUploaded=${took('cameras')} />
+			<div class="form__row">
+				<label for="prediction-name">Name</label>
+				<input class="field" id="prediction-name" maxlength="100" autocomplete="off" value=${name} onInput=${(/** @type {InputEvent} */ event) => setName(/** @type {HTMLInputElement} */ (event.target).value)} />
+			</div>
+			${state.error ? html`<p class="form__error" role="alert">${state.error}</p>` : null}
+		<//>
+	`;
+}
+
+/** @param {{one: DatasetJson, sets: PredictionSet[], changed: () => void}} props */
+export function PredictionSets({ one, sets, changed }) {
+	const [asked, setAsked] = useState(/** @type {PredictionSet | 'upload' | null} */ (null));
+	const [problem, setProblem] = useState('');
+	const close = () => setAsked(null);
+	/** @param {PredictionSet} set */
+	async function remove(set) {
+		try {
+			await deletePredictions(set.id);
+			setProblem('');
+			changed();
+		} catch (error) {
+			setProblem(sentenceOf(error));
+		}
+	}
+	return html`
+		<section class="card" aria-labelledby="sets-title">
+			<h2 id="sets-title">Predictions</h2>
+			${sets.length === 0 ? html`<p class="empty-note">None yet: COCO results, YOLO files, a CSV, or cameras.</p>` : null}
+			<ul>
+				${sets.map((set) => html`
+					<li class="prediction-set" key=${set.id}>
+						<strong>${set.name}</strong>
+						<p class="note">${count(set.boxes)} boxes in ${count(set.frames)} frames${set.cameras ? ` · ${count(set.cameras)} cameras` : ''} · ${set.format} · <${When} at=${set.created} /></p>
+						<${Report} set=${set} />
+						<p class="buttons">
+							${set.boxes ? html`<button class="button button--small" type="button" onClick=${() => setAsked(set)}>Accept…<span class="hidden-text"> ${set.name}</span></button>` : null}
+							<button class="button button--small" type="button" onClick=${() => remove(set)}>Throw away<span class="hidden-text"> ${set.name}</span></button>
+						</p>
+					</li>`)}
+			</ul>
+			${problem ? html`<p class="form__error" role="alert">${problem}</p>` : null}
+			<p class="version-card__freeze"><button class="button" type="button" onClick=${() => setAsked('upload')}>Upload predictions…</button></p>
+			${asked === 'upload' ? html`<${UploadDialog} one=${one} onClose=${close} onAdded=${changed} />` : null}
+			${asked && asked !== 'upload' ? html`<${AcceptPredictions} one=${one} set=${asked} onClose=${close} />` : null}
+		</section>
+	`;
+}

@@ -1,0 +1,95 @@
+// @ts-check
+/** One run: what it pins, its tables, its figures, and the frames behind its numbers. */
+
+import { html } from 'htm/preact';
+import { useEffect, useRef, useState } from 'preact/hooks';
+
+import { deleteEvaluation, getEvaluation } from '../../api/evaluations.js';
+import { count, words } from '../../lib/format.js';
+import { sentenceOf, useResource } from '../../lib/resource.js';
+import { Loading, Trouble } from '../page_frame.js';
+import { When } from '../when.js';
+import { Comparison } from './comparison.js';
+import { FigureCard } from './figure_card.js';
+import { FramesCard } from './frames_card.js';
+import { TableCard } from './table_card.js';
+
+/** @import {EvaluationJson, EvaluationRow, FrameQuery} from '../../api/evaluations.js' */
+/** @import {VersionJson} from '../../api/versions.js' */
+
+/** @param {unknown} value @returns {string} */
+function pinText(value) {
+	if (value === null || value === undefined) return '–';
+	if (typeof value !== 'object') return String(value);
+	return Object.entries(value).map(([name, inner]) => `${words(name)} ${pinText(inner)}`).join(', ');
+}
+
+/** @param {{run: EvaluationJson}} props */
+function Pins({ run }) {
+	return html`
+		<details>
+			<summary class="evaluation__pins">What makes it repeatable</summary>
+			<dl class="facts">${Object.entries(run.pins).map(([name, value]) => html`<dt key=${name}>${words(name)}</dt><dd class="mono">${pinText(value)}</dd>`)}</dl>
+		</details>
+	`;
+}
+
+/** @param {{run: EvaluationJson, others: EvaluationRow[], compare: (id: number) => void, remove: () => void, openFrames: () => void}} props */
+function Head({ run, others, compare, remove, openFrames }) {
+	/** @param {Event} event */
+	function choose(event) {
+		const select = /** @type {HTMLSelectElement} */ (event.target);
+		if (select.value) compare(Number(select.value));
+		select.value = '';
+	}
+	return html`
+		<section class="card version" aria-labelledby="run-title">
+			<header class="version__head">
+				<h2 id="run-title">${run.name}</h2>
+				<p class="note">run <${When} at=${run.created} /> by ${run.actor}</p>
+				<div class="buttons">
+					<select class="field" aria-label="Compare with another run" disabled=${others.length === 0} onChange=${choose}>
+						<option value="">Compare with…</option>${others.map(({ id, name }) => html`<option key=${id} value=${String(id)}>${name}</option>`)}
+					</select>
+					<button class="button" type="button" onClick=${openFrames}>Frames</button>
+					<button class="button button--danger" type="button" onClick=${remove}>Delete</button>
+				</div>
+			</header>
+			<dl class="number-list">${Object.entries(run.counts).map(([name, n]) => html`<div key=${name}><dt>${words(name)}</dt><dd>${count(n)}</dd></div>`)}</dl>
+			<${Pins} run=${run} />
+		</section>
+	`;
+}
+
+/** @param {{id: number, runs: EvaluationRow[], versions: VersionJson[], changed: () => void}} props */
+export function RunDetails({ id, runs, changed }) {
+	const found = useResource((signal) => getEvaluation(id, signal), [id]);
+	const [frames, setFrames] = useState(/** @type {{query: FrameQuery, title: string} | null} */ (null));
+	const [other, setOther] = useState(0);
+	const [problem, setProblem] = useState('');
+	const opened = useRef(/** @type {HTMLDivElement | null} */ (null));
+	useEffect(() => { if (frames || other) opened.current?.scrollIntoView({ block: 'nearest' }); }, [frames?.title, other]);
+	if (found.error) return html`<${Trouble} title="The run cannot be shown" error=${found.error} retry=${found.reload} />`;
+	if (!found.value) return html`<${Loading} what="the run" />`;
+	const run = found.value;
+	/** @param {FrameQuery} query @param {string} title */
+	const open = (query, title) => setFrames({ query, title });
+	async function remove() {
+		try {
+			await deleteEvaluation(id);
+			changed();
+		} catch (error) {
+			setProblem(sentenceOf(error));
+		}
+	}
+	return html`
+		<${Head} run=${run} others=${runs.filter((one) => one.id !== id)} compare=${setOther} remove=${remove} openFrames=${() => open({ sort: 'error_m-desc' }, 'all')} />
+		${problem ? html`<p class="card form__error" role="alert">${problem}</p>` : null}
+		<div class="page__list" ref=${opened}>
+			${other ? html`<${Comparison} evaluation=${id} other=${other} onClose=${() => setOther(0)} />` : null}
+			${frames ? html`<${FramesCard} evaluation=${id} query=${frames.query} title=${frames.title} sort=${(/** @type {string} */ sort) => setFrames({ ...frames, query: { ...frames.query, sort } })} onClose=${() => setFrames(null)} />` : null}
+		</div>
+		<div class="evaluation__tables">${run.tables.map((table) => html`<${TableCard} key=${table.name} table=${table} open=${open} />`)}</div>
+		<div class="evaluation__figures">${run.figures.map((name) => html`<${FigureCard} key=${name} evaluation=${id} name=${name} open=${open} />`)}</div>
+	`;
+}

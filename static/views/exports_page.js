@@ -1,0 +1,89 @@
+// @ts-check
+/** Every export: under way, ready, failed; fetched or deleted. */
+
+import { html } from 'htm/preact';
+import { useEffect, useState } from 'preact/hooks';
+
+import { listen } from '../api/events.js';
+import { deleteExport, getExports } from '../api/exports.js';
+import { count, words } from '../lib/format.js';
+import { sentenceOf, useResource } from '../lib/resource.js';
+import { dataset, loadDatasets } from '../state/datasets.js';
+import { isOver } from '../state/jobs.js';
+import { ExportDialog } from './export_dialog.js';
+import { Loading, PageFrame, Trouble } from './page_frame.js';
+import { sizeText } from './source_choice.js';
+import { When } from './when.js';
+
+/** @import {ExportRow} from '../api/exports.js' */
+/** @import {JobJson} from '../api/jobs.js' */
+
+/** What is in it, in words. @param {ExportRow} row */
+function contents({ request, counts }) {
+	const what = request.version ? `version ${request.version}` : request.all ? 'all groups' : 'accepted groups';
+	const numbers = Object.entries(counts ?? {}).map(([name, n]) => `${count(n)} ${words(name)}`);
+	return [what, `${request.boxes} boxes`, ...numbers].join(' · ');
+}
+
+/** @param {{row: ExportRow, remove: () => void}} props */
+function Row({ row, remove }) {
+	const left = Object.entries(row.left_out ?? {});
+	const open = row.status === 'waiting' || row.status === 'running';
+	return html`
+		<tr>
+			<th scope="row">${row.request.dataset}<small>${row.request.format}</small></th>
+			<td>${contents(row)}
+				${left.length ? html`<small>left out: ${left.map(([why, n]) => `${count(n)} ${words(why)}`).join(', ')}</small>` : null}
+				${row.missing_images?.length ? html`<small>${count(row.missing_images.length)} frames are missing</small>` : null}
+				${row.error ? html`<small class="form__error">${row.error}</small>` : null}</td>
+			<td><span class="pill" data-state=${row.status}>${row.status}</span></td>
+			<td data-numeric="true">${row.bytes === null ? '–' : sizeText(row.bytes)}</td>
+			<td><${When} at=${row.created} /></td>
+			<td><span class="table__actions">
+				${row.content ? html`<a class="button button--small" href=${row.content} download>Download<span class="hidden-text"> export ${row.id}</span></a>` : null}
+				${open ? html`<a class="button button--small" href="/jobs">Job<span class="hidden-text"> of export ${row.id}</span></a>` : row.status === 'ready' ? html`<button class="button button--small" type="button" onClick=${remove}>Delete<span class="hidden-text"> export ${row.id}</span></button>` : null}
+			</span></td>
+		</tr>
+	`;
+}
+
+export function ExportsPage() {
+	const exports = useResource((signal) => getExports({ limit: 100 }, signal), []);
+	const [asking, setAsking] = useState(false);
+	const [problem, setProblem] = useState('');
+	const one = dataset.value;
+	useEffect(() => {
+		loadDatasets();
+		return listen('job', (/** @type {JobJson} */ job) => { if (job.kind === 'export' && (isOver(job) || job.done === 0)) exports.reload(); });
+	}, []);
+	/** @param {ExportRow} row */
+	async function remove(row) {
+		try {
+			await deleteExport(row.id);
+			setProblem('');
+			exports.reload();
+		} catch (error) {
+			setProblem(sentenceOf(error));
+		}
+	}
+	const items = exports.value?.items ?? [];
+	return html`
+		<${PageFrame}
+			current="exports" title="Exports" where=${html`<strong>Exports</strong>`}
+			actions=${one ? html`<button class="button button--primary" type="button" onClick=${() => setAsking(true)}>Export ${one.name}…</button>` : null}
+		>
+			${exports.error ? html`<${Trouble} title="The exports cannot be shown" error=${exports.error} retry=${exports.reload} />` : null}
+			${!exports.value && !exports.error ? html`<${Loading} what="exports" />` : null}
+			${problem ? html`<p class="card form__error" role="alert">${problem}</p>` : null}
+			${exports.value && items.length === 0 ? html`<section class="card empty"><h2>No export yet</h2><p>An export is a zip with a manifest: what is in it, by which policy, with the digest of each file.</p></section>` : null}
+			${items.length ? html`
+				<section class="card card--flush" aria-label="Exports">
+					<table class="table">
+						<thead><tr><th>dataset and format</th><th>what is in it</th><th>state</th><th data-numeric="true">size</th><th>made</th><td></td></tr></thead>
+						<tbody>${items.map((row) => html`<${Row} key=${row.id} row=${row} remove=${() => remove(row)} />`)}</tbody>
+					</table>
+				</section>` : null}
+			${asking && one ? html`<${ExportDialog} one=${one} onClose=${() => { setAsking(false); exports.reload(); }} />` : null}
+		<//>
+	`;
+}

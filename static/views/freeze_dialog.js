@@ -1,0 +1,134 @@
+// @ts-check
+/** Freezing a version: what would enter and what not, then done for good. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { postVersion, previewFreeze } from '../api/versions.js';
+import { count, words } from '../lib/format.js';
+import { sentenceOf, useResource } from '../lib/resource.js';
+import { follow } from '../state/jobs.js';
+import { FormDialog } from './dialog.js';
+import { JobProgress } from './job_progress.js';
+
+/** @import {JobJson} from '../api/jobs.js' */
+/** @import {FreezeRequest, SplitRequest} from '../api/versions.js' */
+/** @import {DatasetJson} from '../api/types.js' */
+
+/** The first of v1, v2, ... that is free. @param {string[]} taken */
+function freeName(taken) {
+	let number = taken.length + 1;
+	while (taken.includes(`v${number}`)) number += 1;
+	return `v${number}`;
+}
+
+/** @param {Event} event */
+const valueOf = (event) => /** @type {HTMLInputElement} */ (event.target).value;
+
+const GROUPS = /** @type {{name: FreezeRequest['groups'], label: string, note: string}[]} */ ([
+	{ name: 'accepted', label: 'Accepted', note: 'by people; against a gate only with a reason' },
+	{ name: 'passing', label: 'Passing', note: 'whatever the policy passes and nobody refused' },
+]);
+const SPLITS = /** @type {{kind: SplitRequest['kind'], label: string, note: string}[]} */ ([
+	{ kind: 'given', label: 'As given', note: 'the split of the source' },
+	{ kind: 'match', label: 'By match', note: 'drawn with a seed; no match is on both sides' },
+	{ kind: 'camera', label: 'By camera', note: 'some static cameras test' },
+]);
+
+/** @param {{split: SplitRequest, change: (split: SplitRequest) => void}} props */
+function SplitFields({ split, change }) {
+	return html`
+		<fieldset class="choice choice--row">
+			<legend>Split into train and test</legend>
+			${SPLITS.map(({ kind, label, note }) => html`
+				<label key=${kind}>
+					<input type="radio" name="split" checked=${split.kind === kind} onChange=${() => change(blank(kind))} />
+					<span>${label}<small>${note}</small></span>
+				</label>`)}
+		</fieldset>
+		${split.kind === 'match' ? html`
+			<div class="form__columns">
+				<div class="form__row"><label for="split-seed">Seed</label><input class="field" id="split-seed" type="number" step="1" min="0" value=${split.seed} onChange=${(/** @type {Event} */ event) => change({ ...split, seed: Math.trunc(Number(valueOf(event))) })} /></div>
+				<div class="form__row"><label for="split-share">Share of matches that test</label><input class="field" id="split-share" type="number" step="0.05" min="0.01" max="0.99" value=${split.test_share} onChange=${(/** @type {Event} */ event) => change({ ...split, test_share: Number(valueOf(event)) })} /></div>
+			</div>` : null}
+		${split.kind === 'camera' ? html`
+			<div class="form__row"><label for="split-cameras">Cameras that test</label><input class="field" id="split-cameras" value=${(split.test_cameras ?? []).join(' ')} onChange=${(/** @type {Event} */ event) => change({ ...split, test_cameras: valueOf(event).split(/[\s,]+/).filter(Boolean) })} /><small>Keys of views, for example cam1 cam2</small></div>` : null}
+	`;
+}
+
+/** @param {SplitRequest['kind']} kind @returns {SplitRequest} */
+function blank(kind) {
+	if (kind === 'match') return { kind, seed: 0, test_share: 0.2 };
+	return kind === 'camera' ? { kind, test_cameras: ['cam1', 'cam2'] } : { kind };
+}
+
+/** @param {{plan: {groups: number, left_out: {[why: string]: number}, unsolved: number}}} props */
+function Plan({ plan }) {
+	const left = Object.entries(plan.left_out);
+	return html`
+		<div class="bulk__outcome" role="status">
+			<p><strong>${count(plan.groups)}</strong> groups enter.</p>
+			${plan.unsolved ? html`<p data-grade="warn">${count(plan.unsolved)} are not solved yet.</p>` : null}
+			${left.length ? html`<ul>${left.map(([why, n]) => html`<li key=${why}>${count(n)} stay out: ${words(why)}</li>`)}</ul>` : null}
+		</div>
+	`;
+}
+
+/** @param {{ask: FreezeRequest, change: (values: Partial<FreezeRequest>) => void}} props */
+function FreezeFields({ ask, change }) {
+	return html`
+		<div class="form__columns">
+			<div class="form__row"><label for="freeze-name">Name</label><input class="field" id="freeze-name" maxlength="100" autocomplete="off" value=${ask.name} onInput=${(/** @type {Event} */ event) => change({ name: valueOf(event) })} /></div>
+			<div class="form__row"><label for="freeze-note">Note</label><input class="field" id="freeze-note" maxlength="2000" autocomplete="off" value=${ask.note} onInput=${(/** @type {Event} */ event) => change({ note: valueOf(event) })} /></div>
+		</div>
+		<fieldset class="choice choice--row">
+			<legend>Groups</legend>
+			${GROUPS.map(({ name, label, note }) => html`
+				<label key=${name}>
+					<input type="radio" name="groups" checked=${ask.groups === name} onChange=${() => change({ groups: name })} />
+					<span>${label}<small>${note}</small></span>
+				</label>`)}
+		</fieldset>
+		<${SplitFields} split=${ask.split} change=${(/** @type {SplitRequest} */ split) => change({ split })} />
+		<div class="form__row">
+			<label for="freeze-licence">Licence</label>
+			<textarea class="field" id="freeze-licence" rows="3" value=${ask.licence} onInput=${(/** @type {Event} */ event) => change({ licence: valueOf(event) })}></textarea>
+			<small>Left empty: the terms of the sources.</small>
+		</div>
+	`;
+}
+
+/** @param {{one: DatasetJson, taken: string[], onClose: () => void, onFrozen: () => void}} props */
+export function FreezeDialog({ one, taken, onClose, onFrozen }) {
+	const [ask, setAsk] = useState(/** @type {FreezeRequest} */ ({ name: freeName(taken), note: '', licence: '', split: { kind: 'given' }, groups: 'accepted', dry_run: false }));
+	const [state, setState] = useState(/** @type {{job: JobJson | null, error: string}} */ ({ job: null, error: '' }));
+	const name = ask.name.trim();
+	const plan = useResource((signal) => previewFreeze(one.id, { ...ask, name: name || 'v1' }, signal), [name, ask.groups, JSON.stringify(ask.split)]);
+	const { job } = state;
+	const busy = job !== null && (job.state === 'running' || job.state === 'waiting');
+	const done = job?.state === 'done';
+	const why = busy ? 'Under way' : done ? '' : !name ? 'A version needs a name' : plan.error ? sentenceOf(plan.error) : plan.value?.groups === 0 ? 'No group would enter' : '';
+	async function send() {
+		if (done) { onClose(); return; }
+		if (why) return;
+		try {
+			const over = await follow(await postVersion(one.id, { ...ask, name }), (moved) => setState({ job: moved, error: '' }));
+			setState({ job: over, error: '' });
+			onFrozen();
+		} catch (error) {
+			setState({ job: null, error: sentenceOf(error) });
+		}
+	}
+	const problem = state.error || (done ? '' : plan.error ? sentenceOf(plan.error) : '');
+	return html`
+		<${FormDialog}
+			wide=${true} title=${`Freeze a version of ${one.name}`} onClose=${onClose} onSubmit=${send}
+			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${busy ? 'Freezing…' : done ? 'Done' : 'Freeze'}</button>`}
+		>
+			<${FreezeFields} ask=${ask} change=${(/** @type {Partial<FreezeRequest>} */ values) => setAsk({ ...ask, ...values })} />
+			${plan.value && !done ? html`<${Plan} plan=${plan.value} />` : null}
+			${job ? html`<${JobProgress} job=${job} />` : null}
+			${problem ? html`<p class="form__error" role="alert">${problem}</p>` : null}
+		<//>
+	`;
+}

@@ -1,0 +1,156 @@
+// @ts-check
+/** Import: format, source, options; first tried, then done. */
+
+import { html } from 'htm/preact';
+import { useEffect, useState } from 'preact/hooks';
+
+import { postImport } from '../api/imports.js';
+import { sentenceOf } from '../lib/resource.js';
+import { param } from '../lib/router.js';
+import { datasets, loadDatasets } from '../state/datasets.js';
+import { IMPORT_FORMATS, optionValue } from '../state/import_formats.js';
+import { follow, isOver } from '../state/jobs.js';
+import { pageAddress } from './dataset_menu.js';
+import { ImportReport } from './import_report.js';
+import { JobProgress } from './job_progress.js';
+import { PageFrame } from './page_frame.js';
+import { SourceChoice, UploadField } from './source_choice.js';
+
+/** @import {ImportSource, UploadJson} from '../api/imports.js' */
+/** @import {JobJson} from '../api/jobs.js' */
+/** @import {FormatOption} from '../state/import_formats.js' */
+
+/** @typedef {{[name: string]: any}} Options */
+
+const valueOf = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.target).value;
+
+/** @param {{option: FormatOption, change: (value: any) => void}} props */
+function OptionField({ option, change }) {
+	const id = `option-${option.name}`;
+	if (option.kind === 'calibration') {
+		return html`
+			<div class="form__row">
+				<label for=${id}>${option.label}</label>
+				<select class="field" id=${id} onChange=${(/** @type {Event} */ event) => change(valueOf(event))}>
+					<option value="given">the given camera counts</option><option value="lines">the lines count</option>
+				</select>
+			</div>
+		`;
+	}
+	return html`
+		<div class="form__row">
+			<label for=${id}>${option.label}</label>
+			<input class="field" id=${id} autocomplete="off" onInput=${(/** @type {Event} */ event) => change(optionValue(option, valueOf(event)))} />
+			<small>${option.hint}</small>
+		</div>
+	`;
+}
+
+/** Lines of static cameras are files of their own. @param {{source: ImportSource | null, change: (lines: ImportSource | undefined) => void}} props */
+function LinesField({ source, change }) {
+	const label = 'Line files of the cameras, where there are any';
+	if (source && 'folder' in source) {
+		return html`
+			<div class="form__row">
+				<label for="import-lines">${label}</label>
+				<input class="field" id="import-lines" autocomplete="off" onInput=${(/** @type {Event} */ event) => change(valueOf(event).trim() ? { folder: valueOf(event).trim() } : undefined)} />
+				<small>another folder that the operator allowed</small>
+			</div>
+		`;
+	}
+	return html`<${UploadField} id="import-lines" label=${label} hint="a zip of sn-calibration line files" onUploaded=${(/** @type {UploadJson | null} */ sent) => change(sent ? { upload: sent.id } : undefined)} />`;
+}
+
+/** @param {{format: string, choose: (format: string) => void}} props */
+function FormatChoice({ format, choose }) {
+	return html`
+		<fieldset class="choice import__formats">
+			<legend>Format</legend>
+			${IMPORT_FORMATS.map(({ name, label, note }) => html`
+				<label key=${name}><input type="radio" name="format" checked=${format === name} onChange=${() => choose(name)} /><span>${label}<small>${note}</small></span></label>`)}
+		</fieldset>
+	`;
+}
+
+/** @param {{job: JobJson, dry: boolean, dataset: string}} props */
+function Outcome({ job, dry, dataset }) {
+	const done = job.state === 'done';
+	return html`
+		<section class="card form" aria-label="Progress">
+			<${JobProgress} job=${job} />
+			${job.problem?.hint ? html`<p>${job.problem.hint}</p>` : null}
+			${done && job.result ? html`<${ImportReport} report=${job.result} dry=${dry} />` : null}
+			${done && !dry ? html`<p class="buttons"><a class="button button--primary" href=${pageAddress(dataset, 'queue')}>Open the queue</a><a class="button" href=${pageAddress(dataset, 'yield')}>See the yield</a></p>` : null}
+		</section>
+	`;
+}
+
+/** One import at a time: the last one, and what went wrong before it could begin. */
+function useImport() {
+	const [state, setState] = useState(/** @type {{job: JobJson | null, dry: boolean, error: string}} */ ({ job: null, dry: true, error: '' }));
+	/** @param {import('../api/imports.js').ImportRequest} body */
+	async function run(body) {
+		const dry = body.dry_run;
+		setState({ job: null, dry, error: '' });
+		try {
+			await follow(await postImport(body), (job) => setState({ job, dry, error: '' }));
+			if (!dry) loadDatasets();
+		} catch (error) {
+			setState({ job: null, dry, error: sentenceOf(error) });
+		}
+	}
+	return { ...state, run };
+}
+
+export function ImportPage() {
+	const [dataset, setDataset] = useState(param('dataset'));
+	const [format, setFormat] = useState(IMPORT_FORMATS[0].name);
+	const [source, setSource] = useState(/** @type {ImportSource | null} */ (null));
+	const [options, setOptions] = useState(/** @type {Options} */ ({}));
+	const { job, dry, error, run } = useImport();
+	useEffect(() => { loadDatasets(); }, []);
+	const chosen = IMPORT_FORMATS.find(({ name }) => name === format) ?? IMPORT_FORMATS[0];
+	const name = dataset.trim();
+	const busy = job !== null && !isOver(job);
+	const why = busy ? 'An import is under way' : !name ? 'Name the dataset first' : !source ? 'Choose a file or folder first' : '';
+	/** @param {boolean} dry_run */
+	function start(dry_run) {
+		if (why || !source) return;
+		const asked = Object.entries(options).filter(([key, value]) => value !== undefined && (chosen.options.some((option) => option.name === key) || (key === 'lines' && chosen.lines)));
+		run({ dataset: name, format, source, options: Object.fromEntries(asked), dry_run });
+	}
+	/** @param {SubmitEvent} event */
+	function submit(event) {
+		event.preventDefault();
+		start(true);
+	}
+	return html`
+		<${PageFrame} current="import" title="Import" where=${html`<strong>Import</strong>`}>
+			<div class="page__columns">
+				<section class="card" aria-labelledby="import-title">
+					<h2 id="import-title">What to import</h2>
+					<form class="form" onSubmit=${submit}>
+						<div class="form__row">
+							<label for="import-dataset">Dataset</label>
+							<input class="field" id="import-dataset" list="known-datasets" maxlength="100" autocomplete="off" value=${dataset} onInput=${(/** @type {Event} */ event) => setDataset(valueOf(event))} />
+							<datalist id="known-datasets">${(datasets.value ?? []).map((one) => html`<option key=${one.id} value=${one.name}></option>`)}</datalist>
+							<small>A new name makes a new dataset. An import into one that is there follows its source; what people edited stays.</small>
+						</div>
+						<${FormatChoice} format=${format} choose=${setFormat} />
+						<${SourceChoice} onSource=${setSource} guess=${(/** @type {string} */ guessed) => { if (IMPORT_FORMATS.some((one) => one.name === guessed)) setFormat(guessed); }} />
+						${chosen.options.map((option) => html`<${OptionField} key=${option.name} option=${option} change=${(/** @type {any} */ value) => setOptions({ ...options, [option.name]: value })} />`)}
+						${chosen.lines ? html`
+							<${LinesField} source=${source} change=${(/** @type {ImportSource | undefined} */ lines) => setOptions({ ...options, lines })} />` : null}
+						<p class="buttons">
+							<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Try it out</button>
+							<button class="button" type="button" aria-disabled=${why !== ''} title=${why} onClick=${() => start(false)}>Import</button>
+						</p>
+						${error ? html`<p class="form__error" role="alert">${error}</p>` : null}
+					</form>
+				</section>
+				${job ? html`<${Outcome} job=${job} dry=${dry} dataset=${name} />` : html`
+					<section class="card empty"><h2>Nothing is changed before you say so</h2><p>Trying it out reads the files and reports what an import would do: what is new, what changed, and every record that cannot be read, with its file and place.</p></section>`}
+			</div>
+		<//>
+	`;
+}

@@ -1,0 +1,56 @@
+// @ts-check
+/** How far a job is, in one line, with the way to end it. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { cancelJob } from '../api/jobs.js';
+import { count } from '../lib/format.js';
+import { sentenceOf } from '../lib/resource.js';
+import { isOver, shareOf } from '../state/jobs.js';
+
+/** @import {JobJson} from '../api/jobs.js' */
+
+/** @param {JobJson} job @returns {string} */
+export function jobText(job) {
+	if (job.state === 'failed') return job.problem?.detail ?? 'It failed.';
+	if (job.state === 'done') return '';
+	if (job.sentence) return job.sentence;
+	return job.total ? `${count(job.done)} of ${count(job.total)}` : '';
+}
+
+/** @param {{job: JobJson}} props */
+export function Meter({ job }) {
+	const share = shareOf(job);
+	const state = job.state === 'failed' ? 'failed' : share === null ? 'unknown' : 'known';
+	return html`
+		<div
+			class="meter" data-state=${state} role="progressbar" aria-label=${job.title} aria-valuemin="0" aria-valuemax="100"
+			aria-valuenow=${share === null ? undefined : Math.round(100 * share)}
+		><span style=${share === null ? undefined : { width: `${100 * share}%` }}></span></div>
+	`;
+}
+
+/** @param {{job: JobJson, cancellable?: boolean}} props */
+export function JobProgress({ job, cancellable = true }) {
+	const [problem, setProblem] = useState('');
+	async function cancel() {
+		try {
+			await cancelJob(job.id);
+		} catch (error) {
+			setProblem(sentenceOf(error));
+		}
+	}
+	return html`
+		<div class="job" role="status">
+			<div class="job__line">
+				<span class="pill" data-state=${job.state}>${job.state}</span>
+				<strong>${job.title}</strong>
+				<span class="job__sentence">${jobText(job)}</span>
+				${cancellable && !isOver(job) ? html`<button class="button button--small" type="button" onClick=${cancel}>Cancel<span class="hidden-text"> ${job.title}</span></button>` : null}
+			</div>
+			${isOver(job) ? null : html`<${Meter} job=${job} />`}
+			${problem ? html`<p class="form__error" role="alert">${problem}</p>` : null}
+		</div>
+	`;
+}

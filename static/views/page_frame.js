@@ -1,0 +1,55 @@
+// @ts-check
+/** What every page but the review screen has: the header, the bars below it, one scrolling part. */
+
+import { html } from 'htm/preact';
+import { useEffect } from 'preact/hooks';
+
+import { sentenceOf } from '../lib/resource.js';
+import { datasets, loadDatasets } from '../state/datasets.js';
+import { dismiss } from '../state/notice.js';
+import { NoticeBar } from './bars.js';
+import { Header } from './header.js';
+
+/** @import {ComponentChildren} from 'preact' */
+
+/**
+ * @param {{
+ *   current: string, title: string, where?: ComponentChildren, actions?: ComponentChildren,
+ *   children?: ComponentChildren
+ * }} props `where` stands in the middle of the header, `actions` at its right
+ */
+export function PageFrame({ current, title, where, actions, children }) {
+	useEffect(() => { document.title = `${title} · Touchline`; }, [title]);
+	useEffect(() => { if (datasets.value === null) loadDatasets(); }, []);
+	// A notice speaks about the page on which it came up.
+	useEffect(() => dismiss, []);
+	return html`
+		<div class="page">
+			<${Header} current=${current}>
+				<div class="header__middle"><span class="header__where">${where}</span></div>
+				${actions}
+			<//>
+			<div class="bars"><${NoticeBar} /></div>
+			<main class="page__main" data-page=${current}>
+				<h1 class="hidden-text">${title}</h1>
+				${children}
+			</main>
+		</div>
+	`;
+}
+
+/** @param {{what: string}} props */
+export function Loading({ what }) {
+	return html`<p class="page__loading" role="status">Reading ${what}…</p>`;
+}
+
+/** @param {{title: string, error: Error, retry?: () => void}} props */
+export function Trouble({ title, error, retry }) {
+	return html`
+		<section class="card empty" role="alert">
+			<h2>${title}</h2>
+			<p>${sentenceOf(error)}</p>
+			${retry ? html`<p><button class="button" type="button" onClick=${retry}>Try again</button></p>` : null}
+		</section>
+	`;
+}

@@ -1,0 +1,129 @@
+// @ts-check
+/** Ctrl K: type where to go or what to do. */
+
+import { html } from 'htm/preact';
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+
+import { count } from '../lib/format.js';
+import { latest } from '../lib/latest.js';
+import { navigate, page } from '../lib/router.js';
+import { dataset, datasets, loadDatasets, useDataset } from '../state/datasets.js';
+import { document as shownGroup } from '../state/group.js';
+import { paletteOpen } from '../state/palette.js';
+import { actionItems, groupItems, matching } from '../state/palette_items.js';
+import { DATASET_PAGES, pageAddress, PLAIN_PAGES } from './dataset_menu.js';
+
+/** @import {DatasetJson} from '../api/types.js' */
+/** @import {Item} from '../state/palette_items.js' */
+
+const PAUSE = 120;
+const KINDS = /** @type {const} */ (['Groups', 'Pages', 'Datasets', 'Actions']);
+
+/** The dataset that the page speaks of. */
+function present() {
+	const name = page.value.page === 'review' ? shownGroup.value?.dataset.name : dataset.value?.name;
+	return (datasets.value ?? []).find((one) => one.name === name) ?? dataset.value;
+}
+
+/** @param {DatasetJson | null} one @returns {Item[]} */
+function pageItems(one) {
+	const ofDataset = one ? DATASET_PAGES.map(({ name, label }) => ({ name, label, hint: one.name, href: pageAddress(one.name, name) })) : [];
+	const plain = PLAIN_PAGES.map(({ name, label, href }) => ({ name, label, hint: '', href }));
+	const review = { name: 'review', label: 'Review', hint: 'first group of the queue', href: '/review' };
+	return [...ofDataset, review, ...plain].map(({ name, label, hint, href }) => ({
+		id: `page-${name}`, kind: 'Pages', label, hint, run: () => navigate(href),
+	}));
+}
+
+/** @returns {Item[]} */
+function datasetItems() {
+	return (datasets.value ?? []).map((one) => ({
+		id: `dataset-${one.id}`, kind: 'Datasets', label: one.name, hint: `${count(one.groups)} groups`,
+		run: () => { useDataset(one.name); navigate(pageAddress(one.name, 'queue')); },
+	}));
+}
+
+/** The groups that answer to what is typed. @param {string} text @returns {Item[]} */
+function useGroups(text) {
+	const [groups, setGroups] = useState(/** @type {Item[]} */ ([]));
+	const asking = useMemo(() => latest(PAUSE, async (/** @type {string} */ asked, signal) => {
+		const one = present();
+		const found = one && asked ? await groupItems(one, asked, signal) : [];
+		if (!signal.aborted) setGroups(found);
+	}), []);
+	useEffect(() => { asking.run(text.trim()); }, [text]);
+	useEffect(() => () => asking.cancel(), []);
+	return groups;
+}
+
+/** @param {{items: Item[], active: string, choose: (item: Item) => void}} props */
+function Choices({ items, active, choose }) {
+	const list = useRef(/** @type {HTMLDivElement | null} */ (null));
+	useEffect(() => {
+		list.current?.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest' });
+	}, [active]);
+	return html`
+		<div class="palette__list" id="palette-list" role="listbox" aria-label="Results" ref=${list}>
+			${KINDS.map((kind) => {
+				const found = items.filter((item) => item.kind === kind);
+				return found.length === 0 ? null : html`
+					<div role="group" key=${kind} aria-label=${kind}>
+						<div class="palette__kind" role="presentation">${kind}</div>
+						${found.map((item) => html`
+							<div
+								key=${item.id} id=${item.id} role="option" class="palette__item"
+								aria-selected=${item.id === active} onClick=${() => choose(item)}
+							><span>${item.label}</span><span class="palette__hint">${item.hint}</span></div>`)}
+					</div>`;
+			})}
+		</div>
+	`;
+}
+
+export function Palette() {
+	const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
+	const [text, setText] = useState('');
+	const [place, setPlace] = useState(0);
+	const groups = useGroups(text);
+	// The keys of the page below, as they were when the palette came up.
+	const actions = useMemo(actionItems, []);
+	useEffect(() => {
+		dialog.current?.showModal();
+		loadDatasets();
+	}, []);
+	const fixed = matching([...pageItems(present()), ...datasetItems(), ...actions], text.trim());
+	const all = [...groups, ...fixed];
+	const [opening] = useState(paletteOpen.value);
+	const items = KINDS.flatMap((kind) => all.filter((item) => item.kind === kind));
+	const at = Math.min(place, items.length - 1);
+	/** @param {Item} item */
+	function choose(item) {
+		dialog.current?.close();
+		paletteOpen.value = 0;
+		item.run();
+	}
+	/** @param {KeyboardEvent} event */
+	function key(event) {
+		const steps = /** @type {{[key: string]: number}} */ ({ ArrowDown: 1, ArrowUp: -1, PageDown: 8, PageUp: -8 });
+		if (event.key === 'Enter' && items[at]) choose(items[at]);
+		else if (steps[event.key]) setPlace(Math.max(0, Math.min(items.length - 1, at + steps[event.key])));
+		else return;
+		event.preventDefault();
+	}
+	return html`
+		<dialog class="dialog palette" ref=${dialog} aria-label="Go to" onClose=${() => { if (paletteOpen.value === opening) paletteOpen.value = 0; }}>
+			<input
+				class="field palette__field" type="text" role="combobox" aria-label="Page, dataset, group or action"
+				placeholder="Page, dataset, group or action" autocomplete="off" spellcheck=${false}
+				aria-expanded="true" aria-controls="palette-list" aria-activedescendant=${items[at]?.id}
+				value=${text} onKeyDown=${key}
+				onInput=${(/** @type {InputEvent} */ event) => {
+					setText(/** @type {HTMLInputElement} */ (event.target).value);
+					setPlace(0);
+				}}
+			/>
+			<${Choices} items=${items} active=${items[at]?.id ?? ''} choose=${choose} />
+			${items.length === 0 ? html`<p class="empty-note" role="status">Nothing is called that.</p>` : null}
+		</dialog>
+	`;
+}

@@ -1,0 +1,59 @@
+// @ts-check
+/** The buttons in the corner of a panel: draw, brightness, size. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { filterOf } from '../state/adjustments.js';
+import { endDrawing, startDrawing } from '../state/drawing.js';
+import { editorAddress } from '../state/editor_address.js';
+import { group } from '../state/group.js';
+import { drawing, equalViews, maximised, toggleMaximised } from '../state/workspace.js';
+import { AdjustPopover } from './adjust_popover.js';
+
+/** @import {ViewPicture} from '../overlays/scene.js' */
+
+const PATHS = {
+	draw: 'M3 13l.8-3L11 2.8 13.2 5 6 12.2zM9.6 4.2l2.2 2.2',
+	camera: 'M2 4.5h3l1-1.5h4l1 1.5h3v8H2zM8 6.2a2.3 2.3 0 1 0 0 4.6 2.3 2.3 0 0 0 0-4.6',
+	light: 'M8 5.2a2.8 2.8 0 1 0 0 5.6 2.8 2.8 0 0 0 0-5.6M8 1.5v1.6M8 12.9v1.6M1.5 8h1.6M12.9 8h1.6M3.4 3.4l1.1 1.1M11.5 11.5l1.1 1.1M3.4 12.6l1.1-1.1M11.5 4.5l1.1-1.1',
+	equal: 'M2.5 3.5h5v9h-5zM8.5 3.5h5v9h-5z',
+	main: 'M2.5 3.5h7v9h-7zM10.5 3.5h3v4h-3zM10.5 8.5h3v4h-3z',
+	larger: 'M9 3h4v4M7 13H3V9',
+	smaller: 'M7 3v4H3M9 13V9h4',
+};
+
+/** @param {{label: string, title: string, path: string, pressed?: boolean, onClick: () => void}} props */
+function Tool({ label, title, path, pressed, onClick }) {
+	return html`
+		<button class="icon-button" type="button" aria-label=${label} title=${title} aria-pressed=${pressed} onClick=${onClick}>
+			<svg viewBox="0 0 16 16" aria-hidden="true"><path d=${path} /></svg>
+		</button>
+	`;
+}
+
+/** @param {{picture: ViewPicture, first: boolean}} props */
+export function PanelTools({ picture, first }) {
+	const [open, setOpen] = useState(false);
+	const { key, letter } = picture.view;
+	const draws = drawing.value?.view === key;
+	const alone = maximised.value !== null;
+	return html`
+		<div class="panel-tools">
+			<${Tool} label=${`Draw in view ${letter}`} title="Draw a ball, a marking, a point (N)" path=${PATHS.draw} pressed=${draws}
+				onClick=${() => (draws ? endDrawing() : startDrawing(letter))} />
+			<a class="icon-button" href=${group.value ? editorAddress(group.value.id, key) : undefined} aria-label=${`Calibration of view ${letter}`} title="Calibration editor (K)">
+				<svg viewBox="0 0 16 16" aria-hidden="true"><path d=${PATHS.camera} /></svg>
+			</a>
+			<${Tool} label=${`Brightness and contrast of view ${letter}`} title="Brightness and contrast" path=${PATHS.light}
+				pressed=${open || filterOf(letter) !== 'none'} onClick=${() => setOpen(!open)} />
+			${first && !alone ? html`
+				<${Tool} label=${equalViews.value ? 'Main camera large' : 'All views equally large'}
+					title=${equalViews.value ? 'Main camera large (Shift+L)' : 'All views equally large (Shift+L)'}
+					path=${equalViews.value ? PATHS.main : PATHS.equal} onClick=${() => { equalViews.value = !equalViews.value; }} />` : null}
+			<${Tool} label=${alone ? 'Show all views' : `Show only view ${letter}`} title=${alone ? 'Show all views' : 'Show only this view'}
+				path=${alone ? PATHS.smaller : PATHS.larger} onClick=${() => toggleMaximised(letter)} />
+		</div>
+		${open ? html`<${AdjustPopover} letter=${letter} onClose=${() => setOpen(false)} />` : null}
+	`;
+}

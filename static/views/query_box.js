@@ -1,0 +1,109 @@
+// @ts-check
+/** The query as text, with what may stand there offered below it. */
+
+import { html } from 'htm/preact';
+import { useEffect, useRef, useState } from 'preact/hooks';
+
+import { param } from '../lib/router.js';
+import { complete } from '../state/completion.js';
+import { facets, loadFacets } from '../state/facets.js';
+
+/** @import {Completion, Offer} from '../state/completion.js' */
+
+const TYPING_PAUSE = 250;
+/** @type {Completion} */
+const NOTHING = { from: 0, to: 0, offers: [] };
+
+/** @param {{offers: Offer[], active: number, choose: (offer: Offer) => void}} props */
+function Offers({ offers, active, choose }) {
+	return html`
+		<ul class="query-box__offers" id="query-offers" role="listbox" aria-label="What may stand here">
+			${offers.map((offer, index) => html`
+				<li
+					key=${offer.text} id=${`query-offer-${index}`} role="option" aria-selected=${index === active}
+					onPointerDown=${(/** @type {PointerEvent} */ event) => { event.preventDefault(); choose(offer); }}
+				><span>${offer.label}</span><small>${offer.hint}</small></li>`)}
+		</ul>
+	`;
+}
+
+/** @param {{field: import('preact').RefObject<HTMLInputElement>, invalid: boolean, onQuery: (q: string) => void}} props */
+export function QueryBox({ field, invalid, onQuery }) {
+	const asked = param('q');
+	const [text, setText] = useState(asked);
+	const [completion, setCompletion] = useState(NOTHING);
+	const [active, setActive] = useState(-1);
+	const caret = useRef(/** @type {number | null} */ (null));
+	const { offers } = completion;
+	useEffect(() => {
+		if (document.activeElement !== field.current) setText(asked);
+	}, [asked]);
+	useEffect(() => {
+		// A word that still lacks its value is no question yet.
+		if (text.trim() === asked || /[:<>=]$/.test(text)) return undefined;
+		const timer = setTimeout(() => onQuery(text), TYPING_PAUSE);
+		return () => clearTimeout(timer);
+	}, [text]);
+	useEffect(() => {
+		if (caret.current !== null) field.current?.setSelectionRange(caret.current, caret.current);
+		caret.current = null;
+	}, [text]);
+
+	const known = facets.value;
+	useEffect(() => {
+		// Values that arrive while somebody waits for them.
+		if (document.activeElement === field.current && /:\S*$/.test(text)) offer(text);
+	}, [known]);
+
+	/** @param {string} now */
+	function offer(now) {
+		setActive(-1);
+		setCompletion(complete(now, field.current?.selectionStart ?? now.length, facets.value));
+	}
+	/** @param {Offer} chosen */
+	function choose(chosen) {
+		const next = text.slice(0, completion.from) + chosen.text + text.slice(completion.to);
+		caret.current = completion.from + chosen.text.length;
+		setText(next);
+		setActive(-1);
+		setCompletion(complete(next, caret.current, facets.value));
+	}
+	/** @param {KeyboardEvent} event */
+	function key(event) {
+		if (event.key === 'ArrowDown' && offers.length === 0) offer(text);
+		else if (event.key === 'ArrowDown' || event.key === 'ArrowUp') {
+			// One place before the first: what was typed, taken as it is.
+			const next = active + (event.key === 'ArrowDown' ? 1 : -1);
+			setActive(next >= offers.length ? -1 : next < -1 ? offers.length - 1 : next);
+		} else if ((event.key === 'Enter' || event.key === 'Tab') && offers[active]) choose(offers[active]);
+		else if (event.key === 'Enter') submit();
+		else if (event.key === 'Escape' && offers.length) setCompletion(NOTHING);
+		else if (event.key === 'Escape') field.current?.blur();
+		else return;
+		event.preventDefault();
+	}
+	function submit() {
+		onQuery(text);
+		setCompletion(NOTHING);
+		field.current?.blur();
+	}
+	return html`
+		<div class="query-box">
+			<input
+				class="field field--query" type="text" role="combobox" ref=${field} value=${text} spellcheck=${false}
+				aria-label="Query" placeholder="status:unreviewed jac<0.95 sort:value" autocomplete="off"
+				aria-invalid=${invalid} aria-expanded=${offers.length > 0}
+				aria-controls="query-offers" aria-activedescendant=${active >= 0 ? `query-offer-${active}` : undefined}
+				onInput=${(/** @type {InputEvent} */ event) => {
+					const { value } = /** @type {HTMLInputElement} */ (event.target);
+					setText(value);
+					offer(value);
+				}}
+				onFocus=${() => { loadFacets(); }} onBlur=${() => setCompletion(NOTHING)} onKeyDown=${key}
+			/>
+			${text ? html`
+				<button class="query-box__clear" type="button" aria-label="Clear the query" onClick=${() => { setText(''); onQuery(''); }}>×</button>` : null}
+			${offers.length > 0 ? html`<${Offers} offers=${offers} active=${active} choose=${choose} />` : null}
+		</div>
+	`;
+}

@@ -1,0 +1,97 @@
+// @ts-check
+/** Between histograms and rows: which states, saved views, and verdicts on everything that matches. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { count } from '../lib/format.js';
+import { useKeys } from '../lib/hooks.js';
+import { valueOf, withField, wordsOf } from '../state/query.js';
+import { queue, statusCounts } from '../state/queue.js';
+import { BulkDialog } from './bulk_dialog.js';
+import { Reviewers } from './reviewers.js';
+import { SavedViews } from './saved_views.js';
+
+/** @import {DatasetJson} from '../api/types.js' */
+
+const STATUSES = [
+	{ name: 'unreviewed', glyph: '○' }, { name: 'accepted', glyph: '✓' },
+	{ name: 'rejected', glyph: '✗' }, { name: 'deferred', glyph: '…' },
+];
+const FLAGS = [
+	{ word: 'finding:any', label: 'with findings' }, { word: 'passes:no', label: 'failing' },
+	{ word: 'stale:yes', label: 'stale' },
+];
+const ORDERS = [
+	{ sort: '', label: 'Order of the dataset' }, { sort: 'value', label: 'Value of review' },
+	{ sort: 'sigma-desc', label: 'Worst σ' }, { sort: 'newest-desc', label: 'Newest change' },
+];
+
+/** @param {{q: string, onQuery: (q: string) => void}} props */
+function Facets({ q, onQuery }) {
+	const chosen = valueOf(q, 'status').split(',').filter(Boolean);
+	const counts = statusCounts.value;
+	const words = wordsOf(q);
+	/** @param {string} name */
+	function turn(name) {
+		const next = chosen.includes(name) ? chosen.filter((one) => one !== name) : [...chosen, name];
+		onQuery(withField(q, 'status', next.length ? [`status:${next.join(',')}`] : []));
+	}
+	/** @param {string} word */
+	function turnFlag(word) {
+		onQuery((words.includes(word) ? words.filter((one) => one !== word) : [...words, word]).join(' '));
+	}
+	return html`
+		<div class="facets" role="group" aria-label="Filters">
+			${STATUSES.map(({ name, glyph }) => html`
+				<button key=${name} class="facet" type="button" data-status=${name} aria-pressed=${chosen.includes(name)} onClick=${() => turn(name)}>
+					<span aria-hidden="true">${glyph}</span> ${name} <span class="facet__count">${counts ? count(counts[name] ?? 0) : ''}</span>
+				</button>`)}
+			${FLAGS.map(({ word, label }) => html`
+				<button key=${word} class="facet" type="button" aria-pressed=${words.includes(word)} onClick=${() => turnFlag(word)}>${label}</button>`)}
+		</div>
+	`;
+}
+
+/** @param {{q: string, onQuery: (q: string) => void}} props */
+function OrderChoice({ q, onQuery }) {
+	const sort = valueOf(q, 'sort');
+	const known = ORDERS.some((order) => order.sort === sort);
+	/** @param {Event} event */
+	function choose(event) {
+		const { value } = /** @type {HTMLSelectElement} */ (event.target);
+		onQuery(withField(q, 'sort', value ? [`sort:${value}`] : []));
+	}
+	return html`
+		<select class="field field--select" aria-label="Order" value=${sort} onChange=${choose}>
+			${ORDERS.map((order) => html`<option key=${order.sort} value=${order.sort}>${order.label}</option>`)}
+			${known ? null : html`<option value=${sort}>By ${sort.replace('-desc', ', descending')}</option>`}
+		</select>
+	`;
+}
+
+/** @param {{dataset: DatasetJson, q: string, onQuery: (q: string) => void}} props */
+export function QueueTools({ dataset, q, onQuery }) {
+	const [deciding, setDeciding] = useState(false);
+	const { total, loaded, error } = queue.value;
+	const reason = !loaded || error ? 'The query has no answer yet' : total === 0 ? 'No group matches' : '';
+	const open = () => { if (!reason) setDeciding(true); };
+	const [keys] = useState(() => ({ run: open }));
+	keys.run = open;
+	const [bindings] = useState(() => [
+		{ keys: ['b'], label: 'Decide all groups that match', group: 'Queue', run: () => keys.run() },
+	]);
+	useKeys(bindings);
+	return html`
+		<div class="queue-tools">
+			<${Facets} q=${q} onQuery=${onQuery} />
+			<${OrderChoice} q=${q} onQuery=${onQuery} />
+			<${SavedViews} dataset=${dataset} q=${q} onQuery=${onQuery} />
+			<${Reviewers} dataset=${dataset} onQuery=${onQuery} />
+			<button class="button" type="button" aria-disabled=${reason !== ''} title=${reason} onClick=${open}>
+				${reason ? 'Decide…' : `Decide all ${count(total)}…`}
+			</button>
+			${deciding ? html`<${BulkDialog} dataset=${dataset} q=${q} onClose=${() => setDeciding(false)} />` : null}
+		</div>
+	`;
+}

@@ -1,0 +1,88 @@
+// @ts-check
+/** How the numbers of a dataset are spread; every bar leads to its groups. */
+
+import { html } from 'htm/preact';
+import { useRef } from 'preact/hooks';
+
+import { getStatistics } from '../api/statistics.js';
+import { count } from '../lib/format.js';
+import { useResource } from '../lib/resource.js';
+import { address, navigate, pageDataset, param } from '../lib/router.js';
+import { queueAddress } from '../state/navigation.js';
+import { DatasetFrame } from './dataset_page.js';
+import { HeatMap } from './heat_map.js';
+import { Loading, Trouble } from './page_frame.js';
+import { QueryBox } from './query_box.js';
+import { seriesColour, Spread } from './spread.js';
+
+/** @import {MatchCounts, StatisticsJson} from '../api/statistics.js' */
+/** @import {DatasetJson} from '../api/types.js' */
+
+/** @param {string} q */
+function setQuery(q) {
+	navigate(address(`/datasets/${encodeURIComponent(pageDataset.value)}/statistics`, { q: q.trim() }), { replace: true });
+}
+
+/** @param {{names: string[]}} props */
+function SplitLegend({ names }) {
+	if (names.length < 2) return null;
+	return html`
+		<p class="chart__legend" aria-label="Splits">
+			${names.map((name, index) => html`<span key=${name}><i class="spread__swatch" data-colour=${seriesColour(index)} aria-hidden="true"></i>${name || 'no split'}</span>`)}
+		</p>
+	`;
+}
+
+/** @param {{matches: MatchCounts[], dataset: string, q: string}} props */
+function Matches({ matches, dataset, q }) {
+	return html`
+		<section class="card card--flush statistics__matches" aria-labelledby="matches-title">
+			<h2 id="matches-title">Matches · ${count(matches.length)}</h2>
+			<table class="table">
+				<thead><tr><th>match</th><th>split</th><th data-numeric="true">groups</th><th data-numeric="true">pass</th><th data-numeric="true">accepted</th></tr></thead>
+				<tbody>${matches.map((one) => html`
+					<tr key=${`${one.match} ${one.split}`}>
+						<th scope="row"><a href=${queueAddress(dataset, `${q} match:"${one.match}"`.trim())}>${one.match || 'no match'}</a></th>
+						<td>${one.split || '–'}</td><td data-numeric="true">${count(one.groups)}</td>
+						<td data-numeric="true">${count(one.passing)}</td><td data-numeric="true">${count(one.accepted)}</td>
+					</tr>`)}
+				</tbody>
+			</table>
+		</section>
+	`;
+}
+
+/** @param {{found: StatisticsJson, dataset: string, q: string}} props */
+function Body({ found, dataset, q }) {
+	const names = found.histograms[0]?.series.map(({ split }) => split) ?? [];
+	return html`
+		<div class="page__title"><p>${count(found.groups)} groups${q ? ' match' : ''}. Choose a bar to open its groups in the queue.</p><${SplitLegend} names=${names} /></div>
+		<div class="statistics__grid">
+			${found.histograms.map((spread) => html`<${Spread} key=${spread.name} spread=${spread} dataset=${dataset} q=${q} />`)}
+		</div>
+		<div class="statistics__rest">
+			<${HeatMap} positions=${found.positions} dataset=${dataset} q=${q} />
+			<${Matches} matches=${found.matches} dataset=${dataset} q=${q} />
+		</div>
+	`;
+}
+
+/** @param {{one: DatasetJson}} props */
+function StatisticsOf({ one }) {
+	const q = param('q');
+	const field = useRef(/** @type {HTMLInputElement | null} */ (null));
+	const found = useResource((signal) => getStatistics(one.id, q, signal), [one.id, q]);
+	return html`
+		<div class="statistics__query"><${QueryBox} field=${field} invalid=${found.error?.status === 400} onQuery=${setQuery} /></div>
+		${found.error ? html`<${Trouble} title=${found.error.status === 400 ? 'The query cannot be read' : 'The statistics cannot be shown'} error=${found.error} retry=${found.reload} />` : null}
+		${found.value ? html`<${Body} found=${found.value} dataset=${one.name} q=${q} />` : found.error ? null : html`<${Loading} what="statistics" />`}
+	`;
+}
+
+export function StatisticsPage() {
+	return html`
+		<${DatasetFrame} current="statistics" title="Statistics">
+			${(/** @type {DatasetJson} */ one) => html`<${StatisticsOf} key=${one.id} one=${one} />`}
+		<//>
+	`;
+}

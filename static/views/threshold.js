@@ -1,0 +1,96 @@
+// @ts-check
+/** One threshold: a slider and the number beside it; some can be switched off. */
+
+import { html } from 'htm/preact';
+
+/** @import {PolicyField, Threshold as Value} from '../api/policies.js' */
+
+/** JaC is measured at these tolerances alone. */
+const GAMMAS = [0.5, 1, 2];
+
+/** Units that stand beside a number in few characters. */
+const UNITS = /** @type {{[unit: string]: string}} */ ({ '% of diagonal': '%', degrees: '°', share: '' });
+
+/** @param {{unit: string}} props */
+function Unit({ unit }) {
+	return html`<span class="threshold__unit" title=${unit}>${UNITS[unit] ?? unit.split(' ')[0]}</span>`;
+}
+
+/** A round step, about two hundred from end to end. @param {number} low @param {number} high */
+export function stepOf(low, high) {
+	const rough = (high - low) / 200;
+	const power = 10 ** Math.floor(Math.log10(rough));
+	const round = [1, 2, 5, 10].find((n) => n * power >= rough * 0.999) ?? 10;
+	return Number((round * power).toPrecision(1));
+}
+
+/** @param {PolicyField} field @returns {[number, number]} */
+function endsOf({ minimum, maximum, default: usual }) {
+	const low = minimum ?? 0;
+	const high = maximum ?? Math.max(1, 4 * Number(usual ?? 1));
+	return [low, high];
+}
+
+/** @param {{field: PolicyField, value: Value, id: string, change: (value: Value) => void}} props */
+function Slider({ field, value, id, change }) {
+	const [low, high] = endsOf(field);
+	const number = (/** @type {Event} */ event) => Number(/** @type {HTMLInputElement} */ (event.target).value);
+	const shown = typeof value === 'number' ? value : low;
+	const off = value === null;
+	const share = Math.max(0, Math.min(1, (shown - low) / (high - low)));
+	return html`
+		<input
+			class="threshold__slider" type="range" min=${low} max=${high} step=${stepOf(low, high)} value=${shown} disabled=${off}
+			aria-label=${`${field.label}, slider`} style=${{ '--share': `${100 * share}%` }}
+			onInput=${(/** @type {Event} */ event) => change(number(event))}
+		/>
+		<input
+			class="field threshold__number" id=${id} type="number" min=${low} max=${high} step="any" value=${off ? '' : shown} disabled=${off}
+			onChange=${(/** @type {Event} */ event) => { if (Number.isFinite(number(event))) change(number(event)); }}
+		/>
+		<${Unit} unit=${field.unit} />
+	`;
+}
+
+/** @param {{field: PolicyField, id: string, value: Value, change: (value: Value) => void}} props */
+function Choice({ field, id, value, change }) {
+	const options = field.name === 'jac_gamma_percent' ? GAMMAS : [];
+	return html`
+		<select class="field threshold__number" id=${id} value=${String(value)} onChange=${(/** @type {Event} */ event) => change(Number(/** @type {HTMLSelectElement} */ (event.target).value))}>
+			${options.map((option) => html`<option key=${option} value=${String(option)}>${option}</option>`)}
+		</select>
+		<${Unit} unit=${field.unit} />
+	`;
+}
+
+/**
+ * @param {{
+ *   field: PolicyField, value: Value, present: Value, switched: Value,
+ *   change: (value: Value) => void
+ * }} props `present` is what the saved policy asks; `switched` what is asked when it is switched on
+ */
+export function Threshold({ field, value, present, switched, change }) {
+	const id = `threshold-${field.name.replace('.', '-')}`;
+	const checked = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.target).checked;
+	const changed = value !== present;
+	if (typeof field.default === 'boolean') {
+		return html`
+			<div class="threshold" data-changed=${changed}>
+				<label class="form__check"><input type="checkbox" checked=${value === true} onChange=${(/** @type {Event} */ event) => change(checked(event))} />${field.label}</label>
+			</div>
+		`;
+	}
+	return html`
+		<div class="threshold" data-changed=${changed}>
+			<label class="threshold__label" for=${id}>${field.label}</label>
+			${field.optional ? html`
+				<label class="threshold__switch">
+					<input type="checkbox" checked=${value !== null} onChange=${(/** @type {Event} */ event) => change(checked(event) ? switched : null)} />
+					<span class="hidden-text">${field.label} is asked</span>
+				</label>` : null}
+			${field.name === 'jac_gamma_percent'
+				? html`<${Choice} field=${field} id=${id} value=${value} change=${change} />`
+				: html`<${Slider} field=${field} id=${id} value=${value} change=${change} />`}
+		</div>
+	`;
+}

@@ -1,0 +1,59 @@
+// @ts-check
+/** What changed from one version to another. */
+
+import { html } from 'htm/preact';
+
+import { getDiff } from '../api/versions.js';
+import { count, fixed, words } from '../lib/format.js';
+import { sentenceOf, useResource } from '../lib/resource.js';
+import { queueAddress } from '../state/navigation.js';
+import { Loading } from './page_frame.js';
+
+/** @import {ComponentChildren} from 'preact' */
+/** @import {VersionJson} from '../api/versions.js' */
+
+const SHOWN = 50;
+
+/** @typedef {(item: any) => ComponentChildren} Tell */
+
+/** @param {{title: string, items: any[], all: number, dataset: string, tell: Tell}} props */
+function Part({ title, items, all, dataset, tell }) {
+	if (all === 0) return null;
+	return html`
+		<details class="diff__part" open=${all <= 12}>
+			<summary>${title} · ${count(all)}</summary>
+			<table class="table">
+				<tbody>${items.slice(0, SHOWN).map((item) => html`
+					<tr key=${item.group}><th scope="row"><a href=${queueAddress(dataset, `key:"${item.group}"`)}>${item.group}</a></th><td>${tell(item)}</td></tr>`)}
+				</tbody>
+			</table>
+			${all > Math.min(SHOWN, items.length) ? html`<p class="note">The first ${Math.min(SHOWN, items.length)} of ${count(all)}.</p>` : null}
+		</details>
+	`;
+}
+
+/** @param {{diff: any, dataset: string}} props */
+function Parts({ diff, dataset }) {
+	const { counts } = diff;
+	return html`
+		<ul class="diff__lines">${diff.lines.map((/** @type {string} */ line) => html`<li key=${line}>${line}</li>`)}</ul>
+		<p class="note">${count(counts.unchanged)} groups are the same in both.</p>
+		<${Part} title="Added" items=${diff.added} all=${counts.added} dataset=${dataset} tell=${(/** @type {any} */ item) => item.why} />
+		<${Part} title="Dropped" items=${diff.dropped} all=${counts.dropped} dataset=${dataset} tell=${(/** @type {any} */ item) => item.why} />
+		<${Part} title="Balls that moved" items=${diff.moved} all=${counts.moved} dataset=${dataset} tell=${(/** @type {any} */ item) => fixed(item.metres, 3, ' m')} />
+		<${Part} title="Changed" items=${diff.changed} all=${counts.changed} dataset=${dataset} tell=${(/** @type {any} */ item) => item.what.map(words).join(', ')} />
+	`;
+}
+
+/** @param {{older: VersionJson, newer: VersionJson, dataset: string, onClose: () => void}} props */
+export function VersionDiff({ older, newer, dataset, onClose }) {
+	const diff = useResource((signal) => getDiff(newer.id, older.id, signal), [newer.id, older.id]);
+	return html`
+		<section class="card" aria-labelledby="diff-title">
+			<h2 id="diff-title">From ${older.name} to ${newer.name}
+				<button class="card__aside link-button" type="button" onClick=${onClose}>Close<span class="hidden-text"> the comparison</span></button></h2>
+			${diff.error ? html`<p class="form__error" role="alert">${sentenceOf(diff.error)}</p>` : null}
+			${diff.value ? html`<${Parts} diff=${diff.value} dataset=${dataset} />` : diff.error ? null : html`<${Loading} what="the difference" />`}
+		</section>
+	`;
+}

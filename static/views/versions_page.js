@@ -1,0 +1,137 @@
+// @ts-check
+/** Frozen versions: listed, compared, verified, exported. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { getVersions, manifestAddress, verifyVersion } from '../api/versions.js';
+import { count } from '../lib/format.js';
+import { sentenceOf, useResource } from '../lib/resource.js';
+import { follow } from '../state/jobs.js';
+import { DatasetFrame } from './dataset_page.js';
+import { ExportDialog } from './export_dialog.js';
+import { FreezeDialog } from './freeze_dialog.js';
+import { Loading, Trouble } from './page_frame.js';
+import { VerifyReport } from './verify_report.js';
+import { VersionDiff } from './version_diff.js';
+import { When } from './when.js';
+
+/** @import {JobJson} from '../api/jobs.js' */
+/** @import {VersionJson} from '../api/versions.js' */
+/** @import {DatasetJson} from '../api/types.js' */
+
+/** @param {any} split @returns {string} */
+function splitText(split) {
+	if (split?.kind === 'match') return `by match, seed ${split.seed}, ${Math.round(100 * split.test_share)} % test`;
+	if (split?.kind === 'camera') return `by camera, ${split.test_cameras.join(' ')} test`;
+	return 'as given';
+}
+
+/** @param {{version: VersionJson}} props */
+function Facts({ version }) {
+	const { counts } = version;
+	const splits = Object.entries(counts.splits ?? {}).map(([name, part]) => `${name} ${count(/** @type {any} */ (part).groups)}`);
+	return html`
+		<dl class="facts">
+			<dt>Hash</dt><dd class="mono">${version.hash}</dd>
+			<dt>Groups</dt><dd>${count(counts.groups)}${splits.length ? ` (${splits.join(', ')})` : ''} · ${count(counts.views ?? 0)} views · ${count(counts.balls ?? 0)} balls${counts.overrides ? ` · ${count(counts.overrides)} accepted against a gate` : ''}</dd>
+			<dt>Split</dt><dd>${splitText(version.split)}</dd>
+			<dt>Policy</dt><dd>${version.policy?.name ?? ''} <span class="mono">${version.policy?.hash ?? ''}</span></dd>
+			<dt>Computed by</dt><dd>solver ${version.solver_version}, Touchline ${version.software_version}</dd>
+		</dl>
+	`;
+}
+
+/**
+ * @param {{
+ *   version: VersionJson, others: VersionJson[], job: JobJson | null, verify: () => void,
+ *   compare: (older: VersionJson) => void, ask: () => void
+ * }} props
+ */
+function VersionSection({ version, others, job, verify, compare, ask }) {
+	/** @param {Event} event */
+	function choose(event) {
+		const select = /** @type {HTMLSelectElement} */ (event.target);
+		const older = others.find(({ id }) => String(id) === select.value);
+		select.value = '';
+		if (older) compare(older);
+	}
+	return html`
+		<li>
+			<section class="card version" aria-labelledby=${`version-${version.id}`}>
+				<header class="version__head">
+					<h2 id=${`version-${version.id}`}>${version.name}</h2>
+					<p class="note">frozen <${When} at=${version.created} />${version.actor ? ` by ${version.actor}` : ''}</p>
+					<div class="buttons">
+						<button class="button" type="button" onClick=${verify}>Verify</button>
+						<select class="field" aria-label=${`Compare ${version.name} with`} disabled=${others.length === 0} onChange=${choose}>
+							<option value="">Compare with…</option>
+							${others.map(({ id, name }) => html`<option key=${id} value=${String(id)}>${name}</option>`)}
+						</select>
+						<a class="button" href=${manifestAddress(version.id)} target="_blank" rel="noopener">Manifest</a>
+						<button class="button" type="button" onClick=${ask}>Export…</button>
+					</div>
+				</header>
+				${version.note ? html`<p>${version.note}</p>` : null}
+				<${Facts} version=${version} />
+				${job ? html`<${VerifyReport} job=${job} />` : null}
+			</section>
+		</li>
+	`;
+}
+
+/** Verifications under way or done, by version. */
+function useVerify() {
+	const [jobs, setJobs] = useState(/** @type {{[id: number]: JobJson}} */ ({}));
+	const [problem, setProblem] = useState('');
+	/** @param {VersionJson} version */
+	async function verify(version) {
+		setProblem('');
+		try {
+			await follow(await verifyVersion(version.id), (job) => setJobs((before) => ({ ...before, [version.id]: job })));
+		} catch (error) {
+			setProblem(sentenceOf(error));
+		}
+	}
+	return { jobs, problem, verify };
+}
+
+/** @param {{one: DatasetJson}} props */
+function VersionsOf({ one }) {
+	const versions = useResource((signal) => getVersions(one.id, signal), [one.id]);
+	const { jobs, problem, verify } = useVerify();
+	const [diff, setDiff] = useState(/** @type {{older: VersionJson, newer: VersionJson} | null} */ (null));
+	const [asked, setAsked] = useState(/** @type {VersionJson | 'freeze' | null} */ (null));
+	if (versions.error) return html`<${Trouble} title="The versions cannot be shown" error=${versions.error} retry=${versions.reload} />`;
+	if (!versions.value) return html`<${Loading} what="versions" />`;
+	const { items } = versions.value;
+	const close = () => setAsked(null);
+	return html`
+		<div class="page__title">
+			<p>A version never changes: its hash says what is in it, and anybody can compute it again.</p>
+			<button class="button button--primary" type="button" onClick=${() => setAsked('freeze')}>Freeze a version…</button>
+		</div>
+		${problem ? html`<p class="card form__error" role="alert">${problem}</p>` : null}
+		${diff ? html`<${VersionDiff} ...${diff} dataset=${one.name} onClose=${() => setDiff(null)} />` : null}
+		${items.length === 0 ? html`
+			<section class="card empty"><h2>Nothing is frozen yet</h2><p>${count(one.accepted)} of ${count(one.groups)} groups are accepted.</p></section>` : null}
+		<ul class="page__list">
+			${items.map((version) => html`
+				<${VersionSection}
+					key=${version.id} version=${version} others=${items.filter(({ id }) => id !== version.id)} job=${jobs[version.id] ?? null}
+					verify=${() => verify(version)} ask=${() => setAsked(version)}
+					compare=${(/** @type {VersionJson} */ other) => setDiff(other.id < version.id ? { older: other, newer: version } : { older: version, newer: other })}
+				/>`)}
+		</ul>
+		${asked === 'freeze' ? html`<${FreezeDialog} one=${one} taken=${items.map(({ name }) => name)} onClose=${close} onFrozen=${versions.reload} />` : null}
+		${asked && asked !== 'freeze' ? html`<${ExportDialog} one=${one} version=${asked} onClose=${close} />` : null}
+	`;
+}
+
+export function VersionsPage() {
+	return html`
+		<${DatasetFrame} current="versions" title="Versions">
+			${(/** @type {DatasetJson} */ one) => html`<${VersionsOf} key=${one.id} one=${one} />`}
+		<//>
+	`;
+}

@@ -1,0 +1,85 @@
+// @ts-check
+/** The markings of the focused view: how far each is off, and how much it matters. */
+
+import { html } from 'htm/preact';
+
+import { pixels } from '../lib/format.js';
+import { influence } from '../state/insight.js';
+import { focused, selected } from '../state/workspace.js';
+import { Letter } from './letter.js';
+import { jacOf } from './view_state.js';
+
+/** @import {GroupDocument} from '../api/types.js' */
+/** @import {MarkingResiduals} from '../geometry/residual.js' */
+/** @import {ViewPicture} from '../overlays/scene.js' */
+/** @import {Influence} from '../state/insight.js' */
+
+/** Bars reach their end at twice what JaC allows. */
+const FULL = 2;
+
+/**
+ * How far a marking would be off if the camera did not know it, and whether the view would be no
+ * worse for that: a marking that fits costs JaC its share when it goes.
+ *
+ * @param {Influence | undefined} one
+ */
+function leftOut(one) {
+	if (!one) return { text: '', better: false };
+	if (!one.jac_without) return { text: 'none', better: false };
+	const better = one.jac_without['0.5'] >= one.jac['0.5'] && one.jac['0.5'] < 1;
+	return { text: one.largest_px_without === null ? '–' : pixels(one.largest_px_without), better };
+}
+
+/** @param {Influence | undefined} one */
+function leftOutWords(one) {
+	if (!one) return '';
+	if (!one.jac_without) return 'Without this marking there is no camera';
+	return `Without it: JaC ${one.jac_without['0.5'].toFixed(2)} instead of ${one.jac['0.5'].toFixed(2)}`;
+}
+
+/** @param {{picture: ViewPicture, marking: MarkingResiduals, one: Influence | undefined}} props */
+function LineRow({ picture, marking, one }) {
+	const share = Math.min(1, (marking.largest ?? 0) / (FULL * picture.gamma));
+	const index = marking.points.findIndex(({ distance }) => distance === marking.largest);
+	const without = leftOut(one);
+	const select = () => {
+		selected.value = { kind: 'point', view: picture.view.key, marking: marking.marking, index: Math.max(0, index) };
+	};
+	return html`
+		<li>
+			<button class="view-line" type="button" onClick=${select} title=${`Select the worst point of ${marking.marking}`}>
+				<span class="view-line__name">${marking.marking}</span>
+				<svg class="view-line__bar" viewBox="0 0 100 8" preserveAspectRatio="none" data-grade=${marking.grade} aria-hidden="true">
+					<rect class="view-line__track" width="100" height="8" /><rect class="view-line__fill" width=${100 * share} height="8" /><path d="M50 0V8" />
+				</svg>
+				<span data-grade=${marking.grade}>${marking.largest === null ? '–' : pixels(marking.largest)}</span>
+				<span class="view-line__without" data-better=${without.better} title=${leftOutWords(one)}>${without.text}</span>
+			</button>
+		</li>
+	`;
+}
+
+/** @param {{group: GroupDocument, pictures: ViewPicture[]}} props */
+export function ViewLines({ group, pictures }) {
+	const picture = pictures.find(({ view }) => view.letter === focused.value);
+	if (!picture) return null;
+	const drawn = picture.markings.filter(({ points }) => points.length > 0);
+	const missing = picture.markings.length - drawn.length;
+	const known = influence.value?.key.startsWith(`influence ${picture.view.id} `) ? influence.value.items : [];
+	const jac = jacOf(picture.solved);
+	return html`
+		<section class="card" aria-label=${`Lines of view ${picture.view.letter}`}>
+			<h2><${Letter} letter=${picture.view.letter} /> Lines${jac === null ? '' : ` · JaC ${jac.toFixed(2)}`}
+				<span class="card__aside">px${known.length ? ' · left out' : ''}</span></h2>
+			${drawn.length ? html`
+				<ul class="view-lines" data-influence=${known.length > 0}>
+					${drawn.map((marking) => html`
+						<${LineRow}
+							key=${`${group.id} ${marking.marking}`} picture=${picture} marking=${marking}
+							one=${known.find((one) => one.marking === marking.marking)}
+						/>`)}
+				</ul>` : html`<p class="empty-note">No lines are drawn in this view. N draws one.</p>`}
+			${missing > 0 ? html`<p class="view-lines__missing">${missing} in sight and not drawn: ${picture.markings.filter(({ points }) => points.length === 0).map(({ marking }) => marking).join(', ')}.</p>` : null}
+		</section>
+	`;
+}

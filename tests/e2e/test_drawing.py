@@ -1,0 +1,198 @@
+"""What is missing is drawn, what is wrong is taken back, and what is small is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.e2e.screen import Document, Screen, interior_point
+
+Review = Callable[..., Screen]
+
+
+def first_view(screen: Screen) -> Document:
+    """The main camera's view, as the server has it."""
+    view: Document = screen.document()["views"][0]
+    return view
+
+
+def undo(screen: Screen, before: Document) -> None:
+    """Take edits back until the view is what it was."""
+    screen.saved()
+    for _ in range(8):
+        now = first_view(screen)
+        if (now["lines"], now["balls"]) == (before["lines"], before["balls"]):
+            return
+        screen.press("Control+z")
+        screen.saved()
+    pytest.fail("undo did not lead back")
+
+
+class TestDrawing:
+    def test_a_missing_ball_is_drawn_at_the_pointer(self, review: Review) -> None:
+        screen = review(1)
+        before = first_view(screen)
+        x, y, width, height = before["balls"][0]["box"]
+        screen.press("Enter", "Delete")
+        expect(screen.page.locator(".object-list")).not_to_contain_text("Ball")
+        screen.press("Escape")
+        screen.page.mouse.move(*screen.place(before, x + width / 2, y + height / 2))
+        screen.press("n", "Enter")
+        screen.saved()
+        box = first_view(screen)["balls"][0]["box"]
+        middle = (box[0] + box[2] / 2, box[1] + box[3] / 2)
+        assert middle == pytest.approx((x + width / 2, y + height / 2), abs=2)
+        assert box[2] == pytest.approx(width, rel=0.5)
+        undo(screen, before)
+
+    def test_a_new_marking_is_drawn_click_by_click(self, review: Review) -> None:
+        screen = review(1)
+        before = first_view(screen)
+        marking = "Goal left crossbar"
+        if marking in before["lines"]:
+            marking = "Goal right crossbar"
+        screen.press("n")
+        screen.page.keyboard.type(marking.lower())
+        screen.press("Enter")
+        expect(screen.page.locator(".drawing-chip")).to_contain_text(marking)
+        for x, y in ((40, 500), (90, 505), (60, 502)):
+            screen.page.mouse.click(*screen.place(before, x, y))
+        screen.press("Escape")
+        expect(screen.page.locator(".drawing-chip")).to_have_count(0)
+        screen.saved()
+        drawn = first_view(screen)["lines"][marking]
+        assert [point["x"] for point in drawn] == pytest.approx([40, 60, 90], abs=2)
+        undo(screen, before)
+
+    def test_a_point_is_put_on_a_line(self, review: Review) -> None:
+        screen = review(1)
+        before = first_view(screen)
+        _, line = max(
+            before["lines"].items(),
+            key=lambda item: abs(item[1][0]["x"] - item[1][1]["x"]) if len(item[1]) > 1 else 0,
+        )
+        middle = [(line[0][axis] + line[1][axis]) / 2 for axis in ("x", "y")]
+        screen.page.keyboard.down("Alt")
+        screen.page.mouse.click(*screen.place(before, *middle))
+        screen.page.keyboard.up("Alt")
+        screen.saved()
+        now = first_view(screen)["lines"]
+        grown = [name for name in now if len(now[name]) > len(before["lines"][name])]
+        assert len(grown) == 1
+        undo(screen, before)
+
+
+class TestObjects:
+    def test_a_ball_is_occluded_out_of_view_and_back(self, review: Review) -> None:
+        screen = review(1)
+        before = first_view(screen)
+        screen.press("q")
+        screen.saved()
+        assert first_view(screen)["balls"][0]["occluded"] is True
+        screen.press("o")
+        expect(screen.page.locator('[data-row="A"] [data-number="ratio"]')).to_have_text("–")
+        screen.saved()
+        assert first_view(screen)["balls"][0]["out_of_view"] is True
+        undo(screen, before)
+
+    def test_a_nudged_ball_is_given_back_what_it_was(self, review: Review) -> None:
+        screen = review(1)
+        before = first_view(screen)
+        screen.press("Enter", "Shift+ArrowRight")
+        screen.saved()
+        assert first_view(screen)["balls"] != before["balls"]
+        screen.press("u")
+        expect(screen.page.locator(".save")).to_have_attribute("data-unsaved", "0")
+        screen.page.wait_for_function(
+            "async ([id, x]) => (await (await fetch(`/api/v1/groups/${id}`)).json())"
+            ".views[0].balls[0].box[0] === x",
+            arg=[screen.group, before["balls"][0]["box"][0]],
+        )
+
+    def test_undo_goes_across_views_and_survives_a_reload(self, review: Review) -> None:
+        screen = review(1)
+        before = screen.document()["views"]
+        screen.press("q")
+        screen.saved()
+        screen.press("Shift+2")
+        screen.saved()
+        screen.page.reload()
+        screen.ready()
+        screen.press("Control+z")
+        screen.saved()
+        assert screen.document()["views"][1]["included"] is True
+        assert screen.document()["views"][0]["balls"][0]["occluded"] is True
+        screen.press("Control+z")
+        expect(screen.page.locator(".save")).to_have_attribute("data-unsaved", "0")
+        undo(screen, before[0])
+        assert screen.document()["views"][0]["balls"] == before[0]["balls"]
+
+    def test_sides_are_swapped_and_swapped_back(self, review: Review) -> None:
+        screen = review(1)
+        before = first_view(screen)
+        screen.press("m")
+        screen.saved()
+        assert set(first_view(screen)["lines"]) != set(before["lines"])
+        screen.press("m")
+        screen.saved()
+        expect(screen.page.locator(".save")).to_have_attribute("data-unsaved", "0")
+        assert first_view(screen)["lines"] == before["lines"]
+
+
+class TestLooking:
+    def test_holding_z_magnifies_and_follows_a_nudge(self, review: Review) -> None:
+        screen = review(1)
+        before = first_view(screen)
+        screen.press("Enter")
+        screen.page.keyboard.down("z")
+        caption = screen.page.locator(".loupe figcaption")
+        expect(caption).to_contain_text("8×")
+        said = caption.inner_text()
+        screen.press("Shift+ArrowRight")
+        expect(caption).not_to_have_text(said)
+        screen.page.keyboard.up("z")
+        expect(caption).to_have_count(0)
+        undo(screen, before)
+
+    def test_a_note_stands_where_the_pointer_was(self, review: Review) -> None:
+        screen = review(1)
+        view = first_view(screen)
+        _, _, point = interior_point(view)
+        screen.page.mouse.move(*screen.place(view, point["x"], point["y"]))
+        screen.press("Shift+n")
+        screen.page.keyboard.type("look here")
+        screen.press("Enter")
+        screen.saved()
+        note = screen.document()["verdict"]["note"]
+        assert note.startswith("A ") and note.endswith(": look here")
+        answer = screen.page.request.put(
+            f"/api/v1/groups/{screen.group}/verdict",
+            data={"state": "unreviewed"},
+            headers={"If-Match": screen.document()["etag"]},
+        )
+        assert answer.ok
+
+    def test_single_letters_can_be_switched_off(self, review: Review) -> None:
+        screen = review(1)
+        screen.press("?")
+        screen.page.get_by_label("Single letters do something").click()
+        screen.press("Escape", "x")
+        expect(screen.page.locator(".reasons")).to_have_count(0)
+        screen.press("?")
+        screen.page.get_by_label("Single letters do something").click()
+        screen.press("Escape", "x")
+        expect(screen.page.locator(".reasons")).to_be_visible()
+
+    def test_another_key_is_chosen_for_a_verdict(self, review: Review) -> None:
+        screen = review(1)
+        screen.press("?")
+        name = "X: choose another key for “Reject; then a digit for the reason”"
+        screen.page.get_by_role("button", name=name, exact=True).click()
+        screen.press("a")
+        expect(screen.page.locator(".key-field")).to_contain_text("Accept and next")
+        screen.press("y", "Escape", "x")
+        expect(screen.page.locator(".reasons")).to_have_count(0)
+        screen.press("y")
+        expect(screen.page.locator(".reasons")).to_be_visible()

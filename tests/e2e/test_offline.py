@@ -1,0 +1,94 @@
+"""The network goes away and comes back: what a person said in between is not lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from playwright.sync_api import Page, expect
+
+from tests.e2e.screen import Screen, rows, withdraw_verdict
+
+OpenPage = Callable[..., Page]
+GONE = ("ERR_INTERNET_DISCONNECTED", "ERR_NETWORK_CHANGED", "ERR_FAILED", "ERR_NETWORK_IO")
+
+
+def at_last_groups(open_page: OpenPage, console: Any) -> tuple[Screen, list[int]]:
+    """The review screen before the last groups, with those that follow loaded."""
+    for part in GONE:
+        console.expect(part)
+    page = open_page(None)
+    chain = [int(row["id"]) for row in rows(page)][-5:]
+    page.goto(f"/review/{chain[0]}")
+    screen = Screen(page)
+    screen.ready()
+    page.wait_for_function(
+        "ids => ids.every((id) => performance.getEntriesByType('resource')"
+        ".some((entry) => entry.name.endsWith(`/api/v1/groups/${id}`)))",
+        arg=chain[1:],
+    )
+    return screen, chain
+
+
+class TestOutbox:
+    def test_edits_and_verdicts_wait_for_the_network(
+        self, open_page: OpenPage, console: Any
+    ) -> None:
+        screen, chain = at_last_groups(open_page, console)
+        page = screen.page
+        box = screen.document()["views"][0]["balls"][0]["box"]
+        page.context.set_offline(True)
+        screen.press("Enter", "Shift+ArrowRight", "s")
+        page.wait_for_url(f"**/review/{chain[1]}")
+        expect(page.locator(".save")).to_contain_text("Offline · 2 changes wait")
+        screen.press("x", "4")
+        page.wait_for_url(f"**/review/{chain[2]}")
+        expect(page.locator(".save")).to_contain_text("Offline · 3 changes wait")
+        page.context.set_offline(False)
+        screen.saved()
+        verdicts = {row["id"]: row["status"] for row in rows(page)}
+        assert [verdicts[group] for group in chain[:2]] == ["deferred", "rejected"]
+        first = page.request.get(f"/api/v1/groups/{chain[0]}").json()
+        assert first["views"][0]["balls"][0]["box"][0] == box[0] + 5
+        leave_as_found(page, chain[:2], edited=chain[0])
+
+    def test_what_waits_survives_a_reload(self, open_page: OpenPage, console: Any) -> None:
+        screen, chain = at_last_groups(open_page, console)
+        page = screen.page
+        box = screen.document()["views"][0]["balls"][0]["box"]
+        page.route("**/api/v1/views/**", lambda route: route.abort())
+        screen.press("Enter", "Shift+ArrowLeft")
+        expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
+        page.unroute("**/api/v1/views/**")
+        page.reload()
+        screen.saved()
+        assert screen.document()["views"][0]["balls"][0]["box"][0] == box[0] - 5
+        leave_as_found(page, [], edited=chain[0])
+
+    def test_an_unsent_edit_can_be_undone(self, open_page: OpenPage, console: Any) -> None:
+        screen, _ = at_last_groups(open_page, console)
+        page = screen.page
+        box = screen.document()["views"][0]["balls"][0]["box"]
+        page.context.set_offline(True)
+        screen.press("Enter", "Shift+ArrowRight")
+        expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
+        screen.press("ArrowUp")
+        expect(page.locator(".save")).to_contain_text("Offline · 2 changes wait")
+        screen.press("Control+z")
+        expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
+        page.context.set_offline(False)
+        screen.saved()
+        now = screen.document()["views"][0]["balls"][0]["box"]
+        assert now == [box[0] + 5, *box[1:]]
+        leave_as_found(page, [], edited=screen.group)
+
+
+def leave_as_found(page: Page, judged: list[int], *, edited: int) -> None:
+    """Take back what a test has said."""
+    for group in judged:
+        withdraw_verdict(page, group)
+    present = page.request.get(f"/api/v1/groups/{edited}")
+    answer = page.request.post(
+        f"/api/v1/groups/{edited}/undo", headers={"If-Match": present.headers["etag"]}
+    )
+    assert answer.ok

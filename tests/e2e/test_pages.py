@@ -1,0 +1,217 @@
+"""The pages around the review: reached, readable for everybody, and doing their work."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.test_access import NESTED_SCROLLERS, SIZES, serious
+
+OpenPage = Callable[..., Page]
+
+PAGES = {
+    "/datasets": ".dataset-card",
+    "/datasets/sample/yield": ".funnel",
+    "/datasets/sample/policy": ".policy__text",
+    "/datasets/sample/statistics": ".spread",
+    "/datasets/sample/versions": ".empty",
+    "/datasets/sample/evaluation": ".run-form",
+    "/import": "#import-dataset",
+    "/jobs": ".page__main > *:nth-child(2)",
+    "/exports": ".page__main > *:nth-child(2)",
+}
+TOO_WIDE = """() => [document.documentElement, document.querySelector('.page__main'),
+  document.querySelector('.header')]
+  .filter((element) => element.scrollWidth > element.clientWidth + 1)
+  .map((element) => element.className || element.tagName)"""
+MINUTE = 60_000
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+class TestEveryPage:
+    def test_is_usable_by_everybody_and_fits(self, open_page: OpenPage, scheme: str) -> None:
+        page = open_page("/datasets", scheme=scheme)
+        for path, waited in PAGES.items():
+            page.goto(path)
+            page.wait_for_selector(waited, timeout=MINUTE)
+            found = {"axe": serious(page)}
+            for width, height in SIZES if scheme == "dark" else []:
+                page.set_viewport_size({"width": width, "height": height})
+                found[f"too wide at {width}"] = page.evaluate(TOO_WIDE)
+                found[f"scrolls twice at {width}"] = page.evaluate(NESTED_SCROLLERS)
+            assert {name: what for name, what in found.items() if what} == {}, path
+
+
+class TestNavigation:
+    def test_the_menu_leads_to_every_page_of_a_dataset(self, open_page: OpenPage) -> None:
+        page = open_page("/datasets")
+        page.wait_for_selector(".dataset-card")
+        page.get_by_role("button", name="Dataset and pages").click()
+        menu = page.locator("#dataset-menu")
+        expect(menu.get_by_role("link", name="sample")).to_be_visible()
+        menu.get_by_role("link", name="Statistics").click()
+        page.wait_for_url("**/datasets/sample/statistics")
+        expect(menu).to_be_hidden()
+        expect(page.locator(".spread").first).to_be_visible()
+
+    def test_the_palette_finds_pages_groups_and_actions(self, open_page: OpenPage) -> None:
+        page = open_page("/groups")
+        page.wait_for_selector(".queue-row a")
+        page.keyboard.press("Control+k")
+        field = page.get_by_role("combobox", name="Page, dataset, group or action")
+        expect(field).to_be_focused()
+        page.keyboard.type("yield")
+        expect(page.locator(".palette [aria-selected=true]")).to_contain_text("Yield")
+        page.keyboard.press("Enter")
+        page.wait_for_url("**/datasets/sample/yield")
+        page.keyboard.press("Control+k")
+        field.fill("7")
+        expect(page.get_by_role("option", name="Group 7")).to_be_visible()
+        page.keyboard.press("Enter")
+        page.wait_for_url("**/review/7")
+
+    def test_a_dataset_that_is_not_there_says_so(self, open_page: OpenPage) -> None:
+        page = open_page("/datasets/nowhere/yield")
+        expect(page.locator(".empty h2")).to_have_text("There is no dataset “nowhere”")
+
+
+class TestYield:
+    def test_a_moved_slider_redraws_the_funnel_and_saves_nothing(self, open_page: OpenPage) -> None:
+        page = open_page("/datasets/sample/yield")
+        page.wait_for_selector(".funnel", timeout=MINUTE)
+        before = page.locator(".yield__difference").inner_text()
+        slider = page.get_by_label("Share of field lines that fit, slider")
+        slider.focus()
+        page.keyboard.press("End")
+        expect(page.locator(".yield__difference")).to_contain_text("0 pass")
+        expect(page.locator(".funnel tr").last).to_contain_text("0")
+        page.get_by_role("button", name="Reset").click()
+        expect(page.locator(".yield__difference")).to_have_text(before)
+        page.get_by_label("As numbers").or_(page.get_by_text("As numbers")).click()
+        expect(page.locator(".chart__numbers tbody tr")).to_have_count(101)
+
+
+class TestStatistics:
+    def test_a_bar_opens_its_groups_in_the_queue_by_keyboard(self, open_page: OpenPage) -> None:
+        page = open_page("/datasets/sample/statistics")
+        spread = page.locator(".spread").first
+        spread.wait_for()
+        spread.locator("a[tabindex='0']").focus()
+        page.keyboard.press("End")
+        page.keyboard.press("ArrowLeft")
+        bar = page.locator(".spread__bar:focus")
+        said = bar.get_attribute("aria-label") or ""
+        bar.press("Enter")
+        page.wait_for_url("**/groups?**")
+        groups = said.rsplit(": ", 1)[1].split()[0]
+        expect(page.locator(".save")).to_contain_text(f"{groups} of 14 match")
+
+
+@pytest.fixture
+def labels(home: Path, tmp_path: Path) -> Path:
+    """A zip with the labels of one match of the sample, without frames."""
+    found = sorted(home.parent.rglob("Labels-v3.json"))[0]
+    target = tmp_path / "match.zip"
+    with ZipFile(target, "w") as archive:
+        archive.write(found, "/".join(found.parts[-4:]))
+    return target
+
+
+@pytest.fixture
+def predictions(home: Path, tmp_path: Path) -> Path:
+    """COCO results: every ball of that match, a little too large."""
+    found = sorted(home.parent.rglob("Labels-v3.json"))[0]
+    labels = json.loads(found.read_text())
+    rows = list(_boxes(labels, "/".join(found.parts[-4:-1])))
+    target = tmp_path / "detector.json"
+    target.write_text(json.dumps(rows))
+    return target
+
+
+def _boxes(labels: dict[str, dict[str, dict[str, object]]], match: str) -> Iterator[object]:
+    for part in ("actions", "replays"):
+        for name, frame in labels[part].items():
+            for item in frame["bboxes"]:  # type: ignore[attr-defined]
+                if item["class"] == "Ball":
+                    x1, y1, x2, y2 = (item["points"][key] for key in ("x1", "y1", "x2", "y2"))
+                    box = [x1 - 0.5, y1 - 0.5, x2 - x1 + 1, y2 - y1 + 1]
+                    yield {"image_id": f"{match}/{name}", "category_id": 1, "bbox": box, "score": 1}
+
+
+class TestLifeOfADataset:
+    def test_imported_judged_frozen_verified_evaluated_and_deleted(
+        self, open_page: OpenPage, labels: Path, predictions: Path
+    ) -> None:
+        page = open_page("/import")
+        bring_in(page, labels)
+        accept_all(page)
+        freeze_and_verify(page)
+        evaluate(page, predictions)
+        page.goto("/datasets")
+        card = page.get_by_role("region", name="passing through")
+        card.get_by_role("button", name="Delete").click()
+        delete = page.get_by_role("button", name="Delete for good")
+        expect(delete).to_have_attribute("aria-disabled", "true")
+        page.get_by_label("Type passing through to go on").fill("passing through")
+        delete.click()
+        expect(card).to_have_count(0, timeout=MINUTE)
+
+
+def bring_in(page: Page, labels: Path) -> None:
+    """A dry run, then the import, then the groups with their numbers."""
+    page.get_by_label("Dataset", exact=True).fill("passing through")
+    page.set_input_files("#import-file", labels)
+    expect(page.get_by_text("is uploaded")).to_be_visible()
+    page.get_by_role("button", name="Try it out").click()
+    expect(page.get_by_role("region", name="What would happen")).to_be_visible(timeout=MINUTE)
+    page.get_by_role("button", name="Import", exact=True).click()
+    expect(page.get_by_role("region", name="What happened")).to_be_visible(timeout=MINUTE)
+    page.goto("/jobs")
+    expect(page.locator(".page__main")).to_contain_text("Import match.zip")
+    # Solving follows the import by itself.
+    expect(page.locator(".meter")).to_have_count(0, timeout=MINUTE)
+    page.goto("/datasets")
+    card = page.get_by_role("region", name="passing through")
+    expect(card).to_be_visible()
+    expect(card).not_to_contain_text("not solved", timeout=MINUTE)
+
+
+def accept_all(page: Page) -> None:
+    """Accept what passes, in one go."""
+    page.goto("/groups?dataset=passing through")
+    page.wait_for_selector(".queue-row a")
+    page.keyboard.press("b")
+    page.locator("dialog").get_by_role("button", name="Accept").click()
+    expect(page.locator(".bar")).to_contain_text("groups accepted", timeout=MINUTE)
+
+
+def freeze_and_verify(page: Page) -> None:
+    """A version that comes out the same when it is computed again."""
+    page.goto("/datasets/passing through/versions")
+    page.get_by_role("button", name="Freeze a version").first.click()
+    expect(page.locator(".bulk__outcome")).to_contain_text("groups enter")
+    page.get_by_role("button", name="Freeze", exact=True).click()
+    page.get_by_role("button", name="Done", exact=True).click(timeout=MINUTE)
+    page.get_by_role("button", name="Verify").click()
+    expect(page.locator(".verify")).to_contain_text("came out as they were", timeout=MINUTE)
+
+
+def evaluate(page: Page, predictions: Path) -> None:
+    """A run with its tables, its figures and the frames behind a row."""
+    page.goto("/datasets/passing through/evaluation")
+    page.get_by_role("button", name="Upload predictions").click()
+    page.set_input_files("#prediction-boxes", predictions)
+    expect(page.get_by_text("is uploaded")).to_be_visible()
+    page.get_by_role("button", name="Add predictions").click()
+    expect(page.locator(".prediction-set")).to_contain_text("detector", timeout=MINUTE)
+    page.get_by_role("button", name="Evaluate", exact=True).click()
+    expect(page.locator("#run-title")).to_have_text("detector", timeout=MINUTE)
+    expect(page.locator(".figure canvas").first).to_be_visible(timeout=MINUTE)
+    page.get_by_role("button", name="Frames", exact=True).click()
+    expect(page.locator("#frames-title")).to_contain_text("Frames")
+    expect(page.locator(".table a[href^='/review/']").first).to_be_visible()

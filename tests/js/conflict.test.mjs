@@ -1,0 +1,64 @@
+import assert from 'node:assert/strict';
+import { describe, it } from 'node:test';
+
+import { conflictOf } from '../../static/state/conflict.js';
+
+const line = [{ x: 1, y: 2 }, { x: 3, y: 4 }];
+const moved = [{ x: 1, y: 2 }, { x: 3, y: 9 }];
+const ball = { box: [10, 10, 4, 4], point: null, occluded: false, out_of_view: false };
+const view = { id: 1, key: '7.png', letter: 'A', included: true, lines: { 'Middle line': line }, balls: [ball] };
+const none = { state: 'unreviewed', reason: null, note: null };
+const base = { lines: view.lines, balls: view.balls, included: true, verdict: none };
+const group = { id: 5, views: [view], verdict: none };
+
+function item(edit, from = base) {
+	return { id: 'x', group: 5, edit, verdict: null, base: from };
+}
+
+const lineEdit = (points) => ({ kind: 'lines', view: '7.png', lines: { 'Middle line': points } });
+
+describe('conflictOf', () => {
+	it('sees that they changed something else', () => {
+		const theirs = { ...group, views: [{ ...view, balls: [] }] };
+		const { fields } = conflictOf(theirs, [item(lineEdit(moved))]);
+		assert.deepEqual(fields.map(({ name, overlaps }) => [name, overlaps]), [['Middle line of A', false]]);
+	});
+
+	it('sees that they moved the same line elsewhere', () => {
+		const theirs = { ...group, views: [{ ...view, lines: { 'Middle line': [{ x: 0, y: 0 }] } }] };
+		const [field] = conflictOf(theirs, [item(lineEdit(moved))]).fields;
+		assert.ok(field.overlaps);
+		assert.deepEqual([field.base, field.mine], [line, moved]);
+	});
+
+	it('does not call the same change an overlap', () => {
+		const theirs = { ...group, views: [{ ...view, lines: { 'Middle line': moved } }] };
+		assert.ok(!conflictOf(theirs, [item(lineEdit(moved))]).fields[0].overlaps);
+	});
+
+	it('takes the last of several edits of one thing, and the first one\'s base', () => {
+		const second = { ...base, lines: { 'Middle line': moved } };
+		const { fields } = conflictOf(group, [item(lineEdit(moved)), item(lineEdit(null), second)]);
+		assert.equal(fields.length, 1);
+		assert.deepEqual([fields[0].base, fields[0].mine], [line, null]);
+	});
+
+	it('can be merged when a part of mine overlaps and a part does not', () => {
+		const theirs = { ...group, views: [{ ...view, balls: [{ ...ball, box: [0, 0, 4, 4] }] }] };
+		const mine = [item(lineEdit(moved)), item({ kind: 'ball', view: '7.png', ball: null })];
+		const { fields, mergeable } = conflictOf(theirs, mine);
+		assert.deepEqual(fields.map(({ overlaps }) => overlaps), [false, true]);
+		assert.ok(mergeable);
+	});
+
+	it('holds a verdict against theirs', () => {
+		const theirs = { ...group, verdict: { ...none, state: 'accepted' } };
+		const verdict = { state: 'rejected', reason: 'other', note: 'x' };
+		const [field] = conflictOf(theirs, [{ ...item(null), verdict }]).fields;
+		assert.deepEqual([field.name, field.overlaps], ['Verdict', true]);
+	});
+
+	it('drops what was said about a view that is gone', () => {
+		assert.deepEqual(conflictOf({ ...group, views: [] }, [item(lineEdit(moved))]).fields, []);
+	});
+});
