@@ -6,6 +6,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+import cv2
+import numpy as np
+
 from app.config import Settings
 from app.evaluation.evaluate import Evaluation
 from app.evaluation.figure_png import figure_png
@@ -15,8 +18,8 @@ from tests.paper.study import run_study
 
 DOCS = Path(__file__).parents[2] / "docs"
 FIGURES = {
-    "precision_distance": "reproduction-precision-distance.png",
-    "sensitivity": "reproduction-sensitivity.png",
+    "precision_distance": "reproduction-precision-distance.jpg",
+    "sensitivity": "reproduction-sensitivity.jpg",
 }
 
 
@@ -37,7 +40,11 @@ def main() -> None:
 def _drawn(found: Evaluation, name: str) -> bytes:
     figure = found.figure(name)
     assert figure is not None
-    return figure_png(figure)
+    picture = cv2.imdecode(np.frombuffer(figure_png(figure), np.uint8), cv2.IMREAD_COLOR)
+    # A hundred coloured lines are 400 kB as PNG, which is too much for a repository.
+    done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 88])
+    assert done
+    return data.tobytes()
 
 
 if __name__ == "__main__":

@@ -93,7 +93,7 @@ def _localisation(study: Study) -> Iterator[str]:
 Over detections with IoU > 0, as in the paper. Without that condition, over all frames with a ball
 and a miss counted as a miss: P 2 m is {_value(study.base, "oracle_all", "p_2m"):.2f} (base) and {_value(study.opt, "oracle_all", "p_2m"):.2f} (opt), oracle cameras.
 
-![Share of frames within a distance](images/reproduction-precision-distance.png)
+![Share of frames within a distance](images/reproduction-precision-distance.jpg)
 
 *Comparable:* that optimised boxes turn an error of about a fifth of the distance into one of a few
 per cent, and P 2 m from nearly nothing to a good part of the frames. That follows from geometry: a
@@ -119,7 +119,7 @@ def _sensitivity(study: Study) -> Iterator[str]:
         yield _line(row.label, paper, f"{smallest:.2g} to {largest:.3g} m", f"{median:.2g} m",
                     f"{slope:.2g} m", f"{correlation:.2f}", row.cells[0].count)  # fmt: skip
     yield from """
-![Sensitivity of the ball from one view](images/reproduction-sensitivity.png)
+![Sensitivity of the ball from one view](images/reproduction-sensitivity.jpg)
 
 *Comparable:* all of it, for it is geometry: the size moves the ball along its ray in proportion to
 the distance, and a shift of the centre moves it across, in proportion to distance over focal
