@@ -5,7 +5,7 @@ BIN := .venv/bin
 export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
-.PHONY: setup run test check bench chromium clean
+.PHONY: setup run test test-python test-browser check bench paper chromium clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready static/node_modules/.ready
@@ -26,9 +26,16 @@ static/node_modules/.ready: static/package-lock.json .venv/ready
 run: setup
 	@$(BIN)/touchline serve --sample
 
+# Two halves side by side: one browser and one Python process leave two cores no rest.
 test: setup chromium
-	$(BIN)/python -m pytest
+	@$(MAKE) --no-print-directory -j2 test-python test-browser
+
+test-python:
+	$(BIN)/python -m pytest --ignore=tests/e2e
+
+test-browser:
 	$(BIN)/npm --prefix static test
+	$(BIN)/python -m pytest tests/e2e
 
 check: setup
 	$(BIN)/ruff format --check .
@@ -39,6 +46,9 @@ check: setup
 
 bench: setup
 	$(BIN)/python -m tests.bench
+
+paper: setup
+	$(BIN)/python -m tests.paper
 
 chromium: setup
 	@$(BIN)/python tests/e2e/install_chromium.py
