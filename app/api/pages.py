@@ -126,12 +126,14 @@ class Modules(StaticFiles):
     """Files of the application: by known types alone, nothing hidden.
 
     Below /static they are always revalidated; below an address that names their version they
-    are kept for good.
+    are kept for good. A first visit asks for all of them at once, so those that were asked for are
+    answered from memory as long as the file is the same.
     """
 
     def __init__(self, folder: Path, caching: str):
         super().__init__(directory=folder, check_dir=False)
         self._caching = caching
+        self._read: dict[str, tuple[str, int, Response]] = {}
 
     async def check_config(self) -> None:
         """A folder that is missing has no files; that is no reason to fail."""
@@ -144,11 +146,33 @@ class Modules(StaticFiles):
         hidden = any(part.startswith(".") for part in parts)
         if hidden or "\\" in path or Path(path).suffix.lower() not in allowed:
             raise HTTPException(status_code=404)
+        names = {name for name, _ in scope["headers"]}
+        plain = not names & {b"range", b"if-none-match", b"if-modified-since"}
+        if plain and (known := self._known(path)) is not None:
+            return known
         response = await super().get_response(path, scope)
         response.headers["Cache-Control"] = self._caching
         if isinstance(response, FileResponse):
             response.headers["Content-Type"] = MEDIA_TYPES[Path(path).suffix.lower()]
+            if plain:
+                return self._remember(path, response)
         return response
+
+    def _known(self, path: str) -> Response | None:
+        """The answer given before, if its file has not changed."""
+        file, changed, response = self._read.get(path, ("", 0, None))
+        try:
+            return response if response and Path(file).stat().st_mtime_ns == changed else None
+        except OSError:
+            return None
+
+    def _remember(self, path: str, response: FileResponse) -> Response:
+        """The same answer with the file's bytes in memory."""
+        file = str(response.path)
+        changed = Path(file).stat().st_mtime_ns
+        kept = Response(Path(file).read_bytes(), headers=dict(response.headers))
+        self._read[path] = (file, changed, kept)
+        return kept
 
 
 def install_pages(app: FastAPI, site: Site) -> None:

@@ -42,7 +42,7 @@ export class ImageStage {
 		this.stage.size({ width, height });
 	}
 
-	/** @param {HTMLImageElement | null} image */
+	/** @param {ImageBitmap | null} image */
 	show(image) {
 		this.picture.image(image ?? undefined);
 		// Without a frame the markings stand on grass.

@@ -10,17 +10,17 @@ import { decoded, loadImage } from './images.js';
 /** Frames whose pixels are kept: a large group's. Each takes four bytes a pixel. */
 const KEPT = 8;
 
-/** @type {Map<HTMLImageElement, ImageData>} */
+/** @type {Map<ImageBitmap, ImageData>} */
 const pixels = new Map();
 
 /**
  * The frames of some views, by view key; those that are not there yet are missing.
  *
  * @param {ViewJson[]} views
- * @returns {Map<string, HTMLImageElement>}
+ * @returns {Map<string, ImageBitmap>}
  */
 export function useFrames(views) {
-	const [frames, setFrames] = useState(/** @type {Map<string, HTMLImageElement>} */ (new Map()));
+	const [frames, setFrames] = useState(/** @type {Map<string, ImageBitmap>} */ (new Map()));
 	const urls = views.map((view) => view.image).join(' ');
 	useLayoutEffect(() => {
 		let wanted = true;
@@ -55,7 +55,7 @@ function whenIdle(work) {
  * The pixels of frames, by view key, as they are read: one at a time and between other work, for
  * reading one takes longer than drawing a group.
  *
- * @param {Map<string, HTMLImageElement>} frames
+ * @param {Map<string, ImageBitmap>} frames
  * @returns {Map<string, ImageData>}
  */
 export function usePixels(frames) {
@@ -77,13 +77,13 @@ export function usePixels(frames) {
 /**
  * The pixels of a frame, read once.
  *
- * @param {HTMLImageElement} frame
+ * @param {ImageBitmap} frame
  * @returns {ImageData}
  */
 function pixelsOf(frame) {
 	const present = pixels.get(frame);
 	if (present) return present;
-	const canvas = new OffscreenCanvas(frame.naturalWidth, frame.naturalHeight);
+	const canvas = new OffscreenCanvas(frame.width, frame.height);
 	const context = /** @type {OffscreenCanvasRenderingContext2D} */ (
 		canvas.getContext('2d', { willReadFrequently: true })
 	);

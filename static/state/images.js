@@ -3,14 +3,14 @@
 
 const KEPT = 32;
 
-/** @type {Map<string, Promise<HTMLImageElement>>} */
+/** @type {Map<string, Promise<ImageBitmap>>} */
 const images = new Map();
 
 /**
  * The image at an address; loading it again costs nothing as long as it is kept.
  *
  * @param {string} url
- * @returns {Promise<HTMLImageElement>}
+ * @returns {Promise<ImageBitmap>}
  */
 export function loadImage(url) {
 	const kept = images.get(url);
@@ -26,19 +26,23 @@ export function loadImage(url) {
 	return loading;
 }
 
-/** Those that are decoded. @type {Map<string, HTMLImageElement>} */
+/** Those that are decoded. @type {Map<string, ImageBitmap>} */
 const ready = new Map();
 
-/** The image at an address, if it can be drawn now. @param {string | null} url @returns {HTMLImageElement | null} */
+/** The image at an address, if it can be drawn now. @param {string | null} url @returns {ImageBitmap | null} */
 export function decoded(url) {
 	return (url && ready.get(url)) || null;
 }
 
-/** @param {string} url */
+/**
+ * Decoded beside the page, and once: an <img> is decoded again for every canvas that draws it.
+ *
+ * @param {string} url
+ */
 async function decode(url) {
-	const image = new Image();
-	image.src = url;
-	await image.decode();
+	const answer = await fetch(url);
+	if (!answer.ok) throw new Error(`no image at ${url}: ${answer.status}`);
+	const image = await createImageBitmap(await answer.blob());
 	if (images.has(url)) ready.set(url, image);
 	return image;
 }

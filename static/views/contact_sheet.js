@@ -64,7 +64,7 @@ function layout(n, width, height) {
 
 /**
  * @param {{
- *   picture: ViewPicture, policy: PolicyJson, side: number, frame: HTMLImageElement | undefined
+ *   picture: ViewPicture, policy: PolicyJson, side: number, frame: ImageBitmap | undefined
  * }} props
  */
 function Crop({ picture, policy, side, frame }) {

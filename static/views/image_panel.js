@@ -32,7 +32,7 @@ const NO_GHOSTS = [];
 /** The frame of a view: undefined while it loads, null when there is none. @param {string | null} url */
 function useFrame(url) {
 	const [frame, setFrame] = useState(
-		/** @type {{url: string | null, image: HTMLImageElement | null, error: boolean}} */
+		/** @type {{url: string | null, image: ImageBitmap | null, error: boolean}} */
 		({ url: null, image: null, error: false }),
 	);
 	useEffect(() => {

@@ -45,7 +45,7 @@ function targetOf(pictures) {
 
 /** @param {string | null} url */
 function useImage(url) {
-	const [image, setImage] = useState(/** @type {HTMLImageElement | null} */ (null));
+	const [image, setImage] = useState(/** @type {ImageBitmap | null} */ (null));
 	useEffect(() => {
 		let wanted = true;
 		setImage(null);
@@ -79,7 +79,7 @@ function Glass({ picture, at }) {
 			context.filter = filter;
 			context.drawImage(image, viewport.left, viewport.top, view.width * scale, view.height * scale);
 			context.filter = 'none';
-			drawPixelGrid(context, viewport, { width: SIDE, height: SIDE }, view.width / image.naturalWidth);
+			drawPixelGrid(context, viewport, { width: SIDE, height: SIDE }, view.width / image.width);
 		}
 		drawOverlays(context, {
 			picture, viewport, selected: selected.value, hidden: false, projections: projections.value,

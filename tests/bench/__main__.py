@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 
 from tests.bench.ball import bench_ball
+from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
 from tests.bench.geometry import bench_geometry
 
@@ -26,6 +27,7 @@ def main() -> None:
         bench_calibration(REAL_DATA)
     else:
         print(f"\nCalibration on real lines: no data in {REAL_DATA}, left out")
+    bench_browser()
 
 
 if __name__ == "__main__":

@@ -262,8 +262,11 @@ def _memory(page: Page) -> float:
 
 def _walk(page: Page, groups: int) -> None:
     """Through the sample, forth and back."""
-    for turn in range(groups):
-        key = "f" if (turn // (SAMPLE_GROUPS - 5)) % 2 == 0 else "d"
+    key = "f"
+    for _ in range(groups):
+        place = int(page.url.split("/review/")[1].split("?")[0])
+        if place >= SAMPLE_GROUPS - 1 or place <= 2:
+            key = "f" if place <= 2 else "d"
         page.evaluate(PAINTED, key)
 
 

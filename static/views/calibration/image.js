@@ -22,7 +22,7 @@ import { attachEditor } from './pointer.js';
 
 /** @param {string | null} url */
 function useImage(url) {
-	const [loaded, setLoaded] = useState(/** @type {{url: string | null, image: HTMLImageElement | null}} */ ({ url: null, image: null }));
+	const [loaded, setLoaded] = useState(/** @type {{url: string | null, image: ImageBitmap | null}} */ ({ url: null, image: null }));
 	useEffect(() => {
 		let wanted = true;
 		if (url) loadImage(url).then((image) => { if (wanted) setLoaded({ url, image }); }, () => {});

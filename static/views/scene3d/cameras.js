@@ -46,12 +46,14 @@ export function ray(stand, palette) {
 /**
  * The frame of a camera where the camera sees it, straightened by its own lens.
  *
- * @param {Stand} stand @param {HTMLImageElement} image
+ * @param {Stand} stand @param {ImageBitmap} image
  * @param {boolean} behind whether it is the backdrop of everything
  * @returns {Mesh}
  */
 export function framePicture(stand, image, behind) {
 	const map = new Texture(image);
+	// A bitmap is never flipped on its way to the texture.
+	map.flipY = false;
 	map.colorSpace = SRGBColorSpace;
 	map.minFilter = LinearFilter;
 	map.generateMipmaps = false;
@@ -81,7 +83,7 @@ function lensGrid({ camera, size }, depth) {
 			const [u, v] = [column / CELLS, row / CELLS];
 			const pixel = { x: u * size.width - 0.5, y: v * size.height - 0.5 };
 			places.push(...toWorld(seenAt(camera, pixel, depth)));
-			uvs.push(u, 1 - v);
+			uvs.push(u, v);
 			if (row === CELLS || column === CELLS) continue;
 			const at = row * (CELLS + 1) + column;
 			faces.push(at, at + CELLS + 1, at + 1, at + 1, at + CELLS + 1, at + CELLS + 2);

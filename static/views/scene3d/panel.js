@@ -43,7 +43,7 @@ function placeLabels(layer, places) {
 	}
 }
 
-/** @param {{scene: SceneValues, images: Map<string, HTMLImageElement>}} props */
+/** @param {{scene: SceneValues, images: Map<string, ImageBitmap>}} props */
 function Stage({ scene, images }) {
 	const [ref, size] = useSize();
 	const labels = useRef(/** @type {HTMLDivElement | null} */ (null));

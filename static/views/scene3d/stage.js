@@ -30,7 +30,7 @@ export class SceneStage {
 		this.size = { width: 1, height: 1 };
 		/** @type {SceneValues | null} */
 		this.values = null;
-		/** @type {Map<string, HTMLImageElement>} */
+		/** @type {Map<string, ImageBitmap>} */
 		this.images = new Map();
 		/** @type {Orbit | null} */
 		this.orbit = null;
@@ -56,7 +56,7 @@ export class SceneStage {
 	/**
 	 * Build everything anew.
 	 *
-	 * @param {SceneValues} values @param {Palette} palette @param {Map<string, HTMLImageElement>} images by letter
+	 * @param {SceneValues} values @param {Palette} palette @param {Map<string, ImageBitmap>} images by letter
 	 */
 	show(values, palette, images) {
 		discard(this.scene);
