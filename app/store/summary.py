@@ -76,6 +76,10 @@ def summarize(group: Group, solution: Solution) -> Summary:
     )
 
 
+COUNTED = frozenset({"calibratable", "two_views", "ball"})
+"""Gates that count views."""
+
+
 def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
@@ -87,7 +91,14 @@ def _relative_margin(gate: Gate) -> float | None:
 
 
 def _nearest(gates: tuple[Gate, ...]) -> Gate | None:
-    measured = [gate for gate in gates if gate.active and _relative_margin(gate) is not None]
+    """The gate nearest to its threshold; two views of two are enough and not near to failing."""
+    measured = [
+        gate
+        for gate in gates
+        if gate.active
+        and _relative_margin(gate) is not None
+        and not (gate.passed and gate.name in COUNTED)
+    ]
     return min(measured, key=lambda gate: _relative_margin(gate) or 0.0, default=None)
 
 

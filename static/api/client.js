@@ -47,6 +47,13 @@ export async function requestTagged(path, { method = 'GET', body, etag, key, sig
 	return { json, etag: response.headers.get('etag') ?? '' };
 }
 
+/** A frame, as it lies on the server. @param {string} url absolute @returns {Promise<Blob>} */
+export async function getFrame(url) {
+	const response = await fetch(url);
+	if (!response.ok) throw new ApiError(response.status, null);
+	return response.blob();
+}
+
 /** @param {Record<string, string | number | null | undefined>} values @returns {string} "?…", or "" */
 export function queryText(values) {
 	const search = new URLSearchParams();

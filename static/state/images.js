@@ -1,6 +1,8 @@
 // @ts-check
 /** Frames as decoded images, the last few kept. */
 
+import { getFrame } from '../api/client.js';
+
 const KEPT = 32;
 
 /** @type {Map<string, Promise<ImageBitmap>>} */
@@ -40,9 +42,7 @@ export function decoded(url) {
  * @param {string} url
  */
 async function decode(url) {
-	const answer = await fetch(url);
-	if (!answer.ok) throw new Error(`no image at ${url}: ${answer.status}`);
-	const image = await createImageBitmap(await answer.blob());
+	const image = await createImageBitmap(await getFrame(url));
 	if (images.has(url)) ready.set(url, image);
 	return image;
 }
