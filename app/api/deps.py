@@ -136,6 +136,7 @@ Actor = Annotated[str, Depends(get_actor)]
 IfMatch = Annotated[str, Depends(require_if_match)]
 IdempotencyKey = Annotated[str | None, Depends(get_idempotency_key)]
 Id = Annotated[int, Path(ge=1, le=MAX_ID)]
+DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
 DatasetQuery = Annotated[
     str, Query(alias="dataset", max_length=200, description="Name or id of the dataset.")
 ]

@@ -53,11 +53,6 @@ export function getDiff(id, against, signal) {
 	return request(`/versions/${id}/diff${queryText({ against })}`, { signal });
 }
 
-/** @param {number} id @param {AbortSignal} [signal] @returns {Promise<any>} */
-export function getChangelog(id, signal) {
-	return request(`/versions/${id}/changelog`, { signal });
-}
-
 /** @param {number} id @returns {Promise<JobJson>} */
 export function verifyVersion(id) {
 	return request(`/versions/${id}/verify`, { method: 'POST', key: idempotencyKey() });

@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useRef, useState } from 'preact/hooks';
 
-import { count } from '../lib/format.js';
+import { count, plural } from '../lib/format.js';
 import { queueAddress } from '../state/navigation.js';
 import { withField, wordsOf } from '../state/query.js';
 
@@ -69,7 +69,7 @@ export function Spread({ spread, dataset, q }) {
 				})}
 			</ul>
 			<p class="bar-chart__ends" aria-hidden="true"><span>${short(edges[0])}</span><span>most ${count(most)}</span><span>${short(edges[edges.length - 1])}${spread.open_high ? '+' : ''}</span></p>
-			${unknown ? html`<p class="note">${count(unknown)} groups have no such number</p>` : null}
+			${unknown ? html`<p class="note">${plural(unknown, 'group')} without such a number</p>` : null}
 		</section>
 	`;
 }

@@ -6,9 +6,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from app.api.deps import Actor, AppStore, Id, IdempotencyKey
+from app.api.deps import Actor, AppStore, DatasetPath, Id, IdempotencyKey
 from app.api.problem import responses
-from app.api.routers.datasets import DatasetPath
 from app.api.schemas.bulk import BatchDocument, BatchList, BulkResult, BulkVerdict, UndoDocument
 from app.review import bulk, bulk_undo
 from app.review.datasets import dataset_id

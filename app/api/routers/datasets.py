@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query
+from fastapi import APIRouter, Query
 
-from app.api.deps import Actor, AppServices, AppStore, QueryText
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, QueryText
 from app.api.problem import responses
 from app.api.schemas.dataset import (
     DatasetDeletion,
@@ -21,8 +21,6 @@ from app.review.delete_dataset import read_contents
 from app.review.progress import summary
 
 router = APIRouter(prefix="/datasets", tags=["datasets"])
-
-DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
 
 
 @router.get("", operation_id="listDatasets", responses=responses())

@@ -5,9 +5,9 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Query, Response
 
-from app.api.deps import MAX_ID, Actor, AppServices, AppStore, Id, IdempotencyKey
+from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id, IdempotencyKey
 from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import Responses, responses
 from app.api.schemas.evaluation import (
@@ -31,7 +31,6 @@ from app.review.evaluation_jobs import request_evaluation
 
 router = APIRouter(tags=["evaluations"])
 
-DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
 FigureName = StrEnum("FigureName", list(FIGURES))  # type: ignore[misc]
 FrameField = StrEnum("FrameField", list(NUMBERS))  # type: ignore[misc]
 CompareField = StrEnum("CompareField", list(FIELDS))  # type: ignore[misc]

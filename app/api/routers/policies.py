@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Path, Response
+from fastapi import APIRouter, Response
 
 from app.api.conflicts import current_state
-from app.api.deps import Actor, AppServices, AppStore, IdempotencyKey, IfMatch
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, IdempotencyKey, IfMatch
 from app.api.jobs import accepted
 from app.api.problem import Responses, responses
 from app.api.schemas.job import JobDocument
@@ -28,7 +26,6 @@ from app.soccer.policy import POLICIES, Policy
 
 router = APIRouter(tags=["policies"])
 
-DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
 TAGGED = {"ETag": {"description": "The policy's state.", "schema": {"type": "string"}}}
 LOCATED = {"Location": {"description": "Of the job.", "schema": {"type": "string"}}}
 CHANGED: Responses = {

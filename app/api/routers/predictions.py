@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from fastapi import APIRouter, Response
 
-from fastapi import APIRouter, Path, Response
-
-from app.api.deps import Actor, AppServices, AppStore, Id, IdempotencyKey
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, IdempotencyKey
 from app.api.jobs import ACCEPTED, accepted
 from app.api.lookup import find_view
 from app.api.problem import responses
@@ -29,7 +27,6 @@ from app.store.uploads import upload_path
 
 router = APIRouter(tags=["predictions"])
 
-DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
 LOCATION = {"Location": {"description": "Of the set.", "schema": {"type": "string"}}}
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Response
 
-from app.api.deps import Actor, AppStore, Id
+from app.api.deps import Actor, AppStore, DatasetPath, Id
 from app.api.problem import responses
-from app.api.routers.datasets import DatasetPath
 from app.api.schemas.saved_view import (
     NewSavedView,
     ReviewerDocument,

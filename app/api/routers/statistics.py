@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from app.api.deps import AppStore, QueryText
+from app.api.deps import AppStore, DatasetPath, QueryText
 from app.api.problem import responses
-from app.api.routers.datasets import DatasetPath
 from app.api.schemas.statistics import StatisticsDocument
 from app.review.datasets import dataset_id
 from app.review.statistics import statistics

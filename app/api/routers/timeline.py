@@ -6,9 +6,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from app.api.deps import AppStore, QueryText
+from app.api.deps import AppStore, DatasetPath, QueryText
 from app.api.problem import responses
-from app.api.routers.datasets import DatasetPath
 from app.api.schemas.timeline import TimelineDocument
 from app.review.datasets import dataset_id
 from app.review.timeline import read_timeline

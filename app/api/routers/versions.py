@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Query, Response
 
-from app.api.deps import MAX_ID, Actor, AppServices, AppStore, Id
+from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import responses
 from app.api.schemas.job import JobDocument
@@ -25,8 +25,6 @@ from app.review.version_diff import changelog, diff_versions
 from app.review.version_manifest import version_manifest
 
 router = APIRouter(tags=["versions"])
-
-DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
 
 
 @router.get("/datasets/{dataset}/versions", operation_id="listVersions", responses=responses(404))

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from app.api.deps import AppServices
+from app.api.deps import AppServices, DatasetPath
 from app.api.problem import responses
-from app.api.routers.datasets import DatasetPath
 from app.api.schemas.yields import WhatIf, YieldDocument
 from app.review.datasets import dataset_id
 from app.review.yields import get_yield
