@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.dataset_commands import commands as dataset_commands
+from app.datasets.format_names import ExportFormat, ImportFormat
 from app.errors import ReviewError
 from app.evaluation_commands import commands as evaluation_commands
 from app.line_commands import commands as line_commands
@@ -60,37 +61,6 @@ app.add_typer(dataset_commands, name="datasets")
 app.add_typer(policy_commands, name="policy")
 app.add_typer(version_commands)
 app.add_typer(evaluation_commands)
-
-
-class Format(StrEnum):
-    """What can be imported."""
-
-    SOCCERNET_V3 = "soccernet-v3"
-    SOCCERNET_V3D = "soccernet-v3d"
-    ISSIA = "issia"
-    ISSIA_3D = "issia-3d"
-    SN_CALIBRATION = "sn-calibration"
-    CAMERAS = "cameras"
-    GAMESTATE = "gamestate"
-    COCO = "coco"
-    PARQUET = "parquet"
-    TOUCHLINE = "touchline"
-
-
-class ExportFormat(StrEnum):
-    """What can be exported."""
-
-    SOCCERNET_V3D = "soccernet-v3d"
-    SOCCERNET_V3 = "soccernet-v3"
-    ISSIA_3D = "issia-3d"
-    ISSIA = "issia"
-    CAMERAS = "cameras"
-    SN_CALIBRATION = "sn-calibration"
-    GAMESTATE = "gamestate"
-    COCO = "coco"
-    YOLO = "yolo"
-    PARQUET = "parquet"
-    TOUCHLINE = "touchline"
 
 
 class Calibration(StrEnum):
@@ -155,7 +125,7 @@ def serve(
 
 @app.command("import")
 def import_(
-    format_: Annotated[Format, typer.Argument(metavar="FORMAT")],
+    format_: Annotated[ImportFormat, typer.Argument(metavar="FORMAT")],
     path: Existing,
     dataset: Dataset,
     lines: Annotated[
@@ -182,7 +152,7 @@ def import_(
     coco, parquet or touchline; docs/formats.md says what each of them holds.
     """
     source = typed_source(
-        format_.value,
+        format_,
         path,
         lines=lines,
         calibration=calibration.value,
@@ -267,7 +237,7 @@ def export(
         report = run_export(
             store,
             dataset,
-            format_.value,
+            format_,
             out,
             everything=everything,
             boxes=boxes.value,

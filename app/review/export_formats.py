@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import get_args
 
 from app.datasets.coco import write_coco
 from app.datasets.export_record import ExportRecord
+from app.datasets.format_names import ExportFormat
 from app.datasets.frame_names import FrameName, flat_frame, match_frame
 from app.datasets.gamestate_writer import write_gamestate
 from app.datasets.issia import FramePersons
@@ -21,19 +23,7 @@ from app.datasets.xgtf import write_issia
 from app.datasets.yolo import write_yolo
 from app.soccer.group import Group
 
-FORMATS = (
-    "soccernet-v3d",
-    "soccernet-v3",
-    "issia-3d",
-    "issia",
-    "cameras",
-    "sn-calibration",
-    "gamestate",
-    "coco",
-    "yolo",
-    "parquet",
-    "touchline",
-)
+FORMATS: tuple[str, ...] = get_args(ExportFormat)
 CONTENT = {
     "cameras": ("cameras", "camera"),
     "issia-3d": ("groups", "ball"),

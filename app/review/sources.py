@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from app.config import Settings
 from app.datasets.archive import Limits
 from app.datasets.camera_json import read_cameras
 from app.datasets.coco_reader import read_coco
+from app.datasets.format_names import ImportFormat
 from app.datasets.gamestate import read_gamestate
 from app.datasets.issia import DEFAULT_SIZE as ISSIA_SIZE
 from app.datasets.issia import IssiaFolder, IssiaOptions, open_issia
@@ -30,19 +31,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.group import Group
 from app.store.session import Store
 
-FORMATS = (
-    "soccernet-v3",
-    "soccernet-v3d",
-    "issia",
-    "issia-3d",
-    "sn-calibration",
-    "cameras",
-    "gamestate",
-    "coco",
-    "parquet",
-    "touchline",
-)
-"""What can be imported. YOLO labels hold no cameras, lines or groups: they are predictions."""
+FORMATS: tuple[str, ...] = get_args(ImportFormat)
 STATIC = ("issia", "issia-3d")
 
 Progress = Callable[[int], None]

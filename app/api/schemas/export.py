@@ -9,21 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.api.export_folder import ExportEntry
 from app.api.schemas.job import JobDocument
+from app.datasets.format_names import ExportFormat
 from app.store.jobs import DONE, Job
 
-Format = Literal[
-    "soccernet-v3d",
-    "soccernet-v3",
-    "issia-3d",
-    "issia",
-    "cameras",
-    "sn-calibration",
-    "gamestate",
-    "coco",
-    "yolo",
-    "parquet",
-    "touchline",
-]
 Boxes = Literal["optimized", "annotated", "exact"]
 Images = Literal["none", "copy"]
 VersionId = Annotated[int, Field(ge=1, le=2**63 - 1)] | Annotated[str, Field(max_length=100)]
@@ -38,7 +26,7 @@ class ExportRequest(BaseModel):
     )
 
     dataset: Annotated[str, Field(min_length=1, max_length=200)]
-    format: Format
+    format: ExportFormat
     all: StrictBool = Field(default=False, description="Every group, not the accepted ones alone.")
     version: VersionId | None = Field(
         default=None,

@@ -6,21 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
+from app.datasets.format_names import ImportFormat
 from app.review.import_folders import FolderListing
 from app.review.import_jobs import ImportRequest
 
-ImportFormat = Literal[
-    "soccernet-v3",
-    "soccernet-v3d",
-    "issia",
-    "issia-3d",
-    "sn-calibration",
-    "cameras",
-    "gamestate",
-    "coco",
-    "parquet",
-    "touchline",
-]
 Camera = Annotated[int, Field(ge=0, le=999)]
 Offset = Annotated[int, Field(ge=-999_999, le=999_999)]
 Side = Annotated[int, Field(ge=2, le=16_384)]

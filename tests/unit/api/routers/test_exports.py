@@ -5,22 +5,16 @@ from __future__ import annotations
 import io
 import threading
 import zipfile
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 
 from app.api.routers import exports as module
-from app.api.schemas.export import Format
-from app.review.export_formats import FORMATS
 from app.review.jobs import Jobs
 
 SECONDS = 30
 API = "/api/v1/exports"
 ORDER = {"dataset": "broadcast", "format": "cameras", "all": True}
-
-
-def test_every_format_can_be_asked_for() -> None:
-    assert set(get_args(Format)) == set(FORMATS)
 
 
 @pytest.fixture
