@@ -146,7 +146,8 @@ QueryText = Annotated[
         alias="q",
         max_length=1000,
         description="Filters and order, as in the browser: "
-        "`status:unreviewed jac<0.95 sigma>0.5 finding:low_parallax sort:value`.",
+        "`status:unreviewed jac<0.95 sigma>0.5 finding:low_parallax sort:value`; "
+        "`id:12,15,19` names groups.",
     ),
 ]
 

@@ -16,7 +16,7 @@ from sqlalchemy.orm import Session
 
 from app.errors import ConflictError
 from app.review.idempotency import Request, is_repeated, remember
-from app.review.query import parse_query
+from app.review.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdict import Verdict, check_verdict
 from app.store.clock import now
 from app.store.group_rows import next_id
@@ -133,7 +133,8 @@ def give_verdicts(
     Args:
         store: The database.
         dataset_id: The dataset.
-        query: As ``query.parse_query`` reads it; its sort is of no matter.
+        query: As ``query.parse_query`` reads it; its sort is of no matter. It may list
+            thousands of groups one by one (``id:12,15``).
         state: As ``verdict.set_verdict`` takes it, like ``reason`` and ``note``.
         actor: Who says so.
         expected: How many groups ``plan_verdicts`` said would change; refuse another number.
@@ -188,7 +189,8 @@ class _SortedOut:
 
 
 def _where(dataset_id: int, query: str) -> list[ColumnElement[bool]]:
-    return [QueueModel.dataset_id == dataset_id, *parse_query(query).conditions]
+    conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
+    return [QueueModel.dataset_id == dataset_id, *conditions]
 
 
 def _rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[Any]:

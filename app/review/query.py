@@ -3,18 +3,20 @@
     status:unreviewed jac<0.95 sigma>0.5 finding:low_parallax match:"league/2015" sort:value-desc
 
 Terms must all hold; ``field:a,b`` means either; ``-field:a`` means not; a bare word is looked
-for in key and label. There are no patterns: text is compared, never interpreted.
+for in key and label; ``id:12,15`` names groups. There are no patterns: text is compared, never
+interpreted.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, case, func, not_, or_
+from sqlalchemy import ColumnElement, and_, case, func, not_, or_, select
 from sqlalchemy.orm import InstrumentedAttribute
 
 from app.errors import InputError
@@ -22,7 +24,10 @@ from app.soccer.solution import FINDING_KINDS, GATES
 from app.store.models import QueueModel
 
 MAX_LENGTH = 1000
+MAX_LISTED_LENGTH = 100_000
+"""Of a query that comes in a body and lists groups one by one: about 15,000 ids."""
 MAX_TERMS = 30
+MAX_ID = 2**63 - 1
 
 NUMBERS: dict[str, InstrumentedAttribute[Any]] = {
     "jac": QueueModel.min_jac,
@@ -121,15 +126,19 @@ class _Term:
     pointer: str
 
 
-def parse_query(text: str) -> Query:
+def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
     """Parse a query.
+
+    Args:
+        text: The query.
+        longest: Most characters. Beyond ``MAX_LENGTH`` there may only be lists of ids.
 
     Raises:
         InputError: With a pointer ``/q/<position>`` to the term that cannot be understood.
     """
     conditions: list[ColumnElement[bool]] = []
     sort, descending = "number", False
-    for negative, term in _terms(text):
+    for negative, term in _terms(text, longest):
         if term.field == "sort":
             sort, descending = _sort(term)
         else:
@@ -138,9 +147,9 @@ def parse_query(text: str) -> Query:
     return Query(tuple(conditions), sort, descending)
 
 
-def _terms(text: str) -> Iterator[tuple[bool, _Term]]:
-    if len(text) > MAX_LENGTH:
-        raise InputError(f"a query has at most {MAX_LENGTH} characters", pointer="/q")
+def _terms(text: str, longest: int) -> Iterator[tuple[bool, _Term]]:
+    if len(text) > longest:
+        raise InputError(f"a query has at most {longest} characters", pointer="/q")
     place, count = 0, 0
     while text[place:].strip():
         pointer = f"/q/{place + len(text[place:]) - len(text[place:].lstrip())}"
@@ -150,6 +159,9 @@ def _terms(text: str) -> Iterator[tuple[bool, _Term]]:
             problem = "the query has too many terms" if found else "a quote is not closed"
             raise InputError(problem, pointer=pointer)
         value = found["plain"] if found["quoted"] is None else found["quoted"]
+        if len(value) > MAX_LENGTH and found["field"] != "id":
+            problem = f"only a list of ids may be longer than {MAX_LENGTH} characters"
+            raise InputError(problem, pointer=pointer)
         yield bool(found["minus"]), _Term(found["field"] or "", found["op"] or ":", value, pointer)
         place = found.end()
 
@@ -169,12 +181,16 @@ def _condition(term: _Term) -> ColumnElement[bool]:
     if term.field in NUMBERS:
         return _number(term)
     if term.op not in (":", "="):
-        raise InputError(f'"{term.field}" is text: it compares with : alone', pointer=term.pointer)
+        raise InputError(
+            f'"{term.field}" has no order: it compares with : alone', pointer=term.pointer
+        )
+    if term.field == "id":
+        return _listed_groups(term)
     if term.field in FLAGS:
         return FLAGS[term.field].is_(_choice(term, term.value, ("yes", "no")) == "yes")
     test = _TESTS.get(term.field)
     if test is None:
-        fields = sorted({*NUMBERS, *FLAGS, *_TESTS, "sort"} - {""})
+        fields = sorted({*NUMBERS, *FLAGS, *_TESTS, "id", "sort"} - {""})
         raise InputError(
             f'the queue has no field "{term.field}"',
             hint=f"Fields: {', '.join(fields)}.",
@@ -183,6 +199,24 @@ def _condition(term: _Term) -> ColumnElement[bool]:
     # A bare word may hold commas; a field's value is a list of choices.
     values = [term.value] if term.field == "" else term.value.split(",")
     return or_(*(test(term, value) for value in values))
+
+
+def _listed_groups(term: _Term) -> ColumnElement[bool]:
+    ids = [_id(term, text) for text in term.value.split(",")]
+    # One parameter, however many there are: a statement takes a limited number of them.
+    listed = func.json_each(json.dumps(ids)).table_valued("value")
+    return QueueModel.group_id.in_(select(listed.c.value))
+
+
+def _id(term: _Term, text: str) -> int:
+    digits = text.isascii() and text.isdigit() and len(text) <= len(str(MAX_ID))
+    if not digits or not 1 <= int(text) <= MAX_ID:
+        raise InputError(
+            f'"{text[:40]}" is not the id of a group',
+            hint="For example id:12,15,19; the id of a group stands in its address.",
+            pointer=term.pointer,
+        )
+    return int(text)
 
 
 def _number(term: _Term) -> ColumnElement[bool]:

@@ -1,4 +1,8 @@
-"""Queue: pages of groups by query, and where a group stands among them."""
+"""Queue: pages of groups by query, and where a group stands among them.
+
+There are two ways to read on: a cursor (no group is seen twice or missed while others edit) and a
+position (any place at once, true at the moment of reading).
+"""
 
 from __future__ import annotations
 
@@ -16,6 +20,7 @@ from app.store.models import QueueModel
 from app.store.session import Store
 
 MAX_PAGE = 500
+MAX_IDS = 100_000
 _NEIGHBOURS = 5
 
 
@@ -90,8 +95,21 @@ class Neighbours:
     next: tuple[int, ...]
 
 
+@dataclass(frozen=True)
+class Ids:
+    """Ids of groups in order, out of ``total`` that match."""
+
+    ids: tuple[int, ...]
+    total: int
+
+
 def list_groups(
-    store: Store, dataset_id: int, query: str = "", limit: int = 50, cursor: str | None = None
+    store: Store,
+    dataset_id: int,
+    query: str = "",
+    limit: int = 50,
+    cursor: str | None = None,
+    start: int | None = None,
 ) -> Page:
     """A page of the groups that match.
 
@@ -101,25 +119,48 @@ def list_groups(
         query: As ``query.parse_query`` reads it.
         limit: Most groups of the page, 1 to 500.
         cursor: ``next`` of the page before, for the same query.
+        start: Position of the first group, from 0, instead of a cursor.
 
     Raises:
-        InputError: The query, the limit or the cursor cannot be understood.
+        InputError: The query, the limit, the cursor or the position cannot be understood.
     """
     parsed = parse_query(query)
     if not 1 <= limit <= MAX_PAGE:
         raise InputError(f"a page has 1 to {MAX_PAGE} groups", pointer="/limit")
+    if cursor is not None and start is not None:
+        raise InputError("a page begins at a cursor or at a position, not both", pointer="/from")
     where = _where(dataset_id, parsed)
     order = Order(parsed)
+    columns = select(*_COLUMNS, *order.keys).order_by(*order.ascending)
     with store.read() as session:
         total = _count(session, where)
-        if cursor is not None:
-            where = [*where, order.after(order.decode(cursor))]
-        rows = session.execute(
-            select(*_COLUMNS, *order.keys).where(*where).order_by(*order.ascending).limit(limit + 1)
-        ).all()
-    more = len(rows) > limit
-    items = [_row(row) for row in rows[:limit]]
-    return Page(items, order.encode(rows[limit - 1]) if more else None, total)
+        if start is not None:
+            ids = _ids_from(session, where, order, start, limit, total)
+            rows = session.execute(columns.where(QueueModel.group_id.in_(ids))).all()
+            more = start + limit < total
+        else:
+            after = [] if cursor is None else [order.after(order.decode(cursor))]
+            rows = session.execute(columns.where(*where, *after).limit(limit + 1)).all()
+            more = len(rows) > limit
+    rows = rows[:limit]
+    return Page([_row(row) for row in rows], order.encode(rows[-1]) if more else None, total)
+
+
+def list_ids(
+    store: Store, dataset_id: int, query: str = "", limit: int = MAX_IDS, start: int = 0
+) -> Ids:
+    """The ids alone of the groups that match, in order, from a position on.
+
+    Raises:
+        InputError: The query cannot be understood.
+    """
+    parsed = parse_query(query)
+    where = _where(dataset_id, parsed)
+    with store.read() as session:
+        total = _count(session, where)
+        return Ids(
+            tuple(_ids_from(session, where, Order(parsed), start, limit, total)), total=total
+        )
 
 
 def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
@@ -151,6 +192,29 @@ def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
             previous=_ids(session, [*where, before], order.backwards),
             next=_ids(session, [*where, after], order.ascending),
         )
+
+
+def _ids_from(
+    session: Session,
+    where: Sequence[ColumnElement[bool]],
+    order: Order,
+    start: int,
+    limit: int,
+    total: int,
+) -> list[int]:
+    """Ids from a position on, in order.
+
+    SQLite sorts as many rows as it skips and reads, and wide rows cost it several times as much:
+    hence ids alone, and behind the middle from the end.
+    """
+    count = min(limit, total - start)
+    if count <= 0:
+        return []
+    behind = total - start - count
+    if start <= behind:
+        return list(session.scalars(_ordered(where, order).offset(start).limit(count)))
+    backwards = select(QueueModel.group_id).where(*where).order_by(*order.backwards)
+    return list(session.scalars(backwards.offset(behind).limit(count)))[::-1]
 
 
 def _ordered(where: Sequence[ColumnElement[bool]], order: Order) -> Select[int]:

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.api.schemas.group import State
 from app.api.schemas.verdict import Reason
 from app.review.bulk import Batch, BatchReport, BulkPlan, Refusal
+from app.review.query import MAX_LISTED_LENGTH
 
 
 class BulkVerdict(BaseModel):
@@ -21,11 +22,19 @@ class BulkVerdict(BaseModel):
             "examples": [
                 {"q": "status:unreviewed passes:yes sigma<0.3", "state": "accepted"},
                 {"q": "finding:sides_swapped", "state": "rejected", "reason": "sides_confused"},
+                {"q": "id:12,15,19", "state": "deferred"},
             ]
         },
     )
 
-    q: Annotated[str, Field(max_length=1000, description="As in the browser; empty: all.")] = ""
+    q: Annotated[
+        str,
+        Field(
+            max_length=MAX_LISTED_LENGTH,
+            description="As in the browser; empty: all. More than 1000 characters only for lists "
+            "of groups, `id:12,15,19` or, for all but these, `-id:12,15,19`.",
+        ),
+    ] = ""
     state: State
     reason: Reason | None = None
     note: Annotated[str, Field(max_length=2000)] | None = None

@@ -95,6 +95,13 @@ class GroupPage(BaseModel):
     total: int = Field(description="How many match in all.")
 
 
+class GroupIds(BaseModel):
+    """Ids of groups that match, in order."""
+
+    ids: list[int]
+    total: int = Field(description="How many match in all.")
+
+
 class Neighbours(BaseModel):
     """Where a group stands among those that match, and what comes before and after it."""
 

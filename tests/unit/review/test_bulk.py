@@ -114,6 +114,22 @@ class TestGiveVerdicts:
             refresh_queue(session, ids)
         assert list_groups(store, 1, limit=500) == before
 
+    def test_groups_can_be_named_one_by_one_or_left_out(self, store, ids) -> None:
+        give_verdicts(store, 1, f"id:{ids[3]},{ids[0]}", "deferred", actor="ben")
+        assert statuses(store) == ["deferred", "unreviewed", "unreviewed", "deferred"]
+        give_verdicts(store, 1, f"status:unreviewed -id:{ids[1]}", "deferred", actor="ben")
+        assert statuses(store) == ["deferred", "unreviewed", "deferred", "deferred"]
+
+    def test_thousands_can_be_named(self, store, ids) -> None:
+        named = ",".join(map(str, range(ids[1], ids[1] + 12_764)))
+        report = give_verdicts(store, 1, f"id:{named}", "deferred", actor="ben")
+        assert report.changed == 3
+        (batch,) = list_batches(store, 1)
+        assert batch.query == f"id:{named}"
+        assert undo_batch(store, report.batch, actor="ben").restored == 3
+        with store.read() as session:
+            assert replay(session) == read_ledger(session)
+
     def test_an_etag_of_before_is_stale(self, store, ids) -> None:
         etag = load(store, ids[0]).etag
         give_verdicts(store, 1, "", "deferred", actor="ben")

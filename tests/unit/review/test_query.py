@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.errors import InputError
-from app.review.query import NUMBERS, SORTS, parse_query
+from app.review.query import MAX_LENGTH, MAX_LISTED_LENGTH, NUMBERS, SORTS, parse_query
 
 
 def pointer(text: str) -> str | None:
@@ -50,6 +50,13 @@ class TestParseQuery:
             ("sort:colour", "/q/0"),
             ("jac<nan", "/q/0"),
             ("passes:maybe", "/q/0"),
+            ("views:2 id:12,15x", "/q/8"),
+            ("id:0", "/q/0"),
+            ("id:12,,15", "/q/0"),
+            ("id:-3", "/q/0"),
+            ("id:٣", "/q/0"),
+            (f"id:{2**63}", "/q/0"),
+            ("id>12", "/q/0"),
             ('match:"open', "/q/0"),
             ("a " * 31, "/q/60"),
             ("x" * 1001, "/q"),
@@ -62,6 +69,20 @@ class TestParseQuery:
         with pytest.raises(InputError) as caught:
             parse_query("colour:red")
         assert "sigma" in str(caught.value.hint)
+
+    def test_a_bad_id_is_named_with_an_example(self) -> None:
+        with pytest.raises(InputError, match='"15x" is not the id of a group') as caught:
+            parse_query("id:12,15x")
+        assert "id:12,15,19" in str(caught.value.hint)
+
+    def test_a_list_of_groups_may_be_long_where_the_caller_says_so_and_nothing_else(self) -> None:
+        listed = "id:" + ",".join(map(str, range(1, 15_001)))
+        assert len(parse_query(listed, MAX_LISTED_LENGTH).conditions) == 1
+        with pytest.raises(InputError, match=f"at most {MAX_LENGTH} characters"):
+            parse_query(listed)
+        with pytest.raises(InputError, match="only a list of ids") as caught:
+            parse_query(f"views:2 {'x' * (MAX_LENGTH + 1)}", MAX_LISTED_LENGTH)
+        assert caught.value.pointer == "/q/8"
 
     @given(st.text(max_size=80))
     def test_any_text_is_a_query_or_an_input_error(self, text: str) -> None:

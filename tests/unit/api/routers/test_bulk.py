@@ -52,12 +52,23 @@ class TestPostVerdicts:
             ({"state": "maybe"}, 422, "/state"),
             ({"state": "accepted", "q": "colour:red"}, 400, "/q/0"),
             ({"state": "deferred", "expected": 2}, 409, None),
+            ({"state": "deferred", "q": "id:1,two"}, 400, "/q/0"),
+            ({"state": "deferred", "q": "x" * 1001}, 400, "/q/0"),
+            ({"state": "deferred", "q": "id:" + "1," * 50_000}, 422, "/q"),
         ],
     )
     def test_what_cannot_be_changes_nothing(self, api, body: Any, status: int, pointer) -> None:
         answer = api.post(VERDICTS, json=body)
         assert (answer.status_code, answer.json()["pointer"]) == (status, pointer)
         assert statuses(api) == {"unreviewed"}
+
+    def test_ticked_rows_are_named_in_the_body_however_many(self, api) -> None:
+        rows = api.get("/api/v1/groups", params={"dataset": "broadcast"}).json()["items"]
+        ticked = [rows[0]["id"], rows[2]["id"], *range(1000, 13_000)]
+        body = {"q": f"id:{','.join(map(str, ticked))}", "state": "deferred"}
+        assert api.post(VERDICTS, json=body).json()["changed"] == 2
+        after = api.get("/api/v1/groups", params={"dataset": "broadcast"}).json()["items"]
+        assert [row["status"] for row in after] == ["deferred", "unreviewed", "deferred"]
 
 
 class TestUndoBatch:

@@ -99,6 +99,33 @@ class TestListGroups:
         if answer.status_code == 400:
             assert answer.json()["pointer"].startswith("/q")
 
+    def test_any_place_of_the_list_can_be_read_at_once(self, api) -> None:
+        query = {"dataset": "broadcast", "q": "sort:number-desc"}
+        whole = api.get(f"{API}/groups", params=query).json()["items"]
+        page = api.get(f"{API}/groups", params={**query, "from": 1, "limit": 1}).json()
+        assert (page["items"], page["total"]) == ([whole[1]], 3)
+        last = api.get(f"{API}/groups", params={**query, "cursor": page["next"]}).json()
+        assert (last["items"], last["next"]) == ([whole[2]], None)
+        beyond = api.get(f"{API}/groups", params={**query, "from": 3}).json()
+        assert (beyond["items"], beyond["next"], beyond["total"]) == ([], None, 3)
+
+    @pytest.mark.parametrize(
+        ("start", "status"), [("-1", 422), ("x", 422), (str(2**63), 422), ("0&cursor=x", 400)]
+    )
+    def test_a_place_that_cannot_be_is_pointed_to(self, api, start: str, status: int) -> None:
+        answer = api.get(f"{API}/groups?dataset=broadcast&from={start}")
+        assert (answer.status_code, answer.json()["pointer"]) == (status, "/from")
+
+    def test_ids_come_alone_in_the_order_of_the_list(self, api) -> None:
+        query = {"dataset": "broadcast", "q": "sort:number-desc"}
+        whole = [row["id"] for row in api.get(f"{API}/groups", params=query).json()["items"]]
+        answer = api.get(f"{API}/groups/ids", params=query).json()
+        assert answer == {"ids": whole, "total": 3}
+        some = api.get(f"{API}/groups/ids", params={**query, "from": 1, "limit": 1}).json()
+        assert some == {"ids": whole[1:2], "total": 3}
+        left = {"dataset": "broadcast", "q": f"-id:{whole[0]},{whole[2]}"}
+        assert api.get(f"{API}/groups/ids", params=left).json()["ids"] == [whole[1]]
+
     @pytest.mark.parametrize("limit", ["0", "501", "x", "-1"])
     def test_a_limit_has_bounds(self, api, limit: str) -> None:
         answer = api.get(f"{API}/groups", params={"dataset": "broadcast", "limit": limit})
