@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import select
+from sqlalchemy.orm import Session
 
-from app.errors import InputError, NotFoundError, StaleRevisionError
+from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.review.datasets import read_dataset
-from app.review.edit import SetBall
+from app.review.edit import SetBall, need_view
+from app.review.etags import require_unchanged, said_of
 from app.review.predictions import read_set
 from app.review.query import parse_query
 from app.review.state import GroupState
@@ -25,7 +27,7 @@ from app.soccer.frames import Box
 from app.soccer.group import View
 from app.store.codecs import ball_from_json, parse
 from app.store.models import GroupModel, QueueModel, ViewModel
-from app.store.predictions import PredictedBox, PredictionSet, read_boxes
+from app.store.predictions import PredictedBox, PredictionSet, read_box, read_boxes
 from app.store.session import Store
 
 SHOWN = 20
@@ -161,6 +163,70 @@ def accept(
             else:
                 refused["changed_meanwhile"] += 1
     return AcceptReport(views, len(changed), dict(refused))
+
+
+def accept_box(
+    store: Store,
+    view_id: int,
+    prediction_id: int,
+    *,
+    if_match: str,
+    actor: str,
+    replace: bool = False,
+    idempotency_key: str | None = None,
+) -> GroupState:
+    """Make one prediction the ball of its view, however sure it is.
+
+    Args:
+        store: The database.
+        view_id: The view.
+        prediction_id: One of the boxes that were predicted for it.
+        if_match: ETag of the group's state that the person saw.
+        actor: Who accepts it.
+        replace: Also where the view has another ball.
+        idempotency_key: The caller's name for this request; sent again it changes nothing.
+
+    Returns:
+        The group as it is then, solved.
+
+    Raises:
+        NotFoundError: The view has no such prediction.
+        ConflictError: The view has a ball, and it is not to be replaced.
+        StaleRevisionError: Somebody else changed the group first.
+    """
+    with store.read() as session:
+        view = _view(session, view_id)
+        box = read_box(session, prediction_id)
+        if box is None or box.view_id != view_id:
+            # Whoever saw an older state is told so first.
+            require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
+            raise NotFoundError(f"view {view_id} has no prediction {prediction_id}")
+        name = read_set(session, box.set_id).name
+    edit = SetBall(view.key, accepted_ball(box, name))
+    if not replace:
+        _require_free(load(store, view.group_id), edit, if_match)
+    return submit(
+        store, view.group_id, edit, if_match=if_match, actor=actor, idempotency_key=idempotency_key
+    )
+
+
+def _view(session: Session, view_id: int) -> Any:
+    statement = select(ViewModel.key, ViewModel.group_id).where(ViewModel.id == view_id)
+    row = session.execute(statement).one_or_none()
+    if row is None:
+        raise NotFoundError(f"there is no view {view_id}")
+    return row
+
+
+def _require_free(state: GroupState, edit: SetBall, if_match: str) -> None:
+    """Refuse where the person saw a ball; of a state that they did not see ``submit`` judges."""
+    balls = need_view(state.group, edit.view).balls
+    if not balls or balls == (edit.ball,) or said_of(state.etag) != said_of(if_match):
+        return
+    raise ConflictError(
+        f"view {edit.view} has a ball already",
+        hint="Delete that ball first, or ask for replace=true.",
+    )
 
 
 def accepted_ball(box: PredictedBox, name: str) -> BallAnnotation:

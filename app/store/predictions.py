@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import delete, insert, select
+from sqlalchemy import delete, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.geometry.camera import Camera
@@ -142,6 +142,26 @@ def read_view_boxes(session: Session, view_id: int) -> list[PredictedBox]:
     """Every box of a view over all sets, the newest set first, the surest box first."""
     found = _boxes(session, PredictionModel.view_id == view_id)
     return sorted(found, key=lambda box: (-box.set_id, -box.score, box.id))
+
+
+def read_group_boxes(session: Session, group_id: int) -> list[PredictedBox]:
+    """Every box of a group: by view, then as ``read_view_boxes``."""
+    views = select(ViewModel.id, ViewModel.position).where(ViewModel.group_id == group_id)
+    places = {row.id: row.position for row in session.execute(views)}
+    found = _boxes(session, PredictionModel.view_id.in_(places))
+    return sorted(found, key=lambda box: (places[box.view_id], -box.set_id, -box.score, box.id))
+
+
+def read_box(session: Session, prediction_id: int) -> PredictedBox | None:
+    """A box by its id."""
+    return next(iter(_boxes(session, PredictionModel.id == prediction_id)), None)
+
+
+def count_prediction_sets(session: Session, dataset_id: int) -> int:
+    """How many sets a dataset has."""
+    model = PredictionSetModel
+    statement = select(func.count()).select_from(model).where(model.dataset_id == dataset_id)
+    return session.scalar(statement) or 0
 
 
 def read_predicted_cameras(session: Session, set_id: int) -> dict[int, Camera]:

@@ -170,6 +170,8 @@ class Attack:
             case.query = {"with": 1}
         if case.operation.path.endswith("/frames"):
             case.query.pop("cursor", None)
+        if "prediction" in path:
+            path["view"] = str([*load(self.store, 1).view_ids.values()][-1])
         if case.operation.path.endswith("/predictions/accept"):
             case.body = {"dataset": "small", "predictions": 1, "q": "", "dry_run": True}
         if case.operation.path.endswith("/evaluations") and case.method == "POST":

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from typing import Annotated
 
-from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, IdempotencyKey
+from fastapi import APIRouter, Query, Response
+
+from app.api.conflicts import current_state
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, IdempotencyKey, IfMatch
 from app.api.jobs import ACCEPTED, accepted
 from app.api.lookup import find_view
 from app.api.problem import responses
+from app.api.routers.groups import CHANGED, CONFLICTS, answer, load_document
+from app.api.schemas.group import GroupDocument
 from app.api.schemas.job import JobDocument
 from app.api.schemas.prediction import (
     AcceptBody,
     AcceptOutcome,
+    GroupPredictionsDocument,
     PredictionRequest,
     PredictionSetDocument,
     PredictionSetList,
@@ -21,8 +27,9 @@ from app.api.schemas.prediction import (
 )
 from app.config import Settings
 from app.review import predictions as review
-from app.review.accept import accept, plan_accept
+from app.review.accept import accept, accept_box, plan_accept
 from app.review.evaluation_jobs import request_accept
+from app.review.predictions_of_group import group_predictions
 from app.store.uploads import upload_path
 
 router = APIRouter(tags=["predictions"])
@@ -137,6 +144,46 @@ def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
     return ViewPredictions(
         items=[ViewPrediction.of(item, box) for item, boxes in found for box in boxes]
     )
+
+
+@router.get(
+    "/groups/{group}/predictions", operation_id="getGroupPredictions", responses=responses(404)
+)
+def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocument:
+    """What was predicted for all views of a group, and where its accepted balls come from."""
+    return GroupPredictionsDocument.of(group_predictions(store, group))
+
+
+@router.post(
+    "/views/{view}/predictions/{prediction}/accept",
+    operation_id="acceptPrediction",
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
+def accept_prediction(
+    view: Id,
+    prediction: Id,
+    store: AppStore,
+    actor: Actor,
+    if_match: IfMatch,
+    key: IdempotencyKey,
+    response: Response,
+    replace: Annotated[
+        bool, Query(description="Also where the view has another ball; else that is a 409.")
+    ] = False,
+) -> GroupDocument:
+    """Make this very prediction the ball of its view: an edit that can be undone."""
+    group = find_view(store, view).group_id
+    with current_state(lambda: load_document(store, group)):
+        state = accept_box(
+            store,
+            view,
+            prediction,
+            if_match=if_match,
+            actor=actor,
+            replace=replace,
+            idempotency_key=key,
+        )
+    return answer(state, response)
 
 
 def _files(settings: Settings, request: PredictionRequest) -> review.PredictionFiles:

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, model_
 
 from app.api.schemas.annotation import BoxNumbers
 from app.review.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
+from app.review.predictions_of_group import GroupPredictions
 from app.soccer.frames import ImageSize
 from app.store.predictions import PredictedBox, PredictionSet
 
@@ -142,6 +143,53 @@ class ViewPredictions(BaseModel):
     """What was predicted for a view, the newest set first, the surest box first."""
 
     items: list[ViewPrediction]
+
+
+class GroupPrediction(ViewPrediction):
+    """A ball that was predicted in one of a group's views."""
+
+    view: int = Field(description="Id of the view.")
+
+
+class AcceptedPrediction(BaseModel):
+    """Where a ball of the group comes from that a person took over from a prediction."""
+
+    view: int = Field(description="Id of the view.")
+    name: str = Field(description="Name of the set.")
+    score: float | None = Field(description="As predicted; null where the set is gone.")
+    by: str | None = Field(description="Who accepted it; null where it was imported so.")
+    at: datetime | None
+
+
+class GroupPredictionsDocument(BaseModel):
+    """What was predicted for a group: by view, the newest set first, the surest box first."""
+
+    sets: int = Field(description="Sets that the dataset has; 0: no group has predictions.")
+    items: list[GroupPrediction]
+    accepted: list[AcceptedPrediction]
+
+    @staticmethod
+    def of(found: GroupPredictions) -> GroupPredictionsDocument:
+        """The document of a group's predictions."""
+        return GroupPredictionsDocument(
+            sets=found.sets,
+            items=[
+                GroupPrediction(view=box.view_id, **ViewPrediction.of(item, box).model_dump())
+                for item, box in found.boxes
+            ],
+            accepted=[
+                AcceptedPrediction.model_validate(
+                    {
+                        "view": ball.view_id,
+                        "name": ball.name,
+                        "score": ball.score,
+                        "by": ball.actor,
+                        "at": ball.at,
+                    }
+                )
+                for ball in found.accepted
+            ],
+        )
 
 
 class AcceptBody(BaseModel):

@@ -4,11 +4,12 @@ import json
 
 import pytest
 
-from app.errors import InputError, NotFoundError
-from app.review.accept import AcceptRequest, accept, plan_accept
+from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
+from app.review.accept import AcceptRequest, accept, accept_box, plan_accept
 from app.review.edit import SetBall
 from app.review.ledger import read_ledger
 from app.review.predictions import PredictionFiles, add_predictions
+from app.review.predictions_of_group import group_predictions
 from app.review.replay import replay
 from app.review.submit import history, load, submit, undo
 from app.soccer.frames import Box
@@ -136,3 +137,57 @@ class TestAccept:
             accept(store, "demo", request, actor="bob", progress=stop)
         assert load(store, cleared.id).group.view("7_1.png").ball.predicted_by == "yolo"
         assert accept(store, "demo", request, actor="bob").views == 1
+
+
+class TestAcceptBox:
+    def box(self, store, cleared, score: float) -> int:
+        found = group_predictions(store, cleared.id).boxes
+        return next(box.id for _, box in found if box.score == score)
+
+    def test_takes_the_one_that_is_named_and_not_the_surest(
+        self, store, cleared, predictions
+    ) -> None:
+        view, less_sure = cleared.view_ids["7.png"], self.box(store, cleared, 0.6)
+        after = accept_box(store, view, less_sure, if_match=cleared.etag, actor="bob")
+        assert after.group.view("7.png").ball.box == Box(10, 300, 14, 14)
+        assert after.group.view("7.png").ball.predicted_by == "yolo"
+        back = undo(store, cleared.id, if_match=after.etag, actor="bob")
+        assert back.group == cleared.group
+
+    def test_a_view_with_a_ball_keeps_it_unless_it_is_to_be_replaced(
+        self, store, cleared, predictions
+    ) -> None:
+        view, box = cleared.view_ids["7_1.png"], self.box(store, cleared, 0.8)
+        with pytest.raises(ConflictError, match="has a ball already") as refused:
+            accept_box(store, view, box, if_match=cleared.etag, actor="bob")
+        assert "replace" in refused.value.hint
+        assert load(store, cleared.id) == cleared
+        after = accept_box(store, view, box, if_match=cleared.etag, actor="bob", replace=True)
+        assert after.group.view("7_1.png").ball.box == Box(20, 300, 14, 14)
+
+    def test_sent_again_it_counts_once(self, store, cleared, predictions) -> None:
+        view, box = cleared.view_ids["7.png"], self.box(store, cleared, 0.9)
+        for _ in range(2):
+            accept_box(store, view, box, if_match=cleared.etag, actor="bob", idempotency_key="once")
+        assert [entry.actor for entry in history(store, cleared.id)].count("bob") == 1
+
+    def test_of_a_state_that_is_gone_it_is_refused(self, store, cleared, predictions) -> None:
+        view, box = cleared.view_ids["7.png"], self.box(store, cleared, 0.9)
+        accept_box(store, view, box, if_match=cleared.etag, actor="bob")
+        with pytest.raises(StaleRevisionError):
+            accept_box(
+                store, view, self.box(store, cleared, 0.6), if_match=cleared.etag, actor="eve"
+            )
+
+    def test_one_that_went_with_an_older_state_is_stale_first(
+        self, store, cleared, predictions
+    ) -> None:
+        view = cleared.view_ids["7.png"]
+        with pytest.raises(StaleRevisionError):
+            accept_box(store, view, 9999, if_match='"older"', actor="eve")
+
+    def test_belongs_to_its_view(self, store, cleared, predictions) -> None:
+        other, box = cleared.view_ids["7_1.png"], self.box(store, cleared, 0.9)
+        for view, asked in ((other, box), (other, 9999)):
+            with pytest.raises(NotFoundError, match="has no prediction"):
+                accept_box(store, view, asked, if_match=cleared.etag, actor="bob")
