@@ -6,6 +6,7 @@ import base64
 import hashlib
 import os
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,7 +55,11 @@ MEDIA_TYPES = {
 """What is served, and as what; the machine's own table of types has no say."""
 LIBRARY_TYPES = frozenset({".css", ".js", ".json", ".map", ".mjs", ".wasm", ".woff2"})
 """Libraries bring pages and pictures of their own, which are not ours to serve."""
+FOR_GOOD = "public, max-age=31536000, immutable"
 _INLINE_SCRIPT = re.compile(rb"<script\b(?P<attributes>[^>]*)>(?P<text>.*?)</script>", re.S | re.I)
+_SHEET = re.compile(rb'\s*<link rel="stylesheet" href="/static/(?P<path>css/[^"]+)">')
+_ALL_SHEETS = b'\n\t<link rel="stylesheet" href="/static/all.css">'
+_MODULE = re.compile(rb'(?:href|src)="/static/([^"]+\.m?js)"')
 
 
 def script_hashes(html: bytes) -> tuple[str, ...]:
@@ -73,17 +78,32 @@ class IndexPage:
     html: bytes
     etag: str
     policy: str
+    styles: bytes
+    """All style sheets of the page, in its order."""
+    modules: tuple[str, ...]
+    """What the page asks for beside them: paths below the folder of the application."""
 
     @staticmethod
-    def make(html: bytes, version: str) -> IndexPage:
-        """The page of those bytes, with the policy that admits its import map.
+    def make(folder: Path, version: str) -> IndexPage:
+        """The page of a folder, with the policy that admits its import map.
 
         Its modules are asked for below an address that names their version, so that browsers
-        keep them for good and a start costs no question per module.
+        keep them for good and a start costs no question per module. Its style sheets come as
+        one, in the place of the last.
+
+        Raises:
+            OSError: The page or one of its sheets cannot be read.
         """
+        html = (folder / "index.html").read_bytes()
+        sheets = list(_SHEET.finditer(html))
+        styles = b"".join((folder / sheet["path"].decode()).read_bytes() for sheet in sheets)
+        if sheets:
+            last = sheets[-1].end()
+            html = _SHEET.sub(b"", html[:last]) + _ALL_SHEETS + html[last:]
+        modules = tuple(found.decode() for found in _MODULE.findall(html))
         html = html.replace(b'"/static/', f'"/assets/{version}/'.encode())
         etag = f'"{hashlib.sha256(html).hexdigest()[:32]}"'
-        return IndexPage(html, etag, content_security_policy(script_hashes(html)))
+        return IndexPage(html, etag, content_security_policy(script_hashes(html)), styles, modules)
 
 
 class Site:
@@ -100,8 +120,7 @@ class Site:
         try:
             version = self._folder_version()
             if version != self._version:
-                html = (self.folder / "index.html").read_bytes()
-                self._page = IndexPage.make(html, version)
+                self._page = IndexPage.make(self.folder, version)
                 self._version = version
         except OSError:
             self._version = self._page = None
@@ -126,8 +145,8 @@ class Modules(StaticFiles):
     """Files of the application: by known types alone, nothing hidden.
 
     Below /static they are always revalidated; below an address that names their version they
-    are kept for good. A first visit asks for all of them at once, so those that were asked for are
-    answered from memory as long as the file is the same.
+    are kept for good. A first visit asks for all of them at once, so what was read once is answered
+    from memory as long as the file is the same.
     """
 
     def __init__(self, folder: Path, caching: str):
@@ -151,12 +170,28 @@ class Modules(StaticFiles):
         if plain and (known := self._known(path)) is not None:
             return known
         response = await super().get_response(path, scope)
+        return self._remember(path, response) if plain else response
+
+    def file_response(
+        self,
+        full_path: str | os.PathLike[str],
+        stat_result: os.stat_result,
+        scope: Scope,
+        status_code: int = 200,
+    ) -> Response:
+        """The answer that has that file, as the type that its name says."""
+        response = super().file_response(full_path, stat_result, scope, status_code)
         response.headers["Cache-Control"] = self._caching
         if isinstance(response, FileResponse):
-            response.headers["Content-Type"] = MEDIA_TYPES[Path(path).suffix.lower()]
-            if plain:
-                return self._remember(path, response)
+            response.headers["Content-Type"] = MEDIA_TYPES[Path(full_path).suffix.lower()]
         return response
+
+    def warm(self, paths: Iterable[str]) -> None:
+        """Read files before anybody asks, so that a first visitor does not wait for the disk."""
+        for path in paths:
+            file, status = self.lookup_path(path)
+            if status is not None:
+                self._remember(path, self.file_response(file, status, {"headers": []}))
 
     def _known(self, path: str) -> Response | None:
         """The answer given before, if its file has not changed."""
@@ -166,8 +201,10 @@ class Modules(StaticFiles):
         except OSError:
             return None
 
-    def _remember(self, path: str, response: FileResponse) -> Response:
+    def _remember(self, path: str, response: Response) -> Response:
         """The same answer with the file's bytes in memory."""
+        if not isinstance(response, FileResponse):
+            return response
         file = str(response.path)
         changed = Path(file).stat().st_mtime_ns
         kept = Response(Path(file).read_bytes(), headers=dict(response.headers))
@@ -179,18 +216,32 @@ def install_pages(app: FastAPI, site: Site) -> None:
     """Serve the pages and the modules of the browser application."""
     router = APIRouter(include_in_schema=False)
 
-    def page(request: Request) -> Response:
+    def found() -> IndexPage:
         index = site.index()
         if index is None:
             raise HTTPException(status_code=404)
+        return index
+
+    def page(request: Request) -> Response:
+        index = found()
         headers = {"ETag": index.etag, "Cache-Control": "no-cache"}
         if index.etag in request.headers.get("if-none-match", ""):
             return Response(status_code=304, headers=headers)
         return Response(index.html, media_type="text/html", headers=headers)
 
+    def styles() -> Response:
+        return Response(found().styles, media_type="text/css", headers={"Cache-Control": FOR_GOOD})
+
     for path in PAGES:
         router.add_api_route(path, page, methods=["GET", "HEAD"])
+    router.add_api_route("/assets/{version}/all.css", styles, methods=["GET", "HEAD"])
     app.include_router(router)
-    app.mount("/static", Modules(site.folder, "no-cache"), name="static")
-    kept = Modules(site.folder, "public, max-age=31536000, immutable")
+    _install_modules(app, site)
+
+
+def _install_modules(app: FastAPI, site: Site) -> None:
+    kept = Modules(site.folder, FOR_GOOD)
     app.mount("/assets/{version}", kept, name="assets")
+    app.mount("/static", Modules(site.folder, "no-cache"), name="static")
+    if index := site.index():
+        kept.warm(index.modules)

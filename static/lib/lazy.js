@@ -9,17 +9,18 @@ import { useEffect, useState } from 'preact/hooks';
 /**
  * A component that shows nothing until its code is there.
  *
- * @param {() => Promise<ComponentType>} load
- * @returns {ComponentType}
+ * @template P
+ * @param {() => Promise<ComponentType<P>>} load
+ * @returns {ComponentType<P>}
  */
 export function lazy(load) {
-	/** @type {ComponentType | null} */
+	/** @type {ComponentType<P> | null} */
 	let View = null;
-	return function Lazy() {
+	return function Lazy(/** @type {P} */ props) {
 		const [, arrive] = useState(false);
 		useEffect(() => {
 			if (!View) load().then((loaded) => { View = loaded; arrive(true); }, () => {});
 		}, []);
-		return View ? html`<${View} />` : null;
+		return View ? html`<${View} ...${props} />` : null;
 	};
 }

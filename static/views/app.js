@@ -8,9 +8,9 @@ import { useKeys } from '../lib/hooks.js';
 import { lazy } from '../lib/lazy.js';
 import { page } from '../lib/router.js';
 import { openPalette, paletteOpen } from '../state/palette.js';
-import { openHelp } from '../state/workspace.js';
+import { helpOpen, openHelp } from '../state/workspace.js';
 import { Announcer } from './bars.js';
-import { Help } from './help.js';
+import { Header } from './header.js';
 import { LazyPage, loadPage } from './lazy_page.js';
 import { ReviewPage } from './review_page.js';
 
@@ -23,14 +23,20 @@ const GLOBAL_KEYS = [
 	{ keys: ['Ctrl+k'], label: 'Go to a page, dataset, group or action', group: 'Everywhere', typing: true, run: openPalette },
 ];
 
+const Help = lazy(async () => (await import('./help.js')).Help);
 const Palette = lazy(async () => (await import('./palette.js')).Palette);
 
 function UnknownPage() {
 	return html`
-		<main class="review__empty">
-			<h1>There is no such page</h1>
-			<p><a href="/groups">Open the queue</a></p>
-		</main>
+		<div class="page">
+			<${Header} current="" />
+			<main class="page__main">
+				<section class="card empty">
+					<h1>There is no such page</h1>
+					<p><a class="button" href="/groups">Open the queue</a></p>
+				</section>
+			</main>
+		</div>
 	`;
 }
 
@@ -43,7 +49,10 @@ function Page() {
 
 /** What is one key away is fetched once the first screen stands. */
 function fetchAhead() {
-	Promise.all([import('./palette.js'), loadPage('queue')]).catch(() => {
+	Promise.all([
+		import('./palette.js'), import('./help.js'), import('./loupe.js'),
+		import('./adjust_popover.js'), import('./conflict_bar.js'), loadPage('queue'),
+	]).catch(() => {
 		// It is asked for again, and complained about, when somebody goes there.
 	});
 }
@@ -54,5 +63,5 @@ export function App() {
 		const timer = setTimeout(fetchAhead, FETCH_AHEAD_AFTER);
 		return () => clearTimeout(timer);
 	}, []);
-	return html`<${Page} /><${Help} />${paletteOpen.value ? html`<${Palette} key=${paletteOpen.value} />` : null}<${Announcer} />`;
+	return html`<${Page} />${helpOpen.value ? html`<${Help} key=${helpOpen.value} opening=${helpOpen.value} />` : null}${paletteOpen.value ? html`<${Palette} key=${paletteOpen.value} />` : null}<${Announcer} />`;
 }

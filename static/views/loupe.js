@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useCallback, useEffect, useState } from 'preact/hooks';
 
+import { boxCenter } from '../geometry/ball.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { Canvas } from '../lib/canvas.js';
 import { colours } from '../lib/colours.js';
@@ -12,7 +13,7 @@ import { drawPixelGrid } from '../overlays/pixel_grid.js';
 import { drawOverlays } from '../overlays/stage.js';
 import { filterOf } from '../state/adjustments.js';
 import { loadImage } from '../state/images.js';
-import { boxes, focused, gain, loupe, pointerPlace, projections, selected } from '../state/workspace.js';
+import { boxes, focused, gain, pointerPlace, projections, selected } from '../state/workspace.js';
 
 /** @import {ImagePoint} from '../geometry/camera.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
@@ -31,7 +32,8 @@ function targetOf(pictures) {
 	const chosen = pictures.find(({ view }) => view.key === object?.view);
 	if (object && chosen) {
 		const ball = ballOf(chosen.view);
-		const at = object.kind === 'ball' ? ball && ballCenter(ball) : chosen.view.lines[object.marking]?.[object.index];
+		const at = object.kind === 'point' ? chosen.view.lines[object.marking]?.[object.index]
+			: object.kind === 'ball' ? ball && ballCenter(ball) : predictedAt(chosen, object.prediction);
 		if (at) return { picture: chosen, at };
 	}
 	const over = pointerPlace.value;
@@ -41,6 +43,12 @@ function targetOf(pictures) {
 	const ball = near && ballOf(near.view);
 	const at = ball && ballCenter(ball);
 	return near && at ? { picture: near, at } : null;
+}
+
+/** @param {ViewPicture} picture @param {number} prediction */
+function predictedAt({ predictions }, prediction) {
+	const box = predictions?.marks.find(({ id }) => id === prediction)?.box;
+	return box && boxCenter(box);
 }
 
 /** @param {string | null} url */
@@ -106,6 +114,6 @@ function Glass({ picture, at }) {
 
 /** @param {{pictures: ViewPicture[]}} props */
 export function Loupe({ pictures }) {
-	const target = loupe.value ? targetOf(pictures) : null;
+	const target = targetOf(pictures);
 	return target ? html`<${Glass} key=${target.picture.view.key} ...${target} />` : null;
 }

@@ -154,6 +154,15 @@ PAINTED = """(key) => new Promise((resolve) => {
 })"""
 """Press a key and wait until another group's frame has been painted."""
 
+USABLE = """(frame) => new Promise((resolve) => {
+  const look = () => {
+    if (!document.querySelector(frame) || !document.querySelector('.gates li')) requestAnimationFrame(look);
+    else requestAnimationFrame((now) => resolve(now));
+  };
+  look();
+})"""
+"""When frames and numbers stand on the screen, in milliseconds since the address was opened."""
+
 FRAMES = """(count) => new Promise((resolve) => {
   const times = [];
   let last = performance.now();
@@ -186,10 +195,10 @@ def _review(browser: Browser, address: str) -> Iterator[Row]:
 def _first_screen(browser: Browser, address: str) -> float:
     """From the address to frames, numbers and keys, in a window that knows nothing."""
     page = _open(browser, address)
+    page.add_init_script(f"window.__first = ({USABLE})({READY!r})")
     page.goto("/review/1", wait_until="commit")
     page.wait_for_selector(READY)
-    page.wait_for_selector(".gates li")
-    spent = float(page.evaluate("() => performance.now()"))
+    spent = float(page.evaluate("() => window.__first"))
     page.context.close()
     return spent
 

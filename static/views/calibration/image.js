@@ -3,9 +3,9 @@
 
 import { html } from 'htm/preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
-import Konva from 'konva/lib/Core.js';
 
 import { useSize } from '../../lib/hooks.js';
+import Konva from '../../lib/konva.js';
 import { ImageStage } from '../../overlays/stage.js';
 import { changed, choice, hovered, lines, mode } from '../../state/calibration.js';
 import { loadImage } from '../../state/images.js';

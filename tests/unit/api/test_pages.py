@@ -79,6 +79,37 @@ class TestPages:
         (static_folder / "main.js").write_text("// another version\n")
         assert address() != first
 
+    def test_style_sheets_come_as_one_in_the_order_of_the_page(
+        self, client, static_folder: Path
+    ) -> None:
+        (static_folder / "css").mkdir()
+        for name in ("b", "a"):
+            (static_folder / "css" / f"{name}.css").write_text(f".{name} {{}}\n")
+        links = [f'<link rel="stylesheet" href="/static/css/{name}.css">\n' for name in "ba"]
+        (static_folder / "index.html").write_text("".join(links) + "<p>")
+
+        def sheet() -> str:
+            (found,) = re.findall(r'<link rel="stylesheet" href="([^"]+)">', client.get("/").text)
+            return found
+
+        first = sheet()
+        answer = client.get(first)
+        assert (answer.text, answer.headers["content-type"]) == (
+            ".b {}\n.a {}\n",
+            "text/css; charset=utf-8",
+        )
+        assert "immutable" in answer.headers["cache-control"]
+        (static_folder / "css" / "a.css").write_text(".another {}\n")
+        assert sheet() != first
+        assert ".another" in client.get(sheet()).text
+
+    def test_a_page_whose_style_sheet_is_missing_is_not_there(
+        self, client, static_folder: Path
+    ) -> None:
+        index = static_folder / "index.html"
+        index.write_text('<link rel="stylesheet" href="/static/css/none.css">')
+        assert client.get("/").status_code == 404
+
     def test_who_has_the_page_is_told_so(self, client) -> None:
         tag = client.get("/").headers["etag"]
         again = client.get("/groups", headers={"If-None-Match": tag})
