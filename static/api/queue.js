@@ -1,7 +1,9 @@
 // @ts-check
-/** Requests about many groups at once: bulk verdicts, saved views, reviewers. */
+/** Requests about many groups at once: any place of the list, bulk verdicts, saved views, reviewers. */
 
-import { idempotencyKey, request } from './client.js';
+import { idempotencyKey, queryText, request } from './client.js';
+
+/** @import {GroupPage} from './types.js' */
 
 /** @typedef {{q: string, state: string, reason: string | null, note: string | null, expected?: number}} BulkRequest   `expected`: how many the person saw */
 /** @typedef {{reason: string, groups: number}} RefusedJson */
@@ -15,6 +17,7 @@ import { idempotencyKey, request } from './client.js';
  */
 
 /** @typedef {{batch: number | null, changed: number, refused: RefusedJson[]}} BulkResult */
+/** @typedef {{id: number, at: string, actor: string, state: string, changed: number, undone: string | null, undone_by: string | null}} BatchJson */
 /** @typedef {{id: number, name: string, q: string, by: string, groups: number}} SavedView */
 
 /**
@@ -26,6 +29,21 @@ import { idempotencyKey, request } from './client.js';
  * @property {number} today
  * @property {string | null} last
  */
+
+/**
+ * Rows from a place of the list on, as it is at this moment.
+ *
+ * @param {{dataset: string, q: string, from: number, limit: number}} options @param {AbortSignal} signal
+ * @returns {Promise<GroupPage>}
+ */
+export function getGroupsFrom(options, signal) {
+	return request(`/groups${queryText(options)}`, { signal });
+}
+
+/** @param {{dataset: string, q: string, from: number, limit: number}} options @returns {Promise<{ids: number[], total: number}>} */
+export function getGroupIds(options) {
+	return request(`/groups/ids${queryText(options)}`);
+}
 
 /** @param {number} dataset @param {BulkRequest} body @param {AbortSignal} signal @returns {Promise<BulkPreview>} */
 export function previewVerdicts(dataset, body, signal) {
@@ -40,6 +58,11 @@ export function postVerdicts(dataset, body) {
 /** @param {number} batch @returns {Promise<{restored: number, kept: number}>} */
 export function undoVerdicts(batch) {
 	return request(`/verdict-batches/${batch}/undo`, { method: 'POST', key: idempotencyKey() });
+}
+
+/** @param {number} dataset @param {AbortSignal} signal @returns {Promise<{items: BatchJson[]}>} */
+export function getBatches(dataset, signal) {
+	return request(`/datasets/${dataset}/verdict-batches?limit=6`, { signal });
 }
 
 /** @param {number} dataset @param {AbortSignal} [signal] @returns {Promise<{items: SavedView[]}>} */

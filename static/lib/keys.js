@@ -100,6 +100,16 @@ export function isLetter(chord) {
 	return /^(?:Shift\+)?\p{L}$/u.test(chord);
 }
 
+const SYMBOLS = /** @type {Record<string, string>} */ ({
+	Escape: 'Esc', Delete: 'Del', ArrowUp: '↑', ArrowDown: '↓', ArrowLeft: '←', ArrowRight: '→',
+	Backspace: '⌫', ' ': 'Space',
+});
+
+/** A chord as it stands on the keys. @param {string} chord */
+export function written(chord) {
+	return chord.split('+').map((key) => SYMBOLS[key] ?? (key.length === 1 ? key.toUpperCase() : key)).join(' ');
+}
+
 /** @param {EventTarget | null} target */
 function isTyping(target) {
 	if (!(target instanceof HTMLElement)) return false;
@@ -109,11 +119,12 @@ function isTyping(target) {
 	return target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement;
 }
 
-/** Enter and Space belong to the button or link that has the focus. @param {KeyboardEvent} event */
+/** Enter and Space belong to the button or field that has the focus, Enter to a link. @param {KeyboardEvent} event */
 function isPress(event) {
-	const pressable = event.target instanceof HTMLButtonElement
-		|| event.target instanceof HTMLAnchorElement || event.target instanceof HTMLInputElement;
-	return pressable && (event.key === 'Enter' || event.key === ' ') && !event.ctrlKey;
+	if (event.ctrlKey) return false;
+	if (event.target instanceof HTMLAnchorElement) return event.key === 'Enter';
+	const pressable = event.target instanceof HTMLButtonElement || event.target instanceof HTMLInputElement;
+	return pressable && (event.key === 'Enter' || event.key === ' ');
 }
 
 /** Arrows move a slider that has the focus. @param {KeyboardEvent} event */

@@ -24,6 +24,7 @@ export function useVirtualList(scroller, { count, rowHeight, overscan = 8 }) {
 			overscan,
 			getScrollElement: () => scroller.current,
 			estimateSize: () => rowHeight,
+			initialOffset: () => scroller.current?.scrollTop ?? 0,
 			scrollToFn: elementScroll,
 			observeElementRect,
 			observeElementOffset,

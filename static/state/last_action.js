@@ -1,11 +1,65 @@
 // @ts-check
-/** What the person did last in this window, so that undo takes back that. */
+/** What the person did in this window, the newest last, so that undo takes back that; it outlives a reload. */
 
 import { stored } from '../lib/storage.js';
 
-/** @typedef {{state: string, reason: string | null, note: string | null}} Before */
-/** @typedef {{kind: 'edit', group: number} | {kind: 'verdict', group: number, number: number, before: Before}} Action */
+/** @typedef {{state: string, reason: string | null, note: string | null}} Said */
+/** @typedef {{kind: 'edit', group: number, number: number, times: number}} EditDone   `times` in a row */
+/** @typedef {{kind: 'verdict', group: number, number: number, given: Said, before: Said}} VerdictDone */
+/** @typedef {{kind: 'batch', batch: number, text: string}} BatchDone */
+/** @typedef {EditDone | VerdictDone | BatchDone} Action */
 
-export const lastAction = stored(
-	'last-action', /** @type {Action | null} */ (null), 'sessionStorage',
-);
+const KEPT = 100;
+
+export const actions = stored('actions', /** @type {Action[]} */ ([]), 'sessionStorage');
+
+/** @param {readonly Action[]} before @param {Action} action @returns {Action[]} edits of one group in a row are one entry */
+export function withAction(before, action) {
+	const last = before.at(-1);
+	if (action.kind === 'edit' && last?.kind === 'edit' && last.group === action.group) {
+		return [...before.slice(0, -1), { ...action, times: last.times + action.times }];
+	}
+	return [...before.slice(1 - KEPT), action];
+}
+
+/** Remember what was done. @param {Action} action */
+export function did(action) {
+	actions.value = withAction(actions.value, action);
+}
+
+/** It was taken back, or cannot be. @param {Action} action */
+export function forget(action) {
+	const rest = actions.value.filter((other) => other !== action && !isSameBatch(other, action));
+	if (rest.length < actions.value.length) actions.value = rest;
+}
+
+/** A batch is taken back from its list too. @param {Action} one @param {Action} other */
+function isSameBatch(one, other) {
+	return one.kind === 'batch' && other.kind === 'batch' && one.batch === other.batch;
+}
+
+/** One edit of a group was taken back. @param {number} group */
+export function forgetEdit(group) {
+	const last = actions.value.findLast((action) => action.kind === 'edit' && action.group === group);
+	if (last?.kind !== 'edit') return;
+	const at = actions.value.lastIndexOf(last);
+	const rest = last.times > 1 ? [{ ...last, times: last.times - 1 }] : [];
+	actions.value = actions.value.toSpliced(at, 1, ...rest);
+}
+
+/**
+ * What undo takes back next.
+ *
+ * @param {readonly Action[]} done @param {number | null} group on screen
+ * @param {boolean} edited whether that has an edit to take back, whoever made it
+ * @returns {Action | 'here' | null} `here`: the last edit of the group on screen
+ */
+export function nextBack(done, group, edited) {
+	for (const action of done.toReversed()) {
+		if (action.kind !== 'edit') return action;
+		if (edited) return 'here';
+		// One of this group that cannot be taken back any more is passed over.
+		if (action.group !== group) return action;
+	}
+	return edited ? 'here' : null;
+}

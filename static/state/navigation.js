@@ -14,7 +14,7 @@ import { announce, complain, dismiss } from './notice.js';
 /** @import {Neighbours} from '../api/types.js' */
 
 /** Neighbours of the group on screen; null until they are known. */
-export const neighbours = signal(/** @type {(Neighbours & {id: number}) | null} */ (null));
+export const neighbours = signal(/** @type {(Neighbours & {id: number, q: string}) | null} */ (null));
 
 /** The query that makes the queue, as in the address bar. */
 export const query = computed(() => param('q'));
@@ -41,8 +41,9 @@ let located = Promise.resolve();
  * @param {number} id
  */
 export async function locate(id) {
-	const asked = getNeighbours(id, query.value).then((found) => {
-		if (currentId() === id) neighbours.value = { ...found, id };
+	const q = query.value.trim();
+	const asked = getNeighbours(id, q).then((found) => {
+		if (currentId() === id && query.value.trim() === q) neighbours.value = { ...found, id, q };
 		return found;
 	});
 	located = asked.then(() => {}, () => {});

@@ -8,7 +8,7 @@ export function wordsOf(q) {
 
 /** @param {string} word @returns {string} the field it speaks about, or "" */
 function fieldOf(word) {
-	return /^([a-z_]+)(?::|<=|>=|<|>|=)/.exec(word)?.[1] ?? '';
+	return /^([a-z_0-9]+)(?::|<=|>=|<|>|=)/.exec(word)?.[1] ?? '';
 }
 
 /**

@@ -1,31 +1,35 @@
 // @ts-check
-/** The queue: the rows that match a query, loaded page by page as they come into sight. */
+/** The queue: the rows that match a query, read where somebody looks. */
 
 import { signal } from '@preact/signals';
 
-import { getGroups, getSummary } from '../api/client.js';
+import { getSummary } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
+import { getGroupsFrom } from '../api/queue.js';
+import { complain } from './notice.js';
 import { withField } from './query.js';
+import { indexOf, PAGE, pagesOf, rowAt, withPage } from './queue_pages.js';
 
-/** @import {GroupRow} from '../api/types.js' */
+/** @import {Pages} from './queue_pages.js' */
 
 /**
  * @typedef {object} Queue
  * @property {string} dataset
  * @property {string} q
- * @property {GroupRow[]} rows those loaded so far
+ * @property {string} shown dataset and query of the rows; "" while there are none
+ * @property {Pages} pages
  * @property {number} total rows that match
- * @property {string | null} next cursor of the page after them
  * @property {ApiError | null} error
- * @property {boolean} loaded whether the first page has arrived
+ * @property {boolean} loaded whether there was an answer
  */
 
-const PAGE = 200;
-/** Far away, fewer and larger pages are faster. */
-const FAR = 500;
+/** Rows beyond those in sight that are read with them. */
+const AHEAD = 20;
+/** Whoever jumps again within this time, ms, is passing by: a scroll bar that is dragged. */
+const PAUSE = 120;
 
 /** @type {Queue} */
-const EMPTY = { dataset: '', q: '', rows: [], total: 0, next: null, error: null, loaded: false };
+const EMPTY = { dataset: '', q: '', shown: '', pages: new Map(), total: 0, error: null, loaded: false };
 
 export const queue = signal(EMPTY);
 /** Counts and histograms of what matches; null until they are known. */
@@ -41,6 +45,11 @@ let countedFor = '';
 /** @param {{id: number}} dataset @param {string} q */
 function countsKey(dataset, q) {
 	return `${dataset.id} ${withField(q, 'sort', [])}`;
+}
+
+/** What the rows of a query are remembered under. @param {string} dataset @param {string} q */
+export function queueKey(dataset, q) {
+	return `${dataset} ${q.trim()}`;
 }
 
 /**
@@ -66,10 +75,13 @@ async function count(dataset, q, abort) {
 }
 
 let controller = new AbortController();
-let busy = false;
+/** While another query is asked, its rows come first. */
+let opening = false;
+/** Rows in sight. */
+let sight = { first: 0, last: 0 };
 
 /**
- * Load the queue of a query from its start.
+ * Read the queue of a query: around the active row, or, when it is shown already, what is in sight.
  *
  * @param {{id: number, name: string}} dataset @param {string} q
  */
@@ -78,64 +90,104 @@ export async function openQueue(dataset, q) {
 	controller = new AbortController();
 	const { signal: abort } = controller;
 	const before = queue.value;
-	const same = before.dataset === dataset.name && before.q === q;
-	if (!same && before.loaded) activeRow.value = 0;
+	const again = before.shown === queueKey(dataset.name, q);
+	if (!again) sight = { first: activeRow.value, last: activeRow.value };
 	// Rows on screen stay until the new ones are there: nothing flickers while one types.
-	queue.value = { ...queue.value, dataset: dataset.name, q };
+	queue.value = { ...before, dataset: dataset.name, q };
+	opening = true;
 	try {
 		// The counts do not depend on the order; rows do not wait for them.
 		const turned = before.q !== q && countedFor === countsKey(dataset, q);
 		const counting = turned ? null : count(dataset, q, abort);
-		const found = await getGroups({ dataset: dataset.name, q, cursor: null, limit: PAGE }, abort);
-		if (abort.aborted) return;
-		queue.value = {
-			dataset: dataset.name, q, rows: found.items, total: found.total, next: found.next,
-			error: null, loaded: true,
-		};
+		await readAnew(dataset.name, q, abort);
 		await counting;
 	} catch (error) {
 		if (abort.aborted) return;
 		if (!(error instanceof ApiError)) throw error;
 		queue.value = { ...EMPTY, dataset: dataset.name, q, error, loaded: true };
-	}
-}
-
-/** Read the counts of the present query again. @param {{id: number}} dataset */
-export async function recount(dataset) {
-	await count(dataset, queue.value.q, controller.signal);
-}
-
-/** Load pages until the row of that index is there. @param {number} index */
-export async function need(index) {
-	if (busy) return;
-	busy = true;
-	const { signal: abort } = controller;
-	try {
-		while (index >= queue.value.rows.length && queue.value.next && !abort.aborted) {
-			const { dataset, q, next, rows } = queue.value;
-			const limit = index - rows.length > PAGE ? FAR : PAGE;
-			const found = await getGroups({ dataset, q, cursor: next, limit }, abort);
-			if (abort.aborted) return;
-			queue.value = {
-				...queue.value, rows: [...queue.value.rows, ...found.items], next: found.next,
-			};
-		}
-	} catch (error) {
-		if (abort.aborted) return;
-		if (!(error instanceof ApiError)) throw error;
-		queue.value = { ...queue.value, error };
 	} finally {
-		busy = false;
+		if (!abort.aborted) opening = false;
 	}
 }
 
-/** Put newer rows in the place of older ones. @param {GroupRow[]} changed */
-export function replaceRows(changed) {
-	const byId = new Map(changed.map((row) => [row.id, row]));
-	queue.value = { ...queue.value, rows: queue.value.rows.map((row) => byId.get(row.id) ?? row) };
+/** Put the pages in sight in the place of all that are there. @param {string} dataset @param {string} q @param {AbortSignal} abort */
+async function readAnew(dataset, q, abort) {
+	const { pages: before, shown } = queue.value;
+	const known = shown === queueKey(dataset, q) ? rowAt(before, activeRow.value) : null;
+	const wanted = pagesOf(sight.first, sight.last);
+	const answers = await Promise.all(wanted.map((page) => readPage(dataset, q, page, abort)));
+	if (abort.aborted) return;
+	const total = answers[answers.length - 1].total;
+	const pages = new Map(wanted.map((page, place) => [page, answers[place].items]));
+	// The active row stays with its group, wherever that stands now.
+	const moved = known ? indexOf(pages, known.id) : -1;
+	activeRow.value = Math.max(0, Math.min(moved < 0 ? activeRow.value : moved, total - 1));
+	opening = false;
+	queue.value = { dataset, q, shown: queueKey(dataset, q), pages, total, error: null, loaded: true };
 }
 
-/** Forget what was loaded, so that the next visit shows what has changed since. */
+/** @param {string} dataset @param {string} q @param {number} page @param {AbortSignal} abort */
+function readPage(dataset, q, page, abort) {
+	return getGroupsFrom({ dataset, q, from: page * PAGE, limit: PAGE }, abort);
+}
+
+/** What is being read, by page. @type {Map<number, AbortController>} */
+const reading = new Map();
+/** @type {ReturnType<typeof setTimeout> | undefined} */
+let timer;
+let jumped = -Infinity;
+
+/** Say which rows are in sight: what is missing is read, what was passed is not waited for. @param {number} first @param {number} last */
+export function look(first, last) {
+	const far = Math.abs(first - sight.first) > AHEAD;
+	const passing = far && performance.now() - jumped < PAUSE;
+	if (far) jumped = performance.now();
+	sight = { first, last };
+	const wanted = pagesInSight();
+	for (const [page, abort] of reading) {
+		if (wanted.includes(page)) continue;
+		abort.abort();
+		reading.delete(page);
+	}
+	if (passing) clearTimeout(timer);
+	if (passing || timer === undefined) timer = setTimeout(readSight, passing ? PAUSE : 0);
+}
+
+function pagesInSight() {
+	return pagesOf(sight.first - AHEAD, sight.last + AHEAD, queue.value.total);
+}
+
+function readSight() {
+	timer = undefined;
+	if (opening || queue.value.shown === '') return;
+	const missing = pagesInSight().filter((page) => !queue.value.pages.has(page) && !reading.has(page));
+	for (const page of missing) readMissing(page);
+}
+
+/** @param {number} page */
+async function readMissing(page) {
+	const abort = new AbortController();
+	const signals = AbortSignal.any([abort.signal, controller.signal]);
+	reading.set(page, abort);
+	const { dataset, q } = queue.value;
+	try {
+		const found = await readPage(dataset, q, page, signals);
+		if (signals.aborted) return;
+		// Where the number of rows has changed, places have too.
+		const kept = found.total === queue.value.total ? queue.value.pages : new Map();
+		queue.value = { ...queue.value, pages: withPage(kept, page, found.items), total: found.total };
+	} catch (error) {
+		if (signals.aborted) return;
+		if (!(error instanceof ApiError)) throw error;
+		complain(`These rows cannot be read: ${error.message}`, { label: 'Try again', run: readSight });
+	} finally {
+		if (reading.get(page) === abort) reading.delete(page);
+	}
+}
+
+/** Forget what is on its way, so that the next visit shows what has changed since. */
 export function closeQueue() {
 	controller.abort();
+	clearTimeout(timer);
+	timer = undefined;
 }

@@ -6,10 +6,12 @@ import { signal } from '@preact/signals';
 import { navigate } from '../lib/router.js';
 import { conflict } from './conflict.js';
 import { document, group, onRefused, open, settle, submitVerdict } from './group.js';
-import { lastAction } from './last_action.js';
+import { actions, did, forget } from './last_action.js';
 import { currentId, goNext, query, queueAddress, reviewAddress } from './navigation.js';
-import { announce, inform } from './notice.js';
+import { announce, complain, inform } from './notice.js';
 import { asking } from './workspace.js';
+
+/** @import {VerdictDone} from './last_action.js' */
 
 /** Reasons to reject, in the order of their digits. */
 export const REASONS = [
@@ -82,10 +84,10 @@ function decide(state, reason, note) {
 	if (reason) lastReason.value = reason;
 	settle();
 	const { state: was, reason: because, note: said } = group.verdict;
-	lastAction.value = {
-		kind: 'verdict', group: group.id, number: group.number,
+	did({
+		kind: 'verdict', group: group.id, number: group.number, given: { state, reason, note },
 		before: { state: was, reason: because, note: said },
-	};
+	});
 	submitVerdict({ state, reason, note });
 	announce(`Group ${group.number} ${state}.`);
 	leave(group.dataset.name);
@@ -109,21 +111,26 @@ export function addNote(text) {
 	announce('Note saved.');
 }
 
-/** Take the last verdict of this window back, and return to its group. */
-export async function takeVerdictBack() {
-	const last = lastAction.value;
-	if (last?.kind !== 'verdict') return;
-	lastAction.value = null;
-	navigate(reviewAddress(last.group));
-	if (document.value?.id !== last.group) await open(last.group);
-	if (document.value?.id !== last.group) return;
-	submitVerdict(last.before);
-	announce(`The verdict on group ${last.number} was taken back.`);
+/** Take a verdict of this window back, and return to its group. @param {VerdictDone} action */
+export async function takeVerdictBack(action) {
+	forget(action);
+	navigate(reviewAddress(action.group));
+	if (document.value?.id !== action.group) await open(action.group);
+	const present = group.value;
+	if (present?.id !== action.group) return;
+	const { state, reason } = present.verdict;
+	if (state !== action.given.state || reason !== action.given.reason) {
+		complain(`Group ${action.number} was judged again since; that verdict stays.`);
+		return;
+	}
+	submitVerdict(action.before);
+	announce(`The verdict on group ${action.number} was taken back.`);
 }
 
 // A verdict that was refused brings its group back to the screen; the notice says why.
 onRefused(({ verdict, group: id }) => {
 	if (!verdict) return;
-	lastAction.value = null;
+	const given = actions.value.findLast((action) => action.kind === 'verdict' && action.group === id);
+	if (given) forget(given);
 	if (currentId() !== id) navigate(reviewAddress(id));
 });

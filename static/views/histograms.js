@@ -125,8 +125,10 @@ export function Histograms({ q, onQuery }) {
 	const histograms = summary.value?.histograms ?? {};
 	return html`
 		${COLUMNS.map((column) => {
-			const data = histograms[column.name] ?? { low: 0, high: 1, counts: Array(20).fill(0) };
-			return html`<${OneHistogram} key=${column.name} column=${column} data=${data} q=${q} onQuery=${onQuery} />`;
+			const data = histograms[column.name];
+			return data
+				? html`<${OneHistogram} key=${column.name} column=${column} data=${data} q=${q} onQuery=${onQuery} />`
+				: html`<section key=${column.name} class="card histogram" aria-busy="true"><h2>${column.label}</h2><svg></svg><p class="histogram__ends">–</p></section>`;
 		})}
 	`;
 }

@@ -91,7 +91,7 @@ export function QueryBox({ field, invalid, onQuery }) {
 		<div class="query-box">
 			<input
 				class="field field--query" type="text" role="combobox" ref=${field} value=${text} spellcheck=${false}
-				aria-label="Query" placeholder="status:unreviewed jac<0.95 sort:value" autocomplete="off"
+				aria-label="Query" placeholder="Query, such as status:unreviewed jac<0.95" autocomplete="off"
 				aria-invalid=${invalid} aria-expanded=${offers.length > 0}
 				aria-controls="query-offers" aria-activedescendant=${active >= 0 ? `query-offer-${active}` : undefined}
 				onInput=${(/** @type {InputEvent} */ event) => {

@@ -7,7 +7,21 @@ import { capital } from '../lib/format.js';
 import { param } from '../lib/router.js';
 import { dataset, datasets, failure, loadDatasets } from '../state/datasets.js';
 import { queueAddress } from '../state/navigation.js';
+import { wordsOf } from '../state/query.js';
 import { queue } from '../state/queue.js';
+
+/** The query with the word that cannot be read marked. @param {{q: string, pointer: string | null}} props */
+function Marked({ q, pointer }) {
+	const place = /^\/q\/(\d+)$/.exec(pointer ?? '');
+	if (!place) return null;
+	// Positions count characters, not halves of them.
+	const letters = [...q];
+	const [before, rest] = [letters.slice(0, Number(place[1])).join(''), letters.slice(Number(place[1])).join('')];
+	const [first = ''] = wordsOf(rest);
+	// A quote that is not closed begins no word.
+	const word = first && rest.startsWith(first) ? first : rest;
+	return html`<p><code>${before}<mark>${word}</mark>${rest.slice(word.length)}</code></p>`;
+}
 
 /** @param {{q: string}} props */
 export function QueueEmpty({ q }) {
@@ -17,6 +31,7 @@ export function QueueEmpty({ q }) {
 		return html`
 			<section class="card empty" role="alert">
 				<h2>${error.status === 400 || error.status === 422 ? 'The query cannot be read' : 'The queue cannot be shown'}</h2>
+				<${Marked} q=${q} pointer=${error.pointer} />
 				<p>${capital(error.message)}.</p>
 				${error.hint ? html`<p>${error.hint}</p>` : null}
 				<p>${failure.value

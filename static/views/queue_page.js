@@ -8,9 +8,10 @@ import { count } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
 import { navigate, param } from '../lib/router.js';
 import { dataset, datasets, failure, loadDatasets, useDataset } from '../state/datasets.js';
-import { neighbours, queueAddress } from '../state/navigation.js';
+import { queueAddress } from '../state/navigation.js';
 import { activeRow, closeQueue, openQueue, queue } from '../state/queue.js';
 import { followQueue } from '../state/queue_live.js';
+import { resume } from '../state/queue_place.js';
 import { NoticeBar } from './bars.js';
 import { ExportButton } from './export_dialog.js';
 import { Header } from './header.js';
@@ -48,6 +49,7 @@ function QueueHeader({ field }) {
 
 export function QueuePage() {
 	const field = useRef(/** @type {HTMLInputElement | null} */ (null));
+	const arrived = useRef(false);
 	const q = param('q');
 	const one = dataset.value;
 	useKeys(useRef([
@@ -55,14 +57,16 @@ export function QueuePage() {
 	]).current);
 	useEffect(() => {
 		document.title = 'Queue · Touchline';
-		// Back from a group: its row is the one that keys move from.
-		activeRow.value = neighbours.value?.index ?? activeRow.value;
 		loadDatasets();
 		return closeQueue;
 	}, []);
 	useEffect(() => {
 		if (!one) return;
 		useDataset(one.name);
+		// Another query begins at its top; who comes from a group goes on at its row.
+		if (arrived.current) activeRow.value = 0;
+		else resume(one.name, q);
+		arrived.current = true;
 		openQueue({ id: one.id, name: one.name }, q);
 	}, [one?.id, q]);
 	useEffect(() => (one ? followQueue(one) : undefined), [one?.id]);

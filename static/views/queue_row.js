@@ -7,6 +7,7 @@ import { fixed, pixels, words } from '../lib/format.js';
 import { navigate } from '../lib/router.js';
 import { reviewAddress } from '../state/navigation.js';
 import { activeRow } from '../state/queue.js';
+import { isTicked, tickTo, ticks, turnTick } from '../state/queue_ticks.js';
 import { GATE_TITLES } from './gate_names.js';
 
 /** @import {GroupRow} from '../api/types.js' */
@@ -43,11 +44,31 @@ function margin(row) {
 	return `${row.margin > 0 ? '+' : ''}${fixed(row.margin, size >= 99.5 ? 0 : size >= 9.95 ? 1 : 2)}`;
 }
 
-/** @param {{row: GroupRow, q: string, active: boolean}} props */
-function Cells({ row, q, active }) {
+/** @param {{row: GroupRow, index: number, active: boolean, ticked: boolean}} props */
+function Tick({ row, index, active, ticked }) {
+	/** @param {MouseEvent} event */
+	async function turn(event) {
+		const box = /** @type {HTMLInputElement} */ (event.currentTarget);
+		if (event.shiftKey) await tickTo(index);
+		else turnTick(index);
+		// The browser has turned it; a range may say otherwise.
+		box.checked = isTicked(ticks.value, row.id);
+	}
+	return html`
+		<div role="gridcell" class="queue-cell queue-cell--tick">
+			<label class="tick" onMouseDown=${(/** @type {MouseEvent} */ event) => { if (event.shiftKey) event.preventDefault(); }}>
+				<input type="checkbox" checked=${ticked} tabindex=${active ? 0 : -1} aria-label=${`Tick group ${row.number}`} onClick=${turn} />
+			</label>
+		</div>
+	`;
+}
+
+/** @param {{row: GroupRow, index: number, q: string, active: boolean, ticked: boolean}} props */
+function Cells({ row, index, q, active, ticked }) {
 	const { status, text } = statusOf(row);
 	const { title, detail } = gateOf(row);
 	return html`
+		<${Tick} row=${row} index=${index} active=${active} ticked=${ticked} />
 		<div role="gridcell" class="queue-cell">
 			<span class="thumbnail">${row.thumbnail ? html`<img src=${row.thumbnail} alt="" loading="lazy" decoding="async" width="104" height="58" />` : 'no frame'}</span>
 		</div>
@@ -74,17 +95,31 @@ function Cells({ row, q, active }) {
 	`;
 }
 
-/** @param {{row: GroupRow | null, index: number, start: number, q: string, active: boolean}} props */
-export function QueueRow({ row, index, start, q, active }) {
+/** What is not read yet, in the shape of what comes. */
+function Waiting() {
+	return html`
+		<div role="gridcell" class="queue-cell"></div>
+		<div role="gridcell" class="queue-cell"><span class="thumbnail thumbnail--waiting"></span></div>
+		<div role="gridcell" class="queue-cell queue-cell--waiting"><span class="hidden-text">Loading</span></div>
+		<div role="gridcell" class="queue-cell queue-cell--waiting" data-short="true"></div>
+		<div role="gridcell" class="queue-cell queue-cell--waiting"></div>
+	`;
+}
+
+/** @param {{row: GroupRow | null, index: number, start: number, q: string, active: boolean, ticked: boolean}} props */
+export function QueueRow({ row, index, start, q, active, ticked }) {
+	/** @param {MouseEvent} event */
+	function open(event) {
+		const pressed = event.target instanceof Element && event.target.closest('a, label, input');
+		if (row && !pressed) navigate(reviewAddress(row.id, q));
+	}
 	return html`
 		<div
-			class="queue-row" role="row" aria-rowindex=${index + 2} aria-selected=${active} data-active=${active}
-			style=${{ transform: `translateY(${start}px)` }}
-			onFocusIn=${() => { activeRow.value = index; }}
-			onClick=${() => { if (row) navigate(reviewAddress(row.id, q)); }}
+			class="queue-row" role="row" aria-rowindex=${index + 2} aria-selected=${ticked} data-active=${active}
+			tabindex=${active ? 0 : -1} style=${{ transform: `translateY(${start}px)` }}
+			onFocusIn=${() => { activeRow.value = index; }} onClick=${open}
 		>
-			${row ? html`<${Cells} row=${row} q=${q} active=${active} />`
-				: html`<div role="gridcell" class="queue-cell queue-cell--waiting">…</div>`}
+			${row ? html`<${Cells} row=${row} index=${index} q=${q} active=${active} ticked=${ticked} />` : html`<${Waiting} />`}
 		</div>
 	`;
 }

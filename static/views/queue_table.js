@@ -2,17 +2,23 @@
 /** The rows of the queue: only those in sight exist. */
 
 import { html } from 'htm/preact';
-import { useEffect, useRef } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 
+import { count } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
 import { navigate } from '../lib/router.js';
 import { useVirtualList } from '../lib/virtual_list.js';
 import { reviewAddress } from '../state/navigation.js';
 import { valueOf, withField } from '../state/query.js';
-import { activeRow, need, queue } from '../state/queue.js';
+import { activeRow, look, queue } from '../state/queue.js';
+import { rowAt } from '../state/queue_pages.js';
+import { arrivals, leftAt, remember } from '../state/queue_place.js';
+import { countOf, extendTicks, isTicked, ticks, turnAll, turnTick } from '../state/queue_ticks.js';
 import { QueueRow } from './queue_row.js';
 
 const ROW = 72;
+/** Rows drawn while nobody knows yet how many there are. */
+const UNKNOWN = 12;
 
 const COLUMNS = [
 	{ label: '', hidden: 'Frame' },
@@ -53,14 +59,40 @@ function HeadCell({ column, q, onQuery }) {
 	`;
 }
 
+/** Ticks everything that matches, seen or not. */
+function HeadTick() {
+	const { total, loaded } = queue.value;
+	const ticked = countOf(ticks.value, total);
+	return html`
+		<div role="columnheader" class="queue-cell queue-cell--tick">
+			<label class="tick" title=${ticked === total ? 'Tick nothing' : `Tick all ${count(total)} that match`}>
+				<input
+					type="checkbox" disabled=${!loaded || total === 0} checked=${ticked > 0 && ticked === total}
+					indeterminate=${ticked > 0 && ticked < total} onChange=${turnAll} aria-label="Tick all groups that match"
+				/>
+			</label>
+		</div>
+	`;
+}
+
+/** Whether a key has just moved the active row, which then comes into sight and has the focus. */
+const following = { current: false };
+
 /** Move the active row, within what there is. @param {number} by */
 function step(by) {
 	const last = queue.value.total - 1;
+	following.current = true;
 	activeRow.value = Math.max(0, Math.min(last, activeRow.value + by));
 }
 
+/** @param {1 | -1} by */
+function extend(by) {
+	following.current = true;
+	extendTicks(by);
+}
+
 function openActive() {
-	const row = queue.value.rows[activeRow.value];
+	const row = rowAt(queue.value.pages, activeRow.value);
 	if (row) navigate(reviewAddress(row.id, queue.value.q));
 }
 
@@ -73,31 +105,86 @@ const KEYS = [
 	{ keys: ['Home'], label: 'First row', group: 'Queue', run: () => step(-Infinity) },
 	{ keys: ['End'], label: 'Last row', group: 'Queue', run: () => step(Infinity) },
 	{ keys: ['Enter'], label: 'Open the row', group: 'Queue', run: openActive },
+	{ keys: [' '], label: 'Tick the row, or untick it', group: 'Queue', run: () => turnTick(activeRow.value) },
+	{ keys: ['Shift+ArrowDown'], label: 'Tick on downwards', group: 'Queue', run: () => extend(1) },
+	{ keys: ['Shift+ArrowUp'], label: 'Tick on upwards', group: 'Queue', run: () => extend(-1) },
 ];
+
+/** The scroll position, as near as can be, at which a row is in sight. @param {number} top @param {number} height @param {number} row */
+function reaching(top, height, row) {
+	if (row * ROW < top) return row * ROW;
+	return Math.max(top, (row + 1) * ROW - height);
+}
+
+/** @typedef {import('preact').RefObject<HTMLDivElement | null>} Scroller */
+
+/** Scroll to where somebody was when rows arrive, and along with keys. @param {Scroller} scroller */
+function useScrolling(scroller) {
+	const { shown } = queue.value;
+	const active = activeRow.value;
+	const arrived = `${shown} ${arrivals.value}`;
+	const before = useRef('');
+	useLayoutEffect(() => {
+		const element = scroller.current;
+		if (!element || shown === '') return;
+		const arriving = before.current !== arrived;
+		before.current = arrived;
+		const left = leftAt(shown);
+		if (arriving) element.scrollTop = left.top * ROW;
+		// Who had scrolled away from the active row finds what was in sight.
+		if (following.current || (arriving && active !== left.active)) {
+			element.scrollTop = reaching(element.scrollTop, element.clientHeight, active);
+		}
+		remember(shown, element.scrollTop / ROW);
+	}, [arrived, active]);
+}
+
+/** Keep the focus on the active row while keys move it. @param {Scroller} scroller @param {boolean} there whether that row is drawn */
+function useRovingFocus(scroller, there) {
+	const active = activeRow.value;
+	useEffect(() => {
+		// The next key may have come already: that row then has the focus, not this one.
+		if (!there || !following.current || activeRow.value !== active) return;
+		following.current = false;
+		/** @type {HTMLElement | null | undefined} */
+		const row = scroller.current?.querySelector('[data-active="true"]');
+		row?.focus({ preventScroll: true });
+	}, [active, there]);
+}
 
 /** @param {{q: string, onQuery: (q: string) => void}} props */
 export function QueueTable({ q, onQuery }) {
 	const scroller = useRef(/** @type {HTMLDivElement | null} */ (null));
-	const { rows, total } = queue.value;
-	const list = useVirtualList(scroller, { count: total, rowHeight: ROW });
+	const { pages, total, loaded, shown } = queue.value;
+	const rows = loaded ? total : UNKNOWN;
+	const list = useVirtualList(scroller, { count: rows, rowHeight: ROW });
 	const items = list.getVirtualItems();
+	const first = items[0]?.index ?? 0;
 	const last = items.at(-1)?.index ?? 0;
 	const active = activeRow.value;
 	useKeys(KEYS);
-	useEffect(() => { if (total > 0) need(last); }, [last, total, rows.length]);
-	useEffect(() => { if (total > 0) list.scrollToIndex(active, { align: 'auto' }); }, [active, total > 0]);
+	useScrolling(scroller);
+	useRovingFocus(scroller, items.some(({ index }) => index === active));
+	useEffect(() => { if (total > 0) look(first, last); }, [first, last, total, pages]);
+	function scrolled() {
+		if (shown && scroller.current) remember(shown, scroller.current.scrollTop / ROW);
+	}
 	return html`
-		<section class="card queue-table" role="grid" aria-label="Groups" aria-rowcount=${total + 1}>
+		<section class="card queue-table" role="grid" aria-label="Groups" aria-multiselectable="true" aria-rowcount=${loaded ? total + 1 : -1} aria-busy=${!loaded}>
 			<div class="queue-row queue-row--head" role="row" aria-rowindex="1">
+				<${HeadTick} />
 				${COLUMNS.map((column) => html`<${HeadCell} key=${column.label} column=${column} q=${q} onQuery=${onQuery} />`)}
 			</div>
-			<div class="queue-table__rows" role="rowgroup" ref=${scroller} tabindex="0" aria-label="Rows">
+			<div class="queue-table__rows" role="rowgroup" ref=${scroller} tabindex="0" aria-label="Rows" onScroll=${scrolled}>
 				<div role="presentation" class="queue-table__space" style=${{ height: `${list.getTotalSize()}px` }}>
-					${items.map(({ index, start }) => html`
-						<${QueueRow}
-							key=${index} index=${index} start=${start} row=${rows[index] ?? null}
-							q=${q} active=${index === active}
-						/>`)}
+					${items.map(({ index, start }) => {
+						const row = rowAt(pages, index);
+						return html`
+							<${QueueRow}
+								key=${index} index=${index} start=${start} row=${row} q=${q} active=${loaded && index === active}
+								ticked=${row !== null && isTicked(ticks.value, row.id)}
+							/>`;
+					})}
 				</div>
 			</div>
 		</section>

@@ -7,7 +7,9 @@ import { useState } from 'preact/hooks';
 import { count } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
 import { valueOf, withField, wordsOf } from '../state/query.js';
+import { undo, undoable } from '../state/history.js';
 import { queue, statusCounts } from '../state/queue.js';
+import { clearTicks, countOf, queryOf, ticks } from '../state/queue_ticks.js';
 import { BulkDialog } from './bulk_dialog.js';
 import { Reviewers } from './reviewers.js';
 import { SavedViews } from './saved_views.js';
@@ -70,16 +72,35 @@ function OrderChoice({ q, onQuery }) {
 	`;
 }
 
+/** How many rows are ticked, and the way to none. @param {{ticked: number}} props */
+function Ticked({ ticked }) {
+	return html`
+		<span class="ticked" role="status">${ticked > 0 ? html`<strong>${count(ticked)}</strong> ticked` : null}</span>
+		${ticked > 0 ? html`<button class="button" type="button" onClick=${clearTicks}>Clear<span class="hidden-text"> the ticks</span></button>` : null}
+	`;
+}
+
+function UndoButton() {
+	const what = undoable.value;
+	return html`
+		<button class="icon-button" type="button" aria-label="Undo" aria-disabled=${what === null} title=${`${what ?? 'Nothing to undo'} (Ctrl Z)`} onClick=${undo}>
+			<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M6 3 3 6l3 3M3 6h6a4 4 0 0 1 0 8H6" /></svg>
+		</button>
+	`;
+}
+
 /** @param {{dataset: DatasetJson, q: string, onQuery: (q: string) => void}} props */
 export function QueueTools({ dataset, q, onQuery }) {
 	const [deciding, setDeciding] = useState(false);
 	const { total, loaded, error } = queue.value;
+	const ticked = countOf(ticks.value, total);
 	const reason = !loaded || error ? 'The query has no answer yet' : total === 0 ? 'No group matches' : '';
 	const open = () => { if (!reason) setDeciding(true); };
 	const [keys] = useState(() => ({ run: open }));
 	keys.run = open;
 	const [bindings] = useState(() => [
-		{ keys: ['b'], label: 'Decide all groups that match', group: 'Queue', run: () => keys.run() },
+		{ keys: ['b'], label: 'Decide what is ticked, or all that match', group: 'Queue', run: () => keys.run() },
+		{ keys: ['Ctrl+z'], label: 'Take back the last verdict', group: 'Queue', run: undo },
 	]);
 	useKeys(bindings);
 	return html`
@@ -88,10 +109,16 @@ export function QueueTools({ dataset, q, onQuery }) {
 			<${OrderChoice} q=${q} onQuery=${onQuery} />
 			<${SavedViews} dataset=${dataset} q=${q} onQuery=${onQuery} />
 			<${Reviewers} dataset=${dataset} onQuery=${onQuery} />
-			<button class="button" type="button" aria-disabled=${reason !== ''} title=${reason} onClick=${open}>
-				${reason ? 'Decide…' : `Decide all ${count(total)}…`}
+			<${UndoButton} />
+			<${Ticked} ticked=${ticked} />
+			<button class=${ticked > 0 ? 'button button--primary' : 'button'} type="button" aria-disabled=${reason !== ''} title=${reason} onClick=${open}>
+				${reason ? 'Decide…' : ticked > 0 ? `Decide ${count(ticked)} ticked…` : `Decide all ${count(total)}…`}
 			</button>
-			${deciding ? html`<${BulkDialog} dataset=${dataset} q=${q} onClose=${() => setDeciding(false)} />` : null}
+			${deciding ? html`
+				<${BulkDialog}
+					dataset=${dataset} q=${q} total=${total} onClose=${() => setDeciding(false)}
+					ticked=${ticked > 0 ? { count: ticked, q: queryOf(ticks.value, q) } : null}
+				/>` : null}
 		</div>
 	`;
 }

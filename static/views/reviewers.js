@@ -1,12 +1,13 @@
 // @ts-check
-/** Who decided how much. */
+/** Who decided how much, and what was decided for many groups at once. */
 
 import { html } from 'htm/preact';
 
-import { getReviewers } from '../api/queue.js';
+import { getBatches, getReviewers } from '../api/queue.js';
 import { ago, count } from '../lib/format.js';
 import { useNow } from '../lib/hooks.js';
 import { sentenceOf, useResource } from '../lib/resource.js';
+import { batchText, takeBatchBack } from '../state/queue_batches.js';
 import { Popover } from './popover.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
@@ -40,12 +41,41 @@ function People({ dataset, open }) {
 	`;
 }
 
+/** The newest verdicts on many groups, each to be taken back as a whole. @param {{dataset: DatasetJson}} props */
+function Batches({ dataset }) {
+	const now = useNow(10_000);
+	const batches = useResource((signal) => getBatches(dataset.id, signal), [dataset.id]);
+	const items = batches.value?.items ?? [];
+	/** @param {typeof items[number]} batch */
+	async function undo({ id, changed, state }) {
+		await takeBatchBack({ kind: 'batch', batch: id, text: batchText(changed, state) });
+		batches.reload();
+	}
+	if (items.length === 0) return null;
+	return html`
+		<section class="batches">
+			<h2>Decided for many at once</h2>
+			<ul>
+				${items.map((batch) => html`
+					<li key=${batch.id}>
+						<span>
+							${batchText(batch.changed, batch.state)}
+							<small>${batch.actor} · ${ago(Date.parse(batch.at), now)}${batch.undone ? ` · taken back by ${batch.undone_by}` : ''}</small>
+						</span>
+						${batch.undone ? null : html`<button class="button" type="button" onClick=${() => undo(batch)}>Undo</button>`}
+					</li>`)}
+			</ul>
+		</section>
+	`;
+}
+
 /** @param {{dataset: DatasetJson, onQuery: (q: string) => void}} props */
 export function Reviewers({ dataset, onQuery }) {
 	return html`
 		<${Popover} id="reviewers" label="Reviewers">
 			${(/** @type {() => void} */ close) => html`
-				<${People} dataset=${dataset} open=${(/** @type {string} */ q) => { close(); onQuery(q); }} />`}
+				<${People} dataset=${dataset} open=${(/** @type {string} */ q) => { close(); onQuery(q); }} />
+				<${Batches} dataset=${dataset} />`}
 		<//>
 	`;
 }

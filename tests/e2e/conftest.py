@@ -26,6 +26,7 @@ from playwright.sync_api import (
 from tests.e2e.film import write_film
 from tests.e2e.install_chromium import ADVICE, find_chromium
 from tests.e2e.screen import Screen, passing
+from tests.e2e.season import fill_season
 
 ROOT = Path(__file__).resolve().parents[2]
 GROUPS = 14
@@ -91,6 +92,15 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     _touchline("migrate", home=home)
     _touchline("import", "issia", str(folder), "--dataset", "film", home=home)
     _touchline("solve", "--dataset", "film", "--workers", "1", home=home)
+    with _serving(home) as address:
+        yield address
+
+
+@pytest.fixture(scope="session")
+def season(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Address of a server over a home of its own: two thousand groups."""
+    home = tmp_path_factory.mktemp("season-home")
+    fill_season(home)
     with _serving(home) as address:
         yield address
 

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from playwright.sync_api import Page, expect
+import pytest
+from playwright.sync_api import Locator, Page, Request, expect
+
+from tests.e2e.season import SEASON
+from tests.e2e.test_access import serious
 
 OpenPage = Callable[..., Page]
+ROW_HEIGHT = 72
 
 
 def opened(open_page: OpenPage, query: str = "") -> Page:
@@ -74,6 +79,169 @@ class TestBulkVerdicts:
         assert statuses(page) == before
 
 
+def pages_asked(page: Page) -> list[str]:
+    """Addresses of the pages of rows that are asked for from now on."""
+    asked: list[str] = []
+
+    def hear(request: Request) -> None:
+        if "/groups?" in request.url:
+            asked.append(request.url)
+
+    page.on("request", hear)
+    return asked
+
+
+def row(page: Page, number: int) -> Locator:
+    """The row of a group in the order of the dataset."""
+    return page.locator(f'.queue-row[aria-rowindex="{number + 1}"]')
+
+
+@pytest.fixture
+def long_list(open_page: OpenPage, season: str) -> Page:
+    """The queue of a season."""
+    page = open_page(None)
+    page.goto(f"{season}/groups")
+    expect(row(page, 1).get_by_role("link", name="1", exact=True)).to_be_visible()
+    return page
+
+
+class TestFarJumps:
+    def test_the_end_of_a_season_is_one_page_away(self, long_list: Page) -> None:
+        height = long_list.locator(".queue-table__space").bounding_box()
+        assert height is not None
+        assert height["height"] == SEASON * ROW_HEIGHT
+        asked = pages_asked(long_list)
+        long_list.keyboard.press("End")
+        last = row(long_list, SEASON)
+        expect(last.get_by_role("link")).to_have_text(str(SEASON))
+        expect(last).to_be_focused()
+        assert len(asked) <= 2, asked
+        long_list.keyboard.press("Home")
+        expect(row(long_list, 1)).to_be_focused()
+        assert len(asked) <= 2, asked
+
+    def test_what_is_scrolled_past_is_not_read(self, long_list: Page) -> None:
+        asked = pages_asked(long_list)
+        # As the scroll bar does it: through the whole list in steps of a hundred and fifty rows.
+        long_list.locator(".queue-table__rows").evaluate(
+            """async (rows, height) => {
+                for (let row = 0; row <= 1900; row += 50) {
+                    rows.scrollTop = row * height;
+                    await new Promise(requestAnimationFrame);
+                }
+            }""",
+            ROW_HEIGHT,
+        )
+        expect(row(long_list, 1905).get_by_role("link")).to_have_text("1905")
+        assert len(asked) < SEASON / 100 / 2, asked
+
+    def test_paging_on_shows_every_row_in_its_place(self, long_list: Page) -> None:
+        for _ in range(30):
+            long_list.keyboard.press("PageDown")
+        expect(row(long_list, 301)).to_have_attribute("data-active", "true")
+        expect(row(long_list, 301).get_by_role("link")).to_have_text("301")
+        expect(row(long_list, 301)).to_be_in_viewport(ratio=1)
+
+    def test_the_place_survives_a_reload_and_a_visit_to_a_group(self, long_list: Page) -> None:
+        page = long_list
+        page.goto(page.url + "?q=sort:number-desc")
+        expect(row(page, 1).get_by_role("link")).to_have_text(str(SEASON))
+        page.locator(".queue-table__rows").evaluate(
+            "(rows, top) => { rows.scrollTop = top; }", 700 * ROW_HEIGHT
+        )
+        expect(row(page, 705).get_by_role("link")).to_have_text(str(SEASON - 704))
+        page.reload()
+        expect(row(page, 705).get_by_role("link")).to_have_text(str(SEASON - 704))
+        expect(row(page, 705)).to_be_in_viewport(ratio=1)
+        row(page, 707).locator(".pill").click()
+        page.wait_for_url("**/review/*")
+        expect(page.locator(".header__place")).to_contain_text(f"707 of {SEASON:,}")
+        page.reload()
+        expect(page.locator(".header__place")).to_contain_text(f"707 of {SEASON:,}")
+        page.keyboard.press("d")
+        expect(page.locator(".header__place")).to_contain_text(f"706 of {SEASON:,}")
+        page.get_by_role("link", name="Queue", exact=True).click()
+        expect(row(page, 706)).to_have_attribute("data-active", "true")
+        expect(row(page, 706)).to_be_in_viewport(ratio=1)
+
+
+def ticked(page: Page) -> Locator:
+    """What the tools say about ticks."""
+    return page.locator(".ticked")
+
+
+class TestTicks:
+    def test_rows_are_ticked_by_keyboard_decided_and_taken_back_after_a_reload(
+        self, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page, "number<=6")
+        before = statuses(page)
+        page.keyboard.press("ArrowDown")
+        page.keyboard.press("Space")
+        expect(ticked(page)).to_have_text("1 ticked")
+        for key in ("Shift+ArrowDown", "Shift+ArrowDown", "Shift+ArrowUp"):
+            page.keyboard.press(key)
+        expect(ticked(page)).to_have_text("2 ticked")
+        assert serious(page) == []
+        page.keyboard.press("b")
+        expect(page.get_by_label("2 ticked")).to_be_checked()
+        page.get_by_label("Defer").check()
+        expect(page.locator(".bulk__outcome")).to_contain_text("2 of 2 groups change")
+        assert serious(page) == []
+        page.get_by_role("button", name="Defer 2 groups").click()
+        expect(page.locator(".bar")).to_contain_text("2 groups deferred")
+        expect(ticked(page)).to_have_text("")
+        for number in (2, 3):
+            expect(row(page, number).locator(".pill")).to_have_attribute("data-status", "deferred")
+        expect(page.locator(".pill[data-status=deferred]")).to_have_count(2)
+        page.reload()
+        expect(page.locator(".pill[data-status=deferred]")).to_have_count(2)
+        page.keyboard.press("Control+z")
+        expect(page.locator(".bar")).to_contain_text("2 verdicts are taken back")
+        expect(page.locator(".pill[data-status=deferred]")).to_have_count(0)
+        assert statuses(page) == before
+
+    def test_a_click_with_shift_ticks_all_in_between_and_another_query_nothing(
+        self, long_list: Page
+    ) -> None:
+        page = long_list
+        row(page, 2).get_by_role("checkbox").click()
+        page.keyboard.press("End")
+        last = row(page, SEASON).get_by_role("checkbox", name=f"Tick group {SEASON}")
+        last.click(modifiers=["Shift"])
+        expect(ticked(page)).to_have_text(f"{SEASON - 1:,} ticked")
+        expect(last).to_be_checked()
+        page.get_by_role("button", name="Group", exact=False).first.click()
+        expect(row(page, 1).get_by_role("checkbox")).to_be_checked()
+        expect(ticked(page)).to_have_text(f"{SEASON - 1:,} ticked")
+        page.get_by_role("button", name="Clear the ticks").click()
+        expect(ticked(page)).to_have_text("")
+        row(page, 1).get_by_role("checkbox").click()
+        page.get_by_role("button", name="failing", exact=True).click()
+        expect(page.locator(".field--query")).to_have_value("sort:number-desc passes:no")
+        expect(ticked(page)).to_have_text("")
+
+    def test_all_that_match_but_one_are_decided_in_one_go(self, long_list: Page) -> None:
+        page = long_list
+        everything = page.get_by_role("checkbox", name="Tick all groups that match")
+        everything.click()
+        expect(ticked(page)).to_have_text(f"{SEASON:,} ticked")
+        row(page, 3).get_by_role("checkbox").click()
+        expect(ticked(page)).to_have_text(f"{SEASON - 1:,} ticked")
+        assert everything.evaluate("(box) => box.indeterminate")
+        page.get_by_role("button", name=f"Decide {SEASON - 1:,} ticked").click()
+        page.get_by_label("Defer").check()
+        page.get_by_role("button", name=f"Defer {SEASON - 1:,} groups").click()
+        expect(page.locator(".bar")).to_contain_text(f"{SEASON - 1:,} groups deferred")
+        expect(row(page, 2).locator(".pill")).to_have_attribute("data-status", "deferred")
+        expect(row(page, 3).locator(".pill")).not_to_have_attribute("data-status", "deferred")
+        page.get_by_role("button", name="Reviewers").click()
+        entry = page.locator(".batches li").filter(has_text=f"{SEASON - 1:,} groups deferred")
+        entry.get_by_role("button", name="Undo").click()
+        expect(entry).to_contain_text("taken back by local")
+        expect(page.locator(".pill[data-status=deferred]")).to_have_count(0)
+
+
 class TestSavedViews:
     def test_a_query_is_saved_opened_and_deleted(self, open_page: OpenPage) -> None:
         page = opened(open_page, "number<=4")
@@ -99,7 +267,7 @@ class TestFollowing:
         # The stream must be open before the other window acts.
         page.wait_for_function(
             "async () => (await import("
-            "document.querySelector('script[src]').src.replace('main.js', 'api/events.js')"
+            "document.querySelector('script[src$=\"main.js\"]').src.replace('main.js', 'api/events.js')"
             ")).connected.value"
         )
         other.keyboard.press("b")

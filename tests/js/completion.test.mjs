@@ -32,6 +32,11 @@ describe('complete', () => {
 		assert.deepEqual(offers.map(({ text }) => text), ['match:"Eastmere - Skarvik" ']);
 	});
 
+	it('knows that groups can be named', () => {
+		assert.deepEqual(labels('i'), ['id:']);
+		assert.deepEqual(labels('id:12,'), []);
+	});
+
 	it('offers no value for a number', () => {
 		assert.deepEqual(labels('jac<0.'), []);
 	});

@@ -1,0 +1,168 @@
+"""Ways through the queue from the review screen, and back over what was decided."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from urllib.parse import quote
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.screen import Screen, withdraw_verdict
+
+OpenPage = Callable[..., Page]
+QUERY = "views>1 -number:3 sort:parallax-desc"
+"""Filtered, and in another order than that of the dataset."""
+
+
+def ids(page: Page, query: str) -> list[int]:
+    """The groups of a query in their order."""
+    params = {"dataset": "sample", "q": query}
+    found: list[int] = page.request.get("/api/v1/groups/ids", params=params).json()["ids"]
+    return found
+
+
+def at(page: Page, group: int, query: str) -> Screen:
+    """The review screen of a group in the queue of a query, its place known."""
+    page.goto(f"/review/{group}?q={quote(query)}")
+    place = page.locator(".header__place")
+    expect(place).to_contain_text("of")
+    screen = Screen(page)
+    screen.ready()
+    return screen
+
+
+def stands(page: Page, queue: list[int], place: int) -> None:
+    """Wait for the group of that place, and for the place to be said."""
+    page.wait_for_url(f"**/review/{queue[place]}?*")
+    expect(page.locator(".header__place")).to_contain_text(f"{place + 1} of {len(queue)}")
+
+
+@pytest.fixture
+def page(open_page: OpenPage) -> Page:
+    """A window with nothing in it."""
+    return open_page(None)
+
+
+class TestFarKeys:
+    def test_v_and_c_go_ten_groups_on_and_back_in_the_order_of_the_queue(self, page: Page) -> None:
+        queue = ids(page, QUERY)
+        assert queue != sorted(queue)
+        assert len(queue) == 13
+        screen = at(page, queue[1], QUERY)
+        stands(page, queue, 1)
+        screen.press("v")
+        stands(page, queue, 11)
+        screen.press("c")
+        stands(page, queue, 1)
+
+    def test_they_stop_at_the_ends_and_say_so(self, page: Page) -> None:
+        queue = ids(page, QUERY)
+        screen = at(page, queue[8], QUERY)
+        screen.press("v")
+        stands(page, queue, 12)
+        screen.press("v")
+        expect(page.get_by_text("This is the last group of the queue.")).to_be_attached()
+        screen.press("c")
+        stands(page, queue, 2)
+        screen.press("c")
+        stands(page, queue, 0)
+        screen.press("c")
+        expect(page.get_by_text("This is the first group of the queue.")).to_be_attached()
+        stands(page, queue, 0)
+
+
+class TestFlaggedKeys:
+    def test_r_and_e_go_from_finding_to_finding_in_the_order_of_the_queue(self, page: Page) -> None:
+        queue, flagged = ids(page, QUERY), ids(page, f"{QUERY} -finding:none")
+        assert 2 <= len(flagged) < len(queue)
+        screen = at(page, flagged[0], QUERY)
+        for group in flagged[1:]:
+            screen.press("r")
+            stands(page, queue, queue.index(group))
+        screen.press("r")
+        expect(page.get_by_text("No flagged group comes after this one.")).to_be_attached()
+        for group in reversed(flagged[:-1]):
+            screen.press("e")
+            stands(page, queue, queue.index(group))
+        screen.press("e")
+        expect(page.get_by_text("No flagged group comes before this one.")).to_be_attached()
+
+    def test_a_group_without_a_finding_leads_to_the_nearest_with_one(self, page: Page) -> None:
+        queue, flagged = ids(page, QUERY), ids(page, f"{QUERY} -finding:none")
+        start = next(
+            place
+            for place, group in enumerate(queue)
+            if group not in flagged and any(other in flagged for other in queue[place + 1 :])
+        )
+        screen = at(page, queue[start], QUERY)
+        screen.press("r")
+        following = next(place for place in range(start, 13) if queue[place] in flagged)
+        stands(page, queue, following)
+
+
+class TestPlace:
+    def test_survives_a_reload_and_leads_back_to_its_row(self, page: Page) -> None:
+        queue = ids(page, QUERY)
+        screen = at(page, queue[4], QUERY)
+        screen.press("f")
+        stands(page, queue, 5)
+        page.reload()
+        stands(page, queue, 5)
+        page.get_by_role("link", name="Queue", exact=True).click()
+        row = page.locator('.queue-row[data-active="true"]')
+        expect(row).to_have_attribute("aria-rowindex", "7")
+        page.keyboard.press("ArrowDown")
+        expect(row).to_have_attribute("aria-rowindex", "8")
+        page.reload()
+        expect(row).to_have_attribute("aria-rowindex", "8")
+        page.keyboard.press("Enter")
+        stands(page, queue, 6)
+
+
+def state_of(page: Page, group: int) -> str:
+    """The verdict that the server has."""
+    state: str = page.request.get(f"/api/v1/groups/{group}").json()["verdict"]["state"]
+    return state
+
+
+class TestTakingVerdictsBack:
+    def test_goes_from_group_to_group_also_after_a_reload(self, page: Page) -> None:
+        queue = ids(page, QUERY)
+        screen = at(page, queue[6], QUERY)
+        screen.press("s")
+        stands(page, queue, 7)
+        screen.press("x", "2")
+        stands(page, queue, 8)
+        screen.saved()
+        assert [state_of(page, group) for group in queue[6:8]] == ["deferred", "rejected"]
+        page.reload()
+        stands(page, queue, 8)
+        screen.ready()
+        screen.press("Control+z")
+        stands(page, queue, 7)
+        screen.saved()
+        screen.press("Control+z")
+        stands(page, queue, 6)
+        screen.saved()
+        assert [state_of(page, group) for group in queue[6:8]] == ["unreviewed"] * 2
+
+    def test_leaves_alone_what_somebody_has_judged_since(self, page: Page) -> None:
+        queue = ids(page, QUERY)
+        screen = at(page, queue[2], QUERY)
+        screen.press("s")
+        stands(page, queue, 3)
+        screen.saved()
+        document = page.request.get(f"/api/v1/groups/{queue[2]}")
+        page.request.put(
+            f"/api/v1/groups/{queue[2]}/verdict",
+            data={"state": "rejected", "reason": "duplicate_view"},
+            headers={"If-Match": document.headers["etag"]},
+        )
+        page.reload()
+        stands(page, queue, 3)
+        screen.ready()
+        screen.press("Control+z")
+        expect(page.locator(".bar")).to_contain_text("was judged again since")
+        assert state_of(page, queue[2]) == "rejected"
+        withdraw_verdict(page, queue[2])

@@ -1,0 +1,56 @@
+import assert from 'node:assert/strict';
+import { beforeEach, describe, it } from 'node:test';
+
+import { actions, did, forget, forgetEdit, nextBack, withAction } from '../../static/state/last_action.js';
+
+const edit = (group) => ({ kind: 'edit', group, number: group, times: 1 });
+const verdict = (group) => ({ kind: 'verdict', group, number: group, given: {}, before: {} });
+const batch = { kind: 'batch', batch: 3, text: '3 groups deferred' };
+
+describe('withAction', () => {
+	it('counts edits of one group in a row, and keeps the last hundred', () => {
+		assert.deepEqual(withAction([edit(1)], edit(1)), [{ ...edit(1), times: 2 }]);
+		assert.deepEqual(withAction([edit(1)], edit(2)), [edit(1), edit(2)]);
+		const many = Array.from({ length: 100 }, (_, number) => verdict(number));
+		const after = withAction(many, verdict(100));
+		assert.deepEqual([after.length, after[0].group, after.at(-1).group], [100, 1, 100]);
+	});
+});
+
+describe('nextBack', () => {
+	it('is what was done last, wherever that was', () => {
+		assert.equal(nextBack([verdict(1), batch], 2, true), batch);
+		assert.deepEqual(nextBack([edit(1), verdict(1)], 2, true), verdict(1));
+		assert.equal(nextBack([verdict(1), edit(2)], 2, true), 'here');
+	});
+
+	it('is the edit of the group on screen before one elsewhere', () => {
+		assert.equal(nextBack([edit(1)], 2, true), 'here');
+		assert.deepEqual(nextBack([edit(1)], 2, false), edit(1));
+	});
+
+	it('passes over edits that cannot be taken back any more', () => {
+		assert.deepEqual(nextBack([verdict(1), edit(2)], 2, false), verdict(1));
+		assert.equal(nextBack([edit(2)], 2, false), null);
+	});
+
+	it('is the last edit of a group where this window has done nothing', () => {
+		assert.equal(nextBack([], 2, true), 'here');
+		assert.equal(nextBack([], 2, false), null);
+	});
+});
+
+describe('actions', () => {
+	beforeEach(() => { actions.value = []; });
+
+	it('are forgotten one by one, edits one at a time', () => {
+		for (const action of [edit(1), edit(1), batch, verdict(2)]) did(action);
+		forgetEdit(1);
+		assert.deepEqual(actions.value, [edit(1), batch, verdict(2)]);
+		forgetEdit(1);
+		forget({ ...batch });
+		assert.deepEqual(actions.value, [verdict(2)]);
+		forget(actions.value[0]);
+		assert.deepEqual(actions.value, []);
+	});
+});
