@@ -81,7 +81,7 @@ export function getPredictions(dataset, signal) {
 	return request(`/datasets/${dataset}/predictions`, { signal });
 }
 
-/** @param {number} dataset @param {{name: string, format: string, upload: string | null, cameras_upload: string | null}} body @returns {Promise<PredictionSet>} */
+/** @param {number} dataset @param {{name: string, format: string, upload: string | null, cameras_upload: string | null, images_upload: string | null, category: number | null}} body @returns {Promise<PredictionSet>} */
 export function postPredictions(dataset, body) {
 	return request(`/datasets/${dataset}/predictions`, { method: 'POST', body, key: idempotencyKey() });
 }
@@ -91,9 +91,18 @@ export function deletePredictions(id) {
 	return request(`/predictions/${id}`, { method: 'DELETE' });
 }
 
-/** @param {any} body @returns {Promise<any>} the outcome of a dry run, or a job */
-export function acceptPredictions(body) {
-	return request('/predictions/accept', { method: 'POST', body });
+/** @typedef {{id: number, predictions: number, name: string, box: [number, number, number, number], score: number, view: number}} PredictionJson */
+/** @typedef {{view: number, name: string, score: number | null, by: string | null, at: string | null}} AcceptedJson */
+/** @typedef {{sets: number, items: PredictionJson[], accepted: AcceptedJson[]}} GroupPredictionsJson */
+
+/** What was predicted in the views of a group. @param {number} group @param {AbortSignal} [signal] @returns {Promise<GroupPredictionsJson>} */
+export function getGroupPredictions(group, signal) {
+	return request(`/groups/${group}/predictions`, { signal });
+}
+
+/** @param {any} body @param {AbortSignal} [signal] @returns {Promise<any>} the outcome of a dry run, or a job */
+export function acceptPredictions(body, signal) {
+	return request('/predictions/accept', { method: 'POST', body, signal });
 }
 
 /** @param {number} dataset @param {AbortSignal} [signal] @returns {Promise<{items: EvaluationRow[]}>} */

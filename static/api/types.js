@@ -31,6 +31,8 @@
  * @property {PairJson | null} point
  * @property {boolean} occluded
  * @property {boolean} out_of_view
+ * @property {'dataset' | 'person' | 'prediction'} [source] who says so
+ * @property {string | null} [predicted_by] the set of predictions that a person accepted it from
  */
 
 /**

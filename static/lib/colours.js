@@ -4,7 +4,7 @@
 import { signal } from '@preact/signals';
 
 const NAMES = /** @type {const} */ ([
-	'ok', 'warn', 'bad', 'muted', 'ink', 'halo', 'point', 'human', 'optimised', 'reprojected',
+	'ok', 'warn', 'bad', 'muted', 'ink', 'halo', 'point', 'human', 'optimised', 'reprojected', 'predicted',
 	'selected', 'plate', 'stage', 'field', 'grass', 'chalk', 'chalk-soft', 'unseen', 'grid',
 ]);
 const LETTERS = ['a', 'b', 'c', 'd', 'e', 'f'];

@@ -11,11 +11,15 @@ import { pinsOf } from '../lib/pins.js';
 /** @import {BallFitJson, GroupDocument, SolutionJson, ViewJson, ViewSolutionJson} from '../api/types.js' */
 /** @import {ImagePoint} from '../geometry/camera.js' */
 /** @import {MarkingResiduals} from '../geometry/residual.js' */
-/** @import {Viewport} from '../geometry/viewport.js' */
+/** @import {ScreenPoint, Viewport} from '../geometry/viewport.js' */
+/** @import {Mark, ViewMarks} from '../state/prediction_marks.js' */
 /** @import {Selection} from '../state/workspace.js' */
 
 /** @typedef {{letter: string, points: ImagePoint[]}} Epipolar */
 /** @typedef {{at: ImagePoint, text: string}} Pin */
+/** @typedef {(context: CanvasRenderingContext2D, scene: Scene) => void} Draw */
+/** @typedef {(viewport: Viewport, at: ScreenPoint) => Mark | null} MarkAt */
+/** @typedef {ViewMarks & {draw: Draw, at: MarkAt}} ViewPredictions   their code is loaded with them */
 /**
  * @typedef {object} ViewPicture
  * @property {ViewJson} view
@@ -27,6 +31,7 @@ import { pinsOf } from '../lib/pins.js';
  * @property {ImagePoint[]} outline of the 3D ball
  * @property {Epipolar[]} epipolars rays of the other views' balls
  * @property {Pin[]} pins notes that stand at a place of this view
+ * @property {ViewPredictions} [predictions] once they are known
  */
 /**
  * @typedef {object} Scene

@@ -1,10 +1,8 @@
 // @ts-check
 /** The canvas of one panel: the frame below, the overlays above, drawn from a Scene. */
 
-import Konva from 'konva/lib/Core.js';
-import { Image as KonvaImage } from 'konva/lib/shapes/Image.js';
-
 import { colours } from '../lib/colours.js';
+import Konva from '../lib/konva.js';
 import { drawBall, drawEpipolars } from './ball.js';
 import { drawGhosts } from './ghosts.js';
 import { drawMarkings } from './markings.js';
@@ -22,7 +20,7 @@ export class ImageStage {
 		this.stage = new Konva.Stage({ container, listening: false, width: 1, height: 1 });
 		this.below = new Konva.Layer({ listening: false });
 		this.above = new Konva.Layer({ listening: false });
-		this.picture = new KonvaImage({ image: undefined, listening: false });
+		this.picture = new Konva.Image({ image: undefined, listening: false });
 		/** @type {Scene | null} */
 		this.scene = null;
 		this.overlay = new Konva.Shape({
@@ -88,6 +86,7 @@ export function drawOverlays(context, scene) {
 	if (scene.projections) drawWhiskers(context, scene);
 	if (scene.rays) drawEpipolars(context, scene);
 	drawPoints(context, scene);
+	if (scene.boxes) scene.picture.predictions?.draw(context, scene);
 	drawBall(context, scene);
 	drawSelectedPoint(context, scene);
 	drawGhosts(context, scene);

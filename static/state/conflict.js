@@ -9,7 +9,7 @@ import { announce } from './notice.js';
 import { discard, outbox } from './outbox.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
-/** @import {Edit} from './edits.js' */
+/** @import {BallEdit, Edit} from './edits.js' */
 /** @import {Item, Verdict} from './outbox.js' */
 
 /**
@@ -72,7 +72,7 @@ function fieldsOf(theirs, { edit, verdict, base }) {
 	}
 	if (edit.kind === 'ball') {
 		return [{
-			...about, key: `ball ${view.key}`, name: `Ball of ${view.letter}`, edit,
+			...about, key: `ball ${view.key}`, name: `Ball of ${view.letter}`, edit: insisting(edit),
 			base: base?.balls, mine: edit.ball ? [edit.ball] : [], theirs: view.balls,
 		}];
 	}
@@ -81,6 +81,11 @@ function fieldsOf(theirs, { edit, verdict, base }) {
 		edit: { kind: 'lines', view: view.key, lines: { [marking]: points } },
 		base: base?.lines[marking] ?? null, mine: points, theirs: view.lines[marking] ?? null,
 	}));
+}
+
+/** The same edit, whatever ball they have put there. @param {BallEdit} edit @returns {BallEdit} */
+function insisting(edit) {
+	return edit.prediction ? { ...edit, prediction: { ...edit.prediction, replace: true } } : edit;
 }
 
 /** @type {Field} */

@@ -4,7 +4,7 @@
 /** @import {BallJson, FixJson, GroupDocument, PointJson, ViewJson} from '../api/types.js' */
 
 /** @typedef {{kind: 'lines', view: string, lines: Record<string, PointJson[] | null>}} LinesEdit */
-/** @typedef {{kind: 'ball', view: string, ball: BallJson | null}} BallEdit */
+/** @typedef {{kind: 'ball', view: string, ball: BallJson | null, prediction?: {id: number, replace: boolean}}} BallEdit   prediction: that this ball is accepted from */
 /** @typedef {{kind: 'include', view: string, included: boolean}} IncludeEdit */
 /** @typedef {LinesEdit | BallEdit | IncludeEdit} Edit */
 
@@ -37,12 +37,17 @@ function editView(view, edit) {
  * Where and what to send for an edit.
  *
  * @param {GroupDocument} group @param {Edit} edit
- * @returns {{path: string, body: unknown, etag: string}}
+ * @returns {{path: string, body: unknown, etag: string, method?: 'POST'}}
  */
 export function requestOf(group, edit) {
 	const view = viewOf(group, edit.view);
 	if (edit.kind === 'include') {
 		return { path: `/views/${view.id}`, body: { included: edit.included }, etag: group.etag };
+	}
+	if (edit.kind === 'ball' && edit.prediction) {
+		const { id, replace } = edit.prediction;
+		const path = `/views/${view.id}/predictions/${id}/accept?replace=${replace}`;
+		return { path, body: undefined, etag: group.etag, method: 'POST' };
 	}
 	if (edit.kind === 'ball') {
 		return { path: `/views/${view.id}/ball`, body: edit.ball && ballBody(edit.ball), etag: group.etag };
@@ -99,6 +104,7 @@ export function sameTarget(a, b) {
 export function describe(group, edit) {
 	const { letter } = viewOf(group, edit.view);
 	if (edit.kind === 'include') return edit.included ? `View ${letter} included` : `View ${letter} left out`;
+	if (edit.kind === 'ball' && edit.prediction) return `Ball of ${letter} accepted from ${edit.ball?.predicted_by}`;
 	if (edit.kind === 'ball') return `Ball of ${letter} changed`;
 	return `${Object.keys(edit.lines).join(', ')} of ${letter} changed`;
 }

@@ -14,7 +14,7 @@ import { previewBall } from '../geometry/preview.js';
 import { latest } from '../lib/latest.js';
 import { known, load, remember } from './documents.js';
 import { applyEdit, describe, previewBody, requestOf, sameTarget, stationOf, viewOf } from './edits.js';
-import { lastAction } from './last_action.js';
+import { did } from './last_action.js';
 import { announce, complain } from './notice.js';
 import { discard, enqueue, outbox, revise } from './outbox.js';
 import { hearFrom, isAway, wake } from './sending.js';
@@ -123,7 +123,8 @@ export function renew(newer) {
 export function propose(edit) {
 	if (draft.value && !sameTarget(draft.value, edit)) settle();
 	draft.value = edit;
-	if (edit.kind === 'lines') asking.run(edit);
+	// Cameras, gates and uncertainty are the server's; a ball moves without waiting for them.
+	asking.run(edit);
 }
 
 /** Drop the edit in hand. */
@@ -145,9 +146,9 @@ export function submit(edit) {
 	const shown = pending.value.reduce(applyEdit, at);
 	batch(() => {
 		draft.value = null;
-		lastAction.value = { kind: 'edit', group: at.id };
+		did({ kind: 'edit', group: at.id, number: at.number, times: 1 });
 		enqueue({
-			...requestOf(at, edit), group: at.id, method: 'PATCH', station: stationOf(at, edit), edit,
+			method: 'PATCH', ...requestOf(at, edit), group: at.id, station: stationOf(at, edit), edit,
 			verdict: null, base: baseOf(shown, edit.view),
 		});
 	});
@@ -223,7 +224,7 @@ function refused(item, error) {
 		if (isGroup(error.current)) takeOver(error.current);
 	});
 	if (error.isConflict && !isGroup(error.current)) load(item.group).then(renew, () => {});
-	if (!conflicting) complain(`Not saved: ${error.message}`);
+	if (!conflicting) complain(`Not saved: ${[error.message, error.hint].filter(Boolean).join('. ')}`);
 	listener(item, error);
 }
 

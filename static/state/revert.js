@@ -17,7 +17,7 @@ import { selected } from './workspace.js';
 export async function revertSelected() {
 	const object = selected.value;
 	const at = document.value;
-	if (!object || !at) {
+	if (!object || object.kind === 'prediction' || !at) {
 		announce('Select a point or a ball first.');
 		return;
 	}

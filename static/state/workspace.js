@@ -7,7 +7,8 @@ import { stored } from '../lib/storage.js';
 
 /** @typedef {{kind: 'point', view: string, marking: string, index: number}} PointSelection */
 /** @typedef {{kind: 'ball', view: string}} BallSelection */
-/** @typedef {PointSelection | BallSelection} Selection */
+/** @typedef {{kind: 'prediction', view: string, prediction: number}} PredictionSelection */
+/** @typedef {PointSelection | BallSelection | PredictionSelection} Selection */
 
 const GAINS = [1, 5, 20];
 
@@ -59,6 +60,11 @@ export function openHelp() {
 /** The next whisker gain. */
 export function cycleGain() {
 	gain.value = GAINS[(GAINS.indexOf(gain.value) + 1) % GAINS.length];
+}
+
+/** Look at the other 3D ball. */
+export function cycleEstimator() {
+	estimator.value = estimator.value === 'mean' ? 'best' : 'mean';
 }
 
 /** @param {string} letter */

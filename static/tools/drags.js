@@ -27,7 +27,7 @@ const SMALLEST = 2;
 export function dragOf(view, hit, from) {
 	if (hit.kind === 'point') return pointDrag(view, hit.marking, hit.index, from);
 	const ball = ballOf(view);
-	if (!ball) return null;
+	if (!ball || hit.kind === 'prediction') return null;
 	if (hit.kind === 'corner') return ball.box ? cornerDrag(view, ball, ball.box, hit) : null;
 	return ballDrag(view, ball, from);
 }

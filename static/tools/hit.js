@@ -12,17 +12,19 @@ import { CORNERS_FROM } from '../overlays/sizes.js';
 /** @typedef {{kind: 'point', marking: string, index: number}} PointHit */
 /** @typedef {{kind: 'ball'}} BallHit */
 /** @typedef {{kind: 'corner', left: boolean, top: boolean}} CornerHit */
-/** @typedef {PointHit | BallHit | CornerHit} Hit */
+/** @typedef {{kind: 'prediction', prediction: number}} PredictionHit */
+/** @typedef {PointHit | BallHit | CornerHit | PredictionHit} Hit */
+/** @typedef {(viewport: Viewport, at: ScreenPoint) => {id: number} | null} PredictionAt   what is predicted at a place */
 
 const REACH = 11;
 const CORNER_REACH = 7;
 
 /**
  * @param {ViewJson} view @param {Viewport} viewport @param {ScreenPoint} at
- * @param {Selection | null} selected
+ * @param {Selection | null} selected @param {PredictionAt} [predictionAt]
  * @returns {Hit | null}
  */
-export function hitTest(view, viewport, at, selected) {
+export function hitTest(view, viewport, at, selected, predictionAt) {
 	const chosen = selected?.kind === 'ball' && selected.view === view.key;
 	const corner = chosen ? hitCorner(view, viewport, at) : null;
 	if (corner) return corner;
@@ -31,7 +33,10 @@ export function hitTest(view, viewport, at, selected) {
 	// Where a point lies on the ball the nearer of the two is meant.
 	if (point && ball !== null) return point.distance < ball ? point.hit : { kind: 'ball' };
 	if (point) return point.hit;
-	return ball === null ? null : { kind: 'ball' };
+	if (ball !== null) return { kind: 'ball' };
+	// What people said is on top of what was predicted, whose tag stands beside it.
+	const predicted = predictionAt?.(viewport, at);
+	return predicted ? { kind: 'prediction', prediction: predicted.id } : null;
 }
 
 /** @param {ViewJson} view @param {Viewport} viewport @param {ScreenPoint} at */

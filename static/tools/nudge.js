@@ -37,6 +37,10 @@ function moved(dx, dy) {
 		const ball = ballOf(view);
 		return ball && moveBall(view, ball, dx, dy);
 	}
+	if (object.kind === 'prediction') {
+		announce('A prediction does not move before it is accepted.');
+		return null;
+	}
 	const point = view.lines[object.marking]?.[object.index];
 	return point
 		? movePoint(view, object.marking, object.index, { x: point.x + dx, y: point.y + dy }) : null;
@@ -59,6 +63,10 @@ export function deleteSelected() {
 	const object = selected.value;
 	if (!object || !group.value) return;
 	const view = viewOf(group.value, object.view);
+	if (object.kind === 'prediction') {
+		announce('A prediction is not deleted here: it counts for nothing until it is accepted.');
+		return;
+	}
 	selected.value = null;
 	if (object.kind === 'ball') submit({ kind: 'ball', view: view.key, ball: null });
 	else if (view.lines[object.marking]?.[object.index]) {

@@ -9,7 +9,7 @@ import { hitTest } from './hit.js';
 /** @import {ImagePoint, ScreenPoint, Viewport} from '../geometry/viewport.js' */
 /** @import {Selection} from '../state/workspace.js' */
 /** @import {Drag} from './drags.js' */
-/** @import {Hit} from './hit.js' */
+/** @import {Hit, PredictionAt} from './hit.js' */
 
 /**
  * @typedef {object} Panel what the pointer needs to know and to say
@@ -18,6 +18,8 @@ import { hitTest } from './hit.js';
  * @property {() => Selection | null} selected
  * @property {() => boolean} enabled whether things can be taken hold of
  * @property {() => boolean} draws whether a click draws
+ * @property {() => PredictionAt | undefined} predictionAt
+ * @property {(hit: Hit | null) => string} hint what is said of the thing under the pointer
  * @property {(at: ImagePoint) => void} draw
  * @property {(at: ScreenPoint) => void} insert put a point on the line there
  * @property {(at: ImagePoint | null) => void} over where the pointer is; null: elsewhere
@@ -47,7 +49,9 @@ export function attachPointer(element, panel) {
 	/** @param {ScreenPoint} place */
 	function hitAt(place) {
 		if (!panel.enabled()) return null;
-		return hitTest(panel.view(), panel.viewport(), place, panel.selected());
+		// Where clicks draw, what is predicted is drawn over.
+		const predictionAt = panel.draws() ? undefined : panel.predictionAt();
+		return hitTest(panel.view(), panel.viewport(), place, panel.selected(), predictionAt);
 	}
 
 	/** @param {PointerEvent} event */
@@ -72,7 +76,9 @@ export function attachPointer(element, panel) {
 		const place = at(event);
 		panel.over(toImage(panel.viewport(), place));
 		if (!gesture) {
-			element.dataset.cursor = hitAt(place) ? 'movable' : panel.draws() ? 'drawing' : 'idle';
+			const over = hitAt(place);
+			element.title = panel.hint(over);
+			element.dataset.cursor = over?.kind === 'prediction' ? 'predicted' : over ? 'movable' : panel.draws() ? 'drawing' : 'idle';
 			return;
 		}
 		if (event.pointerId !== gesture.id) return;

@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useCallback } from 'preact/hooks';
 
+import { boxCenter } from '../geometry/ball.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { gradeOfSize } from '../geometry/residual.js';
 import { Canvas } from '../lib/canvas.js';
@@ -25,6 +26,12 @@ const CAPTION = 26;
 const GAP = 8;
 /** Crops narrower than this have no room for the diameter. */
 const ROOMY = 124;
+/** And these none for words. */
+const NARROW = 76;
+/** A letter with its number. */
+const NUMBERED = 60;
+/** Smaller crops show nothing. */
+const SMALLEST = 24;
 
 /**
  * What part of the image a crop shows.
@@ -32,42 +39,55 @@ const ROOMY = 124;
  * @param {ViewPicture} picture @param {PolicyJson} policy
  * @returns {{center: ImagePoint, side: number} | null} side in image pixels; null without a ball
  */
-function windowOf({ view, ball: fit }, policy) {
+function windowOf({ view, ball: fit, predictions }, policy) {
 	const ball = ballOf(view);
+	const offered = predictions?.marks.find(({ sure }) => sure)?.box;
 	const center = (ball && ballCenter(ball))
-		?? (fit?.reprojected && { x: fit.reprojected[0], y: fit.reprojected[1] });
+		?? (fit?.reprojected && { x: fit.reprojected[0], y: fit.reprojected[1] })
+		?? (offered && boxCenter(offered));
 	if (!center) return null;
-	const annotated = ball?.box ? (ball.box[2] + ball.box[3]) / 2 : null;
+	const box = ball?.box ?? offered;
+	const annotated = box ? (box[2] + box[3]) / 2 : null;
 	const diameter = fit?.optimized_diameter_px ?? annotated;
 	return { center, side: diameter ? (WINDOW_METRES * diameter) / policy.ball_diameter_m : 60 };
 }
 
 /** The diameter that the 3D ball asks for, or the annotated one. @param {ViewPicture} picture */
-function sizeText({ view, ball }) {
+function sizeText({ view, ball, predictions }) {
 	if (ball?.optimized_diameter_px) return `Ø ${pixels(ball.optimized_diameter_px)} px`;
 	const box = ballOf(view)?.box;
-	return box ? `box ${pixels((box[2] + box[3]) / 2)} px` : '';
+	return box ? `box ${pixels((box[2] + box[3]) / 2)} px` : predictions?.marks.some(({ sure }) => sure) ? 'predicted' : '';
 }
 
-/** How many columns make the largest squares. @param {number} n @param {number} width @param {number} height */
-function layout(n, width, height) {
-	let best = { columns: 1, side: 0 };
+/**
+ * How many columns make the largest squares, in cells that are not narrower than `least`.
+ *
+ * @param {number} n @param {number} width @param {number} height @param {number} least
+ */
+function largest(n, width, height, least) {
+	let best = { columns: 1, side: 0, cell: 0 };
 	for (let columns = 1; columns <= n; columns++) {
 		const rows = Math.ceil(n / columns);
 		const wide = (width - GAP * (columns - 1)) / columns;
 		const tall = (height - GAP * (rows - 1)) / rows - CAPTION;
 		const side = Math.floor(Math.min(wide, tall));
-		if (side > best.side) best = { columns, side };
+		if (wide >= least && side > best.side) best = { columns, side, cell: Math.max(side, least) };
 	}
 	return best;
 }
 
+/** With a number below each crop where there is room for it. @param {number} n @param {number} width @param {number} height */
+function layout(n, width, height) {
+	const numbered = largest(n, width, height, NUMBERED);
+	return numbered.side >= SMALLEST ? numbered : largest(n, width, height, 0);
+}
+
 /**
  * @param {{
- *   picture: ViewPicture, policy: PolicyJson, side: number, frame: ImageBitmap | undefined
+ *   picture: ViewPicture, policy: PolicyJson, side: number, cell: number, frame: ImageBitmap | undefined
  * }} props
  */
-function Crop({ picture, policy, side, frame }) {
+function Crop({ picture, policy, side, cell, frame }) {
 	const { view, ball } = picture;
 	const part = windowOf(picture, policy);
 	const theme = colours.value;
@@ -88,19 +108,20 @@ function Crop({ picture, policy, side, frame }) {
 			context.drawImage(frame, viewport.left, viewport.top, view.width * scale, view.height * scale);
 			context.filter = 'none';
 		}
-		drawBall(context, {
-			picture, viewport, selected: null, hidden: false, projections: false, boxes: true, gain: 1, rays: false,
-		});
+		const scene = { picture, viewport, selected: null, hidden: false, projections: false, boxes: true, gain: 1, rays: false };
+		// Where somebody said where the ball is, what was predicted would only be in the way.
+		if (view.balls.length === 0) picture.predictions?.draw(context, scene);
+		drawBall(context, scene);
 	}, [picture, side, frame, theme, filter]);
 	return html`
-		<li class="crop" style=${{ width: `${side}px` }}>
+		<li class="crop" style=${{ width: `${cell}px` }}>
 			<button class="crop__button" type="button" title=${`Focus view ${view.letter}`} onClick=${() => focusView(view.letter)}>
 				<${Canvas} class="crop__canvas" width=${side} height=${side} draw=${draw} name=${`Ball in view ${view.letter}`} />
 			</button>
-			<p class="crop__caption">
+			<p class="crop__caption" data-narrow=${side < NARROW}>
 				<${Letter} letter=${view.letter} />
 				${part && side >= ROOMY ? html`<span>${sizeText(picture)}</span>` : null}
-				${part ? html`<span data-grade=${gradeOfSize(ball?.size_ratio)}>${ball?.size_ratio ? `${fixed(ball.size_ratio, 2)}×` : ''}</span>` : html`<span>no ball</span>`}
+				${cell < NUMBERED ? null : part ? html`<span data-grade=${gradeOfSize(ball?.size_ratio)}>${ball?.size_ratio ? `${fixed(ball.size_ratio, 2)}×` : ''}</span>` : html`<span title="no ball">${cell >= NARROW ? 'no ball' : '–'}</span>`}
 			</p>
 		</li>
 	`;
@@ -110,14 +131,14 @@ function Crop({ picture, policy, side, frame }) {
 export function ContactSheet({ pictures, policy }) {
 	const [ref, size] = useSize();
 	const frames = useFrames(pictures.map(({ view }) => view));
-	const { side } = layout(pictures.length, size.width, size.height);
+	const { columns, side, cell } = layout(pictures.length, size.width, size.height);
 	return html`
 		<section class="card strip-card" aria-label="Ball, one metre window">
 			<h2>Ball, 1 m window</h2>
-			<ul class="crops" ref=${ref}>
-				${side < 24 ? null : pictures.map((picture) => html`
+			<ul class="crops" ref=${ref} style=${{ gridTemplateColumns: `repeat(${columns}, max-content)` }}>
+				${side < SMALLEST ? null : pictures.map((picture) => html`
 					<${Crop}
-						key=${picture.view.key} picture=${picture} policy=${policy} side=${side}
+						key=${picture.view.key} picture=${picture} policy=${policy} side=${side} cell=${cell}
 						frame=${frames.get(picture.view.key)}
 					/>`)}
 			</ul>

@@ -22,6 +22,7 @@ import { DrawingChip } from './drawing_chip.js';
 import { ObjectList } from './object_list.js';
 import { PanelCaption } from './panel_caption.js';
 import { PanelTools } from './panel_tools.js';
+import { PredictionChip } from './prediction_parts.js';
 
 /** @import {ViewPicture} from '../overlays/scene.js' */
 /** @import {Hit} from '../tools/hit.js' */
@@ -53,7 +54,14 @@ function useFrame(url) {
 function selectionOf(key, hit) {
 	if (!hit) return null;
 	if (hit.kind === 'point') return { kind: 'point', view: key, marking: hit.marking, index: hit.index };
+	if (hit.kind === 'prediction') return { kind: 'prediction', view: key, prediction: hit.prediction };
 	return { kind: 'ball', view: key };
+}
+
+/** What is said of a prediction that the pointer is over. @param {ViewPicture['predictions']} predictions @param {Hit | null} hit */
+function hintOf(predictions, hit) {
+	const mark = hit?.kind === 'prediction' ? predictions?.marks.find(({ id }) => id === hit.prediction) : undefined;
+	return mark ? `${mark.name} predicts a ball here, score ${mark.score.toFixed(2)}. Click to select it, Y accepts it.` : '';
 }
 
 /** @param {{picture: ViewPicture, first: boolean}} props */
@@ -64,7 +72,7 @@ export function ImagePanel({ picture, first }) {
 	const stage = useRef(/** @type {ImageStage | null} */ (null));
 	const frame = useFrame(view.image);
 	const viewport = viewportOf(letter, view, size);
-	const now = { view, size, viewport };
+	const now = { view, size, viewport, predictions: picture.predictions };
 	const latestProps = useRef(now);
 	latestProps.current = now;
 
@@ -81,6 +89,8 @@ export function ImagePanel({ picture, first }) {
 				const present = drawing.value;
 				return present?.view === latestProps.current.view.key && present.what !== 'ask';
 			},
+			predictionAt: () => (boxes.value ? latestProps.current.predictions?.at : undefined),
+			hint: (hit) => hintOf(latestProps.current.predictions, hit),
 			draw: (at) => drawAt(latestProps.current.view, at),
 			insert: (at) => insertAt(latestProps.current.view, latestProps.current.viewport, at),
 			over: (at) => {
@@ -143,6 +153,7 @@ export function ImagePanel({ picture, first }) {
 			<${PanelCaption} picture=${picture} />
 			<${PanelTools} picture=${picture} first=${first} />
 			<${DrawingChip} view=${view.key} />
+			${picture.predictions && !drawing.value ? html`<${PredictionChip} picture=${picture} />` : null}
 			${drawing.value?.view === view.key && drawing.value.what === 'ask' ? html`<${ClassChooser} picture=${picture} />` : null}
 			${isFocused && editing.value ? html`<${ObjectList} picture=${picture} />` : html`
 				<button

@@ -7,19 +7,24 @@ import { useLayoutEffect, useRef } from 'preact/hooks';
 import { ballOf } from '../geometry/preview.js';
 import { fixed, pixels } from '../lib/format.js';
 import { objectsOf, sameObject } from '../state/selection.js';
-import { editing, selected } from '../state/workspace.js';
+import { boxes, editing, selected } from '../state/workspace.js';
 
 /** @import {ViewPicture} from '../overlays/scene.js' */
 /** @import {Selection} from '../state/workspace.js' */
 
 /**
  * @param {ViewPicture} picture @param {Selection} object
- * @returns {{name: string, point: string, number: string}}
+ * @returns {{name: string, point: string, number: string, title?: string}}
  */
 function wordsFor(picture, object) {
 	if (object.kind === 'ball') {
-		const box = ballOf(picture.view)?.box;
-		return { name: 'Ball', point: '', number: box ? `Ø ${fixed((box[2] + box[3]) / 2, 2)} px` : '' };
+		const ball = ballOf(picture.view);
+		const size = ball?.box ? `Ø ${fixed((ball.box[2] + ball.box[3]) / 2, 2)} px` : '';
+		return { name: 'Ball', point: ball?.predicted_by ? 'was predicted' : '', number: size, title: picture.predictions?.origin ?? undefined };
+	}
+	if (object.kind === 'prediction') {
+		const mark = picture.predictions?.marks.find(({ id }) => id === object.prediction);
+		return { name: `Predicted by ${mark?.name}`, point: mark?.sure ? '' : 'less sure', number: mark?.score.toFixed(2) ?? '', title: 'Y accepts it' };
 	}
 	const found = picture.markings.find(({ marking }) => marking === object.marking);
 	const distance = found?.points[object.index]?.distance ?? null;
@@ -29,10 +34,10 @@ function wordsFor(picture, object) {
 
 /** @param {{picture: ViewPicture, object: Selection}} props */
 function ObjectButton({ picture, object }) {
-	const { name, point, number } = wordsFor(picture, object);
+	const { name, point, number, title } = wordsFor(picture, object);
 	const select = () => { selected.value = object; };
 	return html`
-		<button type="button" aria-pressed=${sameObject(object, selected.value)} onFocus=${select} onClick=${select}>
+		<button type="button" title=${title} aria-pressed=${sameObject(object, selected.value)} onFocus=${select} onClick=${select}>
 			<span>${name}</span><span>${point}</span><span>${number}</span>
 		</button>
 	`;
@@ -41,12 +46,17 @@ function ObjectButton({ picture, object }) {
 /** @param {{picture: ViewPicture}} props */
 export function ObjectList({ picture }) {
 	const list = useRef(/** @type {HTMLUListElement | null} */ (null));
-	const objects = objectsOf(picture.view);
+	const objects = objectsOf(picture.view, boxes.value ? picture.predictions?.marks : []);
 	// Before the next key: an arrow pressed right after Enter already moves the first object.
 	useLayoutEffect(() => {
 		const at = list.current?.querySelector('[aria-pressed="true"]') ?? list.current?.querySelector('button');
 		if (at instanceof HTMLElement) at.focus();
 	}, []);
+	// What had the focus may have become something else: an accepted prediction is the ball.
+	useLayoutEffect(() => {
+		const at = document.activeElement === document.body ? list.current?.querySelector('[aria-pressed="true"]') : null;
+		if (at instanceof HTMLElement) at.focus();
+	}, [JSON.stringify(objects)]);
 	return html`
 		<ul class="object-list" ref=${list} aria-label=${`Objects of view ${picture.view.letter}`}>
 			${objects.length ? null : html`<li class="object-list__empty">Nothing is annotated here.</li>`}

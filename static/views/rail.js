@@ -6,6 +6,7 @@ import { html } from 'htm/preact';
 import { Findings } from './findings.js';
 import { Gates } from './gates.js';
 import { PairTable } from './pair_table.js';
+import { PredictionCard } from './prediction_parts.js';
 import { VerdictButtons } from './verdict_buttons.js';
 import { VerdictCard } from './verdict_card.js';
 import { ViewLines } from './view_lines.js';
@@ -26,6 +27,7 @@ export function Rail({ group, solution, pictures, live }) {
 				<${VerdictCard} group=${group} solution=${solution} live=${live} />
 				${solution ? html`<${Gates} group=${group} solution=${solution} />` : null}
 				<${ViewTable} group=${group} pictures=${pictures} />
+				${pictures.some(({ predictions }) => predictions) ? html`<${PredictionCard} group=${group} />` : null}
 				${solution ? html`
 					<${PairTable} group=${group} solution=${solution} />
 					<${Findings} group=${group} solution=${solution} />

@@ -13,12 +13,13 @@ import { revertSelected } from '../state/revert.js';
 import { accept, askReason, cancelAsking, defer } from '../state/verdicts.js';
 import { fitAll, fitPanel, isZoomed, zoomTo } from '../state/viewports.js';
 import {
-	asking, boxes, cycleGain, drawing, editing, equalViews, estimator, focused, focusView, gain,
+	asking, boxes, cycleEstimator, cycleGain, drawing, editing, equalViews, estimator, focused, focusView, gain,
 	gatesOpen, loupe, maximised, overlaysHidden, pinPlace, pointerPlace, projections, selected,
 	stripCollapsed, toggleMaximised,
 } from '../state/workspace.js';
 import { deleteSelected, nudge, nudgeDiameter } from '../tools/nudge.js';
 import { EDITOR_DOOR } from './calibration/open.js';
+import { acceptAll, acceptInHand } from './prediction_parts.js';
 import { SCENE_KEYS } from './scene3d/scene3d.js';
 
 /** @import {Binding} from '../lib/keys.js' */
@@ -114,8 +115,8 @@ function judgeView(included) {
 }
 
 /** Which 3D ball is looked at. */
-function cycleEstimator() {
-	estimator.value = estimator.value === 'mean' ? 'best' : 'mean';
+function otherEstimator() {
+	cycleEstimator();
 	announce(estimator.value === 'mean' ? 'Mean of pairs.' : 'Most likely point.');
 }
 
@@ -198,7 +199,7 @@ const VIEW = [
 		keys: ['w'], label: 'Residual whiskers × 1, 5, 20', group: 'View',
 		run: () => { cycleGain(); announce(`Whiskers times ${gain.value}.`); },
 	},
-	{ keys: ['t'], label: '3D ball: mean of pairs, or most likely point', group: 'View', run: cycleEstimator },
+	{ keys: ['t'], label: '3D ball: mean of pairs, or most likely point', group: 'View', run: otherEstimator },
 	{ keys: ['g'], label: 'Gates: what they ask and by how much', group: 'View', run: showGates },
 	{
 		keys: ['Shift+l'], label: 'Main camera large, or all views equal', group: 'View',
@@ -245,6 +246,8 @@ const EDIT = [
 		keys: ['o'], label: 'Ball out of view, or not', group: 'Edit',
 		run: () => changeBall(toggleOutOfView, ''),
 	},
+	{ keys: ['y'], label: 'Accept the selected prediction, else the surest of the view', group: 'Edit', run: acceptInHand },
+	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', run: acceptAll },
 	{ keys: ['u'], label: 'Give the selected object back what it was', group: 'Edit', run: () => { revertSelected(); } },
 	{ keys: ['m'], label: 'Swap left and right in the focused view', group: 'Edit', run: swapFocused },
 	{ keys: ['Ctrl+z'], label: 'Undo', group: 'Edit', run: undo },

@@ -5,20 +5,25 @@ import { html } from 'htm/preact';
 import { useEffect, useMemo } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
+import { lazy } from '../lib/lazy.js';
 import { withBestBall } from '../geometry/estimator.js';
 import { picturesOf } from '../overlays/scene.js';
+import { conflict } from '../state/conflict.js';
 import { document, group, isPreview, solution } from '../state/group.js';
+import { notice } from '../state/notice.js';
 import { sceneShown } from '../state/scene3d.js';
-import { estimator, focused, maximised, stripCollapsed } from '../state/workspace.js';
+import { estimator, focused, loupe, maximised, stripCollapsed } from '../state/workspace.js';
 import { NoticeBar } from './bars.js';
-import { ConflictBar } from './conflict_bar.js';
 import { ImageGrid } from './image_grid.js';
-import { Loupe } from './loupe.js';
+import { usePredictions, withPredictions } from './prediction_parts.js';
 import { Rail } from './rail.js';
 import { ReviewHeader } from './review_header.js';
 import { REVIEW_KEYS } from './review_keys.js';
 import { Scene3D } from './scene3d/scene3d.js';
 import { BottomStrip } from './strip.js';
+
+const ConflictBar = lazy(async () => (await import('./conflict_bar.js')).ConflictBar);
+const Loupe = lazy(async () => (await import('./loupe.js')).Loupe);
 
 /** What is focused or shown alone must exist in this group. @param {string[]} letters */
 function keepWithin(letters) {
@@ -34,16 +39,19 @@ function Workspace() {
 	// While something moves the browser computes the mean of pairs and nothing else.
 	const solved = useMemo(() => (best && shown && found ? withBestBall(shown, found) : found), [best, shown, found]);
 	const saved = document.value;
-	const pictures = useMemo(() => (shown ? picturesOf(shown, solved, saved) : []), [shown, solved, saved]);
+	const plain = useMemo(() => (shown ? picturesOf(shown, solved, saved) : []), [shown, solved, saved]);
+	const predicted = usePredictions(shown !== null);
+	const pictures = useMemo(() => withPredictions(plain, predicted), [plain, predicted]);
 	useEffect(() => keepWithin(pictures.map(({ view }) => view.letter)), [pictures]);
-	if (!shown) return html`<main class="review__empty" aria-busy="true"><p>Loading…</p></main>`;
+	const failed = notice.value?.tone === 'bad';
+	if (!shown) return html`<main class="review__empty" aria-busy=${!failed}><p>${failed ? 'Nothing to show here.' : 'Loading…'}</p></main>`;
 	return html`
 		<main class="review__main" data-collapsed=${stripCollapsed.value} data-count=${maximised.value ? 1 : pictures.length}>
 			${sceneShown.value ? html`<${Scene3D} group=${shown} solution=${found} />` : html`<${ImageGrid} pictures=${pictures} />`}
 			<${BottomStrip} group=${shown} solution=${solved} pictures=${pictures} />
 		</main>
 		<${Rail} group=${shown} solution=${solved} pictures=${pictures} live=${live} />
-		<${Loupe} pictures=${pictures} />
+		${loupe.value ? html`<${Loupe} pictures=${pictures} />` : null}
 	`;
 }
 
@@ -55,7 +63,7 @@ export function ReviewPage() {
 	return html`
 		<div class="review">
 			<${ReviewHeader} />
-			<div class="bars"><${NoticeBar} /><${ConflictBar} /></div>
+			<div class="bars"><${NoticeBar} />${conflict.value ? html`<${ConflictBar} />` : null}</div>
 			<${Workspace} />
 		</div>
 	`;

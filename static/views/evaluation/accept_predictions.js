@@ -2,13 +2,16 @@
 /** Making annotations of predictions: who accepts them says which, and sees how many. */
 
 import { html } from 'htm/preact';
-import { useState } from 'preact/hooks';
+import { useEffect, useState } from 'preact/hooks';
 
 import { acceptPredictions } from '../../api/evaluations.js';
-import { count, words } from '../../lib/format.js';
+import { count, plural, words } from '../../lib/format.js';
+import { matchName } from '../../lib/match_name.js';
 import { sentenceOf, useResource } from '../../lib/resource.js';
 import { resultOf } from '../../state/jobs.js';
+import { reviewAddress } from '../../state/navigation.js';
 import { inform } from '../../state/notice.js';
+import { forgetPredictions } from '../../state/predictions.js';
 import { FormDialog } from '../dialog.js';
 
 /** @import {PredictionSet} from '../../api/evaluations.js' */
@@ -16,31 +19,58 @@ import { FormDialog } from '../dialog.js';
 
 const valueOf = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.target).value;
 
+const REASONS = /** @type {{[why: string]: string}} */ ({
+	annotated: 'the view has a ball already', the_same: 'this very ball is there already',
+	below_score: 'the surest prediction is below the score', changed_meanwhile: 'the group was changed meanwhile',
+});
+const EXAMPLES = 4;
+/** How long a person types before it is counted, ms. */
+const PAUSE = 200;
+
+/** @param {{one: any}} props */
+function Example({ one }) {
+	const { name, aside } = matchName(one.group_key);
+	return html`<li><a class="link" href=${reviewAddress(one.group, '')}>${name}</a><small class="note">${[`view ${one.key}`, `score ${one.score.toFixed(2)}`, aside].filter(Boolean).join(' · ')}</small></li>`;
+}
+
 /** @param {{plan: any}} props */
 function Plan({ plan }) {
 	const refused = Object.entries(plan.refused ?? {});
 	return html`
 		<div class="bulk__outcome" role="status">
-			<p><strong>${count(plan.changed)}</strong> views of ${count(plan.groups)} groups get a ball.</p>
-			${refused.length ? html`<ul>${refused.map(([why, n]) => html`<li key=${why}>${count(Number(n))} stay as they are: ${words(why)}</li>`)}</ul>` : null}
+			<p><strong>${count(plan.changed)}</strong> ${plan.changed === 1 ? 'view' : 'views'} of ${plural(plan.groups, 'group')} ${plan.changed === 1 ? 'gets' : 'get'} a ball.</p>
+			${plan.sample.length ? html`<ul class="accept__sample">${plan.sample.slice(0, EXAMPLES).map((/** @type {any} */ one) => html`<${Example} key=${one.view} one=${one} />`)}${plan.changed > EXAMPLES ? html`<li class="note">and ${count(plan.changed - EXAMPLES)} more</li>` : null}</ul>` : null}
+			${refused.length ? html`<ul>${refused.map(([why, n]) => html`<li key=${why}>${count(Number(n))} left as ${Number(n) === 1 ? 'it is' : 'they are'}: ${REASONS[why] ?? words(why)}</li>`)}</ul>` : null}
 		</div>
 	`;
 }
 
+/** A value once nobody has changed it for a moment. @template T @param {T} value @returns {T} */
+function useSettled(value) {
+	const [settled, setSettled] = useState(value);
+	useEffect(() => {
+		const timer = setTimeout(setSettled, PAUSE, value);
+		return () => clearTimeout(timer);
+	}, [value]);
+	return settled;
+}
+
 /** @param {{one: DatasetJson, set: PredictionSet, onClose: () => void}} props */
 export function AcceptPredictions({ one, set, onClose }) {
-	const [ask, setAsk] = useState({ q: 'gate:ball', min_score: 0.5, replace: false });
+	const [typed, setTyped] = useState({ q: '', min_score: 0.5, replace: false });
+	const ask = useSettled(typed);
 	const [state, setState] = useState({ busy: '', error: '' });
 	const body = { dataset: one.name, predictions: set.id, ...ask };
-	const plan = useResource((signal) => (signal.aborted ? Promise.resolve(null) : acceptPredictions({ ...body, dry_run: true })), [ask.q, ask.min_score, ask.replace]);
+	const plan = useResource((signal) => acceptPredictions({ ...body, dry_run: true }, signal), [ask.q, ask.min_score, ask.replace]);
 	const would = plan.value?.changed ?? 0;
-	const why = state.busy ? 'Under way' : plan.error ? sentenceOf(plan.error) : would === 0 ? 'No view would get a ball' : '';
+	const why = state.busy ? 'Under way' : plan.error ? sentenceOf(plan.error) : ask !== typed || plan.waiting ? 'Counting…' : would === 0 ? 'No view would get a ball' : '';
 	async function send() {
 		if (why) return;
 		setState({ busy: 'Accepting…', error: '' });
 		try {
 			const done = await resultOf(await acceptPredictions({ ...body, dry_run: false }), (job) => setState({ busy: job.sentence || 'Accepting…', error: '' }));
-			inform(`${count(done.changed)} views have a ball from ${set.name}. Each can be undone in its group.`);
+			forgetPredictions();
+			inform(`${plural(done.changed, 'view')} ${done.changed === 1 ? 'has' : 'have'} a ball from ${set.name}. Each can be undone in its group.`);
 			onClose();
 		} catch (error) {
 			setState({ busy: '', error: sentenceOf(error) });
@@ -49,12 +79,12 @@ export function AcceptPredictions({ one, set, onClose }) {
 	return html`
 		<${FormDialog}
 			title=${`Accept balls of ${set.name}`} onClose=${onClose} onSubmit=${send}
-			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${state.busy || `Accept ${count(would)}`}</button>`}
+			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${state.busy || (would ? `Accept ${count(would)}` : 'Accept')}</button>`}
 		>
 			<p>The surest prediction of each view becomes its annotation, as an edit that can be undone.</p>
-			<div class="form__row"><label for="accept-q">Groups, as a query of the queue</label><input class="field mono" id="accept-q" value=${ask.q} autocomplete="off" spellcheck=${false} onChange=${(/** @type {Event} */ event) => setAsk({ ...ask, q: valueOf(event) })} /></div>
-			<div class="form__row"><label for="accept-score">Smallest score</label><input class="field" id="accept-score" type="number" min="0" max="1" step="0.05" value=${ask.min_score} onChange=${(/** @type {Event} */ event) => setAsk({ ...ask, min_score: Number(valueOf(event)) })} /></div>
-			<label class="form__check"><input type="checkbox" checked=${ask.replace} onChange=${(/** @type {Event} */ event) => setAsk({ ...ask, replace: /** @type {HTMLInputElement} */ (event.target).checked })} />Also where the view has another ball</label>
+			<div class="form__row"><label for="accept-q">Groups, as a query of the queue</label><input class="field mono" id="accept-q" placeholder="every group; gate:ball for those without enough balls" value=${typed.q} autocomplete="off" spellcheck=${false} onInput=${(/** @type {Event} */ event) => setTyped({ ...typed, q: valueOf(event) })} /></div>
+			<div class="form__row"><label for="accept-score">Smallest score</label><input class="field" id="accept-score" type="number" min="0" max="1" step="0.05" defaultValue=${String(typed.min_score)} onInput=${(/** @type {Event} */ event) => setTyped({ ...typed, min_score: Number(valueOf(event)) })} /></div>
+			<label class="form__check"><input type="checkbox" checked=${typed.replace} onChange=${(/** @type {Event} */ event) => setTyped({ ...typed, replace: /** @type {HTMLInputElement} */ (event.target).checked })} />Also where the view has another ball</label>
 			${plan.value ? html`<${Plan} plan=${plan.value} />` : null}
 			${state.error || plan.error ? html`<p class="form__error" role="alert">${state.error || sentenceOf(plan.error)}</p>` : null}
 		<//>

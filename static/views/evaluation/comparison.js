@@ -5,13 +5,14 @@ import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
 import { getComparison } from '../../api/evaluations.js';
-import { count, words } from '../../lib/format.js';
+import { count, plural, words } from '../../lib/format.js';
+import { matchName } from '../../lib/match_name.js';
 import { sentenceOf, useResource } from '../../lib/resource.js';
 import { reviewAddress } from '../../state/navigation.js';
 import { Loading } from '../page_frame.js';
 import { Cell, number } from './cell.js';
 
-/** @import {ComparisonJson} from '../../api/evaluations.js' */
+/** @import {ComparisonJson, EvaluationJson} from '../../api/evaluations.js' */
 
 const FIELDS = [
 	{ name: 'error_m', label: 'error of the place, m' }, { name: 'iou', label: 'IoU of the surest box' }, { name: 'hit_iou', label: 'IoU of the hit' },
@@ -21,20 +22,43 @@ const FIELDS = [
 /** @param {number | null} value */
 const signed = (value) => (value === null ? '–' : `${value > 0 ? '+' : ''}${number(value)}`);
 
-/** @param {{found: ComparisonJson}} props */
-function Numbers({ found }) {
+/** What a number is counted in, and which way is better. @param {EvaluationJson} run @param {ComparisonJson['numbers'][number]} one */
+function columnOf(run, { table, column }) {
+	return run.tables.find(({ name }) => name === table)?.columns.find(({ name }) => name === column);
+}
+
+/** @param {number | null} change @param {string | undefined} better @returns {{grade?: string, word: string}} */
+function judged(change, better) {
+	if (!change || !better) return { word: '' };
+	return (change > 0) === (better === 'higher') ? { grade: 'ok', word: 'better' } : { grade: 'warn', word: 'worse' };
+}
+
+/** @param {{run: EvaluationJson, one: ComparisonJson['numbers'][number]}} props */
+function NumberRow({ run, one }) {
+	const column = columnOf(run, one);
+	const { grade, word } = judged(one.change, column?.better);
+	return html`
+		<tr>
+			<th scope="row">${one.label}${column?.unit ? `, ${column.unit}` : ''}<small>${words(one.table)} · ${words(one.row)}</small></th>
+			<td data-numeric="true"><${Cell} cell=${one.first} /></td><td data-numeric="true"><${Cell} cell=${one.second} /></td>
+			<td data-numeric="true" data-grade=${grade}>${signed(one.change)}<small>${word}</small></td>
+		</tr>
+	`;
+}
+
+/** @param {{run: EvaluationJson, found: ComparisonJson}} props */
+function Numbers({ run, found }) {
+	const [all, showAll] = useState(false);
+	const moved = found.numbers.filter(({ change }) => change !== 0);
+	const still = found.numbers.length - moved.length;
 	return html`
 		<div class="table__scroll" tabindex="0" role="region" aria-label="Numbers of both runs">
 			<table class="table">
 				<thead><tr><th>number</th><th data-numeric="true">${found.first.name}</th><th data-numeric="true">${found.second.name}</th><th data-numeric="true">change</th></tr></thead>
-				<tbody>${found.numbers.map((one) => html`
-					<tr key=${`${one.table} ${one.row} ${one.column}`}>
-						<th scope="row">${one.label}<small>${words(one.table)} · ${words(one.row)}</small></th>
-						<td data-numeric="true"><${Cell} cell=${one.first} /></td><td data-numeric="true"><${Cell} cell=${one.second} /></td><td data-numeric="true">${signed(one.change)}</td>
-					</tr>`)}
-				</tbody>
+				<tbody>${(all ? found.numbers : moved).map((one) => html`<${NumberRow} key=${`${one.table} ${one.row} ${one.column}`} run=${run} one=${one} />`)}</tbody>
 			</table>
 		</div>
+		${still && !all ? html`<p class="yield__note">${plural(still, 'number')} did not change. <button class="link-button" type="button" onClick=${() => showAll(true)}>Show ${still === 1 ? 'it' : 'them'}</button></p>` : null}
 	`;
 }
 
@@ -42,23 +66,26 @@ function Numbers({ found }) {
 function Frames({ found }) {
 	const { field } = found;
 	return html`
-		<p class="yield__note">${count(found.shared)} frames in both: ${count(found.better)} better, ${count(found.worse)} worse, ${count(found.gained)} gained, ${count(found.lost)} lost; mean change ${signed(found.mean_change)}.</p>
+		<p class="yield__note">${plural(found.shared, 'frame')} in both: ${count(found.better)} better, ${count(found.worse)} worse, ${count(found.gained)} gained, ${count(found.lost)} lost; mean change ${signed(found.mean_change)}.</p>
 		<table class="table">
-			<thead><tr><th>group and view</th><th data-numeric="true">before</th><th data-numeric="true">now</th><th data-numeric="true">change</th></tr></thead>
-			<tbody>${found.frames.map(({ first, second, change }) => html`
-				<tr key=${second.frame_id}>
-					<th scope="row">${second.group_id > 0 ? html`<a href=${reviewAddress(second.group_id, '')}>${second.group}</a>` : second.group}<small>${second.view}</small></th>
-					<td data-numeric="true">${first[field] === null ? '–' : number(first[field])}</td><td data-numeric="true">${second[field] === null ? '–' : number(second[field])}</td><td data-numeric="true">${signed(change)}</td>
-				</tr>`)}
+			<thead><tr><th>group and view</th><th data-numeric="true">${found.first.name}</th><th data-numeric="true">${found.second.name}</th><th data-numeric="true">change</th></tr></thead>
+			<tbody>${found.frames.map(({ first, second, change }) => {
+				const { name, aside } = matchName(second.group);
+				return html`
+					<tr key=${second.frame_id}>
+						<th scope="row">${second.group_id > 0 ? html`<a href=${reviewAddress(second.group_id, '')}>${name}</a>` : name}<small>${[`view ${second.view}`, aside].filter(Boolean).join(' · ')}</small></th>
+						<td data-numeric="true">${first[field] === null ? '–' : number(first[field])}</td><td data-numeric="true">${second[field] === null ? '–' : number(second[field])}</td><td data-numeric="true">${signed(change)}</td>
+					</tr>`;
+			})}
 			</tbody>
 		</table>
 	`;
 }
 
-/** @param {{evaluation: number, other: number, onClose: () => void}} props */
-export function Comparison({ evaluation, other, onClose }) {
+/** @param {{run: EvaluationJson, other: number, onClose: () => void}} props */
+export function Comparison({ run, other, onClose }) {
 	const [field, setField] = useState(FIELDS[0].name);
-	const found = useResource((signal) => getComparison(evaluation, other, field, signal), [evaluation, other, field]);
+	const found = useResource((signal) => getComparison(run.id, other, field, signal), [run.id, other, field]);
 	return html`
 		<section class="card card--flush" aria-labelledby="comparison-title">
 			<h2 id="comparison-title">Compared with ${found.value?.first.name ?? '…'} <button class="card__aside link-button" type="button" onClick=${onClose}>Close<span class="hidden-text"> the comparison</span></button></h2>
@@ -66,7 +93,7 @@ export function Comparison({ evaluation, other, onClose }) {
 			${!found.value && !found.error ? html`<${Loading} what="the comparison" />` : null}
 			${found.value && !found.value.same_truth ? html`<p class="yield__note" data-grade="warn">The runs judged other frames, or under other thresholds: their numbers cannot be compared straight away.</p>` : null}
 			${found.value ? html`
-				<${Numbers} found=${found.value} />
+				<${Numbers} run=${run} found=${found.value} />
 				<div class="form__row comparison__field"><label for="comparison-field">Frame by frame</label>
 					<select class="field" id="comparison-field" value=${field} onChange=${(/** @type {Event} */ event) => setField(/** @type {HTMLSelectElement} */ (event.target).value)}>
 						${FIELDS.map(({ name, label }) => html`<option key=${name} value=${name}>${label}</option>`)}

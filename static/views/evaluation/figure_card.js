@@ -101,8 +101,8 @@ async function openBehind(evaluation, query, title, open) {
 	}
 }
 
-/** @param {{evaluation: number, name: string, panel: PanelJson, open: Open}} props */
-function Panel({ evaluation, name, panel, open }) {
+/** @param {{evaluation: number, name: string, panel: PanelJson, alone: boolean, open: Open}} props `alone`: the figure's own title says it */
+function Panel({ evaluation, name, panel, alone, open }) {
 	const { x, curves } = useMemo(() => drawn(panel), [panel]);
 	const axis = (/** @type {PanelJson['x']} */ { label, unit }) => (unit ? `${label}, ${unit}` : label);
 	/** @param {number} index @param {number | null} y */
@@ -119,14 +119,14 @@ function Panel({ evaluation, name, panel, open }) {
 	const mark = panel.marks.find((one) => one.axis === 'x');
 	return html`
 		<div class="figure__panel">
-			${panel.title ? html`<h3>${panel.title}</h3>` : null}
+			${alone || !panel.title ? null : html`<h3>${panel.title}</h3>`}
 			<${Chart}
 				name=${`${panel.title || axis(panel.y)} against ${axis(panel.x)}: ${many ? `${curves.length} curves` : curves.map(({ label }) => label).join(', ')}`}
 				x=${x} curves=${curves} xLabel=${axis(panel.x)} yLabel=${axis(panel.y)} height=${260} marker=${mark?.at ?? null} format=${number} legend=${!many}
 				xRange=${panel.x.low !== null && panel.x.high !== null ? [panel.x.low, panel.x.high] : undefined} yRange=${[panel.y.low, panel.y.high]}
 				onPick=${pick}
 			/>
-			${panel.color ? html`<p class="note">Colour: ${axis(panel.color)}, blue is the smallest</p>` : null}
+			${panel.color ? html`<p class="note">Colour: ${axis(panel.color).toLowerCase()}, blue is the smallest</p>` : null}
 		</div>
 	`;
 }
@@ -141,7 +141,7 @@ export function FigureCard({ evaluation, name, open }) {
 				<span class="card__aside buttons">${/** @type {const} */ (['csv', 'json', 'png']).map((ending) => html`<a key=${ending} class="link" href=${figureAddress(evaluation, name, ending)} download=${`${name}.${ending}`}>${ending.toUpperCase()}<span class="hidden-text"> of ${found?.title ?? name}</span></a>`)}</span></h2>
 			${figure.error ? html`<p class="form__error" role="alert">${sentenceOf(figure.error)}</p>` : null}
 			${!found && !figure.error ? html`<${Loading} what="the figure" />` : null}
-			<div class="figure__panels">${(found?.panels ?? []).map((panel, index) => html`<${Panel} key=${index} evaluation=${evaluation} name=${name} panel=${panel} open=${open} />`)}</div>
+			<div class="figure__panels">${(found?.panels ?? []).map((panel, index) => html`<${Panel} key=${index} evaluation=${evaluation} name=${name} panel=${panel} alone=${found?.panels.length === 1} open=${open} />`)}</div>
 			${found?.note ? html`<p class="note">${found.note}</p>` : null}
 		</section>
 	`;

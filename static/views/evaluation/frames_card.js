@@ -7,6 +7,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { getFrames } from '../../api/evaluations.js';
 import { ApiError } from '../../api/problem.js';
 import { count, fixed } from '../../lib/format.js';
+import { matchName } from '../../lib/match_name.js';
 import { sentenceOf } from '../../lib/resource.js';
 import { reviewAddress } from '../../state/navigation.js';
 import { number } from './cell.js';
@@ -21,9 +22,10 @@ const COLUMNS = [
 
 /** @param {{frame: FrameJson, columns: typeof COLUMNS}} props */
 function Row({ frame, columns }) {
+	const { name, aside } = matchName(frame.group);
 	return html`
 		<tr>
-			<th scope="row">${frame.group_id > 0 ? html`<a href=${reviewAddress(frame.group_id, '')}>${frame.group}</a>` : frame.group}<small>${frame.view}</small></th>
+			<th scope="row">${frame.group_id > 0 ? html`<a href=${reviewAddress(frame.group_id, '')}>${name}</a>` : name}<small>${[`view ${frame.view}`, aside].filter(Boolean).join(' · ')}</small></th>
 			${columns.map(({ field }) => html`<td key=${field} data-numeric="true">${frame[field] === null || frame[field] === undefined ? '–' : number(frame[field])}</td>`)}
 		</tr>
 	`;

@@ -1,5 +1,5 @@
 // @ts-check
-/** Sets of predictions: uploaded, looked at, accepted, thrown away. */
+/** Sets of predictions: uploaded, looked at, accepted, deleted. */
 
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
@@ -7,20 +7,23 @@ import { useState } from 'preact/hooks';
 import { deletePredictions, postPredictions } from '../../api/evaluations.js';
 import { count, plural } from '../../lib/format.js';
 import { sentenceOf } from '../../lib/resource.js';
+import { forgetPredictions } from '../../state/predictions.js';
 import { FormDialog } from '../dialog.js';
 import { UploadField } from '../source_choice.js';
 import { When } from '../when.js';
 import { AcceptPredictions } from './accept_predictions.js';
+import { ConfirmButton } from './confirm_button.js';
 
 /** @import {PredictionSet} from '../../api/evaluations.js' */
 /** @import {UploadJson} from '../../api/imports.js' */
 /** @import {DatasetJson} from '../../api/types.js' */
 
 const FORMATS = [
-	{ name: 'coco', label: 'COCO results', note: 'JSON with boxes and scores' },
-	{ name: 'yolo', label: 'YOLO', note: 'a zip of txt files' },
-	{ name: 'csv', label: 'CSV', note: 'as SNv3D.csv' },
+	{ name: 'coco', label: 'COCO results', note: 'JSON with boxes and scores', ending: /\.json$/i },
+	{ name: 'yolo', label: 'YOLO', note: 'a zip of txt files', ending: /\.(?:zip|txt)$/i },
+	{ name: 'csv', label: 'CSV', note: 'as SNv3D.csv, or image,x,y,w,h,score', ending: /\.csv$/i },
 ];
+/** @typedef {{boxes: string | null, cameras: string | null, images: string | null}} Files */
 
 /** @param {{set: PredictionSet}} props */
 function Report({ set }) {
@@ -42,7 +45,8 @@ function Report({ set }) {
 /** @param {{one: DatasetJson, onClose: () => void, onAdded: () => void}} props */
 function UploadDialog({ one, onClose, onAdded }) {
 	const [name, setName] = useState('');
-	const [files, setFiles] = useState(/** @type {{boxes: string | null, cameras: string | null}} */ ({ boxes: null, cameras: null }));
+	const [format, setFormat] = useState('coco');
+	const [files, setFiles] = useState(/** @type {Files} */ ({ boxes: null, cameras: null, images: null }));
 	const [state, setState] = useState({ busy: false, error: '' });
 	const why = state.busy ? 'Under way' : !name.trim() ? 'Name the predictions' : !files.boxes && !files.cameras ? 'Choose a file first' : '';
 	/** @param {FormData} form */
@@ -50,17 +54,24 @@ function UploadDialog({ one, onClose, onAdded }) {
 		if (why) return;
 		setState({ busy: true, error: '' });
 		try {
-			await postPredictions(one.id, { name: name.trim(), format: String(form.get('format')), upload: files.boxes, cameras_upload: files.cameras });
+			const category = String(form.get('category') ?? '').trim();
+			await postPredictions(one.id, {
+				name: name.trim(), format, upload: files.boxes, cameras_upload: files.cameras,
+				images_upload: format === 'coco' ? files.images : null, category: category === '' ? null : Number(category),
+			});
+			forgetPredictions();
 			onAdded();
 			onClose();
 		} catch (error) {
 			setState({ busy: false, error: sentenceOf(error) });
 		}
 	}
-	/** @param {'boxes' | 'cameras'} kind */
+	/** @param {keyof Files} kind */
 	const took = (kind) => (/** @type {UploadJson | null} */ sent) => {
 		setFiles((before) => ({ ...before, [kind]: sent?.id ?? null }));
-		if (sent) setName((before) => before || sent.name.replace(/\.[a-z]+$/i, ''));
+		const guessed = kind === 'boxes' && FORMATS.find(({ ending }) => ending.test(sent?.name ?? ''));
+		if (guessed) setFormat(guessed.name);
+		if (sent && kind !== 'images') setName((before) => before || sent.name.replace(/\.[a-z]+$/i, ''));
 	};
 	return html`
 		<${FormDialog}
@@ -69,9 +80,16 @@ function UploadDialog({ one, onClose, onAdded }) {
 		>
 			<fieldset class="choice choice--row">
 				<legend>Format of the boxes</legend>
-				${FORMATS.map((format, index) => html`<label key=${format.name}><input type="radio" name="format" value=${format.name} defaultChecked=${index === 0} /><span>${format.label}<small>${format.note}</small></span></label>`)}
+				${FORMATS.map((known) => html`<label key=${known.name}><input type="radio" name="format" value=${known.name} checked=${format === known.name} onChange=${() => setFormat(known.name)} /><span>${known.label}<small>${known.note}</small></span></label>`)}
 			</fieldset>
 			<${UploadField} id="prediction-boxes" label="Ball boxes" onUploaded=${took('boxes')} />
+			<details>
+				<summary class="evaluation__pins">Where the file alone does not say enough</summary>
+				<div class="form">
+					${format === 'coco' ? html`<${UploadField} id="prediction-images" label="COCO images" hint="the document whose image numbers the results use" accept=".json" onUploaded=${took('images')} />` : null}
+					<div class="form__row"><label for="prediction-category">Class of the ball</label><input class="field" id="prediction-category" name="category" type="number" min="0" step="1" placeholder="the only one" /></div>
+				</div>
+			</details>
 			<${UploadField} id="prediction-cameras" label="Predicted cameras, where there are any" hint="a zip of SoccerNet camera JSON" onUploaded=${took('cameras')} />
 			<div class="form__row">
 				<label for="prediction-name">Name</label>
@@ -91,6 +109,7 @@ export function PredictionSets({ one, sets, changed }) {
 	async function remove(set) {
 		try {
 			await deletePredictions(set.id);
+			forgetPredictions();
 			setProblem('');
 			changed();
 		} catch (error) {
@@ -105,11 +124,11 @@ export function PredictionSets({ one, sets, changed }) {
 				${sets.map((set) => html`
 					<li class="prediction-set" key=${set.id}>
 						<strong>${set.name}</strong>
-						<p class="note">${count(set.boxes)} boxes in ${count(set.frames)} frames${set.cameras ? ` · ${count(set.cameras)} cameras` : ''} · ${set.format} · <${When} at=${set.created} /></p>
+						<p class="note">${count(set.boxes)} ${set.boxes === 1 ? 'box' : 'boxes'} in ${plural(set.frames, 'frame')}${set.cameras ? ` · ${plural(set.cameras, 'camera')}` : ''} · ${set.format} · <${When} at=${set.created} /></p>
 						<${Report} set=${set} />
 						<p class="buttons">
 							${set.boxes ? html`<button class="button button--small" type="button" onClick=${() => setAsked(set)}>Accept…<span class="hidden-text"> ${set.name}</span></button>` : null}
-							<button class="button button--small" type="button" onClick=${() => remove(set)}>Throw away<span class="hidden-text"> ${set.name}</span></button>
+							<${ConfirmButton} small=${true} label="Delete" question="Delete for good?" what=${set.name} run=${() => remove(set)} />
 						</p>
 					</li>`)}
 			</ul>

@@ -10,12 +10,30 @@ import { sentenceOf, useResource } from '../../lib/resource.js';
 import { Loading, Trouble } from '../page_frame.js';
 import { When } from '../when.js';
 import { Comparison } from './comparison.js';
+import { ConfirmButton } from './confirm_button.js';
 import { FigureCard } from './figure_card.js';
 import { FramesCard } from './frames_card.js';
 import { TableCard } from './table_card.js';
 
 /** @import {EvaluationJson, EvaluationRow, FrameQuery} from '../../api/evaluations.js' */
 /** @import {VersionJson} from '../../api/versions.js' */
+
+/** What each count of a run means, in the order in which they narrow down. */
+const COUNTS = [
+	['groups', 'groups'], ['matches', 'matches'], ['frames', 'frames'], ['judged', 'frames judged'], ['balls', 'with a ball'],
+	['with_3d_ball', 'with a 3D ball'], ['without_ball', 'without a ball'], ['detections', 'detections'], ['frames_with_detections', 'frames with detections'],
+	['detections_not_judged', 'detections not judged'], ['predicted_cameras', 'predicted cameras'], ['careful_boxes', 'careful boxes'],
+	['unknown_predictions_frames', 'unknown frames'], ['gone', 'frames gone since'],
+];
+/** Those that say nothing when they are zero. */
+const OPTIONAL = new Set(['predicted_cameras', 'careful_boxes', 'gone', 'unknown_predictions_frames', 'detections_not_judged']);
+
+/** @param {{[name: string]: number}} counts @returns {[string, number][]} */
+function countsOf(counts) {
+	const known = COUNTS.filter(([name]) => counts[name] !== undefined && !(OPTIONAL.has(name) && counts[name] === 0));
+	const others = Object.entries(counts).filter(([name, n]) => n > 0 && !COUNTS.some(([one]) => one === name));
+	return [...known.map(([name, label]) => /** @type {[string, number]} */ ([label, counts[name]])), ...others.map(([name, n]) => /** @type {[string, number]} */ ([words(name), n]))];
+}
 
 /** @param {unknown} value @returns {string} */
 function pinText(value) {
@@ -48,14 +66,14 @@ function Head({ run, others, compare, remove, openFrames }) {
 				<h2 id="run-title">${run.name}</h2>
 				<p class="note">run <${When} at=${run.created} /> by ${run.actor}</p>
 				<div class="buttons">
-					<select class="field" aria-label="Compare with another run" disabled=${others.length === 0} onChange=${choose}>
+					<select class="field" aria-label="Compare with another run" disabled=${others.length === 0} title=${others.length ? '' : 'There is no other run yet'} onChange=${choose}>
 						<option value="">Compare with…</option>${others.map(({ id, name }) => html`<option key=${id} value=${String(id)}>${name}</option>`)}
 					</select>
 					<button class="button" type="button" onClick=${openFrames}>Frames</button>
-					<button class="button button--danger" type="button" onClick=${remove}>Delete</button>
+					<${ConfirmButton} label="Delete" question="Delete for good?" what="the run" run=${remove} />
 				</div>
 			</header>
-			<dl class="number-list">${Object.entries(run.counts).map(([name, n]) => html`<div key=${name}><dt>${words(name)}</dt><dd>${count(n)}</dd></div>`)}</dl>
+			<dl class="number-list">${countsOf(run.counts).map(([label, n]) => html`<div key=${label}><dt>${label}</dt><dd>${count(n)}</dd></div>`)}</dl>
 			<${Pins} run=${run} />
 		</section>
 	`;
@@ -86,7 +104,7 @@ export function RunDetails({ id, runs, changed }) {
 		<${Head} run=${run} others=${runs.filter((one) => one.id !== id)} compare=${setOther} remove=${remove} openFrames=${() => open({ sort: 'error_m-desc' }, 'all')} />
 		${problem ? html`<p class="card form__error" role="alert">${problem}</p>` : null}
 		<div class="page__list" ref=${opened}>
-			${other ? html`<${Comparison} evaluation=${id} other=${other} onClose=${() => setOther(0)} />` : null}
+			${other ? html`<${Comparison} run=${run} other=${other} onClose=${() => setOther(0)} />` : null}
 			${frames ? html`<${FramesCard} evaluation=${id} query=${frames.query} title=${frames.title} sort=${(/** @type {string} */ sort) => setFrames({ ...frames, query: { ...frames.query, sort } })} onClose=${() => setFrames(null)} />` : null}
 		</div>
 		<div class="evaluation__tables">${run.tables.map((table) => html`<${TableCard} key=${table.name} table=${table} open=${open} />`)}</div>

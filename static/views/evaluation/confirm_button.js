@@ -1,0 +1,20 @@
+// @ts-check
+/** A button for what cannot be undone: it asks back, and forgets the question when one goes on. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+/** @param {{label: string, question: string, what: string, small?: boolean, run: () => void}} props `what`: for who hears the page */
+export function ConfirmButton({ label, question, what, small = false, run }) {
+	const [asked, setAsked] = useState(false);
+	function press() {
+		setAsked(!asked);
+		if (asked) run();
+	}
+	return html`
+		<button
+			class=${`button ${small ? 'button--small ' : ''}${asked || !small ? 'button--danger' : ''}`} type="button" aria-live="polite"
+			onClick=${press} onBlur=${() => setAsked(false)}
+		>${asked ? question : label}<span class="hidden-text"> ${what}</span></button>
+	`;
+}
