@@ -20,7 +20,8 @@ export const place = signal(here());
 const PLAIN = /** @type {{[path: string]: PlainPage}} */ ({
 	'/': 'queue', '/groups': 'queue', '/datasets': 'datasets', '/import': 'import', '/jobs': 'jobs', '/exports': 'exports',
 });
-const OF_DATASET = /^\/datasets\/([^/]+)\/(yield|policy|statistics|versions|evaluation)\/?$/;
+/** A dataset without a page is its yield, which says most about it. */
+const OF_DATASET = /^\/datasets\/([^/]+)(?:\/(yield|policy|statistics|versions|evaluation))?\/?$/;
 
 /** Which page that is. */
 export const page = computed(/** @returns {Page} */ () => {
@@ -31,7 +32,7 @@ export const page = computed(/** @returns {Page} */ () => {
 	const editor = /^\/review\/(\d+)\/calibration\/?$/.exec(path);
 	if (editor) return { page: 'calibration', group: Number(editor[1]) };
 	const found = OF_DATASET.exec(path);
-	if (found) return { page: /** @type {DatasetPage} */ (found[2]), dataset: textOf(found[1]) };
+	if (found) return { page: /** @type {DatasetPage} */ (found[2] ?? 'yield'), dataset: textOf(found[1]) };
 	return { page: 'unknown' };
 });
 

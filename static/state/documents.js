@@ -31,6 +31,11 @@ export function forget(id) {
 	documents.delete(id);
 }
 
+/** Read every group but this one again before it is shown. @param {number | null} id */
+export function forgetOthers(id) {
+	for (const other of [...documents.keys()]) if (other !== id) documents.delete(other);
+}
+
 /** @param {number} id @returns {Promise<GroupDocument>} */
 export function load(id) {
 	const present = loading.get(id);

@@ -18,8 +18,8 @@ export const FORMATS = [
 	{ name: 'parquet', label: 'Parquet', note: 'views.parquet, one row for each view' },
 	{ name: 'gamestate', label: 'Game state', note: 'Labels-GameState.json for each sequence' },
 	{ name: 'touchline', label: 'Touchline', note: 'edits and verdicts, for another installation' },
-	{ name: 'cameras', label: 'Cameras', note: 'one camera JSON for each view' },
-	{ name: 'sn-calibration', label: 'sn-calibration lines', note: 'one line JSON for each view' },
+	{ name: 'cameras', label: 'Cameras', note: 'a camera JSON for each view' },
+	{ name: 'sn-calibration', label: 'sn-calibration lines', note: 'a JSON of lines for each view' },
 ];
 
 /**

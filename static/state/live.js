@@ -6,7 +6,7 @@ import { effect, signal, untracked } from '@preact/signals';
 import { listen } from '../api/events.js';
 import { ApiError } from '../api/problem.js';
 import { page } from '../lib/router.js';
-import { forget, known, load } from './documents.js';
+import { forget, forgetOthers, known, load } from './documents.js';
 import { document, draft, renew } from './group.js';
 import { announce } from './notice.js';
 import { outbox } from './outbox.js';
@@ -50,9 +50,16 @@ async function catchUp() {
 	}
 }
 
+/** Nobody was told for a while: what lies ready may be old, and so may the group on screen. */
+function missed() {
+	const at = document.value;
+	forgetOthers(at?.id ?? null);
+	if (at) heard({ group: at.id, etag: null, actor: null });
+}
+
 /** Listen while a group is on screen. */
 export function startLive() {
-	effect(() => (page.value.page === 'review' ? untracked(() => listen('group', heard)) : undefined));
+	effect(() => (page.value.page === 'review' ? untracked(() => listen('group', heard, missed)) : undefined));
 	effect(() => {
 		if (draft.value === null && outbox.value && document.value) untracked(catchUp);
 	});

@@ -3,7 +3,7 @@
 
 import { getGroups } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
-import { activeBindings } from '../lib/keys.js';
+import { activeBindings, keysOf, written } from '../lib/keys.js';
 import { navigate } from '../lib/router.js';
 import { reviewAddress } from './navigation.js';
 
@@ -26,7 +26,7 @@ export function actionItems() {
 	const usable = activeBindings().filter((binding) => binding.shown !== 'hidden' && binding.when?.() !== false);
 	return usable.map((binding, index) => ({
 		id: `action-${index}`, kind: 'Actions', label: binding.label,
-		hint: binding.shown ?? binding.keys[0], run: () => press(binding),
+		hint: binding.shown ?? keysOf(binding).slice(0, 1).map(written).join(), run: () => press(binding),
 	}));
 }
 

@@ -84,10 +84,12 @@ export function startTimeline() {
 		fetching.cancel();
 		fetching.run({ dataset: at.dataset.id, match: at.match });
 	});
-	const deaf = listen('group', (/** @type {{dataset: string}} */ event) => {
+	/** @param {string | null} name of the dataset in which something changed; null: any */
+	const again = (name) => {
 		const at = document.value;
-		if (at && event.dataset === at.dataset.name) fetching.run({ dataset: at.dataset.id, match: at.match });
-	});
+		if (at && (name === null || name === at.dataset.name)) fetching.run({ dataset: at.dataset.id, match: at.match });
+	};
+	const deaf = listen('group', (/** @type {{dataset: string}} */ event) => again(event.dataset), () => again(null));
 	return () => { stop(); deaf(); fetching.cancel(); playing.value = false; };
 }
 

@@ -16,10 +16,15 @@ function seriesOf({ label, colour, dash, points }, colours) {
 	return { label, stroke, width: 2, dash, spanGaps: true, points: { show: false } };
 }
 
+/** @param {number} place */
+function tickText(place) {
+	return place.toLocaleString('en-GB', { maximumFractionDigits: 6 }).replace('-', '−');
+}
+
 /** @param {string} label @param {Record<ChartColour, string>} colours @returns {uPlot.Axis} */
 function axis(label, colours) {
 	const lines = { stroke: colours['chart-grid'], width: 1 };
-	return { label, labelFont: FONT, font: FONT, stroke: colours.muted, labelSize: 20, grid: lines, ticks: { ...lines, size: 4 } };
+	return { label, labelFont: FONT, font: FONT, stroke: colours.muted, labelSize: 20, grid: lines, ticks: { ...lines, size: 4 }, values: (_plot, places) => places.map(tickText) };
 }
 
 /** The vertical line of a threshold, and the intervals of the values. @param {uPlot} plot @param {ChartProps} props @param {Record<ChartColour, string>} colours */

@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useEffect, useState } from 'preact/hooks';
 
-import { count } from '../lib/format.js';
+import { plural } from '../lib/format.js';
 import { datasets, failure, loadDatasets } from '../state/datasets.js';
 import { DATASET_PAGES, pageAddress } from './dataset_menu.js';
 import { DeleteDataset } from './delete_dataset.js';
@@ -22,7 +22,7 @@ function DatasetCard({ one, ask }) {
 			<section class="card dataset-card" aria-label=${one.name}>
 				<div>
 					<h2><a href=${pageAddress(one.name, 'queue')}>${one.name}</a></h2>
-					<p class="note">${count(one.groups)} groups · policy ${one.policy.name} · since ${created}</p>
+					<p class="note">${plural(one.groups, 'group')} · policy ${one.policy.name} · since ${created}</p>
 				</div>
 				<${ProgressLine} progress=${one} />
 				<div class="buttons">

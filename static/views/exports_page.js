@@ -6,7 +6,7 @@ import { useEffect, useState } from 'preact/hooks';
 
 import { listen } from '../api/events.js';
 import { deleteExport, getExports } from '../api/exports.js';
-import { count, words } from '../lib/format.js';
+import { count, plural, words } from '../lib/format.js';
 import { sentenceOf, useResource } from '../lib/resource.js';
 import { dataset, loadDatasets } from '../state/datasets.js';
 import { isOver } from '../state/jobs.js';
@@ -34,7 +34,7 @@ function Row({ row, remove }) {
 			<th scope="row">${row.request.dataset}<small>${row.request.format}</small></th>
 			<td>${contents(row)}
 				${left.length ? html`<small>left out: ${left.map(([why, n]) => `${count(n)} ${words(why)}`).join(', ')}</small>` : null}
-				${row.missing_images?.length ? html`<small>${count(row.missing_images.length)} frames are missing</small>` : null}
+				${row.missing_images?.length ? html`<small>${plural(row.missing_images.length, 'frame')} missing</small>` : null}
 				${row.error ? html`<small class="form__error">${row.error}</small>` : null}</td>
 			<td><span class="pill" data-state=${row.status}>${row.status}</span></td>
 			<td data-numeric="true">${row.bytes === null ? '–' : sizeText(row.bytes)}</td>
@@ -54,7 +54,7 @@ export function ExportsPage() {
 	const one = dataset.value;
 	useEffect(() => {
 		loadDatasets();
-		return listen('job', (/** @type {JobJson} */ job) => { if (job.kind === 'export' && (isOver(job) || job.done === 0)) exports.reload(); });
+		return listen('job', (/** @type {JobJson} */ job) => { if (job.kind === 'export' && (isOver(job) || job.done === 0)) exports.reload(); }, () => exports.reload());
 	}, []);
 	/** @param {ExportRow} row */
 	async function remove(row) {

@@ -67,9 +67,9 @@ function Plan({ plan }) {
 	const left = Object.entries(plan.left_out);
 	return html`
 		<div class="bulk__outcome" role="status">
-			<p><strong>${count(plan.groups)}</strong> groups enter.</p>
-			${plan.unsolved ? html`<p data-grade="warn">${count(plan.unsolved)} are not solved yet.</p>` : null}
-			${left.length ? html`<ul>${left.map(([why, n]) => html`<li key=${why}>${count(n)} stay out: ${words(why)}</li>`)}</ul>` : null}
+			<p><strong>${count(plan.groups)}</strong> ${plan.groups === 1 ? 'group enters' : 'groups enter'}.</p>
+			${plan.unsolved ? html`<p data-grade="warn">${count(plan.unsolved)} ${plan.unsolved === 1 ? 'is' : 'are'} not solved yet.</p>` : null}
+			${left.length ? html`<ul>${left.map(([why, n]) => html`<li key=${why}>${count(n)} ${n === 1 ? 'stays' : 'stay'} out: ${words(why).replace(': ', ', ')}</li>`)}</ul>` : null}
 		</div>
 	`;
 }

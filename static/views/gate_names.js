@@ -39,6 +39,8 @@ const UNITS = /** @type {Record<string, [number, string]>} */ ({
 export function gateMargin(gate) {
 	const unit = UNITS[gate.name];
 	if (!unit || gate.margin === null || !gate.active) return '';
-	const sign = gate.margin < 0 ? '−' : '+';
-	return `margin ${sign}${Math.abs(gate.margin).toFixed(unit[0])}${unit[1]}`;
+	const size = Math.abs(gate.margin).toFixed(unit[0]);
+	// A gate may ask for more than its threshold.
+	if (!gate.passed && Number(size) === 0) return 'at the threshold: more is asked';
+	return `margin ${gate.margin < 0 ? '−' : '+'}${size}${unit[1]}`;
 }

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useRef, useState } from 'preact/hooks';
 
 import { pitchMarkings } from '../geometry/pitch.js';
-import { count } from '../lib/format.js';
+import { count, fixed, plural } from '../lib/format.js';
 import { queueAddress } from '../state/navigation.js';
 import { withField } from '../state/query.js';
 
@@ -62,7 +62,7 @@ export function HeatMap({ positions, dataset, q }) {
 				<rect class="heat-map__grass" x=${left} y=${top} width=${width} height=${height} />
 				${LINES.map((line) => html`<path class="heat-map__line" d=${line} />`)}
 				${cells.map((cell, index) => {
-					const said = `${count(cell.n)} at x ${((cell.left + cell.right) / 2).toFixed(0)} m, y ${((cell.top + cell.bottom) / 2).toFixed(0)} m`;
+					const said = `${plural(cell.n, 'ball')} at x ${fixed((cell.left + cell.right) / 2, 0, ' m')}, y ${fixed((cell.top + cell.bottom) / 2, 0, ' m')}`;
 					return html`
 						<a key=${said} href=${queueAddress(dataset, queryOf(cell, q))} aria-label=${said} tabindex=${index === at ? 0 : -1} onFocus=${() => setAt(index)}>
 							<rect

@@ -5,29 +5,28 @@ import { html } from 'htm/preact';
 import { useLayoutEffect, useRef, useState } from 'preact/hooks';
 
 import {
-	activeBindings, chooseKey, chordOf, chosenKeys, idOf, isEditable, keysOf, lettersOn,
+	activeBindings, chooseKey, chordOf, chosenKeys, idOf, isEditable, keysOf, lettersOn, written,
 } from '../lib/keys.js';
 import { helpOpen } from '../state/workspace.js';
 
 /** @import {Binding} from '../lib/keys.js' */
 
-const SYMBOLS = /** @type {Record<string, string>} */ ({
-	Escape: 'Esc', Delete: 'Del', ArrowUp: '↑', ArrowDown: '↓', ArrowLeft: '←', ArrowRight: '→',
-	Backspace: '⌫', ' ': 'Space',
-});
+/** Headings in the order of the work; others follow as they come. */
+const ORDER = ['Verdict', 'Navigate', 'View', 'Edit'];
 const MODIFIERS = new Set(['Shift', 'Control', 'Alt', 'Meta']);
-
-/** @param {string} chord */
-function written(chord) {
-	return chord.split('+').map((key) => SYMBOLS[key] ?? (key.length === 1 ? key.toUpperCase() : key)).join(' ');
-}
 
 /** @param {Binding} binding @returns {string[]} */
 function shownKeys(binding) {
 	return binding.shown ? [binding.shown] : keysOf(binding).map(written);
 }
 
-/** @returns {Map<string, Binding[]>} */
+/** @param {string} group */
+function placeOf(group) {
+	const place = ORDER.indexOf(group);
+	return place === -1 ? ORDER.length : place;
+}
+
+/** @returns {[string, Binding[]][]} */
 function grouped() {
 	/** @type {Map<string, Binding[]>} */
 	const groups = new Map();
@@ -35,7 +34,7 @@ function grouped() {
 		if (binding.shown === 'hidden') continue;
 		groups.set(binding.group, [...(groups.get(binding.group) ?? []), binding]);
 	}
-	return groups;
+	return [...groups].sort(([a], [b]) => placeOf(a) - placeOf(b));
 }
 
 /** A binding whose key is being chosen. @param {{binding: Binding, onEnd: () => void}} props */
@@ -79,7 +78,7 @@ function KeyRow({ binding, chosen, onChoose }) {
 }
 
 /** @param {{opening: number}} props */
-function KeyPage({ opening }) {
+export function Help({ opening }) {
 	const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
 	const [chosen, setChosen] = useState(/** @type {string | null} */ (null));
 	useLayoutEffect(() => dialog.current?.showModal(), []);
@@ -89,23 +88,18 @@ function KeyPage({ opening }) {
 				<h2 id="help-title">Keys</h2>
 				<label class="help__switch">
 					<input type="checkbox" checked=${lettersOn.value} onChange=${() => { lettersOn.value = !lettersOn.value; }} />
-					Single letters do something
+					Use single-letter keys
 				</label>
 				<form method="dialog"><button class="button" type="submit" autofocus>Close <kbd>Esc</kbd></button></form>
 			</header>
 			<div class="help">
-				${[...grouped()].map(([name, bindings]) => html`
+				${grouped().map(([name, bindings]) => html`
 					<section key=${name}>
 						<h3>${name}</h3>
 						<dl>${bindings.map((binding) => html`<${KeyRow} key=${idOf(binding)} binding=${binding} chosen=${chosen} onChoose=${setChosen} />`)}</dl>
 					</section>`)}
 			</div>
-			<p class="help__note">Click a key to choose another. The wheel zooms about the pointer, dragging the picture pans, a double click shows one view alone. Drag a line point or the ball to move it; select the ball to resize its box by the corners.</p>
+			<p class="help__note">Click a key to choose another. The wheel zooms about the pointer, dragging the picture pans, a double click shows one view alone. Drag a line point or the ball to move it; select the ball to resize its box by the corners. Corner brackets with a score are predictions: they count for nothing until you accept them.</p>
 		</dialog>
 	`;
-}
-
-export function Help() {
-	const opening = helpOpen.value;
-	return opening ? html`<${KeyPage} key=${opening} opening=${opening} />` : null;
 }

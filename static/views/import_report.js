@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { count, words } from '../lib/format.js';
+import { count, plural, words } from '../lib/format.js';
 
 /** @import {ImportReport as Report} from '../api/imports.js' */
 
@@ -12,7 +12,7 @@ function Skipped({ report }) {
 	const { skipped, more_skipped: more = 0 } = report;
 	if (skipped.length === 0) return html`<p class="note">No record was left out.</p>`;
 	return html`
-		<h3>${count(skipped.length + more)} records are left out</h3>
+		<h3>${plural(skipped.length + more, 'record')} ${skipped.length + more === 1 ? 'is' : 'are'} left out</h3>
 		<div class="table__scroll import__skipped" tabindex="0" role="region" aria-label="Records that are left out">
 			<table class="table">
 				<thead><tr><th>file</th><th>record</th><th>field</th><th>problem</th></tr></thead>

@@ -45,12 +45,12 @@ function useJobs() {
 	const first = () => read(null).then((cursor) => setNext((before) => before ?? cursor));
 	useEffect(() => {
 		first();
-		return listen('job', (/** @type {JobJson} */ job) => setJobs((before) => merged(before ?? [], [job])));
+		return listen('job', (/** @type {JobJson} */ job) => setJobs((before) => merged(before ?? [], [job])), () => { read(null); });
 	}, []);
 	// Where the server cannot tell, ask.
 	useEffect(() => {
 		if (connected.value) return undefined;
-		const timer = setInterval(() => read(null), ASK);
+		const timer = setInterval(() => { if (!document.hidden) read(null); }, ASK);
 		return () => clearInterval(timer);
 	}, [connected.value]);
 	return { jobs, next, error, retry: first, more: () => read(next).then(setNext) };
@@ -87,9 +87,9 @@ export function JobsPage() {
 		<${PageFrame} current="jobs" title="Jobs" where=${html`<strong>Jobs</strong>`}>
 			${error ? html`<${Trouble} title="The jobs cannot be shown" error=${error} retry=${retry} />` : null}
 			${!jobs && !error ? html`<${Loading} what="jobs" />` : null}
-			${jobs?.length === 0 ? html`<section class="card empty"><h2>Nothing has been done yet</h2><p>Imports, solving, freezing, exports and evaluations show up here.</p></section>` : null}
+			${jobs?.length === 0 ? html`<section class="card empty"><h2>Nothing has been done yet</h2><p>Imports, solving, freezing, exports and evaluations show up here.</p><p><a class="button" href="/import">Import a dataset</a></p></section>` : null}
 			${open.length ? html`<${JobList} title="Under way" jobs=${open} />` : null}
-			${over.length ? html`<${JobList} title="Over" jobs=${over} />` : null}
+			${over.length ? html`<${JobList} title="Finished" jobs=${over} />` : null}
 			${next ? html`<p><button class="button" type="button" onClick=${more}>Older jobs</button></p>` : null}
 		<//>
 	`;

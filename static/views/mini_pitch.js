@@ -8,6 +8,7 @@ import { pitchMarkings } from '../geometry/pitch.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { fixed } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
+import { cycleEstimator, estimator } from '../state/workspace.js';
 
 /** @import {GroupDocument, SolutionJson, ViewJson} from '../api/types.js' */
 /** @import {Camera, PitchPoint} from '../geometry/camera.js' */
@@ -122,11 +123,22 @@ function Numbers({ solution }) {
 	`;
 }
 
+/** Which 3D ball the numbers speak of, and the way to the other one. */
+function Estimator() {
+	const best = estimator.value === 'best';
+	return html`
+		<button
+			class="card__aside link-button" type="button" aria-pressed=${best} onClick=${cycleEstimator}
+			title="The mean of the valid pairs is exported; the most likely point fits all views at once (T)"
+		>${best ? 'most likely point' : 'mean of pairs'}</button>
+	`;
+}
+
 /** @param {{group: GroupDocument, solution: SolutionJson | null}} props */
 export function MiniPitch({ group, solution }) {
 	return html`
 		<section class="card strip-card mini-pitch" aria-label="Pitch">
-			<h2>Pitch</h2>
+			<h2>Pitch${solution?.best_ball ? html` <${Estimator} />` : null}</h2>
 			${solution ? html`
 				<${Drawing} group=${group} solution=${solution} />
 				<${Numbers} solution=${solution} />` : html`<p class="empty-note">Not solved yet.</p>`}

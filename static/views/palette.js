@@ -2,14 +2,14 @@
 /** Ctrl K: type where to go or what to do. */
 
 import { html } from 'htm/preact';
-import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
 
-import { count } from '../lib/format.js';
+import { plural } from '../lib/format.js';
 import { latest } from '../lib/latest.js';
 import { navigate, page } from '../lib/router.js';
 import { dataset, datasets, loadDatasets, useDataset } from '../state/datasets.js';
 import { document as shownGroup } from '../state/group.js';
-import { paletteOpen } from '../state/palette.js';
+import { paletteOpen, takeTyped } from '../state/palette.js';
 import { actionItems, groupItems, matching } from '../state/palette_items.js';
 import { DATASET_PAGES, pageAddress, PLAIN_PAGES } from './dataset_menu.js';
 
@@ -38,22 +38,22 @@ function pageItems(one) {
 /** @returns {Item[]} */
 function datasetItems() {
 	return (datasets.value ?? []).map((one) => ({
-		id: `dataset-${one.id}`, kind: 'Datasets', label: one.name, hint: `${count(one.groups)} groups`,
+		id: `dataset-${one.id}`, kind: 'Datasets', label: one.name, hint: plural(one.groups, 'group'),
 		run: () => { useDataset(one.name); navigate(pageAddress(one.name, 'queue')); },
 	}));
 }
 
-/** The groups that answer to what is typed. @param {string} text @returns {Item[]} */
+/** The groups that answer to what is typed. @param {string} text @returns {{groups: Item[], answered: boolean}} */
 function useGroups(text) {
-	const [groups, setGroups] = useState(/** @type {Item[]} */ ([]));
+	const [{ groups, to }, setGroups] = useState({ groups: /** @type {Item[]} */ ([]), to: '' });
 	const asking = useMemo(() => latest(PAUSE, async (/** @type {string} */ asked, signal) => {
 		const one = present();
 		const found = one && asked ? await groupItems(one, asked, signal) : [];
-		if (!signal.aborted) setGroups(found);
+		if (!signal.aborted) setGroups({ groups: found, to: asked });
 	}), []);
 	useEffect(() => { asking.run(text.trim()); }, [text]);
 	useEffect(() => () => asking.cancel(), []);
-	return groups;
+	return { groups, answered: to === text.trim() };
 }
 
 /** @param {{items: Item[], active: string, choose: (item: Item) => void}} props */
@@ -84,28 +84,37 @@ export function Palette() {
 	const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
 	const [text, setText] = useState('');
 	const [place, setPlace] = useState(0);
-	const groups = useGroups(text);
+	const [chosen, setChosen] = useState(false);
+	const { groups, answered } = useGroups(text);
 	// The keys of the page below, as they were when the palette came up.
 	const actions = useMemo(actionItems, []);
-	useEffect(() => {
+	useLayoutEffect(() => {
 		dialog.current?.showModal();
-		loadDatasets();
+		const typed = takeTyped();
+		setText(typed.text);
+		setChosen(typed.chosen);
 	}, []);
+	useEffect(() => { loadDatasets(); }, []);
 	const fixed = matching([...pageItems(present()), ...datasetItems(), ...actions], text.trim());
 	const all = [...groups, ...fixed];
 	const [opening] = useState(paletteOpen.value);
 	const items = KINDS.flatMap((kind) => all.filter((item) => item.kind === kind));
-	const at = Math.min(place, items.length - 1);
+	const at = Math.max(0, Math.min(place, items.length - 1));
 	/** @param {Item} item */
 	function choose(item) {
 		dialog.current?.close();
 		paletteOpen.value = 0;
 		item.run();
 	}
+	// A number means a group, which the server has to find first.
+	const settled = datasets.value !== null && (answered || (items.length > 0 && !/^\d/.test(text.trim())));
+	useEffect(() => {
+		if (chosen && settled && items[at]) choose(items[at]);
+	}, [chosen, settled, items[at]?.id]);
 	/** @param {KeyboardEvent} event */
 	function key(event) {
 		const steps = /** @type {{[key: string]: number}} */ ({ ArrowDown: 1, ArrowUp: -1, PageDown: 8, PageUp: -8 });
-		if (event.key === 'Enter' && items[at]) choose(items[at]);
+		if (event.key === 'Enter') setChosen(true);
 		else if (steps[event.key]) setPlace(Math.max(0, Math.min(items.length - 1, at + steps[event.key])));
 		else return;
 		event.preventDefault();
@@ -120,6 +129,7 @@ export function Palette() {
 				onInput=${(/** @type {InputEvent} */ event) => {
 					setText(/** @type {HTMLInputElement} */ (event.target).value);
 					setPlace(0);
+					setChosen(false);
 				}}
 			/>
 			<${Choices} items=${items} active=${items[at]?.id ?? ''} choose=${choose} />

@@ -22,7 +22,7 @@ export function PanelCaption({ picture }) {
 			<span class="caption__name">${view.label}</span>
 			<span class="caption__state" data-grade=${grade}>
 				<span aria-hidden="true">${GLYPHS[grade]}</span> ${sentence}
-				${jac !== null ? html`<span data-number="jac">JaC ${jac.toFixed(2)}</span>` : null}
+				${jac !== null ? html`<span data-number="jac">${sentence ? ' · ' : ''}JaC ${jac.toFixed(2)}</span>` : null}
 				${error.px === null ? null : html`<span data-number="error"> · ball ${pixels(error.px)} px</span>`}
 			</span>
 		</figcaption>

@@ -4,14 +4,16 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
+import { lazy } from '../lib/lazy.js';
 import { filterOf } from '../state/adjustments.js';
 import { endDrawing, startDrawing } from '../state/drawing.js';
 import { editorAddress } from '../state/editor_address.js';
 import { group } from '../state/group.js';
 import { drawing, equalViews, maximised, toggleMaximised } from '../state/workspace.js';
-import { AdjustPopover } from './adjust_popover.js';
 
 /** @import {ViewPicture} from '../overlays/scene.js' */
+
+const AdjustPopover = lazy(async () => (await import('./adjust_popover.js')).AdjustPopover);
 
 const PATHS = {
 	draw: 'M3 13l.8-3L11 2.8 13.2 5 6 12.2zM9.6 4.2l2.2 2.2',

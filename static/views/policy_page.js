@@ -48,7 +48,7 @@ function PolicyText({ one, policy, etag, busy, send }) {
 				></textarea>
 				<p class="buttons">
 					<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Save and solve</button>
-					<button class="button" type="button" aria-disabled=${!changed} onClick=${() => setText(policy.yaml)}>Reset</button>
+					<button class="button" type="button" aria-disabled=${!changed} title=${changed ? '' : why} onClick=${() => setText(policy.yaml)}>Reset</button>
 					<button class="button" type="button" onClick=${() => saveText(`${one.name}-policy.yaml`, policy.yaml)}>Download</button>
 					<label class="button">Open a file…<input class="hidden-text" type="file" accept=".yaml,.yml,text/yaml" onChange=${pick} /></label>
 				</p>
@@ -68,7 +68,7 @@ function Shipped({ one, policy, etag, shipped, busy, send }) {
 						<th scope="row">${name}</th>
 						<td class="table__actions">
 							${hash === policy.hash ? html`<span class="note">in force</span>` : html`
-								<button class="button button--small" type="button" aria-disabled=${busy} onClick=${() => { if (!busy) send(() => putPolicy(one.id, name, null, etag)); }}>Use ${name}</button>`}
+								<button class="button button--small" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : ''} onClick=${() => { if (!busy) send(() => putPolicy(one.id, name, null, etag)); }}>Use ${name}</button>`}
 						</td>
 					</tr>`)}
 				</tbody>
@@ -95,6 +95,12 @@ function History({ policy }) {
 	`;
 }
 
+/** @param {unknown} value */
+function valueText(value) {
+	if (typeof value === 'boolean') return value ? 'yes' : 'no';
+	return String(value);
+}
+
 /** @param {{policy: PolicyState, fields: PolicyField[]}} props */
 function ValueTable({ policy, fields }) {
 	return html`
@@ -103,7 +109,7 @@ function ValueTable({ policy, fields }) {
 			<table class="table">
 				<tbody>${fields.map(({ name, label, unit }) => {
 					const value = policy.values[name];
-					return html`<tr key=${name}><th scope="row">${label}</th><td data-numeric="true">${value === null || value === undefined ? 'not asked' : `${String(value)} ${unit ?? ''}`}</td></tr>`;
+					return html`<tr key=${name}><th scope="row">${label}</th><td data-numeric="true">${value === null || value === undefined ? 'not asked' : `${valueText(value)} ${unit === 'share' ? '' : unit ?? ''}`}</td></tr>`;
 				})}
 				</tbody>
 			</table>

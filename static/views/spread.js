@@ -19,7 +19,7 @@ export function seriesColour(index) {
 
 /** Up to four digits, none that says nothing. @param {number} value */
 function short(value) {
-	return String(Number(value.toPrecision(4)));
+	return String(Number(value.toPrecision(4))).replace('-', '−');
 }
 
 /** The query that asks for one bar of those that match. @param {SpreadJson} spread @param {number} bin @param {string} q */
@@ -30,8 +30,9 @@ function queryOf({ field, queries }, bin, q) {
 /** The ends of a bar in words. @param {SpreadJson} spread @param {number} bin */
 function endsOf({ edges, unit, open_low: below, open_high: beyond }, bin) {
 	const [from, to] = [short(edges[bin]), short(edges[bin + 1])];
-	if (below && bin === 0) return `below ${to} ${unit}`;
-	return beyond && bin === edges.length - 2 ? `${from} ${unit} and more` : `${from} to ${to} ${unit}`;
+	const of = unit ? ` ${unit}` : '';
+	if (below && bin === 0) return `below ${to}${of}`;
+	return beyond && bin === edges.length - 2 ? `${from}${of} and more` : `${from} to ${to}${of}`;
 }
 
 /** @param {{spread: SpreadJson, dataset: string, q: string}} props */
@@ -56,8 +57,8 @@ export function Spread({ spread, dataset, q }) {
 			<h2 id=${`spread-${name}`}>${label}${unit ? `, ${unit}` : ''} <span class="card__aside">${count(totals.reduce((a, b) => a + b, 0))}</span></h2>
 			<ul class="spread__bars" ref=${list} onKeyDown=${key}>
 				${totals.map((total, bin) => {
-					const said = `${endsOf(spread, bin)}: ${count(total)} groups`;
-										const parts = series.map(({ split, counts }, index) => html`
+					const said = `${endsOf(spread, bin)}: ${plural(total, 'group')}`;
+					const parts = series.map(({ split, counts }, index) => html`
 						<i key=${split} data-colour=${seriesColour(index)} style=${{ height: `${(100 * counts[bin]) / most}%` }}></i>`);
 					return html`
 						<li key=${bin}>
@@ -69,7 +70,7 @@ export function Spread({ spread, dataset, q }) {
 				})}
 			</ul>
 			<p class="bar-chart__ends" aria-hidden="true"><span>${short(edges[0])}</span><span>most ${count(most)}</span><span>${short(edges[edges.length - 1])}${spread.open_high ? '+' : ''}</span></p>
-			${unknown ? html`<p class="note">${plural(unknown, 'group')} without such a number</p>` : null}
+			${unknown ? html`<p class="note">${plural(unknown, 'group')} without this number</p>` : null}
 		</section>
 	`;
 }

@@ -5,7 +5,8 @@ import { html } from 'htm/preact';
 import { useRef } from 'preact/hooks';
 
 import { getStatistics } from '../api/statistics.js';
-import { count } from '../lib/format.js';
+import { count, plural } from '../lib/format.js';
+import { matchName } from '../lib/match_name.js';
 import { useResource } from '../lib/resource.js';
 import { address, navigate, pageDataset, param } from '../lib/router.js';
 import { queueAddress } from '../state/navigation.js';
@@ -40,12 +41,15 @@ function Matches({ matches, dataset, q }) {
 			<h2 id="matches-title">Matches · ${count(matches.length)}</h2>
 			<table class="table">
 				<thead><tr><th>match</th><th>split</th><th data-numeric="true">groups</th><th data-numeric="true">pass</th><th data-numeric="true">accepted</th></tr></thead>
-				<tbody>${matches.map((one) => html`
-					<tr key=${`${one.match} ${one.split}`}>
-						<th scope="row"><a href=${queueAddress(dataset, `${q} match:"${one.match}"`.trim())}>${one.match || 'no match'}</a></th>
-						<td>${one.split || '–'}</td><td data-numeric="true">${count(one.groups)}</td>
-						<td data-numeric="true">${count(one.passing)}</td><td data-numeric="true">${count(one.accepted)}</td>
-					</tr>`)}
+				<tbody>${matches.map((one) => {
+					const { name, aside } = matchName(one.match);
+					return html`
+						<tr key=${`${one.match} ${one.split}`}>
+							<th scope="row"><a href=${queueAddress(dataset, `${q} match:"${one.match}"`.trim())}>${name || 'no match'}</a>${aside ? html`<small>${aside}</small>` : null}</th>
+							<td>${one.split || '–'}</td><td data-numeric="true">${count(one.groups)}</td>
+							<td data-numeric="true">${count(one.passing)}</td><td data-numeric="true">${count(one.accepted)}</td>
+						</tr>`;
+				})}
 				</tbody>
 			</table>
 		</section>
@@ -56,7 +60,7 @@ function Matches({ matches, dataset, q }) {
 function Body({ found, dataset, q }) {
 	const names = found.histograms[0]?.series.map(({ split }) => split) ?? [];
 	return html`
-		<div class="page__title"><p>${count(found.groups)} groups${q ? ' match' : ''}. Choose a bar to open its groups in the queue.</p><${SplitLegend} names=${names} /></div>
+		<div class="page__title"><p>${plural(found.groups, 'group')}${q ? (found.groups === 1 ? ' matches' : ' match') : ''}. Choose a bar to open its groups in the queue.</p><${SplitLegend} names=${names} /></div>
 		<div class="statistics__grid">
 			${found.histograms.map((spread) => html`<${Spread} key=${spread.name} spread=${spread} dataset=${dataset} q=${q} />`)}
 		</div>

@@ -8,6 +8,8 @@ import { html } from 'htm/preact';
 /** JaC is measured at these tolerances alone. */
 const GAMMAS = [0.5, 1, 2];
 
+const OFF = 'Not asked: tick the box to ask it';
+
 /** Units that stand beside a number in few characters. */
 const UNITS = /** @type {{[unit: string]: string}} */ ({ '% of diagonal': '%', degrees: '°', share: '' });
 
@@ -40,12 +42,12 @@ function Slider({ field, value, id, change }) {
 	const share = Math.max(0, Math.min(1, (shown - low) / (high - low)));
 	return html`
 		<input
-			class="threshold__slider" type="range" min=${low} max=${high} step=${stepOf(low, high)} value=${shown} disabled=${off}
+			class="threshold__slider" type="range" min=${low} max=${high} step=${stepOf(low, high)} value=${shown} disabled=${off} title=${off ? OFF : ''}
 			aria-label=${`${field.label}, slider`} style=${{ '--share': `${100 * share}%` }}
 			onInput=${(/** @type {Event} */ event) => change(number(event))}
 		/>
 		<input
-			class="field threshold__number" id=${id} type="number" min=${low} max=${high} step="any" value=${off ? '' : shown} disabled=${off}
+			class="field threshold__number" id=${id} type="number" min=${low} max=${high} step="any" value=${off ? '' : shown} disabled=${off} title=${off ? OFF : ''}
 			onChange=${(/** @type {Event} */ event) => { if (Number.isFinite(number(event))) change(number(event)); }}
 		/>
 		<${Unit} unit=${field.unit} />

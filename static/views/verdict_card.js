@@ -5,12 +5,18 @@ import { html } from 'htm/preact';
 
 import { capital, words } from '../lib/format.js';
 import { REASONS } from '../state/verdicts.js';
-import { GATE_TITLES } from './gate_names.js';
+import { GATE_TITLES, gateLabel } from './gate_names.js';
 
 /** @import {GroupDocument, SolutionJson, VerdictJson} from '../api/types.js' */
 
 /** Findings that say why a view does not meet the others. */
 const ODD = new Set(['view_disagrees', 'sides_swapped', 'not_synchronous']);
+
+/** What a gate asks, before what it got. @param {GroupDocument} group @param {SolutionJson} solution @param {string} name */
+function asked(group, solution, name) {
+	const gate = solution.gates.find((one) => one.name === name);
+	return gate ? `${gateLabel(gate, group.policy)}: ` : '';
+}
 
 /** @param {GroupDocument} group @param {SolutionJson | null} solution */
 function headline(group, solution) {
@@ -23,7 +29,7 @@ function headline(group, solution) {
 	if (!solution.passes) {
 		const failing = solution.first_failing;
 		const gate = failing ? (GATE_TITLES[failing.gate] ?? capital(words(failing.gate))) : 'A gate fails';
-		return { tone: 'bad', over: 'Does not pass', title: gate, text: failing ? `${capital(failing.sentence)}.` : '' };
+		return { tone: 'bad', over: 'Does not pass', title: gate, text: failing ? `${asked(group, solution, failing.gate)}${failing.sentence}.` : '' };
 	}
 	const doubt = solution.findings[0];
 	if (odd || used < all) {
@@ -34,7 +40,7 @@ function headline(group, solution) {
 		return { tone: 'warn', over: `Passes with ${used} of ${all} views`, title, text: odd?.sentence ?? missing(group, solution) };
 	}
 	if (doubt) return { tone: 'warn', over: 'Passes, worth a look', title: capital(words(doubt.kind)), text: doubt.sentence };
-	return { tone: 'ok', over: 'Passes every gate', title: `All ${all} views agree`, text: spread(solution) };
+	return { tone: 'ok', over: 'Passes every gate', title: all === 2 ? 'Both views agree' : `All ${all} views agree`, text: spread(solution) };
 }
 
 /** @param {GroupDocument} group @param {SolutionJson} solution */

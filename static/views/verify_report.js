@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { count } from '../lib/format.js';
+import { plural } from '../lib/format.js';
 import { JobProgress } from './job_progress.js';
 
 /** @import {JobJson} from '../api/jobs.js' */
@@ -27,7 +27,7 @@ export function VerifyReport({ job }) {
 						</tbody>
 					</table>
 				</div>
-				<p class="note">${count(report.different)} differences in all.</p>` : null}
+				<p class="note">${plural(report.different, 'difference')} in all.</p>` : null}
 		</div>
 	`;
 }

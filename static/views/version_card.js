@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
 import { getVersions } from '../api/versions.js';
-import { count } from '../lib/format.js';
+import { plural } from '../lib/format.js';
 import { sentenceOf, useResource } from '../lib/resource.js';
 import { FreezeDialog } from './freeze_dialog.js';
 import { pageAddress } from './dataset_menu.js';
@@ -21,7 +21,7 @@ function Line({ version, address }) {
 	return html`
 		<div class="version-line">
 			<h3><a class="link" href=${address}>${version.name}</a> · frozen <${When} at=${version.created} /></h3>
-			<p class="note">${count(version.counts.groups)} groups · sha ${version.hash.slice(0, 8)}</p>
+			<p class="note">${plural(version.counts.groups, 'group')} · sha ${version.hash.slice(0, 8)}</p>
 			${version.note ? html`<p>${version.note}</p>` : null}
 		</div>
 	`;

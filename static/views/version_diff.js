@@ -4,7 +4,8 @@
 import { html } from 'htm/preact';
 
 import { getDiff } from '../api/versions.js';
-import { count, fixed, words } from '../lib/format.js';
+import { count, fixed, plural, words } from '../lib/format.js';
+import { matchName } from '../lib/match_name.js';
 import { sentenceOf, useResource } from '../lib/resource.js';
 import { queueAddress } from '../state/navigation.js';
 import { Loading } from './page_frame.js';
@@ -23,8 +24,10 @@ function Part({ title, items, all, dataset, tell }) {
 		<details class="diff__part" open=${all <= 12}>
 			<summary>${title} · ${count(all)}</summary>
 			<table class="table">
-				<tbody>${items.slice(0, SHOWN).map((item) => html`
-					<tr key=${item.group}><th scope="row"><a href=${queueAddress(dataset, `key:"${item.group}"`)}>${item.group}</a></th><td>${tell(item)}</td></tr>`)}
+				<tbody>${items.slice(0, SHOWN).map((item) => {
+					const { name, aside } = matchName(item.group);
+					return html`<tr key=${item.group}><th scope="row"><a href=${queueAddress(dataset, `key:"${item.group}"`)}>${name}</a>${aside ? html`<small>${aside}</small>` : null}</th><td>${tell(item)}</td></tr>`;
+				})}
 				</tbody>
 			</table>
 			${all > Math.min(SHOWN, items.length) ? html`<p class="note">The first ${Math.min(SHOWN, items.length)} of ${count(all)}.</p>` : null}
@@ -36,10 +39,11 @@ function Part({ title, items, all, dataset, tell }) {
 function Parts({ diff, dataset }) {
 	const { counts } = diff;
 	return html`
-		<ul class="diff__lines">${diff.lines.map((/** @type {string} */ line) => html`<li key=${line}>${line}</li>`)}</ul>
-		<p class="note">${count(counts.unchanged)} groups are the same in both.</p>
-		<${Part} title="Added" items=${diff.added} all=${counts.added} dataset=${dataset} tell=${(/** @type {any} */ item) => item.why} />
-		<${Part} title="Dropped" items=${diff.dropped} all=${counts.dropped} dataset=${dataset} tell=${(/** @type {any} */ item) => item.why} />
+		<p>${words(diff.lines[0] ?? '')}</p>
+		<ul class="diff__lines">${diff.lines.slice(1).map((/** @type {string} */ line) => html`<li key=${line}>${words(line)}</li>`)}</ul>
+		<p class="note">${plural(counts.unchanged, 'group')} ${counts.unchanged === 1 ? 'is' : 'are'} the same in both.</p>
+		<${Part} title="Added" items=${diff.added} all=${counts.added} dataset=${dataset} tell=${(/** @type {any} */ item) => words(item.why)} />
+		<${Part} title="Dropped" items=${diff.dropped} all=${counts.dropped} dataset=${dataset} tell=${(/** @type {any} */ item) => words(item.why)} />
 		<${Part} title="Balls that moved" items=${diff.moved} all=${counts.moved} dataset=${dataset} tell=${(/** @type {any} */ item) => fixed(item.metres, 3, ' m')} />
 		<${Part} title="Changed" items=${diff.changed} all=${counts.changed} dataset=${dataset} tell=${(/** @type {any} */ item) => item.what.map(words).join(', ')} />
 	`;

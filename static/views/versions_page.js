@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
 import { getVersions, manifestAddress, verifyVersion } from '../api/versions.js';
-import { count } from '../lib/format.js';
+import { count, plural } from '../lib/format.js';
 import { sentenceOf, useResource } from '../lib/resource.js';
 import { follow } from '../state/jobs.js';
 import { DatasetFrame } from './dataset_page.js';
@@ -34,7 +34,7 @@ function Facts({ version }) {
 	return html`
 		<dl class="facts">
 			<dt>Hash</dt><dd class="mono">${version.hash}</dd>
-			<dt>Groups</dt><dd>${count(counts.groups)}${splits.length ? ` (${splits.join(', ')})` : ''} · ${count(counts.views ?? 0)} views · ${count(counts.balls ?? 0)} balls${counts.overrides ? ` · ${count(counts.overrides)} accepted against a gate` : ''}</dd>
+			<dt>Groups</dt><dd>${count(counts.groups)}${splits.length ? ` (${splits.join(', ')})` : ''} · ${plural(counts.views ?? 0, 'view')} · ${plural(counts.balls ?? 0, 'ball')}${counts.overrides ? ` · ${count(counts.overrides)} accepted against a gate` : ''}</dd>
 			<dt>Split</dt><dd>${splitText(version.split)}</dd>
 			<dt>Policy</dt><dd>${version.policy?.name ?? ''} <span class="mono">${version.policy?.hash ?? ''}</span></dd>
 			<dt>Computed by</dt><dd>solver ${version.solver_version}, Touchline ${version.software_version}</dd>
@@ -64,7 +64,7 @@ function VersionSection({ version, others, job, verify, compare, ask }) {
 					<p class="note">frozen <${When} at=${version.created} />${version.actor ? ` by ${version.actor}` : ''}</p>
 					<div class="buttons">
 						<button class="button" type="button" onClick=${verify}>Verify</button>
-						<select class="field" aria-label=${`Compare ${version.name} with`} disabled=${others.length === 0} onChange=${choose}>
+						<select class="field" aria-label=${`Compare ${version.name} with`} disabled=${others.length === 0} title=${others.length ? '' : 'There is no other version yet'} onChange=${choose}>
 							<option value="">Compare with…</option>
 							${others.map(({ id, name }) => html`<option key=${id} value=${String(id)}>${name}</option>`)}
 						</select>
@@ -114,7 +114,7 @@ function VersionsOf({ one }) {
 		${problem ? html`<p class="card form__error" role="alert">${problem}</p>` : null}
 		${diff ? html`<${VersionDiff} ...${diff} dataset=${one.name} onClose=${() => setDiff(null)} />` : null}
 		${items.length === 0 ? html`
-			<section class="card empty"><h2>Nothing is frozen yet</h2><p>${count(one.accepted)} of ${count(one.groups)} groups are accepted.</p></section>` : null}
+			<section class="card empty"><h2>Nothing is frozen yet</h2><p>${count(one.accepted)} of ${plural(one.groups, 'group')} accepted so far. A version takes those, or all that pass.</p></section>` : null}
 		<ul class="page__list">
 			${items.map((version) => html`
 				<${VersionSection}

@@ -18,9 +18,10 @@ const LOOKS = /** @type {const} */ ([
 export function YieldCurves({ answer, marker }) {
 	const { curves } = answer;
 	const x = curves[0]?.thresholds ?? [];
+	// The solid one first: where they coincide, the broken ones are seen on it.
 	const drawn = useMemo(() => curves.map(({ gamma_percent: gamma, groups }, index) => ({
 		label: `γ = ${gamma} %`, values: groups, ...LOOKS[index % LOOKS.length],
-	})), [curves]);
+	})).reverse(), [curves]);
 	const said = curves.map(({ gamma_percent: gamma, groups }) => `γ ${gamma} %: ${count(groups[0] ?? 0)} to ${count(groups.at(-1) ?? 0)}`).join('; ');
 	return html`
 		<section class="card" aria-labelledby="curves-title">

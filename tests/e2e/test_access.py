@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Error, Page
 
 OpenPage = Callable[..., Page]
 
@@ -25,6 +26,24 @@ def serious(page: Page) -> list[str]:
         for violation in found
         if violation["impact"] in ("serious", "critical")
     ]
+
+
+def serious_in_both(page: Page) -> list[str]:
+    """What axe calls serious on the page as it stands, in the dark and in the light."""
+    found = []
+    for scheme in ("light", "dark"):
+        # Colours must not be on their way when they are measured.
+        page.emulate_media(color_scheme=scheme, reduced_motion="reduce")  # type: ignore[arg-type]
+        found += [f"{scheme}: {fault}" for fault in serious(page)]
+    return found
+
+
+def soon(page: Page, faults: str) -> list[str]:
+    """What a script finds once the page has come to rest; the last of it, where it never does."""
+    with suppress(Error):
+        page.wait_for_function(f"() => ({faults})().length === 0", timeout=5_000)
+    found: list[str] = page.evaluate(faults)
+    return found
 
 
 def shown(open_page: OpenPage, name: str, scheme: str, size: tuple[int, int]) -> Page:
@@ -48,6 +67,16 @@ CUT_OFF = """() => [...document.querySelectorAll('h1, h2, th, td, dd, dt, .butto
       && getComputedStyle(element).display !== 'inline';
   })
   .map((element) => `${element.className || element.tagName}: ${element.textContent.trim()}`)"""
+
+BEYOND_ITS_FRAME = """() => [...document.querySelectorAll('main, dialog[open], [popover]:popover-open')]
+  .flatMap((root) => [...root.querySelectorAll('h2, h3, th, td, dt, dd, label, legend, .button, .pill, .note')])
+  .filter((element) => {
+    const box = element.getBoundingClientRect();
+    if (box.width === 0 || element.closest('.hidden-text, .code')) return false;
+    const frame = element.closest('.table__scroll, dialog, [popover], main').getBoundingClientRect();
+    return box.right > frame.right + 1 || box.left < frame.left - 1;
+  })
+  .map((element) => `${element.className || element.tagName}: ${element.textContent.trim().slice(0, 60)}`)"""
 
 NESTED_SCROLLERS = """() => {
   const scrolls = (element) => /auto|scroll/.test(getComputedStyle(element).overflowY)

@@ -1,14 +1,15 @@
-"""Everybody can use what opens on the review screen too."""
+"""Everybody can use what opens on the review screen too, and it fits."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
-from tests.e2e.screen import Screen
-from tests.e2e.test_access import serious
+from tests.e2e.screen import Screen, rows
+from tests.e2e.test_access import CUT_OFF, NESTED_SCROLLERS, SIZES, serious, serious_in_both, soon
 
 OpenPage = Callable[..., Page]
 STATES = {
@@ -16,6 +17,7 @@ STATES = {
     "keys": (["?"], "dialog[open]"),
     "note": (["Shift+n"], ".ask"),
     "margins": (["g"], ".gates__margin"),
+    "alone": (["2", "2"], ".image-panel__stage[data-ready=true]"),
 }
 
 
@@ -34,3 +36,59 @@ class TestAxe:
         page.get_by_role("button", name="Brightness and contrast of view A").click()
         found["adjust"] = serious(page)
         assert {name: faults for name, faults in found.items() if faults} == {}
+
+
+def fits(page: Page) -> None:
+    """Everybody can use the screen as it stands, in both schemes and at every size."""
+    found: dict[str, Any] = {"axe": serious_in_both(page)}
+    for width, height in SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        found[f"cut off at {width}"] = soon(page, CUT_OFF)
+        found[f"scrolls twice at {width}"] = soon(page, NESTED_SCROLLERS)
+    assert {name: what for name, what in found.items() if what} == {}
+
+
+class TestStates:
+    def test_a_group_with_findings_fits(self, open_page: OpenPage) -> None:
+        page = open_page(None)
+        flagged = next(row["id"] for row in rows(page) if row["findings"])
+        page.goto(f"/review/{flagged}")
+        Screen(page).ready()
+        expect(page.locator(".finding").first).to_be_attached()
+        fits(page)
+
+    @pytest.mark.parametrize("views", [2, 3, 4])
+    def test_every_number_of_views_fits_folded_too(self, open_page: OpenPage, views: int) -> None:
+        page = open_page(None)
+        group = next(row["id"] for row in rows(page) if row["views"] == views)
+        page.goto(f"/review/{group}")
+        screen = Screen(page)
+        screen.ready()
+        assert page.locator(".image-panel").count() == views
+        fits(page)
+        screen.press("l")
+        expect(page.locator(".review__main[data-collapsed=true]")).to_be_visible()
+        fits(page)
+
+    def test_an_edit_that_waits_for_the_network_fits(
+        self, open_page: OpenPage, console: Any
+    ) -> None:
+        console.expect("ERR_")
+        page = open_page("/review/1")
+        screen = Screen(page)
+        screen.ready()
+        included = screen.document()["views"][1]["included"]
+        page.context.set_offline(True)
+        screen.press("Shift+2")
+        expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
+        fits(page)
+        screen.press("Shift+2")
+        page.context.set_offline(False)
+        screen.saved()
+        assert screen.document()["views"][1]["included"] == included
+
+    def test_a_group_that_is_not_there_says_so(self, open_page: OpenPage, console: Any) -> None:
+        console.expect("404")
+        page = open_page("/review/999999")
+        expect(page.locator("main, [role=alert]").first).to_contain_text("999999")
+        fits(page)

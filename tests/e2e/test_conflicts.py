@@ -11,6 +11,9 @@ from playwright.sync_api import Locator, Page, expect
 from tests.e2e.screen import Document, Screen, interior_point, passing
 
 OpenPage = Callable[..., Page]
+GONE = ("ERR_INTERNET_DISCONNECTED", "ERR_NETWORK_CHANGED", "ERR_FAILED", "ERR_NETWORK_IO")
+MORE_THAN_CONNECTIONS = 7
+"""Windows: a browser opens six connections to a server in all of them together."""
 
 
 @pytest.fixture
@@ -67,6 +70,17 @@ def meet(mine: Screen, theirs: Screen, change: Callable[[], None]) -> Locator:
     return bar
 
 
+def see(page: Page, seen: bool) -> None:
+    """Bring a window to the front, or behind others."""
+    page.evaluate(
+        """(hidden) => {
+          Object.defineProperty(document, 'hidden', { value: hidden, configurable: true });
+          document.dispatchEvent(new Event('visibilitychange'));
+        }""",
+        not seen,
+    )
+
+
 class TestLiveUpdates:
     def test_an_edit_in_one_browser_appears_in_the_other(self, both: tuple[Screen, Screen]) -> None:
         mine, theirs = both
@@ -86,6 +100,32 @@ class TestLiveUpdates:
         theirs.saved()
         theirs.press("Control+z")
         expect(mine.page.locator('.pill[data-status="deferred"]')).to_have_count(0)
+
+    def test_a_window_that_nobody_saw_shows_what_it_missed(
+        self, both: tuple[Screen, Screen]
+    ) -> None:
+        mine, theirs = both
+        see(mine.page, False)
+        theirs.press("s")
+        theirs.saved()
+        deferred = mine.page.locator('.pill[data-status="deferred"]')
+        expect(deferred).to_have_count(0)
+        see(mine.page, True)
+        expect(deferred).to_be_visible()
+        theirs.press("Control+z")
+        expect(deferred).to_have_count(0)
+
+    def test_windows_that_nobody_sees_leave_their_connections_to_others(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/jobs")
+        for _ in range(MORE_THAN_CONNECTIONS):
+            page.wait_for_selector(".page__main > :nth-child(2)")
+            with page.expect_event("requestfailed", lambda gone: gone.url.endswith("/events")):
+                see(page, False)
+            page = page.context.new_page()
+            page.goto("/jobs")
+        expect(page.locator(".page__main > :nth-child(2)").first).to_be_visible()
 
 
 class TestConflict:
@@ -133,6 +173,32 @@ class TestConflict:
         after = mine.document()["views"][0]
         assert after["lines"][marking][index]["y"] > point["y"] + 8
         assert after["balls"][0]["box"][0] > x + 3
+
+    def test_merging_gives_them_what_overlaps_and_me_the_rest(
+        self, both: tuple[Screen, Screen], console: Any
+    ) -> None:
+        for part in ("412", *GONE):
+            console.expect(part)
+        mine, theirs = both
+        view = mine.document()["views"][0]
+        marking, index, point = interior_point(view)
+        mine.page.context.set_offline(True)
+        move_ball(mine, 8)
+        mine.drag(mine.place(view, point["x"], point["y"]), 3, 15)
+        expect(mine.page.locator(".save")).to_contain_text("2 changes wait")
+        move_ball(theirs, -6)
+        theirs.saved()
+        now = box(theirs)
+        mine.page.context.set_offline(False)
+        bar = mine.page.get_by_role("alert", name="Conflict")
+        expect(bar).to_contain_text("both changed it")
+        expect(bar).to_contain_text("only you changed it")
+        bar.get_by_role("button", name="Merge what does not overlap").click()
+        expect(bar).to_have_count(0)
+        mine.saved()
+        after = mine.document()["views"][0]
+        assert after["balls"][0]["box"] == now
+        assert after["lines"][marking][index]["y"] > point["y"] + 8
 
     def test_a_conflict_survives_a_reload(self, both: tuple[Screen, Screen], console: Any) -> None:
         console.expect("412")

@@ -177,11 +177,11 @@ class TestLooking:
     def test_single_letters_can_be_switched_off(self, review: Review) -> None:
         screen = review(1)
         screen.press("?")
-        screen.page.get_by_label("Single letters do something").click()
+        screen.page.get_by_label("Use single-letter keys").click()
         screen.press("Escape", "x")
         expect(screen.page.locator(".reasons")).to_have_count(0)
         screen.press("?")
-        screen.page.get_by_label("Single letters do something").click()
+        screen.page.get_by_label("Use single-letter keys").click()
         screen.press("Escape", "x")
         expect(screen.page.locator(".reasons")).to_be_visible()
 
@@ -192,7 +192,7 @@ class TestLooking:
         screen.page.get_by_role("button", name=name, exact=True).click()
         screen.press("a")
         expect(screen.page.locator(".key-field")).to_contain_text("Accept and next")
-        screen.press("y", "Escape", "x")
+        screen.press("i", "Escape", "x")
         expect(screen.page.locator(".reasons")).to_have_count(0)
-        screen.press("y")
+        screen.press("i")
         expect(screen.page.locator(".reasons")).to_be_visible()

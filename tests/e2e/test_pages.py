@@ -8,9 +8,16 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
-from tests.e2e.test_access import NESTED_SCROLLERS, SIZES, serious
+from tests.e2e.test_access import (
+    BEYOND_ITS_FRAME,
+    NESTED_SCROLLERS,
+    SIZES,
+    serious,
+    serious_in_both,
+    soon,
+)
 
 OpenPage = Callable[..., Page]
 
@@ -29,6 +36,8 @@ TOO_WIDE = """() => [document.documentElement, document.querySelector('.page__ma
   document.querySelector('.header')]
   .filter((element) => element.scrollWidth > element.clientWidth + 1)
   .map((element) => element.className || element.tagName)"""
+FOCUS_INSIDE = """() => document.activeElement === document.body
+  || document.activeElement.closest('dialog[open], [popover]:popover-open') !== null"""
 MINUTE = 60_000
 
 
@@ -42,9 +51,24 @@ class TestEveryPage:
             found = {"axe": serious(page)}
             for width, height in SIZES if scheme == "dark" else []:
                 page.set_viewport_size({"width": width, "height": height})
-                found[f"too wide at {width}"] = page.evaluate(TOO_WIDE)
-                found[f"scrolls twice at {width}"] = page.evaluate(NESTED_SCROLLERS)
+                found[f"too wide at {width}"] = soon(page, TOO_WIDE)
+                found[f"scrolls twice at {width}"] = soon(page, NESTED_SCROLLERS)
+                found[f"cut off at {width}"] = soon(page, BEYOND_ITS_FRAME)
             assert {name: what for name, what in found.items() if what} == {}, path
+
+
+def usable(page: Page) -> None:
+    """Everybody can use what is shown now, and it fits at every size."""
+    found = {"axe": serious_in_both(page)}
+    before = page.viewport_size
+    for width, height in SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        found[f"too wide at {width}"] = soon(page, TOO_WIDE)
+        found[f"scrolls twice at {width}"] = soon(page, NESTED_SCROLLERS)
+        found[f"cut off at {width}"] = soon(page, BEYOND_ITS_FRAME)
+    assert before is not None
+    page.set_viewport_size(before)
+    assert {name: what for name, what in found.items() if what} == {}
 
 
 class TestNavigation:
@@ -75,9 +99,91 @@ class TestNavigation:
         page.keyboard.press("Enter")
         page.wait_for_url("**/review/7")
 
+    def test_keys_typed_before_the_palette_stands_are_its_own(self, open_page: OpenPage) -> None:
+        page = open_page(None)
+        held: list[Route] = []
+        page.route("**/views/palette.js*", lambda route: held.append(route))
+        page.goto("/review/1")
+        page.wait_for_selector(".image-panel__stage[data-ready=true]")
+        before = page.request.get("/api/v1/groups/1").json()["verdict"]
+        page.keyboard.press("Control+k")
+        page.keyboard.type("statistiks")
+        page.keyboard.press("Backspace")
+        page.keyboard.press("Backspace")
+        page.keyboard.type("cs")
+        page.keyboard.press("Enter")
+        while not held:
+            page.wait_for_timeout(20)
+        held[0].continue_()
+        page.wait_for_url("**/datasets/sample/statistics")
+        assert page.request.get("/api/v1/groups/1").json()["verdict"] == before
+
+    def test_a_number_typed_in_one_go_opens_its_group(self, open_page: OpenPage) -> None:
+        page = open_page("/groups")
+        page.wait_for_selector(".queue-row a")
+        page.keyboard.press("Control+k")
+        page.keyboard.type("7")
+        page.keyboard.press("Enter")
+        page.wait_for_url("**/review/7")
+
     def test_a_dataset_that_is_not_there_says_so(self, open_page: OpenPage) -> None:
         page = open_page("/datasets/nowhere/yield")
         expect(page.locator(".empty h2")).to_have_text("There is no dataset “nowhere”")
+        usable(page)
+
+    def test_an_address_that_is_none_leads_back(self, open_page: OpenPage) -> None:
+        page = open_page("/review/nowhere")
+        expect(page.get_by_role("heading")).to_have_text("There is no such page")
+        usable(page)
+        page.get_by_role("link", name="Open the queue").click()
+        page.wait_for_selector(".queue-row a")
+
+    def test_a_dataset_alone_is_its_yield(self, open_page: OpenPage) -> None:
+        page = open_page("/datasets/sample")
+        expect(page.locator(".funnel")).to_be_visible(timeout=MINUTE)
+
+
+class TestDialogs:
+    """Opened, used by everybody, left by Escape; the focus then is where it was."""
+
+    @pytest.mark.parametrize(
+        ("path", "opener"),
+        [
+            ("/datasets", "Export…"),
+            ("/datasets", "Delete…"),
+            ("/datasets/sample/versions", "Freeze a version…"),
+            ("/datasets/sample/evaluation", "Upload predictions…"),
+            ("/jobs", "Keys"),
+            ("/jobs", "Dataset and pages"),
+        ],
+    )
+    def test_give_the_focus_back(self, open_page: OpenPage, path: str, opener: str) -> None:
+        page = open_page(path)
+        page.wait_for_selector(".page__main > :nth-child(2)")
+        button = page.get_by_role("button", name=opener).first
+        button.focus()
+        page.keyboard.press("Enter")
+        dialog = page.locator("dialog[open], [popover]:popover-open")
+        expect(dialog).to_be_visible()
+        page.wait_for_load_state("networkidle")
+        usable(page)
+        for _ in range(12 if dialog.evaluate("element => element.matches('dialog')") else 0):
+            page.keyboard.press("Tab")
+            assert page.evaluate(FOCUS_INSIDE)
+        page.keyboard.press("Escape")
+        expect(dialog).to_have_count(0)
+        expect(button).to_be_focused()
+
+    def test_the_palette_gives_the_focus_back(self, open_page: OpenPage) -> None:
+        page = open_page("/datasets")
+        button = page.get_by_role("button", name="Export…").first
+        button.focus()
+        page.keyboard.press("Control+k")
+        expect(page.get_by_role("combobox")).to_be_focused()
+        usable(page)
+        page.keyboard.press("Escape")
+        expect(page.locator("dialog")).to_have_count(0)
+        expect(button).to_be_focused()
 
 
 class TestYield:
@@ -169,6 +275,7 @@ def bring_in(page: Page, labels: Path) -> None:
     expect(page.get_by_text("is uploaded")).to_be_visible()
     page.get_by_role("button", name="Try it out").click()
     expect(page.get_by_role("region", name="What would happen")).to_be_visible(timeout=MINUTE)
+    usable(page)
     page.get_by_role("button", name="Import", exact=True).click()
     expect(page.get_by_role("region", name="What happened")).to_be_visible(timeout=MINUTE)
     page.goto("/jobs")
@@ -195,10 +302,12 @@ def freeze_and_verify(page: Page) -> None:
     page.goto("/datasets/passing through/versions")
     page.get_by_role("button", name="Freeze a version").first.click()
     expect(page.locator(".bulk__outcome")).to_contain_text("groups enter")
+    usable(page)
     page.get_by_role("button", name="Freeze", exact=True).click()
     page.get_by_role("button", name="Done", exact=True).click(timeout=MINUTE)
     page.get_by_role("button", name="Verify").click()
     expect(page.locator(".verify")).to_contain_text("came out as they were", timeout=MINUTE)
+    usable(page)
 
 
 def evaluate(page: Page, predictions: Path) -> None:
@@ -207,6 +316,7 @@ def evaluate(page: Page, predictions: Path) -> None:
     page.get_by_role("button", name="Upload predictions").click()
     page.set_input_files("#prediction-boxes", predictions)
     expect(page.get_by_text("is uploaded")).to_be_visible()
+    usable(page)
     page.get_by_role("button", name="Add predictions").click()
     expect(page.locator(".prediction-set")).to_contain_text("detector", timeout=MINUTE)
     page.get_by_role("button", name="Evaluate", exact=True).click()
@@ -215,3 +325,4 @@ def evaluate(page: Page, predictions: Path) -> None:
     page.get_by_role("button", name="Frames", exact=True).click()
     expect(page.locator("#frames-title")).to_contain_text("Frames")
     expect(page.locator(".table a[href^='/review/']").first).to_be_visible()
+    usable(page)

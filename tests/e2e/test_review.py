@@ -54,7 +54,7 @@ class TestQueue:
 
     def test_a_histogram_brushes_the_query(self, open_page: OpenPage) -> None:
         page = open_page("/groups")
-        box = page.locator(".histogram svg").first.bounding_box()
+        box = page.locator(".histogram:not([aria-busy]) svg").first.bounding_box()
         assert box is not None
         page.mouse.move(box["x"] + 0.82 * box["width"], box["y"] + 20)
         page.mouse.down()
@@ -107,6 +107,23 @@ class TestEditing:
         screen.press("Escape", "Control+z")
         expect(screen.page.locator('.mini-pitch [data-number="x"]')).to_have_text(before[0])
 
+    def test_gates_follow_a_ball_that_is_still_held(self, review: Callable[..., Screen]) -> None:
+        screen = review(1)
+        writes = submitted(screen.page)
+        view = screen.document()["views"][0]
+        x, y, width, height = view["balls"][0]["box"]
+        gate = screen.page.locator(".gates [data-gate=reprojection] .gates__value")
+        before, sigma = gate.inner_text(), screen.pitch("sigma")
+        assert "left out" not in before
+        screen.drag(screen.place(view, x + width / 2, y + height / 2), 60, 90, drop=False)
+        expect(gate).to_contain_text("left out")
+        expect(screen.page.locator('.mini-pitch [data-number="sigma"]')).not_to_have_text(sigma)
+        screen.press("Escape")
+        expect(gate).to_have_text(before)
+        expect(screen.page.locator('.mini-pitch [data-number="sigma"]')).to_have_text(sigma)
+        screen.page.mouse.up()
+        assert writes == []
+
     def test_escape_gives_a_held_point_back(self, review: Callable[..., Screen]) -> None:
         screen = review(1)
         writes = submitted(screen.page)
@@ -146,6 +163,43 @@ class TestEditing:
         assert screen.document()["views"][1]["included"] is False
         screen.press("Shift+2")
         expect(panel).to_have_attribute("data-included", "true")
+
+
+class TestLooking:
+    def test_t_shows_the_other_3d_ball_and_says_which(self, review: Callable[..., Screen]) -> None:
+        screen = review(0)
+        solution = screen.document()["solution"]
+        which = screen.page.locator(".mini-pitch button")
+        expect(which).to_have_text("mean of pairs")
+        mean = screen.pitch("sigma"), screen.number("A", "error")
+        screen.press("t")
+        expect(which).to_have_text("most likely point")
+        best = solution["best_ball"]
+        shown = screen.pitch("x"), screen.pitch("y"), screen.pitch("sigma")
+        expected = (
+            f"{best['point'][0]:.2f} m",
+            f"{best['point'][1]:.2f} m",
+            f"{best['sigma_m']:.2f} m",
+        )
+        assert shown == tuple(text.replace("-", "−") for text in expected)
+        # The gates stay with the mean, which is exported.
+        assert screen.document()["solution"]["ball"] == solution["ball"]
+        which.click()
+        expect(which).to_have_text("mean of pairs")
+        assert (screen.pitch("sigma"), screen.number("A", "error")) == mean
+
+    def test_g_tells_by_how_much_each_gate_is_met(self, review: Callable[..., Screen]) -> None:
+        screen = review(0)
+        gate = next(
+            gate for gate in screen.document()["solution"]["gates"] if gate["name"] == "baseline"
+        )
+        margins = screen.page.locator(".gates__margin")
+        expect(margins).to_have_count(0)
+        screen.press("g")
+        told = screen.page.locator('[data-gate="baseline"] .gates__margin')
+        expect(told).to_have_text(f"margin +{gate['margin']:.1f} m")
+        screen.press("g")
+        expect(margins).to_have_count(0)
 
 
 class TestVerdicts:

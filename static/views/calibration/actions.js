@@ -2,7 +2,7 @@
 /** What a person does to the markings, by key, button or diagram. */
 
 import { toImage } from '../../geometry/viewport.js';
-import { count } from '../../lib/format.js';
+import { plural } from '../../lib/format.js';
 import { choice, commit, lines, mode, stageLines, view } from '../../state/calibration.js';
 import {
 	relabelled, sidesSwapped, withAdded, withInserted, withPoint, withoutMarking, withoutPoint,
@@ -28,7 +28,7 @@ export function pickMarking(name) {
 	// What is not there yet can only be drawn.
 	mode.value = lines.value[name] ? 'select' : 'draw';
 	const points = lines.value[name]?.length ?? 0;
-	announce(points ? `${name}, ${points} points.` : `${name}: click to set points.`);
+	announce(points ? `${name}, ${plural(points, 'point')}.` : `${name}: click to set points.`);
 }
 
 /** Give the focus to the image. */
@@ -132,7 +132,7 @@ export function stepMarking(step) {
 	const at = choice.value ? names.indexOf(choice.value.marking) : step > 0 ? -1 : 0;
 	const marking = names[(at + step + names.length) % names.length];
 	choice.value = { marking, index: null };
-	announce(`${marking}, ${count(lines.value[marking].length)} points.`);
+	announce(`${marking}, ${plural(lines.value[marking].length, 'point')}.`);
 }
 
 /** @param {1 | -1} step */

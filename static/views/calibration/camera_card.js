@@ -37,7 +37,7 @@ function SourceChoice({ view }) {
 	// The choice builds on the state that the writes before it make.
 	const off = busy || unsaved.value > 0 ? 'Wait until the last change is saved' : null;
 	const { has_given: given, calibration } = view.station;
-	if (!given) return html`<p class="camera-card__source">From the annotated lines; none was given.</p>`;
+	if (!given) return html`<p class="camera-card__source">Computed from the lines; no camera was given.</p>`;
 	const sources = /** @type {{source: Source, label: string}[]} */ ([
 		{ source: 'given', label: 'Given camera' }, { source: 'lines', label: 'From lines' },
 	]);

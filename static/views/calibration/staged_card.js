@@ -55,6 +55,7 @@ export function MarkingCard({ picture }) {
 				${chosen && chosen.index !== null ? html`<${Action} label="Delete marking" keys="⇧ Del" run=${deleteMarking} off=${absent} />` : null}
 				<${Action} label="Swap sides" keys="M" run=${swapAllSides} off=${Object.keys(lines.value).length ? null : 'There are no lines'} />
 			</div>
+			${chosen ? null : html`<p class="note">Click a line in the diagram, in the table or on the picture.</p>`}
 			<${Points} picture=${picture} />
 		</section>
 	`;
