@@ -3,10 +3,10 @@
 
 import { computed } from '@preact/signals';
 
-import { navigate } from '../lib/router.js';
+import { navigate, page } from '../lib/router.js';
 import { document, lastStation, open, pending, submitTurn } from './group.js';
 import { actions, did, forget, forgetEdit, nextBack } from './last_action.js';
-import { currentId, reviewAddress } from './navigation.js';
+import { reviewAddress } from './navigation.js';
 import { announce, complain } from './notice.js';
 import { discard, outbox } from './outbox.js';
 import { isAway, wake } from './sending.js';
@@ -17,10 +17,12 @@ import { takeVerdictBack } from './verdicts.js';
 const ownStation = computed(() => (
 	lastStation.value?.group === document.value?.id ? (lastStation.value?.station ?? null) : null
 ));
+/** The group that the page is about, in the review as in the calibration editor. */
+const onScreen = computed(() => ('group' in page.value ? page.value.group : null));
 const next = computed(() => {
-	const shown = currentId() === document.value?.id ? document.value : null;
+	const shown = onScreen.value === document.value?.id ? document.value : null;
 	const edited = shown !== null && (shown.can_undo || ownStation.value !== null || pending.value.length > 0);
-	return nextBack(actions.value, currentId(), edited);
+	return nextBack(actions.value, onScreen.value, edited);
 });
 /** What undo would take back, in words; null when there is nothing. */
 export const undoable = computed(() => {

@@ -30,6 +30,8 @@ class TestReading:
     def test_a_cursor_misses_nothing_while_a_position_speaks_about_this_moment(
         self, client
     ) -> None:
+        for group in client.get(f"{GROUPS}/ids", params={"dataset": "small"}).json()["ids"]:
+            judge(client, group, "unreviewed")
         whole = client.get(f"{GROUPS}/ids", params={**LIST, "limit": 100}).json()
         ids = whole["ids"]
         assert (len(ids), whole["total"]) == (4, 4)
