@@ -86,10 +86,6 @@ class Camera:
         """Points of the pitch frame in the camera frame, metres, both shape (N, 3)."""
         return (require_shape(points, (None, 3), "points") - self.position) @ self.rotation.T
 
-    @cached_property
-    def _fold_radius(self) -> float:
-        return fold_radius(self.distortion)
-
     def project(self, points: FloatArray, *, folded: bool = False) -> FloatArray:
         """Pixels of points, as the distorted image shows them.
 
@@ -109,7 +105,7 @@ class Camera:
         ideal = in_camera[:, :2] / safe[:, None]
         if self.distortion.any():
             if not folded:
-                visible &= np.hypot(ideal[:, 0], ideal[:, 1]) <= self._fold_radius
+                visible &= np.hypot(ideal[:, 0], ideal[:, 1]) <= fold_radius(self.distortion)
             ideal = distort(np.where(visible[:, None], ideal, 0.0), self.distortion)
         pixels = self._unit_to_pixel(ideal)
         pixels[~visible] = np.nan

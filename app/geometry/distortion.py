@@ -6,6 +6,8 @@ Coefficients stand in the order k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 (OpenCV docu
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from app.geometry.arrays import FloatArray, require_shape
@@ -97,7 +99,14 @@ def fold_radius(coefficients: FloatArray) -> float:
     Beyond it far points fold back into the picture, so they count as not visible.
     Tangential and prism terms are small and left out.
     """
-    k1, k2, _, _, k3, k4, k5, k6 = coefficients[:8]
+    return _fold_radius(*coefficients[:8].tolist())
+
+
+# A group is solved again on every edit, with the same few lenses.
+@lru_cache(maxsize=1024)
+def _fold_radius(
+    k1: float, k2: float, _p1: float, _p2: float, k3: float, k4: float, k5: float, k6: float
+) -> float:
     if k2 == k3 == k4 == k5 == k6 == 0.0:
         return float(np.sqrt(-1 / (3 * k1))) if k1 < 0 else np.inf
     # d/dr of r N(r^2) / D(r^2) is zero where N D + 2 s (N' D - N D') is, with s = r^2.
