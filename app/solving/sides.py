@@ -76,8 +76,11 @@ def _others(sight: Sight, sights: Sequence[Sight]) -> list[Sight]:
 
 
 def _swap(sight: Sight, others: Sequence[Sight], policy: Policy) -> Swap | None:
-    before, after = _best_error(sight, others, policy), _best_error(_turn(sight), others, policy)
-    if before <= 1 or after >= 1:
+    before = _best_error(sight, others, policy)
+    if before <= 1:
+        return None
+    after = _best_error(_turn(sight), others, policy)
+    if after >= 1:
         return None
     tau = sight.tau_px(policy)
     return Swap(sight.view, before * tau, after * tau, confidence=before / (before + after))

@@ -93,8 +93,7 @@ def _sight(view: View, solved: ViewSolution) -> Sight | None:
     assert ball.center is not None
     diameter = ball.box.diameter if ball.box is not None else 0.0
     sight = Sight(view.key, solved.calibration, ball.center, diameter, view.size, solved.failed)
-    undistorted = sight.camera.undistort(np.array([ball.center]))
-    return sight if np.isfinite(undistorted).all() else None
+    return sight if np.isfinite(sight.ideal_center).all() else None
 
 
 def _with_ball(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -52,6 +53,12 @@ class Sight:
         assert self.calibration.camera is not None
         return self.calibration.camera
 
+    @cached_property
+    def ideal_center(self) -> FloatArray:
+        """The centre as the pinhole without distortion shows it, pixels, shape (2,)."""
+        center: FloatArray = self.camera.undistort(np.array([self.center]))[0]
+        return center
+
     def tau_px(self, policy: Policy) -> float:
         """Largest reprojection error of a valid pair, pixels."""
         return policy.tau_percent / 100 * self.size.diagonal
@@ -65,28 +72,27 @@ def triangulate(sights: Sequence[Sight], policy: Policy) -> tuple[Pair, ...]:
     couples = [
         (a, b) for a, b in combinations(sights, 2) if not np.array_equal(a.camera.P, b.camera.P)
     ]
-    ideal = {sight.view: sight.camera.undistort(np.array([sight.center]))[0] for sight in sights}
     try:
-        points = [*_meet(couples, ideal)] if couples else []
+        points = [*_meet(couples)] if couples else []
     except DegenerateGeometryError:
         # A picture twice in a group: rays that are parallel meet nowhere, the others do.
-        couples = [couple for couple in couples if _can_meet(couple, ideal)]
-        points = [*_meet(couples, ideal)] if couples else []
+        couples = [couple for couple in couples if _can_meet(couple)]
+        points = [*_meet(couples)] if couples else []
     return tuple(_pair(a, b, point, policy) for (a, b), point in zip(couples, points, strict=True))
 
 
-def _meet(couples: Sequence[tuple[Sight, Sight]], ideal: Mapping[str, FloatArray]) -> FloatArray:
+def _meet(couples: Sequence[tuple[Sight, Sight]]) -> FloatArray:
     return triangulate_pairs(
         np.array([a.camera.P for a, _ in couples]),
         np.array([b.camera.P for _, b in couples]),
-        np.array([ideal[a.view] for a, _ in couples]),
-        np.array([ideal[b.view] for _, b in couples]),
+        np.array([a.ideal_center for a, _ in couples]),
+        np.array([b.ideal_center for _, b in couples]),
     )
 
 
-def _can_meet(couple: tuple[Sight, Sight], ideal: Mapping[str, FloatArray]) -> bool:
+def _can_meet(couple: tuple[Sight, Sight]) -> bool:
     try:
-        _meet([couple], ideal)
+        _meet([couple])
     except DegenerateGeometryError:
         return False
     return True
@@ -121,13 +127,13 @@ def mean_covariance(
 
     Source: Hartley & Zisserman, result 5.6.
     """
-    ideal = {
-        view: sight.camera.undistort(np.array([sight.center]))[0] for view, sight in seen.items()
-    }
     steps = [
         (view, axis, sign) for view in seen for axis in (0, 1) for sign in (_STEP_PX, -_STEP_PX)
     ]
-    pixels = {view: np.repeat(pixel[None], len(steps), axis=0) for view, pixel in ideal.items()}
+    pixels = {
+        view: np.repeat(sight.ideal_center[None], len(steps), axis=0)
+        for view, sight in seen.items()
+    }
     for row, (view, axis, step) in enumerate(steps):
         pixels[view][row, axis] += step
     moved = np.mean(
