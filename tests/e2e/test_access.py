@@ -46,9 +46,9 @@ def soon(page: Page, faults: str) -> list[str]:
     return found
 
 
-def shown(open_page: OpenPage, name: str, scheme: str, size: tuple[int, int]) -> Page:
+def shown(open_page: OpenPage, name: str) -> Page:
     """A page with everything on it."""
-    page = open_page(PAGES[name], scheme=scheme, size={"width": size[0], "height": size[1]})
+    page = open_page(PAGES[name])
     waited = ".image-panel__stage[data-ready=true]" if name == "review" else ".queue-row a"
     page.wait_for_selector(waited)
     page.wait_for_load_state("networkidle")
@@ -88,35 +88,31 @@ NESTED_SCROLLERS = """() => {
 }"""
 
 
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-@pytest.mark.parametrize("name", list(PAGES))
-class TestAxe:
-    def test_finds_nothing_serious(self, open_page: OpenPage, name: str, scheme: str) -> None:
-        assert serious(shown(open_page, name, scheme, SIZES[0])) == []
+TOO_WIDE = "() => (document.documentElement.scrollWidth > innerWidth ? ['the page'] : [])"
 
-    def test_finds_nothing_serious_in_dialogs(
-        self, open_page: OpenPage, name: str, scheme: str
-    ) -> None:
-        page = shown(open_page, name, scheme, SIZES[0])
+
+def fits(page: Page) -> None:
+    """Everybody can use the screen as it stands, in both schemes and at every size."""
+    found: dict[str, Any] = {"axe": serious_in_both(page)}
+    for width, height in SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        found[f"cut off at {width}"] = soon(page, CUT_OFF)
+        found[f"scrolls twice at {width}"] = soon(page, NESTED_SCROLLERS)
+        found[f"wider than {width}"] = soon(page, TOO_WIDE)
+    assert {name: what for name, what in found.items() if what} == {}
+
+
+@pytest.mark.parametrize("name", list(PAGES))
+class TestScreens:
+    def test_everybody_can_use_it_at_every_size(self, open_page: OpenPage, name: str) -> None:
+        fits(shown(open_page, name))
+
+    def test_everybody_can_use_its_dialogs(self, open_page: OpenPage, name: str) -> None:
+        page = shown(open_page, name)
         if name == "queue":
             page.get_by_role("button", name="Export").first.click()
         else:
             page.keyboard.press("Enter")
             page.keyboard.press("x")
         page.wait_for_selector("dialog[open], .reasons")
-        assert serious(page) == []
-
-
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-@pytest.mark.parametrize("name", list(PAGES))
-class TestLayout:
-    def test_cuts_nothing_off(self, open_page: OpenPage, name: str, size: tuple[int, int]) -> None:
-        page = shown(open_page, name, "dark", size)
-        assert page.evaluate(CUT_OFF) == []
-
-    def test_has_no_scroll_bar_inside_another(
-        self, open_page: OpenPage, name: str, size: tuple[int, int]
-    ) -> None:
-        page = shown(open_page, name, "dark", size)
-        assert page.evaluate(NESTED_SCROLLERS) == []
-        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        assert serious_in_both(page) == []

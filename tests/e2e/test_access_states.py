@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.screen import Screen, rows
-from tests.e2e.test_access import CUT_OFF, NESTED_SCROLLERS, SIZES, serious, serious_in_both, soon
+from tests.e2e.test_access import fits, serious
 
 OpenPage = Callable[..., Page]
 STATES = {
@@ -36,16 +36,6 @@ class TestAxe:
         page.get_by_role("button", name="Brightness and contrast of view A").click()
         found["adjust"] = serious(page)
         assert {name: faults for name, faults in found.items() if faults} == {}
-
-
-def fits(page: Page) -> None:
-    """Everybody can use the screen as it stands, in both schemes and at every size."""
-    found: dict[str, Any] = {"axe": serious_in_both(page)}
-    for width, height in SIZES:
-        page.set_viewport_size({"width": width, "height": height})
-        found[f"cut off at {width}"] = soon(page, CUT_OFF)
-        found[f"scrolls twice at {width}"] = soon(page, NESTED_SCROLLERS)
-    assert {name: what for name, what in found.items() if what} == {}
 
 
 class TestStates:
