@@ -101,11 +101,11 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None =
     )
     app.state.services = services
     install_handlers(app)
-    # First: nobody asks for as much at once as somebody who opens the first page.
+    app.include_router(health.router)
+    # Before the API: nobody asks for as much at once as somebody who opens the first page.
     install_pages(app, site)
     for router in ROUTERS:
         app.include_router(router.router, prefix=PREFIX)
-    app.include_router(health.router)
     describe(app)
     _add_middleware(app, services, site)
     return app

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fastapi import APIRouter, FastAPI, Request, Response
+from starlette.convertors import StringConvertor, register_url_convertor
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse
 from starlette.staticfiles import StaticFiles
@@ -212,6 +213,16 @@ class Modules(StaticFiles):
         return kept
 
 
+class _Elsewhere(StringConvertor):
+    """Paths below none of the folders that programs ask; those that are no page of ours."""
+
+    NAME = "elsewhere"
+    regex = r"(?!(?:api|static|assets)(?:/|$)).*"
+
+
+register_url_convertor(_Elsewhere.NAME, _Elsewhere())
+
+
 def install_pages(app: FastAPI, site: Site) -> None:
     """Serve the pages and the modules of the browser application."""
     router = APIRouter(include_in_schema=False)
@@ -232,8 +243,15 @@ def install_pages(app: FastAPI, site: Site) -> None:
     def styles() -> Response:
         return Response(found().styles, media_type="text/css", headers={"Cache-Control": FOR_GOOD})
 
+    def elsewhere(request: Request) -> Response:
+        """People who mistyped an address are told so by the page, programs by a problem."""
+        if "text/html" not in request.headers.get("accept", ""):
+            raise HTTPException(status_code=404)
+        return Response(found().html, status_code=404, media_type="text/html")
+
     for path in PAGES:
         router.add_api_route(path, page, methods=["GET", "HEAD"])
+    router.add_api_route(f"/{{path:{_Elsewhere.NAME}}}", elsewhere, methods=["GET", "HEAD"])
     router.add_api_route("/assets/{version}/all.css", styles, methods=["GET", "HEAD"])
     app.include_router(router)
     _install_modules(app, site)

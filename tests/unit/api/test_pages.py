@@ -50,6 +50,11 @@ class TestPages:
         assert answer.status_code == 404
         assert answer.headers["content-type"] == "application/problem+json"
 
+    def test_a_mistyped_address_shows_the_page_to_a_person(self, client) -> None:
+        answer = client.get("/revew/12", headers={"Accept": "text/html,*/*;q=0.8"})
+        assert answer.status_code == 404
+        assert answer.content == client.get("/").content
+
     def test_the_policy_admits_the_import_map(self, client) -> None:
         (digest,) = script_hashes(client.get("/").content)
         for path in ("/", "/static/main.js", "/nothing"):
