@@ -1,7 +1,7 @@
 // @ts-check
 /** Arriving at a group: what the address bar names is on screen in the same moment. */
 
-import { effect, untracked } from '@preact/signals';
+import { effect, signal, untracked } from '@preact/signals';
 
 import { ApiError } from '../api/problem.js';
 import { navigate, page } from '../lib/router.js';
@@ -11,8 +11,12 @@ import { currentId, firstGroup, lastGroup, locate, query, reviewAddress } from '
 import { complain } from './notice.js';
 import { resetForGroup } from './workspace.js';
 
+/** The group that was asked for and cannot be shown; 0 while there is none. */
+export const absent = signal(0);
+
 /** @param {number} id */
 async function enter(id) {
+	absent.value = 0;
 	try {
 		await Promise.all([open(id), locate(id)]);
 	} catch (error) {
@@ -20,6 +24,7 @@ async function enter(id) {
 		// While the server is away what is known stays on screen; the save state says so.
 		if (currentId() !== id || (error.status === 0 && document.value?.id === id)) return;
 		if (error.status === 404) lastGroup.value = 0;
+		absent.value = id;
 		complain(`Group ${id} cannot be shown: ${error.message}`, {
 			label: 'Open the queue', run: () => navigate('/groups'),
 		});

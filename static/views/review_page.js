@@ -8,9 +8,9 @@ import { useKeys } from '../lib/hooks.js';
 import { lazy } from '../lib/lazy.js';
 import { withBestBall } from '../geometry/estimator.js';
 import { picturesOf } from '../overlays/scene.js';
+import { absent } from '../state/arrival.js';
 import { conflict } from '../state/conflict.js';
 import { document, group, isPreview, solution } from '../state/group.js';
-import { notice } from '../state/notice.js';
 import { sceneShown } from '../state/scene3d.js';
 import { estimator, focused, loupe, maximised, stripCollapsed } from '../state/workspace.js';
 import { NoticeBar } from './bars.js';
@@ -31,6 +31,17 @@ function keepWithin(letters) {
 	if (maximised.value && !letters.includes(maximised.value)) maximised.value = null;
 }
 
+/** In the place of a group that is not there, or not yet. */
+function Absent() {
+	if (absent.value === 0) return html`<main class="review__empty" aria-busy="true"><p>Loading…</p></main>`;
+	return html`
+		<main class="review__empty">
+			<h1>Group ${absent.value} cannot be shown</h1>
+			<p><a href="/groups">Open the queue</a></p>
+		</main>
+	`;
+}
+
 function Workspace() {
 	const shown = group.value;
 	const live = isPreview.value;
@@ -43,8 +54,7 @@ function Workspace() {
 	const predicted = usePredictions(shown !== null);
 	const pictures = useMemo(() => withPredictions(plain, predicted), [plain, predicted]);
 	useEffect(() => keepWithin(pictures.map(({ view }) => view.letter)), [pictures]);
-	const failed = notice.value?.tone === 'bad';
-	if (!shown) return html`<main class="review__empty" aria-busy=${!failed}><p>${failed ? 'Nothing to show here.' : 'Loading…'}</p></main>`;
+	if (!shown) return html`<${Absent} />`;
 	return html`
 		<main class="review__main" data-collapsed=${stripCollapsed.value} data-count=${maximised.value ? 1 : pictures.length}>
 			${sceneShown.value ? html`<${Scene3D} group=${shown} solution=${found} />` : html`<${ImageGrid} pictures=${pictures} />`}
