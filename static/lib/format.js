@@ -68,3 +68,13 @@ export function ago(then, now) {
 	if (seconds < 86400) return `${Math.floor(seconds / 3600)} h ago`;
 	return `${Math.floor(seconds / 86400)} d ago`;
 }
+
+/** How sure a detector is. @param {{score: number, scored: boolean}} prediction */
+export function scoreText({ score, scored }) {
+	return scored ? score.toFixed(2) : 'no score';
+}
+
+/** A marking where there is little room: every word that tells it from others. @param {string} marking */
+export function shortMarking(marking) {
+	return marking.replace(' rect.', '');
+}

@@ -2,6 +2,7 @@
 /** Where the marks of predictions stand on screen; drawing and the pointer go by the same. */
 
 import { toScreen } from '../geometry/viewport.js';
+import { scoreText } from '../lib/format.js';
 
 /** @import {ScreenPoint, Viewport} from '../geometry/viewport.js' */
 /** @import {Mark} from '../state/prediction_marks.js' */
@@ -18,9 +19,9 @@ const LONGEST_NAME = 18;
 const REACH = 6;
 
 /** @param {Mark} mark @param {boolean} chosen */
-function textOf({ name, score, sure }, chosen) {
+function textOf({ name, sure, ...mark }, chosen) {
 	const short = name.length > LONGEST_NAME ? `${name.slice(0, LONGEST_NAME - 1)}…` : name;
-	return sure || chosen ? `${short} ${score.toFixed(2)}` : score.toFixed(2);
+	return sure || chosen ? `${short} ${scoreText(mark)}` : scoreText(mark);
 }
 
 /** @param {Rect} a @param {Rect} b */

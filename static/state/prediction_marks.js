@@ -13,6 +13,7 @@ import { boxCenter } from '../geometry/ball.js';
  * @property {number} id
  * @property {string} name of its set
  * @property {number} score
+ * @property {boolean} scored whether its set has scores: without one nobody knows how sure it is
  * @property {[number, number, number, number]} box
  * @property {boolean} sure the surest one of its set in the view, and sure enough
  */
@@ -42,8 +43,8 @@ export function marksOf(found, group, choice) {
 
 /** @param {PredictionJson[]} items of one set, the surest first @param {number} least @returns {Mark[]} */
 function ofSet(items, least) {
-	return items.slice(0, MOST).map(({ id, name, score, box }, place) => (
-		{ id, name, score, box, sure: place === 0 && score >= least }
+	return items.slice(0, MOST).map(({ id, name, score, scored, box }, place) => (
+		{ id, name, score, scored, box, sure: place === 0 && scored && score >= least }
 	));
 }
 
@@ -78,6 +79,22 @@ export function surest(marks) {
 /** The sets that have something to show here, the newest first. @param {GroupPredictionsJson} found @returns {string[]} */
 export function setNames(found) {
 	return [...new Set(found.items.map(({ name }) => name))];
+}
+
+/** What stands for all sets where one may be chosen. */
+export const EVERY_SET = '*';
+
+/**
+ * The set to show: the chosen one where it is here, else the newest with scores.
+ *
+ * @param {GroupPredictionsJson} found @param {string} chosen
+ * @returns {string} "" for all
+ */
+export function setToShow(found, chosen) {
+	if (chosen === EVERY_SET) return '';
+	const names = setNames(found);
+	if (names.includes(chosen)) return chosen;
+	return found.items.find(({ scored }) => scored)?.name ?? names[0] ?? '';
 }
 
 /**

@@ -13,7 +13,7 @@ import { page } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 import { document, group, submit } from './group.js';
 import { announce, complain } from './notice.js';
-import { acceptEdit, acceptEdits, marksOf, setNames, surest } from './prediction_marks.js';
+import { acceptEdit, acceptEdits, marksOf, setNames, setToShow, surest } from './prediction_marks.js';
 import { wasRefused } from './sending.js';
 import { boxes, focused, overlaysHidden, selected } from './workspace.js';
 
@@ -30,7 +30,7 @@ const PAUSE = 120;
 const FRESH = 30_000;
 const MOST_KEPT = 48;
 
-/** Name of the set that is shown; "": every set. */
+/** Name of the set that is shown, or `EVERY_SET`; "": the newest. */
 export const shownSet = stored('prediction-set', '');
 /** Less sure predictions are dotted, and taken only when somebody points at them. */
 export const leastScore = stored('prediction-score', 0.25);
@@ -60,7 +60,7 @@ export const predicted = computed(() => {
 	if (!found || !present || answered.value?.group !== present.id) return null;
 	const sets = setNames(found);
 	if (sets.length === 0 && found.accepted.length === 0) return null;
-	const set = sets.includes(shownSet.value) ? shownSet.value : '';
+	const set = setToShow(found, shownSet.value);
 	return { group: present.id, sets, set, views: marksOf(found, present, { set, least: leastScore.value }) };
 });
 

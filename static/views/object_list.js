@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useLayoutEffect, useRef } from 'preact/hooks';
 
 import { ballOf } from '../geometry/preview.js';
-import { fixed, pixels } from '../lib/format.js';
+import { fixed, pixels, scoreText } from '../lib/format.js';
 import { objectsOf, sameObject } from '../state/selection.js';
 import { boxes, editing, selected } from '../state/workspace.js';
 
@@ -24,7 +24,7 @@ function wordsFor(picture, object) {
 	}
 	if (object.kind === 'prediction') {
 		const mark = picture.predictions?.marks.find(({ id }) => id === object.prediction);
-		return { name: `Predicted by ${mark?.name}`, point: mark?.sure ? '' : 'less sure', number: mark?.score.toFixed(2) ?? '', title: 'Y accepts it' };
+		return { name: `Predicted by ${mark?.name}`, point: mark?.sure ? '' : 'less sure', number: mark ? scoreText(mark) : '', title: 'Y accepts it' };
 	}
 	const found = picture.markings.find(({ marking }) => marking === object.marking);
 	const distance = found?.points[object.index]?.distance ?? null;

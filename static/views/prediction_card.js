@@ -3,8 +3,8 @@
 
 import { html } from 'htm/preact';
 
-import { pixels, plural } from '../lib/format.js';
-import { acceptEdits, distanceTo, surest } from '../state/prediction_marks.js';
+import { pixels, plural, scoreText } from '../lib/format.js';
+import { acceptEdits, distanceTo, EVERY_SET, surest } from '../state/prediction_marks.js';
 import { acceptAll, acceptMark, leastScore, predicted, shownSet } from '../state/predictions.js';
 import { focusView, selected } from '../state/workspace.js';
 import { Letter } from './letter.js';
@@ -25,8 +25,8 @@ function Choice({ predicted: { sets, set } }) {
 	return html`
 		<div class="predictions__choice">
 			${sets.length < 2 ? html`<span class="predictions__set" title=${sets[0]}>${sets[0] ?? 'No set any more'}</span>` : html`
-				<select class="field" aria-label="Set of predictions" value=${set} onChange=${(/** @type {Event} */ event) => { shownSet.value = valueOf(event); }}>
-					<option value="">All ${sets.length} sets</option>
+				<select class="field" aria-label="Set of predictions" value=${set || EVERY_SET} onChange=${(/** @type {Event} */ event) => { shownSet.value = valueOf(event); }}>
+					<option value=${EVERY_SET}>All ${sets.length} sets</option>
 					${sets.map((name) => html`<option key=${name} value=${name}>${name}</option>`)}
 				</select>`}
 			<label class="predictions__least" title="Less sure predictions are dotted and taken only one by one">
@@ -46,8 +46,8 @@ function Offered({ view, mark, sets }) {
 	const there = view.balls.length > 0;
 	const what = away === null ? '' : ` · ${pixels(away)} px off`;
 	return html`
-		<span class="predictions__what" title=${`${mark.name}, score ${mark.score.toFixed(2)}`}>
-			${sets > 1 ? `${mark.name} ` : ''}${mark.score.toFixed(2)}${what}
+		<span class="predictions__what" title=${`${mark.name}, ${mark.scored ? 'score ' : ''}${scoreText(mark)}`}>
+			${sets > 1 ? `${mark.name} ` : ''}${scoreText(mark)}${what}
 		</span>
 		<button
 			class="button button--small" type="button"

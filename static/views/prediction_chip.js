@@ -3,6 +3,7 @@
 
 import { html } from 'htm/preact';
 
+import { scoreText } from '../lib/format.js';
 import { acceptMark } from '../state/predictions.js';
 import { selected } from '../state/workspace.js';
 
@@ -20,7 +21,7 @@ export function PredictionChip({ picture: { view, predictions } }) {
 	const there = view.balls.length > 0;
 	return html`
 		<p class="drawing-chip prediction-chip">
-			<span><strong>${mark.name}</strong> predicts a ball, score ${mark.score.toFixed(2)}</span>
+			<span><strong>${mark.name}</strong> predicts a ball, ${mark.scored ? `score ${scoreText(mark)}` : scoreText(mark)}</span>
 			<button class="drawing-chip__end" type="button" onClick=${() => acceptMark(view, mark, there)}>
 				${there ? 'Replace the ball' : html`Accept <kbd>Y</kbd>`}
 			</button>

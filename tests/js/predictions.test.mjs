@@ -4,7 +4,7 @@ import { describe, it } from 'node:test';
 import { markAt, placeMarks } from '../../static/overlays/prediction_places.js';
 import { conflictOf } from '../../static/state/conflict.js';
 import { applyEdit, describe as inWords, requestOf } from '../../static/state/edits.js';
-import { acceptEdit, acceptEdits, distanceTo, marksOf, setNames, surest } from '../../static/state/prediction_marks.js';
+import { acceptEdit, acceptEdits, distanceTo, marksOf, EVERY_SET, setNames, setToShow, surest } from '../../static/state/prediction_marks.js';
 import { objectsOf, sameObject } from '../../static/state/selection.js';
 import { hitTest } from '../../static/tools/hit.js';
 
@@ -16,7 +16,7 @@ const views = [
 	] },
 ];
 const group = { id: 5, etag: '"e"', views, verdict: {} };
-const box = (id, view, name, score, x = 100) => ({ id, view, name, predictions: name === 'new' ? 2 : 1, score, box: [x, 100, 14, 14] });
+const box = (id, view, name, score, x = 100) => ({ id, view, name, predictions: name === 'new' ? 2 : 1, score, scored: true, box: [x, 100, 14, 14] });
 const found = {
 	sets: 2, accepted: [],
 	items: [box(1, 11, 'new', 0.9), box(2, 11, 'new', 0.4, 300), box(3, 11, 'old', 0.95, 110), box(4, 12, 'new', 0.7, 198)],
@@ -29,6 +29,12 @@ describe('marksOf', () => {
 		assert.deepEqual(marks.map(({ id, sure }) => [id, sure]), [[1, true], [2, false], [3, true]]);
 		const strict = marksOf(found, group, { set: '', least: 0.92 }).get('7.png').marks;
 		assert.deepEqual(strict.filter(({ sure }) => sure).map(({ id }) => id), [3]);
+	});
+
+	it('calls nothing sure that came without scores', () => {
+		const careful = { ...found, items: [{ ...box(9, 11, 'careful', 1), scored: false }] };
+		const { marks } = marksOf(careful, group, all).get('7.png');
+		assert.deepEqual([marks.map(({ sure }) => sure), surest(marks)], [[false], null]);
 	});
 
 	it('shows one set when that is asked for', () => {
@@ -53,6 +59,15 @@ describe('marksOf', () => {
 
 	it('says nothing of a ball that a person drew', () => {
 		assert.equal(marksOf(found, group, all).get('7_1.png').origin, null);
+	});
+});
+
+describe('setToShow', () => {
+	const careful = { ...found, items: [{ ...box(9, 11, 'careful', 1), scored: false }, ...found.items] };
+
+	it('is the newest that has scores until one is chosen', () => {
+		assert.deepEqual([setToShow(found, ''), setToShow(careful, ''), setToShow(careful, 'gone')], ['new', 'new', 'new']);
+		assert.deepEqual([setToShow(careful, 'careful'), setToShow(careful, EVERY_SET)], ['careful', '']);
 	});
 });
 
@@ -107,7 +122,7 @@ describe('placeMarks', () => {
 	});
 
 	it('keeps tags within the image, and long names short', () => {
-		const edge = [{ id: 1, name: 'a detector with a very long name', score: 0.5, box: [1270, 700, 8, 8], sure: true }];
+		const edge = [{ id: 1, name: 'a detector with a very long name', score: 0.5, scored: true, box: [1270, 700, 8, 8], sure: true }];
 		const [{ tag, text }] = placeMarks(edge, viewport, 1280);
 		assert.ok(tag.left + tag.width <= 2 * 1280);
 		assert.equal(text, 'a detector with a… 0.50');

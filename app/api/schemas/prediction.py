@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, model_validator
 
-from app.api.schemas.annotation import BoxNumbers
 from app.review.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
 from app.review.predictions_of_group import GroupPredictions
 from app.soccer.frames import ImageSize
@@ -18,6 +17,8 @@ Side = Annotated[int, Field(strict=True, ge=2, le=16_384)]
 Size = tuple[Side, Side]
 ViewId = Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
 MAX_VIEWS = 200
+StoredBox = tuple[float, float, float, float]
+"""As it was predicted: x, y of the top-left corner, width, height; whatever the file said."""
 
 
 class PredictionRequest(BaseModel):
@@ -124,8 +125,9 @@ class ViewPrediction(BaseModel):
     id: int
     predictions: int = Field(description="Id of its set.")
     name: str = Field(description="Name of its set.")
-    box: BoxNumbers
+    box: StoredBox
     score: float
+    scored: bool = Field(description="False: its set came without scores, each counts as 1.")
 
     @staticmethod
     def of(found: PredictionSet, box: PredictedBox) -> ViewPrediction:
@@ -136,6 +138,7 @@ class ViewPrediction(BaseModel):
             name=found.name,
             box=(box.x, box.y, box.width, box.height),
             score=box.score,
+            scored=not found.report.get("without_score"),
         )
 
 
@@ -238,7 +241,7 @@ class AcceptedView(BaseModel):
     key: str
     group: int
     group_key: str
-    box: BoxNumbers
+    box: StoredBox
     score: float
 
 
@@ -246,7 +249,7 @@ class AcceptOutcome(BaseModel):
     """What accepting does, or did.
 
     `refused` counts views by reason: `below_score`, `annotated`, `the_same`,
-    `changed_meanwhile`.
+    `not_a_ball` (the prediction cannot be one in this image), `changed_meanwhile`.
     """
 
     dry_run: bool
