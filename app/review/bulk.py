@@ -51,19 +51,29 @@ class Refusal:
 
 
 @dataclass(frozen=True)
+class SampleGroup:
+    """A group that would change, with the number and label that the queue shows."""
+
+    id: int
+    key: str
+    number: int
+    label: str
+
+
+@dataclass(frozen=True)
 class BulkPlan:
     """What a bulk verdict would do.
 
     Attributes:
         matches: Groups that the query finds.
         would_change: Those that would get the verdict.
-        sample: Id and key of the first of them.
+        sample: The first of them.
     """
 
     matches: int
     would_change: int
     refused: tuple[Refusal, ...]
-    sample: tuple[tuple[int, str], ...]
+    sample: tuple[SampleGroup, ...]
 
 
 @dataclass(frozen=True)
@@ -109,7 +119,10 @@ def plan_verdicts(
     with store.read() as session:
         rows = _rows(session, _where(dataset_id, query))
     sorted_out = _sorted_out(rows, verdict)
-    sample = [(row.group_id, row.key) for row in sorted_out.change[:SAMPLE]]
+    sample = [
+        SampleGroup(row.group_id, row.key, row.number, row.label)
+        for row in sorted_out.change[:SAMPLE]
+    ]
     return BulkPlan(len(rows), len(sorted_out.change), sorted_out.refused, tuple(sample))
 
 
@@ -194,7 +207,18 @@ def _where(dataset_id: int, query: str) -> list[ColumnElement[bool]]:
 
 
 def _rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[Any]:
-    names = ("group_id", "key", "status", "stale", "reason", "solved", "passes", "gate")
+    names = (
+        "group_id",
+        "key",
+        "number",
+        "label",
+        "status",
+        "stale",
+        "reason",
+        "solved",
+        "passes",
+        "gate",
+    )
     columns = [getattr(QueueModel, name) for name in names]
     statement = select(*columns).where(*where).order_by(QueueModel.number)
     return list(session.execute(statement).all())

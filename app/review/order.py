@@ -8,7 +8,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, Label, and_, case, func, literal, or_
+from sqlalchemy import ColumnElement, Label, and_, case, func, or_
 
 from app.errors import InputError
 from app.review.query import SORTS, TEXT_SORTS, Query
@@ -28,9 +28,6 @@ class Order:
         self.name = query.sort + ("-desc" if query.descending else "")
         column = SORTS[query.sort]
         keys: list[tuple[Any, bool]] = []
-        if query.sort == "value":
-            unreviewed = QueueModel.status == literal("unreviewed", literal_execute=True)
-            keys.append((case((unreviewed, 0), else_=1), False))
         if query.sort not in ("number", "newest"):
             keys.append((case((column.is_(None), 1), else_=0), False))
             absent = "" if query.sort in TEXT_SORTS else 0.0

@@ -13,7 +13,7 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {number} matches
  * @property {number} would_change
  * @property {RefusedJson[]} refused
- * @property {{id: number, key: string}[]} sample
+ * @property {{id: number, key: string, number: number, label: string}[]} sample
  */
 
 /** @typedef {{batch: number | null, changed: number, refused: RefusedJson[]}} BulkResult */

@@ -42,6 +42,18 @@ async function enterFirst() {
 	navigate(first === null ? '/groups' : reviewAddress(first), { replace: true });
 }
 
+/** A verdict may take the group on screen out of its queue, and undo brings it back. */
+function followVerdict() {
+	let said = { id: 0, state: '' };
+	effect(() => {
+		const at = document.value;
+		const now = { id: at?.id ?? 0, state: at?.verdict.state ?? '' };
+		const turned = now.id === said.id && now.state !== said.state;
+		said = now;
+		if (turned && currentId() === now.id) locate(now.id).catch(() => {});
+	});
+}
+
 /**
  * Follow the address bar.
  *
@@ -59,4 +71,5 @@ export function startArrivals() {
 			else enter(at.group);
 		});
 	});
+	followVerdict();
 }

@@ -39,8 +39,8 @@ function Outcome({ preview, q }) {
 				</ul>` : null}
 			${preview.sample.length ? html`
 				<p class="note">For example</p>
-				<ul class="bulk__sample">${preview.sample.slice(0, 5).map(({ id, key }) => html`
-					<li key=${id}><a href=${reviewAddress(id, q)} target="_blank" title=${key}>${key.split('/').slice(-2).join('/')}</a></li>`)}
+				<ul class="bulk__sample">${preview.sample.slice(0, 5).map(({ id, key, number, label }) => html`
+					<li key=${id}><a href=${reviewAddress(id, q)} target="_blank" title=${key}>${number} · ${label}</a></li>`)}
 				</ul>` : null}
 		</div>
 	`;

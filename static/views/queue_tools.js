@@ -7,7 +7,7 @@ import { useState } from 'preact/hooks';
 import { count } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
 import { valueOf, withField, wordsOf } from '../state/query.js';
-import { undo, undoable } from '../state/history.js';
+import { redo, undo, undoable } from '../state/history.js';
 import { queue, statusCounts } from '../state/queue.js';
 import { clearTicks, countOf, queryOf, ticks } from '../state/queue_ticks.js';
 import { BulkDialog } from './bulk_dialog.js';
@@ -101,6 +101,7 @@ export function QueueTools({ dataset, q, onQuery }) {
 	const [bindings] = useState(() => [
 		{ keys: ['b'], label: 'Decide what is ticked, or all that match', group: 'Queue', run: () => keys.run() },
 		{ keys: ['Ctrl+z'], label: 'Take back the last verdict', group: 'Queue', run: undo },
+		{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Give it again', group: 'Queue', run: redo },
 	]);
 	useKeys(bindings);
 	return html`

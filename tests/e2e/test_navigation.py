@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from urllib.parse import quote
 
@@ -146,6 +147,28 @@ class TestTakingVerdictsBack:
         stands(page, queue, 6)
         screen.saved()
         assert [state_of(page, group) for group in queue[6:8]] == ["unreviewed"] * 2
+        screen.press("Control+Shift+z")
+        screen.saved()
+        assert [state_of(page, group) for group in queue[6:8]] == ["deferred", "unreviewed"]
+        screen.press("Control+z")
+        screen.saved()
+        assert state_of(page, queue[6]) == "unreviewed"
+
+    def test_a_judged_group_keeps_its_place_among_those_worth_a_review(self, page: Page) -> None:
+        order = "sort:value status:unreviewed"
+        queue = ids(page, order)
+        screen = at(page, queue[3], order)
+        screen.press("s")
+        expect(page).to_have_url(re.compile(rf"/review/{queue[4]}\b"))
+        screen.saved()
+        page.goto(f"/review/{queue[3]}?q={quote(order)}")
+        screen.ready()
+        screen.press("f")
+        expect(page).to_have_url(re.compile(rf"/review/{queue[4]}\b"))
+        screen.press("Control+z")
+        stands(page, queue, 3)
+        screen.saved()
+        assert state_of(page, queue[3]) == "unreviewed"
 
     def test_leaves_alone_what_somebody_has_judged_since(self, page: Page) -> None:
         queue = ids(page, QUERY)

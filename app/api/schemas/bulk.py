@@ -55,11 +55,13 @@ class RefusalDocument(BaseModel):
         return RefusalDocument(**vars(refusal))
 
 
-class SampleGroup(BaseModel):
-    """One of the groups that would change."""
+class SampleDocument(BaseModel):
+    """One of the groups that would change, with the number and label that the queue shows."""
 
     id: int
     key: str
+    number: int
+    label: str
 
 
 class BulkResult(BaseModel):
@@ -68,7 +70,7 @@ class BulkResult(BaseModel):
     dry_run: bool
     matches: int | None = Field(description="Groups that the query finds; dry run only.")
     would_change: int | None = Field(description="Dry run only, like `sample`.")
-    sample: list[SampleGroup] | None
+    sample: list[SampleDocument] | None
     batch: int | None = Field(
         description="What `POST /verdict-batches/{batch}/undo` takes back; null when nothing "
         "changed."
@@ -83,7 +85,7 @@ class BulkResult(BaseModel):
             dry_run=True,
             matches=plan.matches,
             would_change=plan.would_change,
-            sample=[SampleGroup(id=number, key=key) for number, key in plan.sample],
+            sample=[SampleDocument(**vars(group)) for group in plan.sample],
             batch=None,
             changed=0,
             refused=[RefusalDocument.of(item) for item in plan.refused],

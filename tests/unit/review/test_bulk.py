@@ -53,7 +53,7 @@ class TestPlanVerdicts:
         plan = plan_verdicts(store, 1, "", "accepted")
         assert (plan.matches, plan.would_change) == (4, 2)
         assert [(item.reason, item.groups) for item in plan.refused] == [("needs_note", 1)]
-        assert [number for number, _ in plan.sample] == [ids[1], ids[3]]
+        assert [group.id for group in plan.sample] == [ids[1], ids[3]]
         assert statuses(store) == ["accepted", *["unreviewed"] * 3]
 
     def test_with_a_note_nothing_is_refused_but_what_nobody_knows(
