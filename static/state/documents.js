@@ -36,11 +36,23 @@ export function forgetOthers(id) {
 	for (const other of [...documents.keys()]) if (other !== id) documents.delete(other);
 }
 
+/** Answers to writes, by group: what was asked before one knows less than it. @type {Map<number, number>} */
+const answers = new Map();
+
+/** Remember what the server answered to a write. @param {GroupDocument} document */
+export function rememberAnswer(document) {
+	answers.set(document.id, (answers.get(document.id) ?? 0) + 1);
+	remember(document);
+}
+
 /** @param {number} id @returns {Promise<GroupDocument>} */
 export function load(id) {
 	const present = loading.get(id);
 	if (present) return present;
+	const before = answers.get(id);
 	const request = getGroup(id).then((document) => {
+		const newer = answers.get(id) === before ? undefined : known(id);
+		if (newer) return newer;
 		remember(document);
 		return document;
 	}).finally(() => loading.delete(id));

@@ -12,7 +12,7 @@ import * as client from '../api/client.js';
 import { ApiError } from '../api/problem.js';
 import { previewBall } from '../geometry/preview.js';
 import { latest } from '../lib/latest.js';
-import { known, load, remember } from './documents.js';
+import { known, load, rememberAnswer } from './documents.js';
 import { applyEdit, describe, previewBody, requestOf, sameTarget, stationOf, viewOf } from './edits.js';
 import { did } from './last_action.js';
 import { announce, complain } from './notice.js';
@@ -243,7 +243,7 @@ function isGroup(body) {
 
 /** Go on from a newer state of a group. @param {GroupDocument} newer */
 export function takeOver(newer) {
-	remember(newer);
+	rememberAnswer(newer);
 	if (document.value?.id === newer.id) document.value = newer;
 }
 

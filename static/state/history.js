@@ -5,12 +5,12 @@ import { computed } from '@preact/signals';
 
 import { navigate, page } from '../lib/router.js';
 import { document, lastStation, open, pending, submitTurn } from './group.js';
-import { actions, did, forget, forgetEdit, nextBack } from './last_action.js';
+import { actions, didAgain, forget, forgetEdit, nextBack, tookBack, undone } from './last_action.js';
 import { reviewAddress } from './navigation.js';
 import { announce, complain } from './notice.js';
 import { discard, outbox } from './outbox.js';
 import { isAway, wake } from './sending.js';
-import { takeVerdictBack } from './verdicts.js';
+import { giveVerdictAgain, takeVerdictBack } from './verdicts.js';
 
 /** @import {EditDone} from './last_action.js' */
 
@@ -33,7 +33,8 @@ export const undoable = computed(() => {
 	if (action.kind === 'edit') return `Go back to group ${action.number} and undo its last edit`;
 	return `Take back the verdict on group ${action.number}`;
 });
-export const canRedo = computed(() => Boolean(document.value?.can_redo) || ownStation.value !== null);
+const canRedoHere = computed(() => Boolean(document.value?.can_redo) || ownStation.value !== null);
+export const canRedo = computed(() => undone.value.length > 0 || canRedoHere.value);
 
 /** One after the other: the next one speaks about the group to which the last one led. */
 let turn = Promise.resolve();
@@ -57,9 +58,14 @@ async function undoOne() {
 }
 
 function undoHere() {
-	if (document.value) forgetEdit(document.value.id);
+	const at = document.value;
+	if (!at) return;
+	forgetEdit(at.id);
 	if (isAway.value) undoUnsent();
-	else submitTurn('undo');
+	else {
+		tookBack({ kind: 'edit', group: at.id, number: at.number, times: 1 });
+		submitTurn('undo');
+	}
 }
 
 /** Return to a group and undo its last edit. @param {EditDone} action */
@@ -71,14 +77,27 @@ async function undoThere(action) {
 	else forget(action);
 }
 
-/** Make the undone edit again. */
+/** Do again what was taken back last, wherever that was, else the last undone edit of this group. */
 export function redo() {
-	if (!canRedo.value) announce('Nothing to redo.');
+	turn = turn.then(redoOne, redoOne);
+}
+
+async function redoOne() {
+	const action = undone.value.at(-1);
+	if (action?.kind === 'verdict') await giveVerdictAgain(action);
 	else if (isAway.value) complain('Redo needs the server, which cannot be reached.');
-	else {
-		if (document.value) did({ kind: 'edit', group: document.value.id, number: document.value.number, times: 1 });
-		submitTurn('redo');
-	}
+	else if (action) await redoThere(action);
+	else if (canRedoHere.value) submitTurn('redo');
+	else announce('Nothing to redo.');
+}
+
+/** Return to a group and make its undone edit again. @param {EditDone} action */
+async function redoThere(action) {
+	if (onScreen.value !== action.group) navigate(reviewAddress(action.group));
+	if (document.value?.id !== action.group) await open(action.group);
+	if (document.value?.id !== action.group) return;
+	didAgain();
+	submitTurn('redo');
 }
 
 /** While the server is away only what it never saw can be taken back. */

@@ -22,8 +22,25 @@ export function withAction(before, action) {
 	return [...before.slice(1 - KEPT), action];
 }
 
-/** Remember what was done. @param {Action} action */
+/** What was taken back and can be done again, the last one last. */
+export const undone = stored('undone', /** @type {(EditDone | VerdictDone)[]} */ ([]), 'sessionStorage');
+
+/** Remember what was done; what was taken back before stays so. @param {Action} action */
 export function did(action) {
+	actions.value = withAction(actions.value, action);
+	undone.value = [];
+}
+
+/** It was taken back. @param {EditDone | VerdictDone} action */
+export function tookBack(action) {
+	undone.value = [...undone.value.slice(1 - KEPT), action];
+}
+
+/** What was taken back last is done again. */
+export function didAgain() {
+	const action = undone.value.at(-1);
+	if (!action) return;
+	undone.value = undone.value.slice(0, -1);
 	actions.value = withAction(actions.value, action);
 }
 

@@ -6,7 +6,7 @@ import { signal } from '@preact/signals';
 import { navigate } from '../lib/router.js';
 import { conflict } from './conflict.js';
 import { document, group, onRefused, open, settle, submitVerdict } from './group.js';
-import { actions, did, forget } from './last_action.js';
+import { actions, did, didAgain, forget, tookBack } from './last_action.js';
 import { currentId, goNext, query, queueAddress, reviewAddress } from './navigation.js';
 import { announce, complain, inform } from './notice.js';
 import { asking } from './workspace.js';
@@ -124,7 +124,18 @@ export async function takeVerdictBack(action) {
 		return;
 	}
 	submitVerdict(action.before);
+	tookBack(action);
 	announce(`The verdict on group ${action.number} was taken back.`);
+}
+
+/** Give a verdict again that was taken back, on its group. @param {VerdictDone} action */
+export async function giveVerdictAgain(action) {
+	navigate(reviewAddress(action.group));
+	if (document.value?.id !== action.group) await open(action.group);
+	if (document.value?.id !== action.group) return;
+	didAgain();
+	submitVerdict(action.given);
+	announce(`Group ${action.number} ${action.given.state} again.`);
 }
 
 // A verdict that was refused brings its group back to the screen; the notice says why.

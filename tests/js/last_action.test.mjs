@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { beforeEach, describe, it } from 'node:test';
 
-import { actions, did, forget, forgetEdit, nextBack, withAction } from '../../static/state/last_action.js';
+import { actions, did, didAgain, forget, forgetEdit, nextBack, tookBack, undone, withAction } from '../../static/state/last_action.js';
 
 const edit = (group) => ({ kind: 'edit', group, number: group, times: 1 });
 const verdict = (group) => ({ kind: 'verdict', group, number: group, given: {}, before: {} });
@@ -52,5 +52,19 @@ describe('actions', () => {
 		assert.deepEqual(actions.value, [verdict(2)]);
 		forget(actions.value[0]);
 		assert.deepEqual(actions.value, []);
+	});
+});
+
+describe('what was taken back', () => {
+	it('is done again in turn, until something else is done', () => {
+		actions.value = [];
+		tookBack(edit(1));
+		tookBack(verdict(2));
+		didAgain();
+		assert.deepEqual([actions.value, undone.value], [[verdict(2)], [edit(1)]]);
+		did(verdict(3));
+		assert.deepEqual(undone.value, []);
+		didAgain();
+		assert.deepEqual(actions.value, [verdict(2), verdict(3)]);
 	});
 });
