@@ -11,14 +11,14 @@ import { fitBall, seenBalls } from './preview.js';
  * Gates, pairs and exports stay with the paper's estimator: only what is looked at changes.
  *
  * @param {GroupDocument} group @param {SolutionJson} solution
- * @returns {SolutionJson} the solution itself when it has no such point
+ * @returns {SolutionJson} the solution itself when it has no such point, or no valid pair
  */
 export function withBestBall(group, solution) {
 	const best = solution.best_ball;
-	if (!best) return solution;
+	if (!best || !solution.ball) return solution;
 	const seen = seenBalls(group, solution);
 	/** @type {Ball3DJson} */
-	const ball = { ...best, parallax_degrees: solution.ball?.parallax_degrees ?? NaN };
+	const ball = { ...best, parallax_degrees: solution.ball.parallax_degrees };
 	return {
 		...solution,
 		ball,

@@ -85,15 +85,20 @@ function drawChosenBox(context, viewport, box) {
 	}
 }
 
+/** How far up the line its letter stands, CSS pixels: at the end on the grass it would cover low balls. */
+const LETTER_AWAY = 46;
+
 /** The rays of the other views' balls, from the grass to 30 m above it. */
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
 export function drawEpipolars(context, { picture, viewport }) {
 	for (const { letter, points } of picture.epipolars) {
 		strokeLine(context, viewport, points, { colour: viewColour(letter), width: 1.75, dash: [2, 4] });
-		const last = points.at(-1);
-		if (last) {
-			const { x, y } = toScreen(viewport, last);
-			label(context, letter, { x: x + 6, y }, viewColour(letter));
-		}
+		const [above, last] = points.slice(-2).map((point) => toScreen(viewport, point));
+		if (!last) continue;
+		const length = Math.hypot(above.x - last.x, above.y - last.y) || 1;
+		const share = LETTER_AWAY / length;
+		label(context, letter, {
+			x: last.x + (above.x - last.x) * share + 6, y: last.y + (above.y - last.y) * share,
+		}, viewColour(letter));
 	}
 }

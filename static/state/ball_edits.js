@@ -4,7 +4,7 @@
 import { boxDiameter, squareBox } from '../geometry/ball.js';
 import { ballOf, diagonal } from '../geometry/preview.js';
 
-/** @import {GroupDocument, PointJson, SolutionJson, ViewJson} from '../api/types.js' */
+/** @import {BallJson, GroupDocument, PointJson, SolutionJson, ViewJson} from '../api/types.js' */
 /** @import {BallEdit} from './edits.js' */
 
 /** Where nothing says how large a ball looks: this share of the diagonal. */
@@ -50,9 +50,18 @@ export function isOutOfView(view) {
 	return view.balls.some((ball) => ball.out_of_view);
 }
 
-/** Say that the ball is not in the picture, or take that back. @param {ViewJson} view @returns {BallEdit} */
+/** Balls that were said to be out of view in this window, by view. @type {Map<number, BallJson>} */
+const gone = new Map();
+
+/**
+ * Say that the ball is not in the picture, or take that back: the ball that was there returns.
+ *
+ * @param {ViewJson} view @returns {BallEdit}
+ */
 export function toggleOutOfView(view) {
-	const ball = isOutOfView(view) ? null
-		: { box: null, point: null, occluded: false, out_of_view: true };
-	return { kind: 'ball', view: view.key, ball };
+	if (isOutOfView(view)) return { kind: 'ball', view: view.key, ball: gone.get(view.id) ?? null };
+	const present = ballOf(view);
+	if (present) gone.set(view.id, present);
+	else gone.delete(view.id);
+	return { kind: 'ball', view: view.key, ball: { box: null, point: null, occluded: false, out_of_view: true } };
 }

@@ -100,13 +100,17 @@ export function sameTarget(a, b) {
 		|| Object.keys(a.lines).every((marking) => marking in b.lines);
 }
 
+/** As many markings are named; more nobody listens to. */
+const FEW = 3;
+
 /** What an edit did, in words. @param {GroupDocument} group @param {Edit} edit */
 export function describe(group, edit) {
 	const { letter } = viewOf(group, edit.view);
 	if (edit.kind === 'include') return edit.included ? `View ${letter} included` : `View ${letter} left out`;
 	if (edit.kind === 'ball' && edit.prediction) return `Ball of ${letter} accepted from ${edit.ball?.predicted_by}`;
 	if (edit.kind === 'ball') return `Ball of ${letter} changed`;
-	return `${Object.keys(edit.lines).join(', ')} of ${letter} changed`;
+	const markings = Object.keys(edit.lines);
+	return `${markings.length > FEW ? `${markings.length} markings` : markings.join(', ')} of ${letter} changed`;
 }
 
 /**

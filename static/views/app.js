@@ -21,6 +21,8 @@ const FETCH_AHEAD_AFTER = 1500;
 const GLOBAL_KEYS = [
 	{ keys: ['?', 'Shift+?'], label: 'This page', group: 'Everywhere', shown: '?', run: openHelp },
 	{ keys: ['Ctrl+k'], label: 'Go to a page, dataset, group or action', group: 'Everywhere', typing: true, run: openPalette },
+	// Pages with a search field of their own bind it to that.
+	{ keys: ['/'], label: 'Search', group: 'Everywhere', run: openPalette },
 ];
 
 const Help = lazy(async () => (await import('./help.js')).Help);

@@ -23,6 +23,7 @@ function unbroken(sentence) {
 /** @param {GateJson} gate */
 function stateOf(gate) {
 	if (!gate.active) return { state: 'off', glyph: '·', word: 'not asked' };
+	if (gate.value === null) return { state: 'off', glyph: '·', word: 'not judged' };
 	if (gate.passed) return { state: 'passed', glyph: '✓', word: 'passed' };
 	return { state: 'failed', glyph: '✗', word: 'failed' };
 }

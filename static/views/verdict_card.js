@@ -3,11 +3,12 @@
 
 import { html } from 'htm/preact';
 
+import { ballOf } from '../geometry/preview.js';
 import { capital, words } from '../lib/format.js';
 import { REASONS } from '../state/verdicts.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
 
-/** @import {GroupDocument, SolutionJson, VerdictJson} from '../api/types.js' */
+/** @import {GroupDocument, SolutionJson, VerdictJson, ViewJson} from '../api/types.js' */
 
 /** Findings that say why a view does not meet the others. */
 const ODD = new Set(['view_disagrees', 'sides_swapped', 'not_synchronous']);
@@ -46,7 +47,12 @@ function headline(group, solution) {
 /** @param {GroupDocument} group @param {SolutionJson} solution */
 function missing(group, solution) {
 	const out = group.views.filter((view) => !solution.ball?.views.includes(view.key));
-	return `Left out: ${out.map((view) => view.letter).join(', ')}.`;
+	const blind = out.filter((view) => view.included && !ballOf(view));
+	const others = out.filter((view) => !blind.includes(view));
+	const letters = (/** @type {ViewJson[]} */ views) => views.map(({ letter }) => letter).join(', ');
+	return [
+		blind.length ? `No ball in ${letters(blind)}.` : '', others.length ? `Not used: ${letters(others)}.` : '',
+	].filter(Boolean).join(' ');
 }
 
 /** @param {SolutionJson} solution */

@@ -43,6 +43,8 @@ describe('toggles', () => {
 		assert.deepEqual(out, { box: null, point: null, occluded: false, out_of_view: true });
 		const gone = { ...seen, balls: [out] };
 		assert.ok(isOutOfView(gone));
-		assert.equal(toggleOutOfView(gone).ball, null);
+		assert.deepEqual(toggleOutOfView(gone).ball, ball);
+		toggleOutOfView(empty);
+		assert.equal(toggleOutOfView({ ...empty, balls: [out] }).ball, null);
 	});
 });
