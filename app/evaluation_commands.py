@@ -76,7 +76,19 @@ def evaluate(
     ] = None,
     careful: Annotated[
         str | None,
-        typer.Option(help="Careful boxes, which the dataset's are measured with: as PREDICTIONS."),
+        typer.Option(
+            help="Careful boxes, one a frame, which the dataset's are measured with: a file, "
+            "folder or zip, or the name of a set. Only the --careful options apply to them."
+        ),
+    ] = None,
+    careful_format: Annotated[
+        PredictionFormat, typer.Option(help="As --format, of the careful boxes.")
+    ] = PredictionFormat.AUTO,
+    careful_size: Annotated[
+        str | None, typer.Option(metavar="WxH", help="As --size, of the careful boxes.")
+    ] = None,
+    careful_category: Annotated[
+        int | None, typer.Option(min=0, help="As --category, of the careful boxes.")
     ] = None,
     version: Annotated[
         str | None, typer.Option(help="Name, id or hash of a version; default: as it is now.")
@@ -110,18 +122,20 @@ def evaluate(
         raise typer.BadParameter("name predictions, --cameras or --careful")
     made_for = None if cameras_size is None else parse_size(cameras_size)
     pixels = None if size is None else parse_size(size)
+    drawn_on = None if careful_size is None else parse_size(careful_size)
     from app.review.evaluations import EvaluationRequest, run_evaluation
     from app.review.versions import find_version
 
     with _store() as store, show_progress("Evaluating") as progress:
         chosen = None if version is None else find_version(store, dataset, version).id
-        shared: dict[str, Any] = {"category": category, "size": pixels, "images": images}
         found = drawn = None
         if predictions is not None or cameras is not None:
-            own = {**shared, "cameras": cameras, "cameras_size": made_for}
+            own = {"category": category, "size": pixels, "images": images,
+                   "cameras": cameras, "cameras_size": made_for}  # fmt: skip
             found = _set(store, dataset, predictions, format_.value, own)
         if careful is not None:
-            drawn = _set(store, dataset, careful, format_.value, shared)
+            other = {"category": careful_category, "size": drawn_on}
+            drawn = _set(store, dataset, careful, careful_format.value, other)
         request = EvaluationRequest(
             name=name,
             predictions=None if found is None else found.id,

@@ -79,6 +79,7 @@ def error_figure(frames: Sequence[FrameResult], bins: Bins) -> Figure:
         low=tuple(quarters[:, 0].tolist()),
         high=tuple(quarters[:, 2].tolist()),
         count=tuple(len(inside[place]) for place in places),
+        frames=tuple(Frames(bins.field, *bins.bounds(place)) for place in places),
     )
     panel = Panel(
         bins.title,
@@ -140,4 +141,6 @@ def _points(frames: Sequence[FrameResult], field: str) -> Series:
     step = max(math.ceil(len(pairs) / MAX_NAMED), 1)
     series = Series("frames", "Frames", (), (), "points")
     x, y = zip(*pairs[::step], strict=True) if pairs else ((), ())
-    return replace(series, x=tuple(x), y=tuple(y))
+    # No number lies between a value and the next one: a point opens its own frame.
+    only = tuple(Frames(field, value, math.nextafter(value, math.inf)) for value in x)
+    return replace(series, x=tuple(x), y=tuple(y), frames=only)

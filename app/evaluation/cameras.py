@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
 from app.evaluation.bootstrap import Resamples
 from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.frame import Frame
-from app.evaluation.table import Cell, Column, Row, Table
+from app.evaluation.table import Cell, Column, Frames, Row, Table
 from app.geometry.camera import Camera
 from app.solving.score import GAMMAS_PERCENT, SHARE_ABOVE, FrameScore, score, score_frame
 
@@ -50,24 +51,43 @@ def score_cameras(
 
 
 def cameras_table(
-    rows: Sequence[tuple[str, str, Scores]], frames: Sequence[Frame], resamples: Resamples
+    rows: Sequence[tuple[str, str, Scores]],
+    frames: Sequence[Frame],
+    resamples: Resamples,
+    judged: Collection[int],
 ) -> Table:
-    """One row per set of cameras, over all frames with lines; a frame without camera counts 0."""
+    """One row per set of cameras, over all frames with lines; a frame without camera counts 0.
+
+    Args:
+        rows: Name, words and scores of each set of cameras.
+        frames: Of the dataset.
+        resamples: For the intervals.
+        judged: Ids of the frames that a run lists.
+    """
     match = {frame.id: frame.match for frame in frames}
     made = tuple(_row(name, label, scores, match, resamples) for name, label, scores in rows)
     count = len(rows[0][2]) if rows else 0
+    unseen = sum(frame not in judged for frame in (rows[0][2] if rows else ()))
     note = (
         f"{count} frames with annotated lines; JaC, share and challenge score count a frame "
         f"without a camera as 0. The challenge score takes the better of the labels as given and "
         f"turned by 180 degrees; JaC does not."
     )
+    if unseen:
+        note += (
+            f" The list of frames has {count - unseen} of them: the ball of the other {unseen} is "
+            f"not known, so they are scored here and judged nowhere else."
+        )
     return Table("calibration", "Calibration against annotated lines", COLUMNS, made, note)
 
 
 def jac_figure(rows: Sequence[tuple[str, str, Scores]], min_jac: float) -> Figure:
     """Share of frames whose JaC is above a threshold, for each gamma."""
-    panels = tuple(_panel(label, scores, min_jac) for _name, label, scores in rows)
-    note = f"{len(rows[0][2]) if rows else 0} frames with annotated lines."
+    panels = tuple(_panel(name, label, scores, min_jac) for name, label, scores in rows)
+    note = (
+        f"{len(rows[0][2]) if rows else 0} frames with annotated lines. Points of the predicted "
+        f"cameras at γ = {GAMMAS_PERCENT[0]:g} % open their frames."
+    )
     return Figure("jac", "Frames above a JaC", panels, note)
 
 
@@ -90,10 +110,10 @@ def _row(
         Cell(total.error_median_px, count=total.calibrated, of=count),
         Cell(total.error_p95_px, count=total.calibrated, of=count),
     )
-    return Row(name, label, cells)
+    return Row(name, label, cells, Frames("predicted_jac"))
 
 
-def _panel(label: str, scores: Scores, min_jac: float) -> Panel:
+def _panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
     values = np.array(
         [item.jac if item is not None else (0.0,) * len(GAMMAS_PERCENT) for item in scores.values()]
     ).reshape(-1, len(GAMMAS_PERCENT))
@@ -108,6 +128,7 @@ def _panel(label: str, scores: Scores, min_jac: float) -> Panel:
                 tuple(THRESHOLDS.tolist()),
                 tuple(share.tolist()),
                 count=tuple(above.tolist()),
+                frames=_above() if name == "predicted" and place == 0 else (),
             )
         )
     return Panel(
@@ -117,3 +138,9 @@ def _panel(label: str, scores: Scores, min_jac: float) -> Panel:
         tuple(series),
         (Mark("x", min_jac, f"{min_jac:g}"),),
     )
+
+
+def _above() -> tuple[Frames, ...]:
+    """The frames above each threshold itself, which a lower bound alone would take in."""
+    bounds = (math.nextafter(threshold, math.inf) for threshold in THRESHOLDS.tolist())
+    return tuple(Frames("predicted_jac", low=bound) for bound in bounds)

@@ -26,6 +26,7 @@ def boxes_table(
     careful: Mapping[int, Box],
     detections: Mapping[int, Sequence[Detection]],
     resamples: Resamples,
+    truth: str = "optimized",
 ) -> Table:
     """IoU and size error of every kind of box, over the same frames for each.
 
@@ -37,15 +38,15 @@ def boxes_table(
         careful: The careful box by id of the frame.
         detections: By id of the frame.
         resamples: For the intervals.
+        truth: The kind of box whose overlap a run keeps of each frame (``box_iou``): its row
+            opens the frames.
     """
     compared = [
-        (frame, careful[frame.id])
-        for frame in frames
-        if frame.id in careful and all(kind in frame.boxes for kind, _ in ROWS)
+        (frame, careful[frame.id]) for frame in frames if frame.id in careful and comparable(frame)
     ]
     rows = [
         _row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared], resamples,
-             len(careful))
+             len(careful), Frames("box_iou") if kind == truth else None)
         for kind, label in ROWS
     ]  # fmt: skip
     if detections:
@@ -55,9 +56,15 @@ def boxes_table(
         rows.append(_row("detected", "Detected boxes, IoU > 0", found, resamples, len(careful)))
     note = (
         f"{len(compared)} frames that have a careful box and a 3D ball, of {len(careful)} careful "
-        f"boxes. Size error is |d - d careful| in per cent of the careful box's diagonal."
+        f"boxes. Size error is |d - d careful| in per cent of the careful box's diagonal. "
+        f"Frames are kept with the IoU of the run's true box, whose row opens them."
     )
     return Table("boxes", "Boxes against careful boxes", COLUMNS, tuple(rows), note)
+
+
+def comparable(frame: Frame) -> bool:
+    """Whether it has every kind of box, so that all rows are over the same frames."""
+    return all(kind in frame.boxes for kind, _ in ROWS)
 
 
 def _row(
@@ -66,12 +73,13 @@ def _row(
     compared: Sequence[tuple[Frame, Box, Box]],
     resamples: Resamples,
     whole: int,
+    behind: Frames | None = None,
 ) -> Row:
     matches = [frame.match for frame, _, _ in compared]
     overlaps = [iou(box, careful) for _, box, careful in compared]
     errors = [size_error_percent(box, careful) for _, box, careful in compared]
     cells = (resamples.mean(overlaps, matches, whole), resamples.mean(errors, matches, whole))
-    return Row(kind, label, cells, Frames("box_iou"))
+    return Row(kind, label, cells, behind)
 
 
 def _hit(detections: Mapping[int, Sequence[Detection]], frame: Frame, careful: Box) -> Box | None:

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from app.evaluation.result import FrameResult
 from app.evaluation.table import Cell, Table
 
 FIELDS = ("error_m", "iou", "hit_iou", "predicted_error_m", "predicted_jac")
 """Fields of ``FrameResult`` whose difference is told per frame."""
+
+_MEASURES = (
+    "state",
+    "policy_hash",
+    "solver_version",
+    "split",
+    "boxes",
+    "min_score",
+    "software_version",
+)
 
 
 @dataclass(frozen=True)
@@ -59,6 +70,14 @@ class FrameComparison:
     lost: int
     mean_change: float | None
     frames: tuple[FrameDifference, ...]
+
+
+def differing_pins(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...]:
+    """Pins in which two runs differ that should be measured alike."""
+    names = [name for name in _MEASURES if first.get(name) != second.get(name)]
+    # Where one has no careful boxes, no two numbers come of different ones.
+    drawn = {pins["careful"]["digest"] for pins in (first, second) if pins.get("careful")}
+    return (*names, *(["careful"] if len(drawn) > 1 else []))
 
 
 def compare_tables(first: Sequence[Table], second: Sequence[Table]) -> list[Difference]:

@@ -88,6 +88,7 @@ def _series(hits: Hits, index: int, words: str) -> Series:
         tuple(found.recall[chosen].tolist()),
         tuple(found.precision[chosen].tolist()),
         count=tuple((chosen + 1).tolist()),
+        frames=tuple(Frames("score", low=score) for score in hits.scores[chosen].tolist()),
     )
 
 

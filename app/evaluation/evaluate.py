@@ -9,7 +9,7 @@ from app.evaluation import sensitivity
 from app.evaluation.binned import DISTANCE, PARALLAX, SIZE, detection_table, error_figure
 from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
 from app.evaluation.cameras import Scores, cameras_table, jac_figure, score_cameras
-from app.evaluation.careful import boxes_table
+from app.evaluation.careful import boxes_table, comparable
 from app.evaluation.detection import detection_summary, precision_recall
 from app.evaluation.figure import Figure
 from app.evaluation.frame import Detection, Frame, Judged, judge
@@ -86,13 +86,15 @@ def evaluate(
         tables += list(_detection_tables(judged, results, inputs, resamples))
         figures += list(_detection_figures(judged, results, inputs))
     if inputs.careful is not None:
-        tables.append(boxes_table(frames, inputs.careful, inputs.detections or {}, resamples))
+        tables.append(
+            boxes_table(frames, inputs.careful, inputs.detections or {}, resamples, options.boxes)
+        )
     if scores is not None:
         rows = [
             ("predicted", "Predicted cameras", scores[0]),
             ("dataset", "The dataset's own", scores[1]),
         ]
-        tables.append(cameras_table(rows, frames, resamples))
+        tables.append(cameras_table(rows, frames, resamples, {item.frame.id for item in judged}))
         figures.append(jac_figure(rows, options.min_jac))
     say(3, 4, "Sensitivity")
     table, figure = _sensitivity(frames, options)
@@ -127,16 +129,23 @@ def _measure(
         result = measure_frame(
             item, options.ball_diameter_m, cameras.get(frame.id), options.min_score
         )
-        score = scores[0].get(frame.id) if scores else None
         box = careful.get(frame.id)
         results.append(
             replace(
                 result,
-                predicted_jac=score.jac[0] if score else None,
-                box_iou=iou(item.truth, box) if item.truth and box else None,
+                predicted_jac=_jac(scores[0], frame.id) if scores else None,
+                box_iou=iou(item.truth, box) if item.truth and box and comparable(frame) else None,
             )
         )
     return results
+
+
+def _jac(scores: Scores, frame: int) -> float | None:
+    """None without lines; lines without a camera count as 0, as they do in the table."""
+    if frame not in scores:
+        return None
+    score = scores[frame]
+    return 0.0 if score is None else score.jac[0]
 
 
 def _detection_tables(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.evaluation.table import Frames
+
 FIGURES = (
     "precision_recall",
     "precision_distance",
@@ -36,6 +38,7 @@ class Series:
         count: Items behind each place; empty where that says nothing.
         color: Value that the colour stands for (see ``Panel.color``), or None.
         group_id: The group behind a whole series, or None.
+        frames: The frames behind each place; empty where no number of theirs was kept.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Series:
     count: tuple[int, ...] = ()
     color: float | None = None
     group_id: int | None = None
+    frames: tuple[Frames, ...] = ()
 
 
 @dataclass(frozen=True)

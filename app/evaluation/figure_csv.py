@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from app.datasets.csv_text import Value, cell
-from app.evaluation.figure import Figure, Panel, Series
+from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.table import Table
-
-COLUMNS = ("panel", "series", "kind", "x", "y", "low", "high", "count", "color", "group_id")
 
 
 def figure_csv(figure: Figure) -> str:
-    """The curves of a figure; the units stand in the header's ``x`` and ``y`` of the JSON."""
-    return _text(COLUMNS, (row for panel in figure.panels for row in _rows(panel)))
+    """The curves of a figure; the header says what the axes show, with their units."""
+    x, y = _axes([panel.x for panel in figure.panels]), _axes([panel.y for panel in figure.panels])
+    color = _axes([panel.color for panel in figure.panels if panel.color]) or "color"
+    header = ("panel", "series", "kind", x or "x", y or "y", "low", "high", "count", color)
+    return _text((*header, "group_id"), (row for panel in figure.panels for row in _rows(panel)))
 
 
 def table_csv(table: Table) -> str:
@@ -29,6 +30,12 @@ def table_csv(table: Table) -> str:
         for row in table.rows
     )  # fmt: skip
     return _text(header, rows)
+
+
+def _axes(axes: Sequence[Axis]) -> str:
+    """The name of a column; panels whose axes differ stand in it one after the other."""
+    names = [f"{axis.label} ({axis.unit})" if axis.unit else axis.label for axis in axes]
+    return " / ".join(dict.fromkeys(names))
 
 
 def _rows(panel: Panel) -> Iterator[list[Value]]:

@@ -27,6 +27,7 @@ class Frame:
             pair.
         lines: Annotated markings, pixels of ``size``.
         station: Key of the camera station, which lines and camera belong to.
+        predicted_by: Set of predictions that the ball was accepted from; empty: somebody drew it.
     """
 
     id: int
@@ -44,6 +45,7 @@ class Frame:
     lines: Lines = field(default_factory=dict)
     pitch: Pitch = field(default_factory=Pitch)
     station: str = ""
+    predicted_by: str = ""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,13 @@ from app.soccer.group import Group, Station, View
 _SUFFIX = re.compile(r"\.(png|jpe?g|webp|bmp|txt|json)$", re.IGNORECASE | re.ASCII)
 _MATCH = " - "
 """Stands in the name of every SoccerNet match."""
+_HOLDER = re.compile(
+    r"(labels?|images?|imgs?|frames?|frames-v3|pred(iction)?s?|predict|results?|detect(ion)?s?"
+    r"|out(put)?s?|runs?|exp|train(ing)?|val(id|idation)?|test|challenge|data(sets?)?|coco|yolo"
+    r"|csv|txt|json|box(es)?|balls?|careful|cameras?|calib(ration)?s?|\.)[-_]?[0-9]*",
+    re.IGNORECASE | re.ASCII,
+)
+"""Folders that hold predictions of any match; every other folder may be the name of one."""
 _SEVERAL = -1
 """Stands in the index for a name that fits several frames."""
 
@@ -37,31 +44,40 @@ class FrameNames:
     ending, or (where only one match has it) the match. A frame of a static camera is
     ``<camera>/<frame>`` or ``<frame>/<camera>``. Slashes may be spelt ``_``, ``__`` or ``-``.
     The names that exports give to frames are known, too.
+
+    A name that does not tell the match means a frame only where no folder before it could be
+    another match: ``7_1.png`` and ``labels/test/7_1.txt``, but not ``epl/Arsenal/7_1.png``.
     """
 
     frames: Mapping[int, NamedFrame]
     stations: Mapping[str, tuple[int, ...]]
     _index: Mapping[str, int] = field(repr=False)
+    _telling: frozenset[str] = field(repr=False)
+    """Names of the index that tell the match, whatever stands before them."""
 
     @staticmethod
     def of(frames: Iterable[NamedFrame]) -> FrameNames:
         """The index of a dataset's frames."""
         known = {frame.id: frame for frame in frames}
         index: dict[str, int] = {}
+        telling: set[str] = set()
         stations: dict[str, list[int]] = {}
         for frame in known.values():
             if frame.station:
                 stations.setdefault(frame.station, []).append(frame.id)
-            for name in _spellings(frame):
+            own = _telling(frame)
+            telling |= own
+            for name in own | _short(frame):
                 other = index.setdefault(name, frame.id)
                 if other != frame.id:
                     index[name] = _SEVERAL
-        return FrameNames(known, {key: tuple(ids) for key, ids in stations.items()}, index)
+        by_station = {key: tuple(ids) for key, ids in stations.items()}
+        return FrameNames(known, by_station, index, frozenset(telling))
 
     def find(self, name: str) -> NamedFrame | None:
         """The one frame that a name means, or None.
 
-        Folders before the part that is known do not matter: ``labels/test/a/b/c/7_1.txt``.
+        Folders before a known match do not matter: ``/data/labels/test/<match>/7_1.txt``.
         """
         identity = self._lookup(name)
         return self.frames[identity] if identity is not None and identity != _SEVERAL else None
@@ -70,6 +86,8 @@ class FrameNames:
         """Why ``find`` found nothing, in words."""
         if self._lookup(name) == _SEVERAL:
             return "fits several frames of the dataset; name its match, too"
+        if _bare(name).rsplit("/", 1)[-1] in self._index:
+            return "is no frame of the dataset: its folders name none of the matches"
         return "is no frame of the dataset"
 
     def of_station(self, name: str) -> tuple[int, ...]:
@@ -79,12 +97,12 @@ class FrameNames:
     def _lookup(self, name: str) -> int | None:
         parts = _bare(name).split("/")
         for start in range(len(parts)):
-            if start == len(parts) - 1 and any(_MATCH in part for part in parts[:start]):
-                # 7_1 of a match that the dataset does not have is not the 7_1 that it has.
-                return None
-            found = self._index.get("/".join(parts[start:]))
-            if found is not None:
-                return found
+            known = "/".join(parts[start:])
+            # 7_1 of a match that the dataset does not have is not the 7_1 that it has.
+            if known in self._telling or all(map(_HOLDER.fullmatch, parts[:start])):
+                found = self._index.get(known)
+                if found is not None:
+                    return found
         return None
 
 
@@ -92,17 +110,34 @@ def _bare(name: str) -> str:
     return _SUFFIX.sub("", name.replace("\\", "/").strip().strip("/"))
 
 
-def _spellings(frame: NamedFrame) -> set[str]:
+def _telling(frame: NamedFrame) -> set[str]:
+    """Names that tell the match of a frame, or the group where it has no match."""
     view, group, match = _bare(frame.view), _bare(frame.group), _bare(frame.match)
-    if frame.station:
-        names = {f"{view}/{group}", f"{group}/{view}"}
-        if match:
-            names |= {f"{match}/{name}" for name in names}
+    last = match.rsplit("/", 1)[-1]
+    places = {match, last} if _MATCH in last else {match}
+    within = _within(frame)
+    if match:
+        names = {f"{place}/{name}" for place in places for name in within}
     else:
-        names = {view, f"{match}/{view}"} if match else {view, f"{group}/{view}"}
-        names |= {f"{match.rsplit('/', 1)[-1]}/{view}"} if match else set()
-    names |= {name.replace("/", glue) for name in names for glue in ("_", "__", "-")}
-    return names | {name for name in _exported(frame) if name}
+        names = within if frame.station else {f"{group}/{view}"}
+    return _glued(names) | {name for name in _exported(frame) if name}
+
+
+def _short(frame: NamedFrame) -> set[str]:
+    """Names that another match could have as well."""
+    last = _bare(frame.match).rsplit("/", 1)[-1]
+    within = _within(frame)
+    return _glued(within | ({f"{last}/{name}" for name in within} if last else set()))
+
+
+def _within(frame: NamedFrame) -> set[str]:
+    """Names of a frame within its match."""
+    view, group = _bare(frame.view), _bare(frame.group)
+    return {f"{view}/{group}", f"{group}/{view}"} if frame.station else {view}
+
+
+def _glued(names: set[str]) -> set[str]:
+    return names | {name.replace("/", glue) for name in names for glue in ("_", "__", "-")}
 
 
 def _exported(frame: NamedFrame) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -64,15 +65,16 @@ def localization_table(
 def precision_distance(frames: Sequence[FrameResult], *, predicted: bool) -> Figure:
     """Share of frames within a distance, against the distance."""
     balls = [frame for frame in frames if frame.ball and frame.distance_m is not None]
-    places = np.arange(0, round(FARTHEST_M / STEP_M) + 1) * STEP_M
+    places = (np.arange(0, round(FARTHEST_M / STEP_M) + 1) * STEP_M).round(6)
     series = []
     for name, label, error, _percent, any_error in SOURCES[: 1 + predicted]:
         placed = _values(balls, error)
         missed = _values(balls, any_error)
-        series.append(_within(name, label, placed, len(placed), places, "line"))
-        series.append(
-            _within(f"{name}_all", f"{label}, all frames", missed, len(balls), places, "dashed")
+        series.append(_within(name, label, placed, len(placed), places, error))
+        everywhere = _within(
+            f"{name}_all", f"{label}, all frames", missed, len(balls), places, any_error
         )
+        series.append(replace(everywhere, kind="dashed"))
     panel = Panel(
         "Share within a distance",
         Axis("Distance from the ball", "m", 0.0, FARTHEST_M),
@@ -139,7 +141,7 @@ def _median(values: Sequence[float], whole: int) -> Cell:
 
 
 def _within(
-    name: str, label: str, values: Sequence[float], of: int, places: np.ndarray, kind: str
+    name: str, label: str, values: Sequence[float], of: int, places: np.ndarray, field: str
 ) -> Series:
     ordered = np.sort(np.asarray(values, dtype=float))
     below = np.searchsorted(ordered, places, side="left")
@@ -147,8 +149,8 @@ def _within(
     return Series(
         name,
         f"{label} (of {of})",
-        tuple(places.round(6).tolist()),
+        tuple(places.tolist()),
         tuple(share.tolist()),
-        kind,
         count=tuple(below.tolist()),
+        frames=tuple(Frames(field, high=place) for place in places.tolist()),
     )

@@ -275,7 +275,8 @@ def _add_yolo(run: PredictionRun, frame: NamedFrame | None, cells: list[str]) ->
         return
     across, down = frame.size.width, frame.size.height
     box = Box((x - width / 2) * across, (y - height / 2) * down, width * across, height * down)
-    run.add(frame, box, score, frame.size)
+    with in_field("cx, cy, w, h"):
+        run.add(frame, box, score, frame.size)
 
 
 def _read_csv(tree: FileTree, run: PredictionRun, limits: Limits) -> None:
@@ -306,7 +307,8 @@ def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:
             size = ImageSize(
                 read_field(cells, "img_w", fields.whole), read_field(cells, "img_h", fields.whole)
             )
-        run.add(frame, box, score, size)
+        with in_field("ball_bbox" if "ball_bbox" in cells else "x, y, w, h"):
+            run.add(frame, box, score, size)
 
 
 def _row_box(cells: Mapping[str, str]) -> Box | None:

@@ -88,7 +88,8 @@ class PredictionRun:
             ValueError: It cannot be a box of that image, or there are too many.
         """
         seen = size or self.size or frame.size
-        _check_box(box, seen)
+        if problem := box_problem(box, seen):
+            raise ValueError(problem)
         if score is None:
             self.found.without_score += 1
         elif not 0 <= score <= 1:
@@ -116,12 +117,18 @@ class PredictionRun:
             report.counts["other classes"] = self.left_out
 
 
-def _check_box(box: Box, size: ImageSize) -> None:
+def box_problem(box: Box, size: ImageSize) -> str | None:
+    """Why a box cannot be a ball in an image, in words; None where it can."""
     if not (box.width > 0 and box.height > 0):
-        raise ValueError("is not wider and higher than nothing")
+        return "is not wider and higher than nothing"
+    image = f"the image of {size.width} x {size.height} pixels"
+    # Numbers that are none compare as false, and end here, too.
+    if not (box.width <= size.width and box.height <= size.height):
+        return f"is wider or higher than {image}"
     right, bottom = box.x + box.width, box.y + box.height
-    if right < 0 or bottom < 0 or box.x > size.width or box.y > size.height:
-        raise ValueError(f"lies outside the image of {size.width} x {size.height} pixels")
+    if not (right >= 0 and bottom >= 0 and box.x <= size.width and box.y <= size.height):
+        return f"lies outside {image}"
+    return None
 
 
 def _scaled(box: Box, seen: ImageSize, annotated: ImageSize) -> Box:

@@ -27,8 +27,10 @@ class FrameResult:
         error_percent: The same, of the distance.
         any_error_m: The same for the surest detection, whether it overlaps or not.
         predicted_error_m: As ``error_m`` with the predicted camera; likewise the two after it.
-        predicted_jac: JaC of the predicted camera at 0.5 % of the diagonal.
-        box_iou: Overlap of the dataset's box with the careful one, where there is one.
+        predicted_jac: JaC of the predicted camera at 0.5 % of the diagonal; 0 where there are
+            annotated lines and no camera.
+        box_iou: Overlap of the true box with the careful one; only where the frame has every kind
+            of box, as in the table of boxes.
     """
 
     frame_id: int

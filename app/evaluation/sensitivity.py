@@ -168,7 +168,10 @@ def sensitivity_table(samples: Sequence[Sample], able: int) -> Table:
         Column("predicted_m", "Median by the derivative", "m"),
         Column("correlation", "Correlation with distance"),
     )
-    note = f"{len(samples)} of {able} frames with a 3D ball, a seeded sample."
+    note = (
+        f"{len(samples)} of {able} frames with a 3D ball, a seeded sample. "
+        f"Each curve of the figure opens the group of its ball."
+    )
     return Table("sensitivity", "Sensitivity", columns, rows, note)
 
 

@@ -4,6 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+TABLES = (
+    "detection",
+    "localization",
+    "detection_by_size",
+    "detection_by_distance",
+    "boxes",
+    "calibration",
+    "sensitivity",
+)
+
 
 @dataclass(frozen=True)
 class Cell:

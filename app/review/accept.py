@@ -15,6 +15,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
+from app.evaluation.prediction_run import box_problem
 from app.review.datasets import read_dataset
 from app.review.edit import SetBall, need_view
 from app.review.etags import require_unchanged, said_of
@@ -23,10 +24,10 @@ from app.review.query import parse_query
 from app.review.state import GroupState
 from app.review.submit import load, submit
 from app.soccer.annotation import BallAnnotation
-from app.soccer.frames import Box
+from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
 from app.store.codecs import ball_from_json, parse
-from app.store.models import GroupModel, QueueModel, ViewModel
+from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
 from app.store.predictions import PredictedBox, PredictionSet, read_box, read_boxes
 from app.store.session import Store
 
@@ -38,6 +39,7 @@ REASONS = {
     "below_score": "the surest prediction is below the score",
     "annotated": "the view has a ball already",
     "the_same": "the view has this very ball already",
+    "not_a_ball": "the prediction cannot be a ball in this image",
 }
 
 Progress = Callable[[int, int | None, str], None]
@@ -157,11 +159,12 @@ def accept(
         if progress is not None:
             progress(number, plan.groups, "Accepting predictions.")
         for item in items:
-            if _accept(store, item, plan.predictions.name, request, actor):
+            why = _accept(store, item, plan.predictions.name, request, actor)
+            if why is None:
                 views += 1
                 changed.add(group_id)
             else:
-                refused["changed_meanwhile"] += 1
+                refused[why] += 1
     return AcceptReport(views, len(changed), dict(refused))
 
 
@@ -191,6 +194,7 @@ def accept_box(
 
     Raises:
         NotFoundError: The view has no such prediction.
+        InputError: The prediction cannot be a ball in this image.
         ConflictError: The view has a ball, and it is not to be replaced.
         StaleRevisionError: Somebody else changed the group first.
     """
@@ -201,6 +205,9 @@ def accept_box(
             # Whoever saw an older state is told so first.
             require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
             raise NotFoundError(f"view {view_id} has no prediction {prediction_id}")
+        if problem := _problem(box, view):
+            require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
+            raise InputError(f"the prediction {problem}")
         name = read_set(session, box.set_id).name
     edit = SetBall(view.key, accepted_ball(box, name))
     if not replace:
@@ -211,7 +218,11 @@ def accept_box(
 
 
 def _view(session: Session, view_id: int) -> Any:
-    statement = select(ViewModel.key, ViewModel.group_id).where(ViewModel.id == view_id)
+    statement = (
+        select(ViewModel.key, ViewModel.group_id, StationModel.width, StationModel.height)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(ViewModel.id == view_id)
+    )
     row = session.execute(statement).one_or_none()
     if row is None:
         raise NotFoundError(f"there is no view {view_id}")
@@ -243,8 +254,11 @@ def _views(dataset_id: int, request: AcceptRequest) -> Any:
             ViewModel.balls,
             GroupModel.id.label("group_id"),
             GroupModel.key.label("group"),
+            StationModel.width,
+            StationModel.height,
         )
         .join(GroupModel, GroupModel.id == ViewModel.group_id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
         .join(QueueModel, QueueModel.group_id == GroupModel.id)
         .where(GroupModel.dataset_id == dataset_id)
         .order_by(GroupModel.number, ViewModel.position)
@@ -262,11 +276,19 @@ def _judge(row: Any, boxes: Sequence[PredictedBox], name: str, request: AcceptRe
     why = None
     if best.score < request.min_score:
         why = "below_score"
+    elif _problem(best, row) is not None:
+        why = "not_a_ball"
     elif balls == [accepted_ball(best, name)]:
         why = "the_same"
     elif balls and not request.replace:
         why = "annotated"
     return Accepted(row.id, row.key, row.group_id, row.group, best, why)
+
+
+def _problem(box: PredictedBox, view: Any) -> str | None:
+    """Why a box cannot be a ball in its view."""
+    place = Box(box.x, box.y, box.width, box.height)
+    return box_problem(place, ImageSize(view.width, view.height))
 
 
 def _by_group(items: Sequence[Accepted]) -> Iterator[tuple[int, list[Accepted]]]:
@@ -276,24 +298,26 @@ def _by_group(items: Sequence[Accepted]) -> Iterator[tuple[int, list[Accepted]]]
     yield from groups.items()
 
 
-def _accept(store: Store, item: Accepted, name: str, request: AcceptRequest, actor: str) -> bool:
-    """Submit one edit; False where the view is no longer as it was when this was planned."""
+def _accept(
+    store: Store, item: Accepted, name: str, request: AcceptRequest, actor: str
+) -> str | None:
+    """Submit one edit; why not, where the view is no longer as planned or the edit impossible."""
     edit = SetBall(item.view, accepted_ball(item.box, name))
     for _ in range(TRIES):
         try:
             state = load(store, item.group_id)
         except NotFoundError:
-            return False
+            break
         if not _still_fits(state, item, request):
-            return False
+            break
         try:
             submit(store, item.group_id, edit, if_match=state.etag, actor=actor)
         except StaleRevisionError:
             continue
         except InputError:
-            return False
-        return True
-    return False
+            return "not_a_ball"
+        return None
+    return "changed_meanwhile"
 
 
 def _still_fits(state: GroupState, item: Accepted, request: AcceptRequest) -> bool:

@@ -134,6 +134,7 @@ def group_frames(
             lines=view.station.lines,
             pitch=group.pitch,
             station=view.station.key,
+            predicted_by=view.ball.predicted_by if view.ball else "",
         )
 
 

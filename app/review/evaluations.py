@@ -16,12 +16,15 @@ from app.evaluation.comparison import (
     FrameComparison,
     compare_frames,
     compare_tables,
+    differing_pins,
 )
 from app.evaluation.evaluate import Inputs, Options, evaluate
 from app.evaluation.figure import Figure
 from app.evaluation.frame import BOX_KINDS, Detection
 from app.evaluation.result import NUMBERS, Evaluation, FrameResult
 from app.evaluation.table import Table
+from app.review.accepted_truth import AcceptedTruth
+from app.review.careful_boxes import careful_boxes
 from app.review.datasets import Dataset, read_dataset
 from app.review.evaluation_frames import LIVE_RULES, Truth, live_truth, version_truth
 from app.review.predictions import read_set
@@ -39,12 +42,17 @@ from app.store.evaluations import (
     read_frame_rows,
 )
 from app.store.prediction_models import EvaluationFrameModel, EvaluationModel
-from app.store.predictions import PredictionSet, read_boxes, read_predicted_cameras
+from app.store.predictions import (
+    PredictionSet,
+    read_boxes,
+    read_predicted_cameras,
+)
 from app.store.session import Store
 from app.store.value_codec import from_json, to_json
 
 MAX_PAGE = 500
 MAX_NAME = 100
+_SET_PINS = ("id", "name", "digest", "source", "unknown")
 
 Progress = Callable[[int, int | None, str], None]
 
@@ -114,11 +122,18 @@ class FramePage:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two runs of one dataset; ``same_truth`` says whether their numbers can be compared."""
+    """Two runs of one dataset.
+
+    Attributes:
+        same_truth: Whether their numbers can be compared.
+        differs: Pins in which they differ: those that make it another truth, and the version of
+            the software.
+    """
 
     first: StoredEvaluation
     second: StoredEvaluation
     same_truth: bool
+    differs: tuple[str, ...]
     numbers: list[Difference]
     frames: FrameComparison
 
@@ -159,6 +174,8 @@ def run_evaluation(
         min_jac=truth.policy.min_jac,
     )
     result = evaluate(truth.frames, inputs, options, progress)
+    own = sets["predictions"].name if "predictions" in sets else None
+    accepted = AcceptedTruth.count(truth.frames, request.boxes, own)
     values = {
         "dataset_id": found.id,
         "name": request.name or " and ".join(item.name for item in sets.values()),
@@ -168,8 +185,13 @@ def run_evaluation(
         "careful_set_id": request.careful,
         "version_id": request.version,
         "pins": {**truth.pins, **_pins(request, options, sets)},
-        "counts": {**result.counts, "gone": truth.gone, **_set_counts(sets)},
-        "tables": [to_json(table) for table in result.tables],
+        "counts": {
+            **result.counts,
+            "gone": truth.gone,
+            "accepted_predictions": accepted.frames,
+            **_set_counts(sets),
+        },
+        "tables": [to_json(table) for table in accepted.warn(result.tables)],
     }
     return _save(store, values, result)
 
@@ -181,7 +203,9 @@ def check_evaluation(store: Store, dataset: str | int, request: EvaluationReques
         found = read_dataset(session, dataset)
         for name in ("predictions", "careful"):
             if (identity := getattr(request, name)) is not None:
-                _own_set(session, found, identity, name)
+                own = _own_set(session, found, identity, name)
+                if name == "careful":
+                    careful_boxes(session, own)
         if request.version is not None:
             _own_version(session, found, request.version)
         elif request.groups not in LIVE_RULES:
@@ -278,10 +302,12 @@ def compare(store: Store, first_id: int, second_id: int, field: str = "error_m")
             [FrameResult(**row) for row in read_frame_rows(session, item.id)]
             for item in (first, second)
         ]
+    differs = differing_pins(first.pins, second.pins)
     return Comparison(
         first,
         second,
-        _truth_of(first) == _truth_of(second),
+        set(differs) <= {"software_version"},
+        differs,
         compare_tables(tables_of(first), tables_of(second)),
         compare_frames(frames[0], frames[1], field),
     )
@@ -322,10 +348,7 @@ def _inputs(session: Session, sets: Mapping[str, PredictionSet]) -> Inputs:
         if predictions.cameras:
             cameras = read_predicted_cameras(session, predictions.id)
     if careful is not None:
-        boxes = {
-            view: Box(found[0].x, found[0].y, found[0].width, found[0].height)
-            for view, found in read_boxes(session, careful.id).items()
-        }
+        boxes = careful_boxes(session, careful)
     return Inputs(detections, boxes, cameras)
 
 
@@ -339,21 +362,12 @@ def _pins(
         "min_score": options.min_score,
         "resamples": options.resamples,
         "seed": options.seed,
-        **{
-            name: {"id": item.id, "name": item.name, "digest": item.digest}
-            for name, item in sets.items()
-        },
+        **{name: {part: getattr(item, part) for part in _SET_PINS} for name, item in sets.items()},
     }
 
 
 def _set_counts(sets: Mapping[str, PredictionSet]) -> dict[str, int]:
     return {f"unknown_{name}_frames": item.unknown for name, item in sets.items()}
-
-
-def _truth_of(evaluation: StoredEvaluation) -> list[Json]:
-    """What two runs must share for their numbers to be comparable."""
-    names = ("state", "policy_hash", "solver_version", "split", "boxes", "min_score")
-    return [evaluation.pins.get(name) for name in names]
 
 
 def _no_frames(dataset: Dataset, request: EvaluationRequest) -> InputError:

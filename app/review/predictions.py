@@ -30,7 +30,7 @@ from app.geometry.camera import Camera
 from app.review.datasets import read_dataset
 from app.soccer.frames import ImageSize
 from app.store.clock import now
-from app.store.codecs import Json
+from app.store.codecs import Json, canonical
 from app.store.prediction_models import PredictionSetModel
 from app.store.predictions import (
     PredictedBox,
@@ -91,8 +91,8 @@ def add_predictions(
         files: What to read.
         actor: Who brings them.
         source: What people call the file; its own name by default.
-        reuse: Answer the set that says the very same, where there is one, and find another name
-            where the name is taken.
+        reuse: Answer the set that came of the very same reading, where there is one, and find
+            another name where the name is taken.
 
     Raises:
         InputError: A file cannot be used, no box or camera belongs to a frame of the dataset, or
@@ -167,7 +167,7 @@ def save_predictions(
         found = read_dataset(session, dataset)
         if reuse:
             own = read_prediction_sets(session, PredictionSetModel.dataset_id == found.id)
-            known = next((item for item in own if item.digest == values["digest"]), None)
+            known = next((item for item in own if _same_reading(item, values)), None)
             if known is not None:
                 return known
             values["name"] = name = _free_name(name, {item.name for item in own})
@@ -263,6 +263,13 @@ def require_free(session: Session, dataset_id: int, name: str) -> None:
             f'there is a set of predictions "{name}" already',
             hint="Choose another name, or delete that one first.",
         )
+
+
+def _same_reading(known: PredictionSet, values: Mapping[str, Any]) -> bool:
+    """Whether a set has the same boxes and cameras, from the same source with the same report."""
+    names = ("digest", "format", "source", "unknown")
+    same = all(getattr(known, name) == values[name] for name in names)
+    return same and canonical(known.report) == canonical(values["report"])
 
 
 def _free_name(name: str, taken: set[str]) -> str:

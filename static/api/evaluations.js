@@ -53,6 +53,7 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {number[]} count
  * @property {number | null} color
  * @property {number | null} group_id
+ * @property {FramesLink[]} [frames] behind each place, where they are kept
  */
 
 /** @typedef {{title: string, x: AxisJson, y: AxisJson, series: SeriesJson[], marks: {axis: 'x' | 'y', at: number, label: string}[], color: AxisJson | null}} PanelJson */
@@ -81,7 +82,7 @@ export function getPredictions(dataset, signal) {
 	return request(`/datasets/${dataset}/predictions`, { signal });
 }
 
-/** @param {number} dataset @param {{name: string, format: string, upload: string | null, cameras_upload: string | null, images_upload: string | null, category: number | null}} body @returns {Promise<PredictionSet>} */
+/** @param {number} dataset @param {{name: string, format: string, upload: string | null, cameras_upload: string | null, images_upload: string | null, category: number | null, size: [number, number] | null, cameras_size: [number, number] | null}} body @returns {Promise<PredictionSet>} */
 export function postPredictions(dataset, body) {
 	return request(`/datasets/${dataset}/predictions`, { method: 'POST', body, key: idempotencyKey() });
 }
@@ -91,7 +92,7 @@ export function deletePredictions(id) {
 	return request(`/predictions/${id}`, { method: 'DELETE' });
 }
 
-/** @typedef {{id: number, predictions: number, name: string, box: [number, number, number, number], score: number, view: number}} PredictionJson */
+/** @typedef {{id: number, predictions: number, name: string, box: [number, number, number, number], score: number, scored: boolean, view: number}} PredictionJson */
 /** @typedef {{view: number, name: string, score: number | null, by: string | null, at: string | null}} AcceptedJson */
 /** @typedef {{sets: number, items: PredictionJson[], accepted: AcceptedJson[]}} GroupPredictionsJson */
 
@@ -133,6 +134,11 @@ export function getFigure(id, name, signal) {
 /** The address of a figure as a file. @param {number} id @param {string} name @param {'csv' | 'json' | 'png'} ending */
 export function figureAddress(id, name, ending) {
 	return `/api/v1/evaluations/${id}/figures/${name}.${ending}`;
+}
+
+/** The address of a table as a file. @param {number} id @param {string} name @param {'csv' | 'json'} ending */
+export function tableAddress(id, name, ending) {
+	return `/api/v1/evaluations/${id}/tables/${name}.${ending}`;
 }
 
 /** @typedef {{field?: string, low?: number | null, high?: number | null, missing?: string, sort?: string}} FrameQuery */

@@ -166,6 +166,8 @@ class Attack:
             path |= {name: value for name, value in gone.items() if name in path}
         if "figure" in path:
             path |= {"figure": "sensitivity", "ending": "json"}
+        if "table" in path:
+            path |= {"table": "sensitivity", "ending": "json"}
         if case.operation.path.endswith("/compare"):
             case.query = {"with": 1}
         if case.operation.path.endswith("/frames"):

@@ -91,6 +91,39 @@ class TestEvaluate:
         assert "Optimised boxes" in done.stdout
         assert "the dataset as it is" in done.stdout
 
+    def test_careful_boxes_are_read_by_their_own_options(
+        self, run, truth, scenes, tmp_path
+    ) -> None:
+        halves = [
+            {**item, "category_id": 32, "bbox": [side / 2 for side in item["bbox"]]}
+            for item in json.loads(truth.read_text())
+        ]
+        half = tmp_path / "half.json"
+        half.write_text(json.dumps(halves))
+        lines = ["image,x,y,w,h"]
+        for item in json.loads(truth.read_text()):
+            lines.append(",".join([item["image_id"], *map(str, item["bbox"])]))
+        careful = tmp_path / "careful.csv"
+        careful.write_text("\n".join(lines))
+        size = scenes[0].group.views[0].size
+        of_half = f"{size.width // 2}x{size.height // 2}"
+        words = ("evaluate", "--dataset", "small", "--json")
+        options = ("--format", "coco", "--category", "32", "--size", of_half)
+        done = run(*words, str(half), *options, "--careful", str(careful))
+        assert done.exit_code == 0, done.output
+        document = json.loads(done.stdout)
+        assert document["counts"]["careful_boxes"] == len(halves)
+        table = next(item for item in document["tables"] if item["name"] == "boxes")
+        rows = {row["name"]: row["cells"][0]["value"] for row in table["rows"]}
+        assert rows["detected"] > 0.99
+        swapped = run(
+            *words, str(truth), "--careful", str(half), "--careful-format", "coco",
+            "--careful-category", "32", "--careful-size", of_half,
+        )  # fmt: skip
+        document = json.loads(swapped.stdout)
+        table = next(item for item in document["tables"] if item["name"] == "boxes")
+        assert {row["name"]: row["cells"][0]["value"] for row in table["rows"]}["detected"] > 0.99
+
     def test_writes_tables_and_figures_into_a_folder(self, run, truth, tmp_path) -> None:
         out = tmp_path / "out"
         done = run("evaluate", "--dataset", "small", str(truth), "--out", str(out), "--json")

@@ -18,20 +18,23 @@ from app.api.schemas.evaluation import (
     EvaluationRow,
     FigureDocument,
     FrameList,
+    TableDocument,
 )
 from app.api.schemas.job import JobDocument
-from app.errors import InputError
+from app.errors import InputError, NotFoundError
 from app.evaluation.comparison import FIELDS
 from app.evaluation.figure import FIGURES
-from app.evaluation.figure_csv import figure_csv
+from app.evaluation.figure_csv import figure_csv, table_csv
 from app.evaluation.figure_png import figure_png
 from app.evaluation.result import NUMBERS
+from app.evaluation.table import TABLES
 from app.review import evaluations as review
 from app.review.evaluation_jobs import request_evaluation
 
 router = APIRouter(tags=["evaluations"])
 
 FigureName = StrEnum("FigureName", list(FIGURES))  # type: ignore[misc]
+TableName = StrEnum("TableName", list(TABLES))  # type: ignore[misc]
 FrameField = StrEnum("FrameField", list(NUMBERS))  # type: ignore[misc]
 CompareField = StrEnum("CompareField", list(FIELDS))  # type: ignore[misc]
 SortField = StrEnum("SortField", [*NUMBERS, *(f"{name}-desc" for name in NUMBERS)])  # type: ignore[misc]
@@ -46,6 +49,16 @@ FIGURE_FILES: Responses = {
             "application/json": {"schema": {"$ref": "#/components/schemas/FigureDocument"}},
             "text/csv": {"schema": {"type": "string"}},
             "image/png": {"schema": {"type": "string", "format": "binary"}},
+        },
+    }
+}
+
+TABLE_FILES: Responses = {
+    200: {
+        "description": "The table: as JSON, or as CSV with intervals and denominators.",
+        "content": {
+            "application/json": {"schema": {"$ref": "#/components/schemas/TableDocument"}},
+            "text/csv": {"schema": {"type": "string"}},
         },
     }
 }
@@ -121,6 +134,31 @@ def get_figure(
         return Response(figure_csv(found), media_type="text/csv; charset=utf-8", headers=headers)
     inline = {"Content-Disposition": name.replace("attachment", "inline")}
     return Response(figure_png(found), media_type="image/png", headers=inline)
+
+
+@router.get(
+    "/evaluations/{evaluation}/tables/{table}.{ending}",
+    operation_id="getTable",
+    response_class=Response,
+    responses={**responses(404), **TABLE_FILES},
+)
+def get_table(
+    evaluation: Id, table: TableName, ending: Literal["json", "csv"], store: AppStore
+) -> Response:
+    """One table of an evaluation; 404 where the evaluation has no such table."""
+    tables = {
+        item.name: item for item in review.tables_of(review.get_evaluation(store, evaluation))
+    }
+    found = tables.get(str(table))
+    if found is None:
+        raise NotFoundError(
+            f'evaluation {evaluation} has no table "{table}"', hint=f"It has {', '.join(tables)}."
+        )
+    if ending == "json":
+        return Response(TableDocument.of(found).model_dump_json(), media_type="application/json")
+    name = f'attachment; filename="touchline-{evaluation}-{table}.csv"'
+    headers = {"Content-Disposition": name}
+    return Response(table_csv(found), media_type="text/csv; charset=utf-8", headers=headers)
 
 
 @router.get(

@@ -88,7 +88,7 @@ class ColumnDocument(BaseModel):
 
 
 class FramesLink(BaseModel):
-    """The frames behind a row, as parameters of `/evaluations/{id}/frames`."""
+    """The frames behind a number, as parameters of `/evaluations/{id}/frames`."""
 
     field: str
     low: float | None
@@ -206,6 +206,9 @@ class SeriesDocument(BaseModel):
     count: list[int]
     color: float | None = Field(description="What the colour stands for, see the panel's `color`.")
     group_id: int | None
+    frames: list[FramesLink] = Field(
+        default=[], description="The frames behind each place; empty where they are not kept."
+    )
 
 
 class MarkDocument(BaseModel):
@@ -339,7 +342,11 @@ class ComparisonDocument(BaseModel):
     first: EvaluationRow
     second: EvaluationRow
     same_truth: bool = Field(
-        description="Same frames, policy, solver and options: the numbers can be compared."
+        description="Same frames, policy, solver, options and careful boxes: the numbers can be "
+        "compared."
+    )
+    differs: list[str] = Field(
+        description="Pins in which the runs differ: those of `same_truth`, and `software_version`."
     )
     numbers: list[DifferenceDocument]
     field: str
@@ -366,6 +373,7 @@ class ComparisonDocument(BaseModel):
             first=EvaluationRow.of(found.first),
             second=EvaluationRow.of(found.second),
             same_truth=found.same_truth,
+            differs=list(found.differs),
             numbers=[DifferenceDocument.of(item) for item in found.numbers],
             **{name: getattr(found.frames, name) for name in counts},
             frames=[FrameDifferenceDocument.of(item) for item in shown],

@@ -36,8 +36,8 @@ function EvaluationOf({ one }) {
 	return html`
 		<div class="evaluation">
 			<div class="evaluation__side">
-				<${PredictionSets} one=${one} sets=${sets} changed=${() => changed(null)} />
 				<${Runs} one=${one} sets=${sets} runs=${runs} versions=${versions} shown=${asked} show=${show} changed=${changed} />
+				<${PredictionSets} one=${one} sets=${sets} changed=${() => changed(null)} />
 			</div>
 			<div class="evaluation__main">
 				${asked ? html`<${RunDetails} key=${asked} id=${asked} runs=${runs} versions=${versions} changed=${() => changed(null)} />` : html`

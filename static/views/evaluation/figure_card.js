@@ -12,22 +12,13 @@ import { complain } from '../../state/notice.js';
 import { Chart } from '../chart.js';
 import { Loading } from '../page_frame.js';
 import { number } from './cell.js';
+import { axisText, behindText, opens, pointAt } from './figure_points.js';
+import { colourOf, stepsOf } from './figure_scale.js';
 
-/** @import {ChartColour} from '../../lib/chart_colours.js' */
 /** @import {FrameQuery, PanelJson, SeriesJson} from '../../api/evaluations.js' */
 /** @import {Curve} from '../chart.js' */
 
 /** @typedef {(query: FrameQuery, title: string) => void} Open */
-
-/** Which numbers of the frames stand along x, and what a place there means. @type {{[figure: string]: {field: string, below: boolean}}} */
-const BEHIND = {
-	precision_distance: { field: 'error_m', below: true },
-	error_by_distance: { field: 'distance_m', below: false },
-	error_by_parallax: { field: 'parallax_degrees', below: false },
-	error_by_size: { field: 'diameter_px', below: false },
-	jac: { field: 'predicted_jac', below: true },
-};
-const COLOURS = /** @type {ChartColour[]} */ (['chart-a', 'chart-b', 'chart-c', 'chart-d', 'chart-e', 'chart-f']);
 
 /** All places of x, once each, in order. @param {SeriesJson[]} series @returns {number[]} */
 function places(series) {
@@ -40,15 +31,6 @@ function spread(values, { x }, at, length) {
 	const row = Array(length).fill(null);
 	if (values.length === x.length) x.forEach((place, index) => { row[/** @type {number} */ (at.get(place))] = values[index]; });
 	return row;
-}
-
-/** The colour of a series: its own, or by the value that it stands for. @param {SeriesJson} series @param {number} index @param {PanelJson} panel */
-function colourOf({ color }, index, panel) {
-	if (color === null || !panel.color) return COLOURS[index % COLOURS.length];
-	const values = panel.series.flatMap((one) => (one.color === null ? [] : [one.color]));
-	const [low, high] = [Math.min(...values), Math.max(...values)];
-	const share = high > low ? (color - low) / (high - low) : 0;
-	return COLOURS[Math.min(COLOURS.length - 1, Math.floor(share * 4))];
 }
 
 /** @param {PanelJson} panel @returns {{x: number[], curves: Curve[]}} */
@@ -67,29 +49,6 @@ function drawn(panel) {
 	return { x, curves };
 }
 
-/** The nearest series with a group at a place of x. @param {PanelJson} panel @param {number} place @param {number | null} y */
-function groupAt(panel, place, y) {
-	const near = panel.series.flatMap((series) => {
-		if (series.group_id === null) return [];
-		return series.x.map((x, index) => ({ group: series.group_id, off: Math.abs(x - place), up: y === null ? 0 : Math.abs(series.y[index] - y) }));
-	});
-	const closest = Math.min(...near.map(({ off }) => off));
-	return near.filter(({ off }) => off === closest).sort((a, b) => a.up - b.up)[0]?.group ?? null;
-}
-
-/** The frames between the neighbours of a place. @param {string} name @param {number[]} x @param {number} index @returns {FrameQuery | null} */
-function framesAt(name, x, index) {
-	const behind = BEHIND[name];
-	if (!behind) return null;
-	if (behind.below) return { field: behind.field, high: x[index] };
-	const between = (/** @type {number} */ a, /** @type {number} */ b) => (x[a] + x[b]) / 2;
-	return {
-		field: behind.field,
-		low: index > 0 ? between(index - 1, index) : null,
-		high: index < x.length - 1 ? between(index, index + 1) : null,
-	};
-}
-
 /** A point that stands for one frame opens its group, one for several lists them. @param {number} evaluation @param {FrameQuery} query @param {string} title @param {Open} open */
 async function openBehind(evaluation, query, title, open) {
 	try {
@@ -101,19 +60,26 @@ async function openBehind(evaluation, query, title, open) {
 	}
 }
 
-/** @param {{evaluation: number, name: string, panel: PanelJson, alone: boolean, open: Open}} props `alone`: the figure's own title says it */
-function Panel({ evaluation, name, panel, alone, open }) {
+/** What the colours of the curves mean. @param {{panel: PanelJson}} props */
+function ScaleLegend({ panel }) {
+	return html`
+		<p class="chart__legend">
+			<span>${panel.color?.label}</span>
+			${stepsOf(panel).map(({ colour, low, high }) => html`<span key=${colour}><svg class="chart__swatch" viewBox="0 0 22 8" aria-hidden="true" data-colour=${colour}><path d="M0 4h22" /></svg>${number(low)} to ${number(high)}${panel.color?.unit ? ` ${panel.color.unit}` : ''}</span>`)}
+		</p>
+	`;
+}
+
+/** @param {{evaluation: number, panel: PanelJson, alone: boolean, open: Open}} props `alone`: the figure's own title says it */
+function Panel({ evaluation, panel, alone, open }) {
 	const { x, curves } = useMemo(() => drawn(panel), [panel]);
-	const axis = (/** @type {PanelJson['x']} */ { label, unit }) => (unit ? `${label}, ${unit}` : label);
 	/** @param {number} index @param {number | null} y */
 	function pick(index, y) {
-		const group = groupAt(panel, x[index], y);
-		if (group !== null) {
-			navigate(reviewAddress(group, ''));
-			return;
-		}
-		const query = framesAt(name, x, index);
-		if (query) openBehind(evaluation, query, `${axis(panel.x)} ${number(x[index])}`, open);
+		const point = pointAt(panel, x[index], y);
+		if (!point) return;
+		const { series, place } = point;
+		if (series.group_id !== null) navigate(reviewAddress(series.group_id, ''));
+		else if (series.frames?.[place]) openBehind(evaluation, series.frames[place], behindText(panel, series, place), open);
 	}
 	const many = curves.length > 8;
 	const mark = panel.marks.find((one) => one.axis === 'x');
@@ -121,12 +87,12 @@ function Panel({ evaluation, name, panel, alone, open }) {
 		<div class="figure__panel">
 			${alone || !panel.title ? null : html`<h3>${panel.title}</h3>`}
 			<${Chart}
-				name=${`${panel.title || axis(panel.y)} against ${axis(panel.x)}: ${many ? `${curves.length} curves` : curves.map(({ label }) => label).join(', ')}`}
-				x=${x} curves=${curves} xLabel=${axis(panel.x)} yLabel=${axis(panel.y)} height=${260} marker=${mark?.at ?? null} format=${number} legend=${!many}
+				name=${`${panel.title || axisText(panel.y)} against ${axisText(panel.x)}: ${many ? `${curves.length} curves` : curves.map(({ label }) => label).join(', ')}`}
+				x=${x} curves=${curves} xLabel=${axisText(panel.x)} yLabel=${axisText(panel.y)} height=${260} marker=${mark?.at ?? null} format=${number} legend=${!many}
 				xRange=${panel.x.low !== null && panel.x.high !== null ? [panel.x.low, panel.x.high] : undefined} yRange=${[panel.y.low, panel.y.high]}
-				onPick=${pick}
+				onPick=${panel.series.some(opens) ? pick : undefined}
 			/>
-			${panel.color ? html`<p class="note">Colour: ${axis(panel.color).toLowerCase()}, blue is the smallest</p>` : null}
+			${panel.color ? html`<${ScaleLegend} panel=${panel} />` : null}
 		</div>
 	`;
 }
@@ -141,7 +107,7 @@ export function FigureCard({ evaluation, name, open }) {
 				<span class="card__aside buttons">${/** @type {const} */ (['csv', 'json', 'png']).map((ending) => html`<a key=${ending} class="link" href=${figureAddress(evaluation, name, ending)} download=${`${name}.${ending}`}>${ending.toUpperCase()}<span class="hidden-text"> of ${found?.title ?? name}</span></a>`)}</span></h2>
 			${figure.error ? html`<p class="form__error" role="alert">${sentenceOf(figure.error)}</p>` : null}
 			${!found && !figure.error ? html`<${Loading} what="the figure" />` : null}
-			<div class="figure__panels">${(found?.panels ?? []).map((panel, index) => html`<${Panel} key=${index} evaluation=${evaluation} name=${name} panel=${panel} alone=${found?.panels.length === 1} open=${open} />`)}</div>
+			<div class="figure__panels">${(found?.panels ?? []).map((panel, index) => html`<${Panel} key=${index} evaluation=${evaluation} panel=${panel} alone=${found?.panels.length === 1} open=${open} />`)}</div>
 			${found?.note ? html`<p class="note">${found.note}</p>` : null}
 		</section>
 	`;

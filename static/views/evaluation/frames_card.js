@@ -14,13 +14,33 @@ import { number } from './cell.js';
 
 /** @import {FrameJson, FrameQuery} from '../../api/evaluations.js' */
 
+/** @typedef {{field: string, label: string}} Column */
+
+/** @type {Column[]} */
 const COLUMNS = [
 	{ field: 'score', label: 'score' }, { field: 'iou', label: 'IoU' }, { field: 'error_m', label: 'error, m' },
 	{ field: 'error_percent', label: 'error, %' }, { field: 'distance_m', label: 'distance, m' },
-	{ field: 'diameter_px', label: 'Ø, px' }, { field: 'parallax_degrees', label: 'β, °' }, { field: 'predicted_jac', label: 'JaC' },
+	{ field: 'diameter_px', label: 'Ø, px' }, { field: 'parallax_degrees', label: 'β, °' }, { field: 'predicted_jac', label: 'predicted JaC' },
 ];
+/** Those of the number that was clicked; the first is the number itself. @type {{[field: string]: Column[]}} */
+const ASKED = {
+	detections: [{ field: 'detections', label: 'detections' }],
+	hit_iou: [{ field: 'hit_iou', label: 'IoU of the hit' }],
+	size_error_percent: [{ field: 'size_error_percent', label: 'size error, %' }],
+	any_error_m: [{ field: 'any_error_m', label: 'error of the surest, m' }],
+	predicted_error_m: [{ field: 'predicted_error_m', label: 'predicted camera: error, m' }, { field: 'predicted_error_percent', label: 'predicted camera: error, %' }],
+	predicted_any_error_m: [{ field: 'predicted_any_error_m', label: 'predicted camera: error of the surest, m' }],
+	box_iou: [{ field: 'box_iou', label: 'IoU of the true box with the careful one' }],
+};
 
-/** @param {{frame: FrameJson, columns: typeof COLUMNS}} props */
+/** The clicked number first, then those that some frame has. @param {string} field @param {FrameJson[]} items */
+function columnsOf(field, items) {
+	const asked = ASKED[field] ?? COLUMNS.filter((column) => column.field === field);
+	const others = COLUMNS.filter((column) => !asked.includes(column) && items.some((frame) => frame[column.field] !== null && frame[column.field] !== undefined));
+	return [...asked, ...others];
+}
+
+/** @param {{frame: FrameJson, columns: Column[]}} props */
 function Row({ frame, columns }) {
 	const { name, aside } = matchName(frame.group);
 	return html`
@@ -51,7 +71,7 @@ function useFrames(evaluation, query) {
 /** @param {{evaluation: number, query: FrameQuery, title: string, sort: (sort: string) => void, onClose: () => void}} props */
 export function FramesCard({ evaluation, query, title, sort, onClose }) {
 	const { items, next, total, error, more } = useFrames(evaluation, query);
-	const columns = COLUMNS.filter(({ field }) => items.some((frame) => frame[field] !== null && frame[field] !== undefined));
+	const columns = columnsOf(query.field ?? '', items);
 	/** @param {string} field */
 	const turn = (field) => sort(query.sort === `${field}-desc` ? field : `${field}-desc`);
 	return html`

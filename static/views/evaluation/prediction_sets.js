@@ -13,6 +13,7 @@ import { UploadField } from '../source_choice.js';
 import { When } from '../when.js';
 import { AcceptPredictions } from './accept_predictions.js';
 import { ConfirmButton } from './confirm_button.js';
+import { readSize } from './image_size.js';
 
 /** @import {PredictionSet} from '../../api/evaluations.js' */
 /** @import {UploadJson} from '../../api/imports.js' */
@@ -52,12 +53,20 @@ function UploadDialog({ one, onClose, onAdded }) {
 	/** @param {FormData} form */
 	async function send(form) {
 		if (why) return;
+		const size = readSize(String(form.get('size') ?? ''), 'Image size');
+		const camerasSize = readSize(String(form.get('cameras_size') ?? ''), 'Image size of the cameras');
+		const problem = size.problem || camerasSize.problem;
+		if (problem) {
+			setState({ busy: false, error: problem });
+			return;
+		}
 		setState({ busy: true, error: '' });
 		try {
 			const category = String(form.get('category') ?? '').trim();
 			await postPredictions(one.id, {
 				name: name.trim(), format, upload: files.boxes, cameras_upload: files.cameras,
 				images_upload: format === 'coco' ? files.images : null, category: category === '' ? null : Number(category),
+				size: size.size, cameras_size: camerasSize.size,
 			});
 			forgetPredictions();
 			onAdded();
@@ -88,6 +97,8 @@ function UploadDialog({ one, onClose, onAdded }) {
 				<div class="form">
 					${format === 'coco' ? html`<${UploadField} id="prediction-images" label="COCO images" hint="the document whose image numbers the results use" accept=".json" onUploaded=${took('images')} />` : null}
 					<div class="form__row"><label for="prediction-category">Class of the ball</label><input class="field" id="prediction-category" name="category" type="number" min="0" step="1" placeholder="the only one" /></div>
+					<div class="form__row"><label for="prediction-size">Image size, where the detector saw resized images</label><input class="field" id="prediction-size" name="size" autocomplete="off" maxlength="20" placeholder="as annotated, or 1280x720" /></div>
+					<div class="form__row"><label for="prediction-cameras-size">Image size of the cameras</label><input class="field" id="prediction-cameras-size" name="cameras_size" autocomplete="off" maxlength="20" placeholder="as annotated, or 960x540" /></div>
 				</div>
 			</details>
 			<${UploadField} id="prediction-cameras" label="Predicted cameras, where there are any" hint="a zip of SoccerNet camera JSON" onUploaded=${took('cameras')} />
@@ -119,6 +130,7 @@ export function PredictionSets({ one, sets, changed }) {
 	return html`
 		<section class="card" aria-labelledby="sets-title">
 			<h2 id="sets-title">Predictions</h2>
+			<p><button class="button" type="button" onClick=${() => setAsked('upload')}>Upload predictions…</button></p>
 			${sets.length === 0 ? html`<p class="empty-note">None yet: COCO results, YOLO files, a CSV, or cameras.</p>` : null}
 			<ul>
 				${sets.map((set) => html`
@@ -133,7 +145,6 @@ export function PredictionSets({ one, sets, changed }) {
 					</li>`)}
 			</ul>
 			${problem ? html`<p class="form__error" role="alert">${problem}</p>` : null}
-			<p class="version-card__freeze"><button class="button" type="button" onClick=${() => setAsked('upload')}>Upload predictions…</button></p>
 			${asked === 'upload' ? html`<${UploadDialog} one=${one} onClose=${close} onAdded=${changed} />` : null}
 			${asked && asked !== 'upload' ? html`<${AcceptPredictions} one=${one} set=${asked} onClose=${close} />` : null}
 		</section>

@@ -107,7 +107,7 @@ export function RunDetails({ id, runs, changed }) {
 			${other ? html`<${Comparison} run=${run} other=${other} onClose=${() => setOther(0)} />` : null}
 			${frames ? html`<${FramesCard} evaluation=${id} query=${frames.query} title=${frames.title} sort=${(/** @type {string} */ sort) => setFrames({ ...frames, query: { ...frames.query, sort } })} onClose=${() => setFrames(null)} />` : null}
 		</div>
-		<div class="evaluation__tables">${run.tables.map((table) => html`<${TableCard} key=${table.name} table=${table} open=${open} />`)}</div>
+		<div class="evaluation__tables">${run.tables.map((table) => html`<${TableCard} key=${table.name} evaluation=${id} table=${table} open=${open} />`)}</div>
 		<div class="evaluation__figures">${run.figures.map((name) => html`<${FigureCard} key=${name} evaluation=${id} name=${name} open=${open} />`)}</div>
 	`;
 }

@@ -101,13 +101,15 @@ export function Runs({ one, sets, runs, versions, shown, show, changed }) {
 	}
 	const versionOf = (/** @type {EvaluationRow} */ run) => (run.version === null ? 'as it was' : `version ${versions.find(({ id }) => id === run.version)?.name ?? run.version}`);
 	return html`
-		<section class="card" aria-labelledby="runs-title">
-			<h2 id="runs-title">Runs · ${count(runs.length)}</h2>
-			<ul class="run-list">${runs.map((run) => html`<${RunLine} key=${run.id} run=${run} shown=${run.id === shown} version=${versionOf(run)} show=${() => show(run.id)} />`)}</ul>
+		<section class="card" aria-labelledby="new-run-title">
+			<h2 id="new-run-title">New run</h2>
+			<${RunForm} key=${[...sets, ...versions].map(({ id, name }) => `${id} ${name}`).join()} sets=${sets} versions=${versions} why=${why} send=${send} />
 			${job ? html`<${JobProgress} job=${job} />` : null}
 			${error ? html`<p class="form__error" role="alert">${error}</p>` : null}
-			<h3 class="evaluation__new">New run</h3>
-			<${RunForm} key=${[...sets, ...versions].map(({ id, name }) => `${id} ${name}`).join()} sets=${sets} versions=${versions} why=${why} send=${send} />
 		</section>
+		${runs.length === 0 ? null : html`<section class="card" aria-labelledby="runs-title">
+			<h2 id="runs-title">Runs · ${count(runs.length)}</h2>
+			<ul class="run-list">${runs.map((run) => html`<${RunLine} key=${run.id} run=${run} shown=${run.id === shown} version=${versionOf(run)} show=${() => show(run.id)} />`)}</ul>
+		</section>`}
 	`;
 }

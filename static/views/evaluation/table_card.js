@@ -3,6 +3,7 @@
 
 import { html } from 'htm/preact';
 
+import { tableAddress } from '../../api/evaluations.js';
 import { count } from '../../lib/format.js';
 import { Cell, number } from './cell.js';
 
@@ -32,11 +33,12 @@ function Row({ row, open }) {
 
 const ARROWS = /** @type {{[better: string]: string}} */ ({ higher: ' ↑', lower: ' ↓' });
 
-/** @param {{table: TableJson, open: (query: FrameQuery, title: string) => void}} props */
-export function TableCard({ table, open }) {
+/** @param {{evaluation: number, table: TableJson, open: (query: FrameQuery, title: string) => void}} props */
+export function TableCard({ evaluation, table, open }) {
 	return html`
 		<section class="card card--flush" aria-labelledby=${`table-${table.name}`}>
-			<h2 id=${`table-${table.name}`}>${table.title}</h2>
+			<h2 id=${`table-${table.name}`}>${table.title}
+				<span class="card__aside buttons">${/** @type {const} */ (['csv', 'json']).map((ending) => html`<a key=${ending} class="link" href=${tableAddress(evaluation, table.name, ending)} download=${`${table.name}.${ending}`}>${ending.toUpperCase()}<span class="hidden-text"> of ${table.title}</span></a>`)}</span></h2>
 			<div class="table__scroll" tabindex="0" role="region" aria-label=${table.title}>
 				<table class="table">
 					<thead><tr><td></td>${table.columns.map((column) => html`

@@ -39,6 +39,15 @@ class TestErrorFigure:
         assert (middle.low, middle.high, middle.count) == ((1, 9), (3, 9), (5, 1))
         assert len(points.x) == 6
 
+    def test_a_median_opens_its_bin_and_a_point_its_frame(self) -> None:
+        places = [20.0, 25.0, 29.9, 105.0]
+        frames = [replace(RESULT, distance_m=place, error_m=1.0) for place in places]
+        points, middle = error_figure(frames, DISTANCE).panels[0].series
+        assert [(item.low, item.high) for item in middle.frames] == [(20, 30), (100, None)]
+        assert {item.field for item in (*middle.frames, *points.frames)} == {"distance_m"}
+        for behind in points.frames:
+            assert sum(behind.low <= place < behind.high for place in places) == 1
+
     @pytest.mark.parametrize("bins", [DISTANCE, PARALLAX, SIZE])
     def test_of_nothing_is_an_empty_figure(self, bins) -> None:
         points, middle = error_figure([RESULT], bins).panels[0].series

@@ -7,6 +7,7 @@ import pytest
 
 from app.evaluation.bootstrap import Resamples
 from app.evaluation.cameras import cameras_table, jac_figure, score_cameras
+from app.evaluation.table import Frames
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.annotation import make_lines
 from app.soccer.pitch import MARKINGS, Pitch
@@ -59,12 +60,14 @@ class TestScoreCameras:
 class TestCamerasTable:
     def test_missing_cameras_count_as_nothing(self, frames) -> None:
         rows = [("predicted", "Predicted", score_cameras(frames, {1: frames[0].camera}))]
-        table = cameras_table(rows, frames, Resamples.draw(["m1", "m2", "m3"]))
+        table = cameras_table(rows, frames, Resamples.draw(["m1", "m2", "m3"]), {1})
         assert table.cell("predicted", "completeness").value == 0.5
         assert table.cell("predicted", "jac_0.5").value == pytest.approx(0.5)
         assert table.cell("predicted", "challenge").value == pytest.approx(0.5)
         assert table.cell("predicted", "jac_2").of == 2
         assert table.cell("predicted", "error_median_px").value == pytest.approx(0, abs=0.5)
+        assert table.row("predicted").frames == Frames("predicted_jac")
+        assert "The list of frames has 1 of them" in table.note
 
 
 class TestJacFigure:
@@ -74,3 +77,13 @@ class TestJacFigure:
         at = dict(zip(panel.series[0].x, panel.series[0].y, strict=True))
         assert (at[0.0], at[0.75], at[1.0]) == (0.5, 0.5, 0)
         assert panel.marks[0].at == 0.75
+
+    def test_a_point_opens_the_frames_above_it_where_their_number_is_kept(self, frames) -> None:
+        scores = score_cameras(frames, {1: frames[0].camera})
+        rows = [("predicted", "Predicted", scores), ("dataset", "Own", scores)]
+        predicted, own = jac_figure(rows, 0.75).panels
+        at = dict(zip(predicted.series[0].x, predicted.series[0].frames, strict=True))
+        assert at[0.75].low > 0.75 == np.nextafter(at[0.75].low, 0)
+        assert at[0.75].high is None
+        others = [*predicted.series[1:], *own.series]
+        assert [series.frames for series in others] == [()] * 5

@@ -6,7 +6,9 @@ import pytest
 
 from app.evaluation.bootstrap import Resamples
 from app.evaluation.careful import boxes_table
+from app.evaluation.evaluate import Inputs, Options, evaluate
 from app.evaluation.frame import Detection
+from app.evaluation.table import Frames
 
 
 class TestBoxesTable:
@@ -28,3 +30,16 @@ class TestBoxesTable:
         found = {1: [Detection(frame.boxes["annotated"], 0.4)]}
         table = boxes_table([frame], {1: frame.boxes["exact"]}, found, Resamples.draw(["m"]))
         assert table.cell("detected", "iou").value == pytest.approx(0.64)
+
+    def test_only_the_row_whose_overlap_is_kept_opens_frames(self, make_frame) -> None:
+        frame, bare = make_frame(1), make_frame(2)
+        bare = replace(bare, boxes={"annotated": bare.boxes["annotated"]})
+        careful = {1: frame.boxes["exact"], 2: frame.boxes["exact"]}
+        result = evaluate(
+            [frame, bare], Inputs(careful=careful), Options(boxes="annotated", resamples=20)
+        )
+        table = result.table("boxes")
+        opening = {row.name: row.frames for row in table.rows if row.frames}
+        assert opening == {"annotated": Frames("box_iou")}
+        kept = [item.box_iou for item in result.frames if item.box_iou is not None]
+        assert kept == [pytest.approx(table.cell("annotated", "iou").value)]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.evaluation.comparison import compare_frames, compare_tables
+from app.evaluation.comparison import compare_frames, compare_tables, differing_pins
 from app.evaluation.result import FrameResult
 from app.evaluation.table import Cell, Column, Row, Table
 
@@ -13,6 +13,17 @@ RESULT = FrameResult(1, 1, "g", "1.png", "m", ball=True, detections=1)
 
 def table(name: str, value: float | None, row: str = "all") -> Table:
     return Table(name, name, (Column("ap", "AP"),), (Row(row, row, (Cell(value),)),))
+
+
+class TestDifferingPins:
+    def test_names_what_makes_numbers_others(self) -> None:
+        pins = {"state": "a", "software_version": "1", "name": "x", "careful": {"digest": "d"}}
+        assert differing_pins(pins, {**pins, "name": "y"}) == ()
+        other = {**pins, "state": "b", "software_version": "2", "careful": {"digest": "e"}}
+        assert differing_pins(pins, other) == ("state", "software_version", "careful")
+
+    def test_careful_boxes_of_one_run_alone_make_no_difference(self) -> None:
+        assert differing_pins({"careful": {"digest": "d"}}, {}) == ()
 
 
 class TestCompareTables:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 
 from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.figure_csv import figure_csv, table_csv
@@ -23,6 +24,14 @@ class TestFigureCsv:
         assert (found[2]["count"], found[2]["group_id"]) == ("7", "12")
         # A spreadsheet would run it.
         assert found[2]["series"] == "'=b"
+
+    def test_the_header_says_what_the_axes_show(self) -> None:
+        one = Panel("P", Axis("Change", "%"), Axis("Moves by", "m"), (), color=Axis("Far", "m"))
+        two = replace(one, x=Axis("Shift", "px"))
+        header = figure_csv(Figure("f", "F", (one, two))).splitlines()[0]
+        assert header == (
+            "panel,series,kind,Change (%) / Shift (px),Moves by (m),low,high,count,Far (m),group_id"
+        )
 
 
 class TestTableCsv:

@@ -41,12 +41,25 @@ class TestFind:
             ALDER.replace("/", "_") + "_7_1.txt",
             "7_1.png",
             "predictions/7_1.txt",
+            "runs/detect/predict2/labels/7_1.txt",
+            f"/data/frames of mine/{ALDER}/7_1.png",
+            f"C:\\frames\\{ALDER}\\7_1.png",
+            f"mine/{ALDER.rsplit('/', 1)[1]}/7_1.png",
         ],
     )
     def test_knows_the_spellings_of_a_broadcast_frame(self, names, name: str) -> None:
         assert names.find(name).id == 2
 
-    @pytest.mark.parametrize("name", ["cam3/358.jpg", "358/cam3", "358_cam3.txt", "a/cam3_358.txt"])
+    @pytest.mark.parametrize(
+        "name",
+        [
+            "cam3/358.jpg",
+            "358/cam3",
+            "358_cam3.txt",
+            "labels/cam3_358.txt",
+            "/data/issia/cam3/358.png",
+        ],
+    )
     def test_knows_the_spellings_of_a_static_frame(self, names, name: str) -> None:
         assert names.find(name).id == 4
 
@@ -65,7 +78,40 @@ class TestFind:
     def test_a_frame_of_another_match_is_not_the_one_of_that_number(self, names) -> None:
         other = "league/2030-2031/2030-09-01 - 18-00 Fir 1 - 0 Oak/7_1.png"
         assert names.find(other) is None
-        assert names.why_not(other) == "is no frame of the dataset"
+        assert names.why_not(other).startswith("is no frame of the dataset: its folders name none")
+        assert names.why_not("99.png") == "is no frame of the dataset"
+
+    @pytest.mark.parametrize(
+        "name",
+        [
+            "epl/2014-2015/Arsenal/7_1.png",
+            "Arsenal/7_1.png",
+            "labels/Arsenal/7_1.txt",
+            "Arsenal/Frames-v3/7_1.png",
+            "Arsenal/labels/7_1.txt",
+            "other/cam3/358.jpg",
+            "other/cam3_358.txt",
+        ],
+    )
+    def test_folders_that_may_be_another_match_are_not_passed_over(self, names, name: str) -> None:
+        assert names.find(name) is None
+
+    def test_the_last_folder_alone_of_a_match_without_teams_does_not_tell_it(self) -> None:
+        found = FrameNames.of([broadcast(1, "epl/2015-2016/Arsenal", "2_2.png")])
+        assert found.find("Arsenal/2_2.png").id == 1
+        assert found.find("x/epl/2015-2016/Arsenal/2_2.png").id == 1
+        assert found.find("epl/2014-2015/Arsenal/2_2.png") is None
+
+    def test_where_frames_have_no_match_their_group_tells_them(self) -> None:
+        found = FrameNames.of(
+            [
+                NamedFrame(1, "g7", "7_1.png", "", SIZE),
+                NamedFrame(2, "358", "cam3", "", SIZE, station="cam3"),
+            ]
+        )
+        assert [found.find(name).id for name in ("7_1", "labels/7_1", "x/g7/7_1")] == [1, 1, 1]
+        assert found.find("x/cam3/358.jpg").id == 2
+        assert found.find("x/7_1.png") is None
 
 
 class TestOfStation:

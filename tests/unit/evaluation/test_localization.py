@@ -55,3 +55,14 @@ class TestPrecisionDistance:
         assert (at[0.0], at[1.0], at[1.1], at[4.0], at[4.1], at[20.0]) == (0, 0, 0.5, 0.5, 1, 1)
         assert everywhere.y[-1] == 0.5
         assert "of 4" in everywhere.label
+
+    def test_a_point_opens_the_frames_that_its_curve_counts(self, frames) -> None:
+        frames = [replace(frame, predicted_error_m=3.0) for frame in frames]
+        (panel,) = precision_distance(frames, predicted=True).panels
+        assert [series.frames[0].field for series in panel.series] == [
+            "error_m", "any_error_m", "predicted_error_m", "predicted_any_error_m",
+        ]  # fmt: skip
+        for series in panel.series:
+            for behind, count in zip(series.frames, series.count, strict=True):
+                errors = [getattr(frame, behind.field) for frame in frames]
+                assert sum(error is not None and error < behind.high for error in errors) == count

@@ -83,6 +83,9 @@ class TestCoco:
             ({"bbox": [1, 2, 0, 4]}, "bbox", "wider"),
             ({"bbox": [5000, 2, 3, 4]}, "bbox", "outside the image of 1280 x 720"),
             ({"bbox": [1, 2, True, 4]}, "bbox", "truth value"),
+            ({"bbox": [1, 2, 3e9, 4]}, "bbox", "wider or higher than the image of 1280 x 720"),
+            ({"bbox": [1, 2, 3, 721]}, "bbox", "wider or higher"),
+            ({"bbox": [1281, 2, 3, 4]}, "bbox", "outside the image"),
             ({"score": 1.5}, "score", "is 1.5"),
             ({"score": None}, "score", "not a number"),
             ({"image_id": None}, "image_id", "neither"),
@@ -157,6 +160,7 @@ class TestYolo:
             ("0 0.5 0.5 x 0.1", "'x'"),
             ("0.5 0.5 0.5 0.1 0.1", "whole number"),
             ("0 0.5 0.5 0 0.1", "wider"),
+            ("0 0.5 0.5 1.5 0.1", "wider or higher than the image"),
             ("0 0.5 0.5 0.1 0.1 2", "is 2, which"),
         ],
     )
@@ -197,6 +201,8 @@ class TestCsv:
         [
             ("image,score\n7.png,0.5\n", "ball_bbox", "missing"),
             ("image,x,y,w,h\n7.png,1,2,a,4\n", "w", "'a'"),
+            ("image,x,y,w,h\n7.png,1,2,3e9,4\n", "x, y, w, h", "wider or higher"),
+            ('image,ball_bbox\n7.png,"[1, 2, 3, 4e9]"\n', "ball_bbox", "wider or higher"),
             ("x,y,w,h\n1,2,3,4\n", "frame", "missing"),
             ('image,ball_bbox\n7.png,"[1, 2, __import__(3), 4]"\n', "ball_bbox", "not a list"),
         ],

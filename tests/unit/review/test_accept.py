@@ -5,10 +5,16 @@ import json
 import pytest
 
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
+from app.evaluation.frame import Detection
 from app.review.accept import AcceptRequest, accept, accept_box, plan_accept
 from app.review.edit import SetBall
 from app.review.ledger import read_ledger
-from app.review.predictions import PredictionFiles, add_predictions
+from app.review.predictions import (
+    PredictionFiles,
+    add_predictions,
+    frame_names,
+    save_predictions,
+)
 from app.review.predictions_of_group import group_predictions
 from app.review.replay import replay
 from app.review.submit import history, load, submit, undo
@@ -36,7 +42,26 @@ def predictions(store, cleared, tmp_path):
     return add_predictions(store, "demo", "yolo", PredictionFiles(path), actor="ann")
 
 
+@pytest.fixture
+def absurd(store, cleared):
+    """A set as no reader lets it in any more: a box as wide as a country."""
+    found = {cleared.view_ids["7.png"]: [Detection(Box(1, 2, 3e9, 4), 0.95)]}
+    names = frame_names(store, "demo")
+    report = {"problems": [], "more_problems": 0}
+    return save_predictions(
+        store, "demo", "old", found, {},
+        names=names, format="coco", source="old.json", report=report, actor="ann",
+    )  # fmt: skip
+
+
 class TestPlanAccept:
+    def test_a_box_that_can_be_no_ball_is_refused_as_such(self, store, absurd) -> None:
+        plan = plan_accept(store, "demo", AcceptRequest(absurd.id))
+        assert (plan.changes, plan.refused) == ((), {"not_a_ball": 1})
+        assert accept(store, "demo", AcceptRequest(absurd.id), actor="bob").refused == {
+            "not_a_ball": 1
+        }
+
     def test_takes_the_surest_of_views_without_a_ball(self, store, cleared, predictions) -> None:
         plan = plan_accept(store, "demo", AcceptRequest(predictions.id))
         assert [(item.view, item.box.x) for item in plan.changes] == [("7.png", 600)]
@@ -140,6 +165,16 @@ class TestAccept:
 
 
 class TestAcceptBox:
+    def test_a_box_that_can_be_no_ball_is_refused_with_the_reason(
+        self, store, cleared, absurd
+    ) -> None:
+        view, box = cleared.view_ids["7.png"], self.box(store, cleared, 0.95)
+        with pytest.raises(InputError, match="wider or higher than the image"):
+            accept_box(store, view, box, if_match=cleared.etag, actor="bob")
+        with pytest.raises(StaleRevisionError):
+            accept_box(store, view, box, if_match='"0"', actor="bob")
+        assert load(store, cleared.id) == cleared
+
     def box(self, store, cleared, score: float) -> int:
         found = group_predictions(store, cleared.id).boxes
         return next(box.id for _, box in found if box.score == score)

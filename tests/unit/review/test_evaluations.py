@@ -6,11 +6,13 @@ import pytest
 from sqlalchemy import func, select
 
 from app.errors import ConflictError, InputError, NotFoundError
+from app.review.accept import AcceptRequest, accept
 from app.review.delete_dataset import delete_dataset
 from app.review.edit import SetBall
 from app.review.evaluations import (
     EvaluationRequest,
     FrameQuery,
+    check_evaluation,
     compare,
     get_evaluation,
     get_figure,
@@ -82,6 +84,8 @@ class TestRunEvaluation:
         assert again.pins == first.pins
         assert again.tables == first.tables
         assert first.pins["predictions"]["digest"] == exact.digest
+        assert first.pins["predictions"]["source"] == "a.json"
+        assert first.pins["predictions"]["unknown"] == 0
         assert first.pins["policy_hash"] == states[0].policy.hash
         edit = SetBall("7.png", None)
         submit(store, states[0].id, edit, if_match=states[0].etag, actor="ann")
@@ -128,6 +132,41 @@ class TestRunEvaluation:
         assert [table["name"] for table in found.tables] == ["boxes", "sensitivity"]
         assert cell(found, "boxes", "optimized", "iou").value == pytest.approx(1)
         assert cell(found, "boxes", "annotated", "iou").value < 1
+
+    def test_two_careful_boxes_in_a_frame_are_refused_with_its_name(
+        self, store, states, exact, tmp_path
+    ) -> None:
+        path = tmp_path / "a.json"
+        values = json.loads(path.read_text())
+        path.write_text(json.dumps([*values, values[1]]))
+        twice = add_predictions(store, "demo", "twice", PredictionFiles(path), actor="ann")
+        request = EvaluationRequest(predictions=exact.id, careful=twice.id)
+        for refused in (check_evaluation, lambda *args: run_evaluation(*args, actor="ann")):
+            with pytest.raises(InputError, match="have more than one box") as caught:
+                refused(store, "demo", request)
+            assert caught.value.pointer == "/careful"
+            assert caught.value.message.endswith(f": {values[1]['image_id']}")
+        assert list_evaluations(store, "demo") == []
+
+    def test_a_truth_that_was_a_prediction_is_counted_and_warned_of(
+        self, store, states, exact, loose
+    ) -> None:
+        clean = run_evaluation(store, "demo", EvaluationRequest(predictions=exact.id), actor="ann")
+        assert clean.counts["accepted_predictions"] == 0
+        assert not any("Warning" in table.note for table in tables_of(clean))
+        view = states[0].view_ids["7.png"]
+        accept(store, "demo", AcceptRequest(exact.id, views=(view,), replace=True), actor="ann")
+        own, other = (
+            run_evaluation(store, "demo", EvaluationRequest(predictions=item.id), actor="ann")
+            for item in (exact, loose)
+        )
+        assert own.counts["accepted_predictions"] == other.counts["accepted_predictions"] == 1
+        notes = [
+            next(item.note for item in tables_of(run) if item.name == "detection")
+            for run in (own, other)
+        ]
+        assert all("Warning: the ball of 1 of 6 frames is an accepted" in note for note in notes)
+        assert ["the very set" in note for note in notes] == [True, False]
 
     @pytest.mark.parametrize(
         ("change", "error"),
@@ -207,7 +246,7 @@ class TestCompare:
             for item in (loose, exact)
         ]
         found = compare(store, runs[0].id, runs[1].id)
-        assert found.same_truth
+        assert (found.same_truth, found.differs) == (True, ())
         assert (found.frames.better, found.frames.worse, found.frames.shared) == (6, 0, 6)
         change = next(item for item in found.numbers if item.column == "mae_m")
         assert change.change is not None and change.change < -5
@@ -219,9 +258,29 @@ class TestCompare:
             )
             for split in (None, "test")
         ]
-        assert not compare(store, runs[0].id, runs[1].id).same_truth
+        found = compare(store, runs[0].id, runs[1].id)
+        assert (found.same_truth, found.differs) == (False, ("split",))
         with pytest.raises(InputError, match="compared by"):
             compare(store, runs[0].id, runs[1].id, "group")
+
+    def test_other_careful_boxes_are_another_truth(self, store, exact, loose) -> None:
+        runs = [
+            run_evaluation(
+                store, "demo", EvaluationRequest(predictions=exact.id, careful=careful), actor="a"
+            )
+            for careful in (exact.id, loose.id, None)
+        ]
+        other = compare(store, runs[0].id, runs[1].id)
+        assert (other.same_truth, other.differs) == (False, ("careful",))
+        assert compare(store, runs[0].id, runs[2].id).same_truth
+
+    def test_says_when_the_software_is_another(self, store, exact, monkeypatch) -> None:
+        request = EvaluationRequest(predictions=exact.id)
+        first = run_evaluation(store, "demo", request, actor="ann")
+        monkeypatch.setattr("app.review.evaluation_frames.software_version", lambda: "99.0")
+        second = run_evaluation(store, "demo", request, actor="ann")
+        found = compare(store, first.id, second.id)
+        assert (found.same_truth, found.differs) == (True, ("software_version",))
 
 
 class TestRemoveEvaluation:

@@ -73,6 +73,21 @@ class TestAddPredictions:
         other = results(tmp_path / "yolo.json", "7_1.png")
         assert add_predictions(store, "demo", "yolo", other, actor="b", reuse=True).name == "yolo-2"
 
+    def test_a_file_with_another_report_is_another_set(self, store, state, tmp_path) -> None:
+        files = results(tmp_path / "yolo.json", "7.png")
+        first = add_predictions(store, "demo", "yolo", files, actor="ann", reuse=True)
+        # The same box again, and beside it a frame that is not known.
+        more = results(tmp_path / "yolo.json", "7.png", "99.png")
+        second = add_predictions(store, "demo", "yolo", more, actor="ann", reuse=True)
+        assert second.digest == first.digest
+        assert (second.name, second.unknown) == ("yolo-2", 1)
+        assert [item["frame"] for item in second.report["unknown_frames"]] == ["99.png"]
+        assert add_predictions(store, "demo", "yolo", more, actor="a", reuse=True) == second
+        renamed = results(tmp_path / "later.json", "7.png")
+        third = add_predictions(store, "demo", "later", renamed, actor="ann", reuse=True)
+        assert (third.name, third.source, third.unknown) == ("later", "later.json", 0)
+        assert get_predictions(store, first.id) == first
+
     def test_a_file_for_another_dataset_is_refused(self, store, state, tmp_path) -> None:
         with pytest.raises(InputError, match="none of the 2 frames belongs"):
             add_predictions(

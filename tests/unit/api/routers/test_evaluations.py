@@ -225,9 +225,14 @@ class TestEvaluations:
         for name in document["figures"]:
             address = f"{API}/evaluations/{number}/figures/{name}"
             assert running.get(f"{address}.json").json()["name"] == name
-            assert running.get(f"{address}.csv").text.startswith("panel,series,kind,x,y")
+            assert running.get(f"{address}.csv").text.startswith("panel,series,kind,")
             assert running.get(f"{address}.png").content[:4] == b"\x89PNG"
         for table in document["tables"]:
+            address = f"{API}/evaluations/{number}/tables/{table['name']}"
+            assert running.get(f"{address}.json").json() == table
+            lines = running.get(f"{address}.csv").text.splitlines()
+            assert lines[0].startswith(f"row,{table['columns'][0]['name']},")
+            assert len(lines) == 1 + len(table["rows"])
             for row in table["rows"]:
                 if row["frames"] is None:
                     continue
@@ -263,6 +268,22 @@ class TestEvaluations:
         assert [table["name"] for table in document["tables"]] == ["boxes", "sensitivity"]
         missing = running.get(f"{API}/evaluations/{number}/figures/jac.json")
         assert missing.status_code == 404
+        tables = f"{API}/evaluations/{number}/tables"
+        assert running.get(f"{tables}/detection.csv").status_code == 404
+        assert running.get(f"{tables}/other.csv").status_code == 404
+
+    def test_the_points_of_figures_open_what_they_count(self, running) -> None:
+        loose = add(running, "loose", results(running, 1.1)).json()
+        address = f"{API}/evaluations/{evaluate(running, predictions=loose['id'])}"
+        for name in ("error_by_distance", "precision_recall", "precision_distance"):
+            (panel,) = running.get(f"{address}/figures/{name}.json").json()["panels"]
+            for series in panel["series"]:
+                assert len(series["frames"]) == len(series["x"]) > 0
+                # Groups of this dataset share their cameras: some frames are equally far.
+                behind, count = series["frames"][-1], (series["count"] or [3])[-1]
+                query = {name: value for name, value in behind.items() if value is not None}
+                page = running.get(f"{address}/frames", params=query).json()
+                assert page["total"] == count
 
     def test_a_deleted_one_is_gone(self, running, exact) -> None:
         number = evaluate(running, predictions=exact["id"])

@@ -1,0 +1,22 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+from app.api.schemas.prediction import AcceptOutcome, ViewPrediction
+from app.review.accept import Accepted, AcceptPlan
+from app.store.predictions import PredictedBox, PredictionSet
+
+SET = PredictionSet(
+    3, 1, "old", "coco", "old.json", "2030-08-17T18:00:00Z", "ann", "0" * 64, 1, 1, 0, 0, {}
+)
+BOX = PredictedBox(7, 3, 31, 1.0, 2.0, 3e9, 4.0, 0.9)
+
+
+class TestStoredBox:
+    def test_of_a_view_is_told_however_absurd(self) -> None:
+        assert ViewPrediction.of(SET, BOX).box == (1.0, 2.0, 3e9, 4.0)
+        assert ViewPrediction.of(SET, replace(BOX, width=-1.0)).box[2] == -1
+
+    def test_of_a_dry_run_is_told_however_absurd(self) -> None:
+        plan = AcceptPlan(SET, (Accepted(31, "7.png", 5, "m/7.png", BOX, None),), {})
+        assert AcceptOutcome.planned(plan).sample[0].box == (1.0, 2.0, 3e9, 4.0)
