@@ -22,6 +22,7 @@ const valueOf = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ 
 const REASONS = /** @type {{[why: string]: string}} */ ({
 	annotated: 'the view has a ball already', the_same: 'this very ball is there already',
 	below_score: 'the surest prediction is below the score', changed_meanwhile: 'the group was changed meanwhile',
+	not_a_ball: 'the box cannot be a ball of that image',
 });
 const EXAMPLES = 4;
 /** How long a person types before it is counted, ms. */

@@ -92,6 +92,7 @@ export function Comparison({ run, other, onClose }) {
 			${found.error ? html`<p class="form__error" role="alert">${sentenceOf(found.error)}</p>` : null}
 			${!found.value && !found.error ? html`<${Loading} what="the comparison" />` : null}
 			${found.value && !found.value.same_truth ? html`<p class="yield__note" data-grade="warn">The runs judged other frames, or under other thresholds: their numbers cannot be compared straight away.</p>` : null}
+			${found.value?.differs.length ? html`<p class="note">Pinned differently: ${found.value.differs.map(words).join(', ')}.</p>` : null}
 			${found.value ? html`
 				<${Numbers} run=${run} found=${found.value} />
 				<div class="form__row comparison__field"><label for="comparison-field">Frame by frame</label>
