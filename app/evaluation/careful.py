@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 
 from app.evaluation.bootstrap import Resamples
+from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.frame import Detection, Frame
 from app.evaluation.overlap import iou, size_error_percent
 from app.evaluation.table import Column, Frames, Row, Table
@@ -41,9 +43,7 @@ def boxes_table(
         truth: The kind of box whose overlap a run keeps of each frame (``box_iou``): its row
             opens the frames.
     """
-    compared = [
-        (frame, careful[frame.id]) for frame in frames if frame.id in careful and comparable(frame)
-    ]
+    compared = _compared(frames, careful)
     rows = [
         _row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared], resamples,
              len(careful), Frames("box_iou") if kind == truth else None)
@@ -57,9 +57,65 @@ def boxes_table(
     note = (
         f"{len(compared)} frames that have a careful box and a 3D ball, of {len(careful)} careful "
         f"boxes. Size error is |d - d careful| in per cent of the careful box's diagonal. "
-        f"Frames are kept with the IoU of the run's true box, whose row opens them."
+        f"The row of the run's true box opens its frames; the figure of boxes has every frame of "
+        f"every row."
     )
     return Table("boxes", "Boxes against careful boxes", COLUMNS, tuple(rows), note)
+
+
+def boxes_figure(
+    frames: Sequence[Frame], careful: Mapping[int, Box], distances: Mapping[int, float]
+) -> Figure:
+    """IoU and size error of each box of each frame, over the distance of the ball.
+
+    Args:
+        frames: Of the dataset.
+        careful: The careful box by id of the frame.
+        distances: Camera to ball, metres, by id of the frame; frames without one are left out.
+    """
+    compared = sorted(
+        (distances[frame.id], frame.id, frame, box)
+        for frame, box in _compared(frames, careful)
+        if frame.id in distances
+    )
+    note = f"{len(compared)} frames; a point opens its frame."
+    measures = (
+        ("Overlap with the careful box", Axis("IoU", low=0.0, high=1.0), iou),
+        ("Size against the careful box", Axis("Size error", "%", low=0.0), size_error_percent),
+    )
+    panels = tuple(
+        Panel(
+            title,
+            Axis("Distance to the camera", "m"),
+            axis,
+            tuple(_points(kind, label, compared, measure) for kind, label in ROWS),
+        )
+        for title, axis, measure in measures
+    )
+    return Figure("box_overlap", "Boxes against careful boxes", panels, note)
+
+
+def _points(
+    kind: str,
+    label: str,
+    compared: Sequence[tuple[float, int, Frame, Box]],
+    measure: Callable[[Box, Box], float],
+) -> Series:
+    places = tuple(distance for distance, _, _, _ in compared)
+    return Series(
+        kind,
+        label,
+        places,
+        tuple(measure(frame.boxes[kind], box) for _, _, frame, box in compared),
+        kind="points",
+        frames=tuple(Frames("distance_m", at, math.nextafter(at, math.inf)) for at in places),
+    )
+
+
+def _compared(frames: Sequence[Frame], careful: Mapping[int, Box]) -> list[tuple[Frame, Box]]:
+    return [
+        (frame, careful[frame.id]) for frame in frames if frame.id in careful and comparable(frame)
+    ]
 
 
 def comparable(frame: Frame) -> bool:

@@ -9,7 +9,7 @@ from app.evaluation import sensitivity
 from app.evaluation.binned import DISTANCE, PARALLAX, SIZE, detection_table, error_figure
 from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
 from app.evaluation.cameras import Scores, cameras_table, jac_figure, score_cameras
-from app.evaluation.careful import boxes_table, comparable
+from app.evaluation.careful import boxes_figure, boxes_table, comparable
 from app.evaluation.detection import detection_summary, precision_recall
 from app.evaluation.figure import Figure
 from app.evaluation.frame import Detection, Frame, Judged, judge
@@ -89,6 +89,10 @@ def evaluate(
         tables.append(
             boxes_table(frames, inputs.careful, inputs.detections or {}, resamples, options.boxes)
         )
+        distances = {
+            item.frame_id: item.distance_m for item in results if item.distance_m is not None
+        }
+        figures.append(boxes_figure(frames, inputs.careful, distances))
     if scores is not None:
         rows = [
             ("predicted", "Predicted cameras", scores[0]),

@@ -14,6 +14,7 @@ FIGURES = (
     "error_by_size",
     "sensitivity",
     "jac",
+    "box_overlap",
 )
 
 

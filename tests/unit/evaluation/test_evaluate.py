@@ -66,7 +66,7 @@ class TestEvaluate:
         careful = {frame.id: frame.boxes["exact"] for frame in frames if frame.boxes}
         result = evaluate(frames, Inputs(careful=careful), Options(resamples=50))
         assert [table.name for table in result.tables] == ["boxes", "sensitivity"]
-        assert [figure.name for figure in result.figures] == ["sensitivity"]
+        assert [figure.name for figure in result.figures] == ["box_overlap", "sensitivity"]
         cameras = {frame.id: camera_at(50.0) for frame in frames}
         whole = evaluate(
             frames, Inputs(found_in(frames, "exact"), careful, cameras), Options(resamples=50)
@@ -75,7 +75,7 @@ class TestEvaluate:
             "detection", "localization", "detection_by_size", "detection_by_distance",
             "boxes", "calibration", "sensitivity",
         }  # fmt: skip
-        assert len(whole.figures) == 7
+        assert len(whole.figures) == 8
 
     def test_rows_name_the_frames_behind_them(self, frames) -> None:
         result = evaluate(frames, Inputs(found_in(frames, "optimized")), Options(resamples=50))
