@@ -5,11 +5,11 @@ import { signal } from '@preact/signals';
 
 import { navigate } from '../lib/router.js';
 import { conflict } from './conflict.js';
-import { document, group, onRefused, open, settle, submitVerdict } from './group.js';
+import { document, group, onRefused, open, settle, submit, submitVerdict } from './group.js';
 import { actions, did, didAgain, forget, tookBack } from './last_action.js';
 import { currentId, goNext, query, queueAddress, reviewAddress } from './navigation.js';
 import { announce, complain, inform } from './notice.js';
-import { asking } from './workspace.js';
+import { asking, focused } from './workspace.js';
 
 /** @import {VerdictDone} from './last_action.js' */
 
@@ -45,6 +45,36 @@ export function accept() {
 /** Ask for the reason to reject. */
 export function askReason() {
 	if (document.value) asking.value = 'reason';
+}
+
+/** The view in hand, if it is one of its group. */
+function viewInHand() {
+	return group.value?.views.find(({ letter }) => letter === focused.value);
+}
+
+/** Ask for the reason to leave the view in hand out of its group. */
+export function askViewReason() {
+	const view = viewInHand();
+	if (view && !view.included) announce(`View ${view.letter} is left out already.`);
+	else if (view) asking.value = 'view';
+}
+
+/** Leave the view in hand out for a reason. @param {string} reason one of REASONS */
+export function rejectView(reason) {
+	const label = REASONS.find(({ name }) => name === reason)?.label ?? reason;
+	if (reason === 'other') asking.value = 'viewNote';
+	else leaveOut(label.toLowerCase(), reason);
+}
+
+/** Leave the view in hand out; why is kept as a note of its group. @param {string} why @param {string} [reason] */
+export function leaveOut(why, reason) {
+	const view = viewInHand();
+	asking.value = null;
+	if (!view) return;
+	if (reason) lastReason.value = reason;
+	submit({ kind: 'include', view: view.key, included: false });
+	addNote(`View ${view.letter} left out: ${why}`);
+	announce(`View ${view.letter} left out: ${why}.`);
 }
 
 /** @param {string} reason one of REASONS */

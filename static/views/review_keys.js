@@ -10,7 +10,7 @@ import { redo, undo } from '../state/history.js';
 import { goBy, goFlagged, goNext, goPrevious } from '../state/navigation.js';
 import { announce, dismiss, notice } from '../state/notice.js';
 import { revertSelected } from '../state/revert.js';
-import { accept, askReason, cancelAsking, defer } from '../state/verdicts.js';
+import { accept, askReason, askViewReason, cancelAsking, defer } from '../state/verdicts.js';
 import { fitAll, fitPanel, isZoomed, zoomTo } from '../state/viewports.js';
 import {
 	asking, boxes, cycleEstimator, cycleGain, drawing, editing, equalViews, estimator, focused, focusView, gain,
@@ -106,12 +106,12 @@ function swapFocused() {
 	else submit(swapSides(view));
 }
 
-/** A verdict on one view: whether the group is made of it. @param {boolean} included */
-function judgeView(included) {
+/** Make the group of the view in hand, too. */
+function useView() {
 	const view = group.value?.views.find(({ letter }) => letter === focused.value);
 	if (!view) return;
-	if (view.included === included) announce(`View ${view.letter} is ${included ? 'used' : 'left out'} already.`);
-	else submit({ kind: 'include', view: view.key, included });
+	if (view.included) announce(`View ${view.letter} is used already.`);
+	else submit({ kind: 'include', view: view.key, included: true });
 }
 
 /** Which 3D ball is looked at. */
@@ -152,8 +152,8 @@ const VERDICT = [
 	{ keys: ['a', 'Ctrl+Enter'], label: 'Accept and next', group: 'Verdict', run: accept },
 	{ keys: ['x'], label: 'Reject; then a digit for the reason', group: 'Verdict', run: askReason },
 	{ keys: ['s'], label: 'Defer and next', group: 'Verdict', run: defer },
-	{ keys: ['Shift+a'], label: 'Use the focused view', group: 'Verdict', run: () => judgeView(true) },
-	{ keys: ['Shift+x'], label: 'Leave the focused view out', group: 'Verdict', run: () => judgeView(false) },
+	{ keys: ['Shift+a'], label: 'Use the focused view', group: 'Verdict', run: useView },
+	{ keys: ['Shift+x'], label: 'Leave the focused view out; then a digit for the reason', group: 'Verdict', run: askViewReason },
 	{ keys: ['Shift+n'], label: 'Note at the pointer', group: 'Verdict', run: askNote },
 ];
 

@@ -6,38 +6,48 @@ import { useLayoutEffect, useRef } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
 import {
-	accept, addNote, answer, askReason, cancelAsking, defer, lastReason, reject, REASONS,
+	accept, addNote, answer, askReason, cancelAsking, defer, lastReason, leaveOut, reject, rejectView, REASONS,
 } from '../state/verdicts.js';
 import { asking, pinPlace } from '../state/workspace.js';
 import { pinText } from '../lib/pins.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
 
-const isAskingReason = () => asking.value === 'reason';
+/**
+ * The keys of a list of reasons.
+ *
+ * @param {string} verb @param {string} again key for the last reason
+ * @param {(reason: string) => void} choose
+ * @returns {import('../lib/keys.js').Binding[]}
+ */
+function reasonKeys(verb, again, choose) {
+	return [
+		...REASONS.map(({ name, label }, i) => ({
+			keys: [String(i + 1)], label: `${verb}: ${label.toLowerCase()}`, group: 'Verdict', run: () => choose(name),
+		})),
+		{
+			keys: [again], label: `${verb} with the last reason`, group: 'Verdict',
+			when: () => lastReason.value !== null, run: () => choose(lastReason.value ?? 'other'),
+		},
+	];
+}
 
-/** @type {import('../lib/keys.js').Binding[]} */
-const REASON_KEYS = [
-	...REASONS.map(({ name, label }, i) => ({
-		keys: [String(i + 1)], label: `Reject: ${label.toLowerCase()}`, group: 'Verdict',
-		when: isAskingReason, run: () => reject(name),
-	})),
-	{
-		keys: ['x'], label: 'Reject with the last reason', group: 'Verdict',
-		when: () => isAskingReason() && lastReason.value !== null,
-		run: () => reject(lastReason.value ?? 'other'),
-	},
-];
+const GROUP_REASONS = { title: 'Reject because', choose: reject, again: 'X', keys: reasonKeys('Reject', 'x', reject) };
+const VIEW_REASONS = {
+	title: 'Leave this view out because', choose: rejectView, again: 'Shift X', keys: reasonKeys('Leave out', 'Shift+x', rejectView),
+};
 
-function ReasonList() {
-	useKeys(REASON_KEYS);
+/** @param {typeof GROUP_REASONS} props */
+function ReasonList({ title, choose, again, keys }) {
+	useKeys(keys);
 	return html`
-		<section class="ask" aria-label="Why is it rejected?">
-			<p class="ask__title">Reject because <kbd>Esc</kbd></p>
+		<section class="ask" aria-label=${title}>
+			<p class="ask__title">${title} <kbd>Esc</kbd></p>
 			<ol class="reasons">
 				${REASONS.map(({ name, label }, i) => html`
 					<li key=${name}>
-						<button type="button" data-last=${name === lastReason.value} onClick=${() => reject(name)}>
-							<kbd>${i + 1}</kbd> ${label} ${name === lastReason.value ? html`<kbd>X</kbd>` : null}
+						<button type="button" data-last=${name === lastReason.value} onClick=${() => choose(name)}>
+							<kbd>${i + 1}</kbd> ${label} ${name === lastReason.value ? html`<kbd>${again}</kbd>` : null}
 						</button>
 					</li>
 				`)}
@@ -87,7 +97,9 @@ function PinForm() {
 
 /** @param {{group: GroupDocument}} props */
 function Ask({ group }) {
-	if (asking.value === 'reason') return html`<${ReasonList} />`;
+	if (asking.value === 'reason') return html`<${ReasonList} key="group" ...${GROUP_REASONS} />`;
+	if (asking.value === 'view') return html`<${ReasonList} key="view" ...${VIEW_REASONS} />`;
+	if (asking.value === 'viewNote') return html`<${NoteForm} title="Why is this view left out?" button="Leave out" onNote=${leaveOut} />`;
 	if (asking.value === 'note') return html`<${NoteForm} title="What is wrong with it?" button="Reject" />`;
 	if (asking.value === 'pin') return html`<${PinForm} />`;
 	if (asking.value !== 'override') return null;

@@ -154,6 +154,25 @@ class TestEditing:
         screen.saved()
         assert screen.document()["views"][0]["balls"][0]["box"] == box
 
+    def test_a_view_is_left_out_for_a_reason(self, review: Callable[..., Screen]) -> None:
+        screen = review(0)
+        before = screen.document()["verdict"]
+        screen.press("2", "Shift+x")
+        expect(screen.page.locator(".ask__title")).to_contain_text("Leave this view out because")
+        screen.press("6")
+        panel = screen.page.locator('.image-panel[data-view="B"]')
+        expect(panel).to_have_attribute("data-included", "false")
+        screen.saved()
+        verdict = screen.document()["verdict"]
+        assert (verdict["state"], verdict["note"]) == (
+            before["state"],
+            "View B left out: duplicate view",
+        )
+        screen.press("Shift+a")
+        expect(panel).to_have_attribute("data-included", "true")
+        screen.saved()
+        withdraw_verdict(screen.page, screen.group)
+
     def test_a_view_is_left_out_and_taken_back(self, review: Callable[..., Screen]) -> None:
         screen = review(0)
         screen.press("Shift+2")
