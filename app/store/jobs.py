@@ -51,11 +51,6 @@ class Job:
     ended: str | None
     actor: str
 
-    @property
-    def is_over(self) -> bool:
-        """Whether nothing more will come of it."""
-        return self.state not in OPEN
-
 
 @dataclass(frozen=True)
 class NewJob:

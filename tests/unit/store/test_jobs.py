@@ -28,7 +28,7 @@ class TestReadJob:
             {"detail": "é"},
             None,
         )
-        assert (found.state, found.done, found.total, found.is_over) == ("failed", 2, 9, True)
+        assert (found.state, found.done, found.total) == ("failed", 2, 9)
         # Its dataset is gone.
         assert (found.dataset_id, found.dataset) == (77, None)
 
