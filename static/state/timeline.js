@@ -107,8 +107,12 @@ function show(index) {
 }
 
 const scrubbing = latest(40, async (/** @type {number} */ index) => {
-	const id = show(index);
-	if (id !== null) await load(id).catch(() => {});
+	const [id, from] = [columns.value?.id[index], currentId()];
+	if (id === undefined) return;
+	// Shown only once it is there: an empty screen in between would take the curve and the keyboard's focus with it.
+	// Why a group cannot be loaded is said by whoever shows it.
+	if (!known(id)) await load(id).catch(() => {});
+	if (currentId() === from) show(index);
 });
 
 /** Go to the group at a place; what is asked for faster than it can be shown is left out. @param {number} index */
@@ -135,7 +139,7 @@ export function goToWorst() {
 	// Whoever stands on any other frame begins with the worst.
 	const target = jumped === position.value ? next : order[0];
 	jumped = target;
-	show(target);
+	scrubTo(target);
 	announce(`Frame ${columns.value?.frame[target] ?? target + 1}, number ${order.indexOf(target) + 1} of the worst.`);
 }
 

@@ -12,6 +12,15 @@ from tests.e2e.film import FRAMES, SEEN_BY_TWO, WORST
 from tests.e2e.test_access import CUT_OFF, NESTED_SCROLLERS, SIZES, serious
 
 OpenPage = Callable[..., Page]
+SLOW_GROUPS = r"""() => {
+    const quick = window.fetch;
+    window.fetch = async (address, ...rest) => {
+        const isGroup = /\/groups\/\d+$/.test(String(address.url ?? address));
+        if (isGroup) await new Promise((done) => setTimeout(done, 700));
+        return quick(address, ...rest);
+    };
+}"""
+"""Groups that come late, each after the same while."""
 
 
 def columns(page: Page, film: str) -> dict[str, Any]:
@@ -70,6 +79,22 @@ class TestTimeline:
         expect_frame(page, FRAMES[0])
         page.mouse.click(box["x"] + box["width"] - 3, box["y"] + box["height"] / 2)
         expect_frame(page, FRAMES[-1])
+
+    def test_scrubbing_keeps_the_keyboard_while_a_frame_is_loaded(
+        self, open_page: OpenPage, film: str
+    ) -> None:
+        page = open_page(None)
+        open_timeline(page, film, FRAMES[5])
+        page.get_by_role("slider", name="Frame").focus()
+        # As slow as a busy machine: nothing that comes next is there before it is asked for.
+        page.evaluate(SLOW_GROUPS)
+        page.keyboard.press("End")
+        page.wait_for_timeout(200)
+        # The frame before stays, and so does the keyboard's focus.
+        expect_frame(page, FRAMES[5])
+        expect_frame(page, FRAMES[-1])
+        page.keyboard.press("Home")
+        expect_frame(page, FRAMES[0])
 
     def test_plays_to_the_end(self, open_page: OpenPage, film: str) -> None:
         page = open_page(None)
