@@ -84,6 +84,7 @@ def ball_to_json(ball: BallAnnotation) -> dict[str, Any]:
         "occluded": ball.occluded,
         "out_of_view": ball.out_of_view,
         **({"predicted_by": ball.predicted_by} if ball.predicted_by else {}),
+        **({"inferred": True} if ball.inferred else {}),
     }
 
 
@@ -221,6 +222,7 @@ class StateReader:
             occluded=value.get("occluded") is True,
             out_of_view=out_of_view,
             predicted_by=str(value.get("predicted_by") or ""),
+            inferred=value.get("inferred") is True,
         )
 
     @staticmethod

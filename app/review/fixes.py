@@ -18,24 +18,22 @@ def edit_of_fix(group: Group, fix: Fix, point: ImagePoint | None = None) -> Edit
     Args:
         group: The group that the fix is about.
         fix: What to do.
-        point: Where ``move_point`` puts its point and ``move_ball`` the ball's centre, pixels of the annotated size.
+        point: Where ``move_point`` puts its point, pixels of the annotated size.
     """
     view = None if fix.view is None else group.view(fix.view)
     if view is None:
         return None
-    if fix.action == "exclude_view":
-        return IncludeView(view.key, False)
+    if fix.action in ("exclude_view", "include_view"):
+        return IncludeView(view.key, fix.action == "include_view")
     if fix.action == "pick_ball":
         chosen = fix.index is not None and fix.index < len(view.balls)
         return SetBall(view.key, view.balls[fix.index or 0]) if chosen else None
-    if fix.action == "move_ball":
-        return None if point is None or view.ball is None else _ball_at(view.key, view.ball, point)
     changes = _swapped(view) if fix.action == "swap_sides" else _line_changes(view, fix, point)
     return SetLines(view.key, changes) if changes else None
 
 
-def _ball_at(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBall:
-    """The same ball somewhere else."""
+def ball_at(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBall:
+    """The edit that puts a view's ball somewhere else, as large as it is."""
     if ball.box is None:
         return SetBall(view, replace(ball, point=point))
     box = ball.box

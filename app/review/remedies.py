@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from app.review.fixes import edit_of_fix
+from app.review.edit import Edit, SetLines
+from app.review.fixes import ball_at, edit_of_fix
 from app.review.solver import Solver
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View
@@ -19,22 +21,33 @@ from app.solving.solve import solve
 MOST_TRIALS = 24
 """A person waits for the answer; what helps is nearly always among the first."""
 MARKINGS_PER_VIEW = 4
+_CLICKS = 8
+"""As many points a person would put on a marking."""
 MIN_POINTS_LEFT = 2
 MAX_HEIGHT_M = 30.0
+MAX_POINT_SLIP_PERCENT = 7.0
+MAX_BALL_SLIP_PERCENT = 3.0
+"""How far a click can plausibly be off, in per cent of the diagonal; beyond it something else is
+wrong, or the ball is another one."""
+BETTER_CAUSES = frozenset(
+    {"sides_swapped", "wrong_label", "several_balls", "under_constrained", "implausible_camera"}
+)
+"""Findings that explain why rays do not meet: then no ball is moved to make them meet."""
 RAY_DEPTHS_M = np.geomspace(1.0, 400.0, 2000)
 """Where balls are looked for along a ray; a step is a third of a per cent of the distance."""
 
 
 @dataclass(frozen=True)
 class Remedy:
-    """An edit that would make a group pass, or bring the gate that fails nearer to passing.
+    """What would make a group pass, or bring the gate that fails nearer to passing.
 
     Attributes:
         gate: The gate that fails now.
         view: View that is edited.
         sentence: What would have to be so, to be read after "would pass if".
-        fix: The edit.
-        point: Where ``move_point`` or ``move_ball`` puts it, pixels; None for other actions.
+        fix: The edit, or (``draw_marking``, ``look_ball``) where a person should look and draw.
+        point: Where ``move_point`` puts its point and ``look_ball`` would see the ball, pixels;
+            None for other actions.
         value: What the gate would measure.
         passes: Whether the whole group would pass.
     """
@@ -56,6 +69,8 @@ class _Idea:
     sentence: str
     fix: Fix
     point: ImagePoint | None = None
+    trial: Edit | None = None
+    """What a person would draw; None: the fix itself is the edit."""
 
 
 def find_remedies(
@@ -91,7 +106,7 @@ def _try(
     solver: Solver,
 ) -> Remedy | None:
     """The remedy, or None where the edit changes nothing for the better."""
-    edit = edit_of_fix(group, idea.fix, idea.point)
+    edit = idea.trial or edit_of_fix(group, idea.fix, idea.point)
     if edit is None:
         return None
     then = solver(edit.apply(group), policy, known)
@@ -128,18 +143,52 @@ def _of_findings(group: Group, solution: Solution) -> Iterator[_Idea]:
         fix = finding.fix
         view = None if fix is None or fix.view is None else group.view(fix.view)
         if fix is not None and view is not None:
-            yield _Idea(_RANKS.get(fix.action, 3), _sentence(group, view, fix), fix)
+            yield _Idea(_RANKS[fix.action], _sentence(group, view, fix), fix)
 
 
 def _of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Idea]:
     for view in group.views:
         solved = solution.view(view.key)
-        if solved is None or not view.included:
+        if solved is None:
             continue
-        if failing.name == "jac" and solved.failed == "jac":
+        if not view.included:
+            fix = Fix("include_view", view.key)
+            yield _Idea(_RANKS[fix.action], _sentence(group, view, fix), fix)
+        elif solved.failed == "jac":
+            yield from _of_undrawn(group, view, solved)
             yield from _of_lines(group, view, solved)
-    if failing.name == "reprojection":
+    explained = any(finding.kind in BETTER_CAUSES for finding in solution.findings)
+    if failing.name == "reprojection" and not explained:
         yield from _of_balls(group, solution)
+
+
+def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]:
+    """Draw what the camera sees and nobody has drawn: all of it, the longest first."""
+    undrawn = sorted(
+        (fit for fit in solved.calibration.markings if fit.outcome == "fp" and _is_undrawn(fit)),
+        key=polyline_length,
+        reverse=True,
+    )
+    if not undrawn:
+        return
+    letter = chr(ord("A") + group.views.index(view))
+    names = [
+        f"{fit.marking} (visible over {max(polyline_length(fit), 1):.0f} px)" for fit in undrawn
+    ]
+    verb = "were" if len(names) > 1 else "was"
+    sentence = f"{' and '.join(names)} {verb} drawn in {letter}"
+    drawn = {fit.marking: fit.polyline[:: len(fit.polyline) // _CLICKS + 1] for fit in undrawn}
+    fix = Fix("draw_marking", view.key, undrawn[0].marking)
+    yield _Idea(_RANKS[fix.action], sentence, fix, trial=SetLines(view.key, drawn))
+
+
+def polyline_length(fit: MarkingFit) -> float:
+    """Length of a projected marking, pixels."""
+    return sum(math.dist(a, b) for a, b in pairwise(fit.polyline))
+
+
+def _is_undrawn(fit: MarkingFit) -> bool:
+    return not fit.distances_px and bool(fit.polyline)
 
 
 def _of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]:
@@ -153,13 +202,19 @@ def _of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]
             fix = Fix(
                 action, view.key, fit.marking, index=None if action == "drop_marking" else index
             )
+            slip = MAX_POINT_SLIP_PERCENT / 100 * view.size.diagonal
+            if action == "move_point" and fit.distances_px[index] > slip:
+                continue
             point = fit.nearest[index] if action == "move_point" else None
             sentence = _sentence(group, view, fix, fit.distances_px[index])
             yield _Idea(_RANKS[action], sentence, fix, point)
 
 
 def _of_balls(group: Group, solution: Solution) -> Iterator[_Idea]:
-    """Move the ball of either view of a pair to where the other's ray passes."""
+    """Look for the ball where the other view's ray passes, in either view of a pair.
+
+    Nobody moves it there by a key: a ball that is put onto a ray meets it, right or wrong.
+    """
     for pair in solution.pairs:
         for moved, other in ((pair.a, pair.b), (pair.b, pair.a)):
             view = group.view(moved)
@@ -167,8 +222,12 @@ def _of_balls(group: Group, solution: Solution) -> Iterator[_Idea]:
             if view is None or point is None or view.ball is None or view.ball.center is None:
                 continue
             apart = math.dist(point, view.ball.center)
-            fix = Fix("move_ball", moved, to=other)
-            yield _Idea(_RANKS["move_ball"], _sentence(group, view, fix, apart), fix, point)
+            if apart > MAX_BALL_SLIP_PERCENT / 100 * view.size.diagonal:
+                continue
+            fix = Fix("look_ball", moved, to=other)
+            trial = ball_at(moved, view.ball, point)
+            sentence = _sentence(group, view, fix, apart)
+            yield _Idea(_RANKS[fix.action], sentence, fix, point, trial)
 
 
 def _beside_ray(group: Group, solution: Solution, moved: str, other: str) -> ImagePoint | None:
@@ -201,10 +260,12 @@ _RANKS = {
     "swap_sides": 0,
     "pick_ball": 0,
     "move_point": 1,
-    "move_ball": 1,
-    "drop_point": 2,
-    "drop_marking": 3,
-    "exclude_view": 4,
+    "look_ball": 1,
+    "draw_marking": 2,
+    "include_view": 2,
+    "drop_point": 3,
+    "drop_marking": 4,
+    "exclude_view": 5,
 }
 """Mending what is wrong comes before leaving it out."""
 
@@ -213,12 +274,14 @@ def _sentence(group: Group, view: View, fix: Fix, moved_px: float = 0.0) -> str:
     letter = chr(ord("A") + group.views.index(view))
     number = None if fix.index is None else fix.index + 1
     return {
-        "relabel": f"{fix.marking} in {letter} were {fix.to}",
-        "swap_sides": f"{letter} were labelled for the other side",
-        "pick_ball": f"ball {number} were the ball of {letter}",
+        "relabel": f"{fix.marking} in {letter} was relabelled as {fix.to}",
+        "swap_sides": f"left and right were swapped in {letter}",
+        "pick_ball": f"ball {number} was the one in play in {letter}",
         "move_point": f"point {number} of {fix.marking} in {letter} moved {moved_px:.1f} px",
-        "move_ball": f"the ball in {letter} were {moved_px:.1f} px away, where the other view has it",
-        "drop_point": f"point {number} of {fix.marking} in {letter} were dropped",
-        "drop_marking": f"{fix.marking} in {letter} were dropped",
-        "exclude_view": f"{letter} were left out",
+        "look_ball": f"the ball of {letter} was really {moved_px:.1f} px away, on the ray of the "
+        "other view",
+        "drop_point": f"point {number} of {fix.marking} in {letter} was dropped",
+        "drop_marking": f"{fix.marking} in {letter} was dropped",
+        "include_view": f"{letter} was used again",
+        "exclude_view": f"{letter} was left out",
     }[fix.action]

@@ -115,6 +115,8 @@ class _Chunk:
         size = ImageSize(row.width, row.height)
         balls = tuple(map(ball_from_json, parse(row.balls)))
         ball = View(row.key, Station("", size), balls).ball
+        # One that was put where the others see it confirms nothing.
+        ball = None if ball is not None and ball.inferred else ball
         center = ball.center if ball is not None else None
         camera = calibrated.camera
         columns["view_group"].append(group)

@@ -33,6 +33,8 @@ class BallAnnotation:
     out_of_view: bool = False
     predicted_by: str = ""
     """The set of predictions that a person accepted it from; empty: a dataset or a person said it."""
+    inferred: bool = False
+    """Put where the 3D ball of the other views is seen: it is exported, and confirms nothing."""
 
     @property
     def center(self) -> ImagePoint | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from app.geometry.camera import Camera
 from app.soccer.frames import Box, ImagePoint
 
-SOLVER_VERSION = "1"
+SOLVER_VERSION = "2"
 """Part of every solution's key; raised by one whenever a number changes."""
 
 GAMMAS_PERCENT = (0.5, 1.0, 2.0)
@@ -204,6 +204,17 @@ class BallFit:
 
 
 @dataclass(frozen=True)
+class ExpectedBall:
+    """Where a view should show the 3D ball, whether or not anybody annotated it there."""
+
+    place: ImagePoint
+    covariance: tuple[float, ...]
+    """Of ``place``, 2 x 2, row by row, square pixels: the ball's and the camera's uncertainty."""
+    box: Box | None
+    """Tight box of the ball's outline."""
+
+
+@dataclass(frozen=True)
 class ViewSolution:
     """What was computed for one view.
 
@@ -218,6 +229,9 @@ class ViewSolution:
     failed: str | None
     """First gate that dropped this view, or None."""
     ball: BallFit | None = None
+    """How the annotated ball agrees with the 3D ball."""
+    expected: ExpectedBall | None = None
+    """Where the 3D ball is to be seen; None without a camera, and where it is not in front of it."""
 
 
 @dataclass(frozen=True)
@@ -240,10 +254,11 @@ class Gate:
 
 @dataclass(frozen=True)
 class Fix:
-    """An edit that a finding proposes.
+    """What a finding or a remedy proposes to do.
 
-    ``action`` is ``relabel``, ``drop_point``, ``drop_marking``, ``swap_sides``,
-    ``exclude_view`` or ``pick_ball``.
+    ``action`` is ``relabel``, ``move_point``, ``drop_point``, ``drop_marking``, ``swap_sides``,
+    ``include_view``, ``exclude_view`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
+    say where a person should look and draw: what was computed there is no evidence for itself.
     """
 
     action: str

@@ -1,4 +1,4 @@
-"""Ball box: the triangulated ball seen again in a view, and the box that fits it."""
+"""Ball box: the triangulated ball seen again in a view, where it is to be seen and how large."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from app.geometry.camera import Camera
 from app.geometry.sphere import optimal_diameter, position_from_diameter, tight_box
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.solution import BallFit
+from app.soccer.solution import Ball3D, BallFit, Calibration, ExpectedBall
+from app.solving.triangulate import calibration_spread
 
 
 def fit_ball(
@@ -54,6 +55,33 @@ def fit_ball(
         monocular_error_m=float(np.linalg.norm(alone - point)) if alone is not None else None,
         # Depth times diameter is constant, so the slope is depth over diameter.
         depth_per_px_m=depth / diameter if diameter else None,
+    )
+
+
+def expect_ball(
+    calibration: Calibration, size: ImageSize, ball: Ball3D, diameter_m: float
+) -> ExpectedBall | None:
+    """Where a view should show the 3D ball; None where it has no camera or the ball is behind it.
+
+    Args:
+        calibration: The view's calibration.
+        size: Annotated size.
+        ball: The triangulated ball.
+        diameter_m: True diameter, metres.
+    """
+    if calibration.camera is None:
+        return None
+    point = np.array(ball.point)
+    x, y = calibration.camera.project(point[None])[0].tolist()
+    if not np.isfinite((x, y)).all():
+        return None
+    jacobian = calibration.camera.jacobian(point)
+    spread = jacobian @ np.array(ball.covariance).reshape(3, 3) @ jacobian.T
+    spread = spread + calibration_spread(calibration, size, point)
+    return ExpectedBall(
+        place=ImagePoint(x, y),
+        covariance=tuple(spread.ravel().tolist()),
+        box=_exact_box(calibration.camera, point, diameter_m),
     )
 
 

@@ -42,10 +42,15 @@ def calibration_findings(
 def _wrong_labels(calibration: Calibration, view: str | None) -> Iterator[Finding]:
     for suspect in calibration.suspects:
         if suspect.suggested is None:
-            sentence = f"“{suspect.marking}” contradicts all others and fits no other marking."
+            sentence = (
+                f"“{suspect.marking}” contradicts all other lines and fits no other marking. Drop "
+                "it, or draw it anew."
+            )
             fix = Fix("drop_marking", view, suspect.marking)
         else:
-            sentence = f"“{suspect.marking}” fits as “{suspect.suggested}”, not as labelled."
+            sentence = (
+                f"“{suspect.marking}” has the wrong label: its points lie on “{suspect.suggested}”."
+            )
             fix = Fix("relabel", view, suspect.marking, to=suspect.suggested)
         yield Finding(
             "wrong_label",
@@ -73,7 +78,8 @@ def _bad_points(calibration: Calibration, size: ImageSize, view: str | None) -> 
             continue
         yield Finding(
             "bad_point",
-            f"Point {index + 1} of “{fit.marking}” lies {worst:.1f} px off its line.",
+            f"Point {index + 1} of “{fit.marking}” lies {worst:.1f} px off the line on which all "
+            "its other points lie. Drop it, or move it onto the paint.",
             view,
             fit.marking,
             number=worst,
@@ -96,7 +102,8 @@ def _not_annotated(
         if length > shortest:
             yield Finding(
                 "visible_not_annotated",
-                f"“{fit.marking}” should be seen over {length:.0f} px and is not annotated.",
+                f"“{fit.marking}” should be visible over {length:.0f} px, and nobody has drawn "
+                "it. Draw it if you see it.",
                 view,
                 fit.marking,
                 number=length,
@@ -106,13 +113,18 @@ def _not_annotated(
 
 def _under_constrained(calibration: Calibration, view: str | None) -> Iterator[Finding]:
     if calibration.camera is None:
-        yield Finding("under_constrained", f"No camera: {calibration.reason}.", view)
+        yield Finding(
+            "under_constrained",
+            f"No camera was found: {calibration.reason}. Draw more lines.",
+            view,
+        )
     elif calibration.unobservable:
         words = " and ".join(calibration.unobservable)
         verb = "are" if len(calibration.unobservable) > 1 else "is"
         yield Finding(
             "under_constrained",
-            f"The annotated lines do not determine the camera: its {words} {verb} a guess.",
+            f"The annotated lines do not determine the camera: its {words} {verb} a guess. Draw "
+            "lines of other directions.",
             view,
             number=calibration.position_sigma_m,
             threshold=MAX_POSITION_SIGMA_M,
@@ -146,7 +158,10 @@ def _implausible_camera(calibration: Calibration, view: str | None) -> Iterator[
     ]
     if wrong:
         number, threshold, _ = wrong[0]
-        sentence = f"The camera {' and '.join(words for _, _, words in wrong)}."
+        sentence = (
+            f"The camera {' and '.join(words for _, _, words in wrong)}. Check the labels of its "
+            "lines."
+        )
         yield Finding("implausible_camera", sentence, view, number=number, threshold=threshold)
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from app.soccer.frames import height_above_grass
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D, Finding, Fix, Pair, ViewSolution
 from app.solving.calibration_findings import calibration_findings
+from app.solving.plausible import implausible
 from app.solving.sides import Swap, find_swaps
 from app.solving.triangulate import Sight
 
@@ -44,7 +44,8 @@ def find(
     policy: Policy,
 ) -> tuple[Finding, ...]:
     """All findings of a group, those that explain most first, then by view."""
-    swaps = {swap.view: swap for swap in find_swaps(sights, policy)}
+    main = group.views[0].key if group.views else ""
+    swaps = {swap.view: swap for swap in find_swaps(sights, main, group.pitch, policy)}
     found: list[Finding] = []
     for view, solved in zip(group.views, views, strict=True):
         said = calibration_findings(solved.calibration, view.size, view.key)
@@ -74,7 +75,8 @@ def _several_balls(view: View) -> Iterator[Finding]:
     if count > 1:
         yield Finding(
             "several_balls",
-            f"{count} balls are annotated here and none is used; keep the one in play.",
+            f"{count} balls are annotated in this view, so none of them is used. Keep the one in "
+            "play.",
             view.key,
             number=float(count),
             threshold=1.0,
@@ -83,10 +85,19 @@ def _several_balls(view: View) -> Iterator[Finding]:
 
 
 def _sides_swapped(swap: Swap) -> Finding:
+    if swap.turned_error_px is None:
+        sentence = (
+            "The lines put the main camera on the far side of the pitch, where no main camera "
+            "stands: left and right are swapped here, and in every view that agrees with it."
+        )
+    else:
+        sentence = (
+            "The lines are labelled from the other end of the pitch: with left and right swapped "
+            f"this view sees the ball where the others do, within {swap.turned_error_px:.1f} px."
+        )
     return Finding(
         "sides_swapped",
-        f"Labelled for the other side: turned by 180° its ball meets the others within "
-        f"{swap.turned_error_px:.1f} px.",
+        sentence,
         swap.view,
         number=swap.error_px,
         threshold=swap.turned_error_px,
@@ -108,8 +119,8 @@ def _view_disagrees(
     apart = min(max(pair.errors_px) for pair in judged)
     yield Finding(
         "view_disagrees",
-        f"The ball of this view meets that of no other: {apart:.1f} px apart at best, "
-        f"{tau:.1f} px are allowed.",
+        f"This view does not see the ball where another view sees it: {apart:.1f} px apart at "
+        f"best, {tau:.1f} px are allowed. Correct its ball, or leave the view out.",
         view.key,
         number=apart,
         threshold=tau,
@@ -123,7 +134,8 @@ def _ball_size(solved: ViewSolution) -> Iterator[Finding]:
         return
     yield Finding(
         "ball_size",
-        f"The ball's box is {ratio:.2f} times as large as its distance implies.",
+        f"The ball's box is {ratio:.2f} times as large as a ball looks at this distance. Check "
+        "that it is the ball, and correct the size of its box.",
         solved.view,
         number=ratio,
         threshold=MAX_SIZE_RATIO if ratio > 1 else 1 / MAX_SIZE_RATIO,
@@ -142,8 +154,9 @@ def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Ite
     sizes = [view.size.diagonal for view in group.views if view.key in (best.a, best.b)]
     yield Finding(
         "not_synchronous",
-        f"The balls of no two views meet ({max(best.errors_px):.0f} px apart at best): the views "
-        "may show different instants.",
+        f"No two views see the ball in the same place ({max(best.errors_px):.0f} px apart at "
+        "best): they may show different instants. Compare the pictures; leave the odd view out, "
+        "or reject the group.",
         number=max(best.errors_px),
         threshold=policy.tau_percent / 100 * max(sizes),
     )
@@ -153,8 +166,8 @@ def _low_parallax(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
     if ball.parallax_degrees < policy.low_parallax_degrees:
         yield Finding(
             "low_parallax",
-            f"The rays meet at {ball.parallax_degrees:.1f}°: depth is known to "
-            f"{ball.sigma_m:.1f} m only.",
+            f"The rays meet at {ball.parallax_degrees:.1f}° only, so the distance of the ball is "
+            f"uncertain: about ± {ball.sigma_m:.1f} m. A view from another side would settle it.",
             number=ball.parallax_degrees,
             threshold=policy.low_parallax_degrees,
         )
@@ -164,8 +177,8 @@ def _high_uncertainty(ball: Ball3D) -> Iterator[Finding]:
     if ball.sigma_m > HIGH_SIGMA_M:
         yield Finding(
             "high_uncertainty",
-            f"The ball's place is known to {ball.sigma_m:.1f} m only, however small its "
-            "reprojection error.",
+            f"The position of the ball is uncertain, about ± {ball.sigma_m:.1f} m, although the "
+            "views agree. Decide whether that is good enough.",
             number=ball.sigma_m,
             threshold=HIGH_SIGMA_M,
         )
@@ -173,19 +186,11 @@ def _high_uncertainty(ball: Ball3D) -> Iterator[Finding]:
 
 def _implausible_ball(ball: Ball3D, pitch: Pitch, policy: Policy) -> Iterator[Finding]:
     """One finding, with the number of what is wrong first."""
-    x, y, z = ball.point
-    height = height_above_grass(z)
-    outside = max(abs(x) - pitch.length / 2, abs(y) - pitch.width / 2)
-    wrong = [
-        (number, threshold, words)
-        for number, threshold, words in (
-            (z, policy.below_grass_m, f"lies {z:.1f} m below the grass"),
-            (height, policy.max_height_m, f"flies {height:.0f} m high"),
-            (outside, policy.outside_pitch_m, f"is {outside:.0f} m outside the pitch"),
-        )
-        if number > threshold
-    ]
+    wrong = implausible(ball.point, pitch, policy)
     if wrong:
         number, threshold, _ = wrong[0]
-        sentence = f"The ball {' and '.join(words for _, _, words in wrong)}."
+        sentence = (
+            f"The 3D ball {' and '.join(words for _, _, words in wrong)}. Check the sides of the "
+            "views and the ball in each."
+        )
         yield Finding("implausible_ball", sentence, number=number, threshold=threshold)

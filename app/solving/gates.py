@@ -47,12 +47,17 @@ def view_failure(calibration: Calibration, jac: float | None, policy: Policy) ->
 
 
 def judge(
-    views: Sequence[JudgedView], pairs: Sequence[Pair], ball: Ball3D | None, policy: Policy
+    views: Sequence[JudgedView],
+    left_out: Sequence[str],
+    pairs: Sequence[Pair],
+    ball: Ball3D | None,
+    policy: Policy,
 ) -> tuple[Gate, ...]:
     """All gates in order, those that the policy does not ask for as not active.
 
     Args:
         views: The included views.
+        left_out: Letters of the views that a person left out.
         pairs: Their pairs.
         ball: The triangulated ball, or None.
         policy: The thresholds.
@@ -62,8 +67,8 @@ def judge(
     return (
         _calibratable(views, short),
         _jac(views, short, policy),
-        _two_views(left),
-        _ball(left),
+        _two_views(views, left, left_out),
+        _ball(views, left),
         _baseline(left, pairs, policy),
         _reprojection(left, pairs),
         _parallax(ball, policy),
@@ -75,9 +80,9 @@ def _calibratable(views: Sequence[JudgedView], short: bool) -> Gate:
     fallen = [view for view in views if view.failed == "calibratable"]
     count = len(views) - len(fallen)
     blamed = short and bool(fallen) and count < MIN_VIEWS
-    sentence = f"{count} of {len(views)} views"
+    sentence = f"{count} of {len(views)} views have a camera"
     if blamed:
-        sentence = f"{fallen[0].letter}: {fallen[0].calibration.reason}"
+        sentence = f"{fallen[0].letter} has no camera: {fallen[0].calibration.reason}"
     return _gate(
         "calibratable",
         not blamed,
@@ -95,36 +100,57 @@ def _jac(views: Sequence[JudgedView], short: bool, policy: Policy) -> Gate:
     blamed = short and bool(fallen) and calibrated >= MIN_VIEWS
     if not measured:
         given = any(view.calibration.source == "given" for view in views)
-        sentence = "given, not measured" if given else "nothing to measure"
+        sentence = "not measured, the cameras were given" if given else "nothing to measure"
         return Gate("jac", True, None, policy.min_jac, None, sentence)
     shown = fallen if blamed else [item for item in measured if item[1].failed is None] or measured
     jac, view = min(shown, key=lambda item: item[0])
     sentence = f"{'worst ' if len(shown) > 1 else ''}{jac:.2f} · {view.letter}"
     if fallen and not blamed:
-        sentence += f", {_letters([view for _, view in fallen])} left out"
+        sentence += f"; {_letters([view for _, view in fallen])} below, not used"
     key = view.key if blamed else None
     return _gate("jac", not blamed, jac, policy.min_jac, sentence, view=key)
 
 
-def _two_views(left: Sequence[JudgedView]) -> Gate:
-    return _gate(
-        "two_views",
-        len(left) >= MIN_VIEWS,
-        len(left),
-        MIN_VIEWS,
-        f"{len(left)} calibrated {'view' if len(left) == 1 else 'views'}",
-    )
+_FALLEN_AT = {"calibratable": "no camera", "jac": "field lines do not fit"}
+"""Why a view does not count."""
 
 
-def _ball(left: Sequence[JudgedView]) -> Gate:
+def _two_views(
+    views: Sequence[JudgedView], left: Sequence[JudgedView], left_out: Sequence[str]
+) -> Gate:
+    sentence = f"{len(left)} of {len(views) + len(left_out)} views count"
+    if len(left) < MIN_VIEWS:
+        why = [*_fallen(views)]
+        if left_out:
+            why.append(f"{', '.join(left_out)} left out by a person")
+        sentence = "; ".join([sentence, *why])
+    return _gate("two_views", len(left) >= MIN_VIEWS, len(left), MIN_VIEWS, sentence)
+
+
+def _ball(views: Sequence[JudgedView], left: Sequence[JudgedView]) -> Gate:
     without = [view for view in left if not view.has_ball]
     count = len(left) - len(without)
     passed = count >= MIN_VIEWS
     sentence = f"in {count} {'view' if count == 1 else 'views'}"
     if without:
-        sentence += f", not in {_letters(without)}"
+        sentence += f", none in {_letters(without)}"
+    if not passed:
+        idle = _fallen([view for view in views if view.has_ball])
+        sentence = "; ".join([sentence, *(f"that of {reason}" for reason in idle)])
     view = without[0].key if without and not passed else None
     return _gate("ball", passed, count, MIN_VIEWS, sentence, view=view)
+
+
+def _fallen(views: Sequence[JudgedView]) -> list[str]:
+    """Which views do not count, and why: one text for each reason."""
+    reasons = {
+        name: [view for view in views if view.failed == name]
+        for name in dict.fromkeys(view.failed for view in views if view.failed is not None)
+    }
+    return [
+        f"{_letters(fallen)} not counted ({_FALLEN_AT.get(name, name)})"
+        for name, fallen in reasons.items()
+    ]
 
 
 def _baseline(left: Sequence[JudgedView], pairs: Sequence[Pair], policy: Policy) -> Gate:

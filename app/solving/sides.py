@@ -13,7 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.geometry.camera import Camera
+from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
+from app.solving.plausible import is_plausible
 from app.solving.triangulate import Sight, triangulate
 
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
@@ -25,14 +27,16 @@ class Swap:
 
     Attributes:
         view: Key of the view.
-        error_px: Larger reprojection error of its best pair as labelled.
-        turned_error_px: The same once it is turned; below tau.
+        error_px: Larger reprojection error of its best pair as labelled; None where its ball
+            meets no other in front of both cameras and near the pitch.
+        turned_error_px: The same once it is turned, below tau; None for a main camera on the
+            far side with which the others agree: they are labelled from the other end as well.
         confidence: Between 0.5 and 1.
     """
 
     view: str
-    error_px: float
-    turned_error_px: float
+    error_px: float | None
+    turned_error_px: float | None
     confidence: float
 
 
@@ -43,26 +47,32 @@ def turned_camera(camera: Camera) -> Camera:
     )
 
 
-def find_swaps(sights: Sequence[Sight], policy: Policy) -> tuple[Swap, ...]:
+def find_swaps(
+    sights: Sequence[Sight], main: str, pitch: Pitch, policy: Policy
+) -> tuple[Swap, ...]:
     """Views whose ball meets that of the others only after a half turn.
 
-    The first view, the main camera, is believed; it stands on the near side by definition, so
-    where it does not (y < 0) it is the one to turn. A given camera rests on no labels and is
-    never turned.
+    The main camera is believed; it stands on the near side by definition, so where it does not
+    (y < 0) it is the one to turn. That others agree with it then says only that they are
+    labelled from the same wrong end. A given camera rests on no labels and is never turned.
 
     Args:
-        sights: Views with camera and ball, the main camera first.
+        sights: Views with camera and ball.
+        main: Key of the main camera.
+        pitch: Tells which meeting points are plausible.
         policy: Holds tau.
     """
     usable = [sight for sight in sights if sight.failed is None]
+    first = next((sight for sight in sights if sight.view == main), None)
+    if first is not None and first.camera.position[1] < 0 and _from_lines(first):
+        swap = _swap(first, _others(first, usable), pitch, policy) if len(usable) > 1 else None
+        return (swap or Swap(first.view, None, None, confidence=0.9),)
     if len(usable) < 2:
         return ()
-    main, *replays = usable
-    if main.camera.position[1] < 0 and _from_lines(main):
-        swap = _swap(main, replays, policy)
-        return () if swap is None else (swap,)
     swaps = (
-        _swap(replay, _others(replay, usable), policy) for replay in replays if _from_lines(replay)
+        _swap(replay, _others(replay, usable), pitch, policy)
+        for replay in usable
+        if replay.view != main and _from_lines(replay)
     )
     return tuple(swap for swap in swaps if swap is not None)
 
@@ -75,14 +85,16 @@ def _others(sight: Sight, sights: Sequence[Sight]) -> list[Sight]:
     return [other for other in sights if other is not sight]
 
 
-def _swap(sight: Sight, others: Sequence[Sight], policy: Policy) -> Swap | None:
-    before = _best_error(sight, others, policy)
+def _swap(sight: Sight, others: Sequence[Sight], pitch: Pitch, policy: Policy) -> Swap | None:
+    before = _best_error(sight, others, pitch, policy)
     if before <= 1:
         return None
-    after = _best_error(_turn(sight), others, policy)
+    after = _best_error(_turn(sight), others, pitch, policy)
     if after >= 1:
         return None
     tau = sight.tau_px(policy)
+    if np.isinf(before):
+        return Swap(sight.view, None, after * tau, confidence=1.0)
     return Swap(sight.view, before * tau, after * tau, confidence=before / (before + after))
 
 
@@ -91,12 +103,17 @@ def _turn(sight: Sight) -> Sight:
     return replace(sight, calibration=calibration)
 
 
-def _best_error(sight: Sight, others: Sequence[Sight], policy: Policy) -> float:
-    """Larger error of the best pair with one of the others, in units of tau."""
+def _best_error(sight: Sight, others: Sequence[Sight], pitch: Pitch, policy: Policy) -> float:
+    """Larger error of the best pair with one of the others, in units of tau.
+
+    Two rays can meet by accident, far from any pitch: such a pair says nothing.
+    """
     tau = {item.view: item.tau_px(policy) for item in (sight, *others)}
     errors = [
         np.inf
-        if pair.failed not in (None, "reprojection") or _behind(pair.point, sight, other)
+        if pair.failed not in (None, "reprojection")
+        or _behind(pair.point, sight, other)
+        or not is_plausible(pair.point, pitch, policy)
         else max(pair.errors_px[0] / tau[pair.a], pair.errors_px[1] / tau[pair.b])
         for other in others
         for pair in triangulate((sight, other), policy)

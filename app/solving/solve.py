@@ -15,7 +15,7 @@ import numpy as np
 from app.soccer.group import Group, View
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Ball3D, Calibration, Solution, ViewSolution
-from app.solving.ball_box import fit_ball
+from app.solving.ball_box import expect_ball, fit_ball
 from app.solving.best_ball import best_ball
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.findings import find
@@ -57,7 +57,7 @@ def solve(
         pairs=pairs,
         ball=ball,
         best_ball=best_ball(pairs, sights, policy),
-        gates=judge(_judged(group, views, policy), pairs, ball, policy),
+        gates=judge(_judged(group, views, policy), _left_out(group), pairs, ball, policy),
         findings=find(group, views, sights, pairs, ball, policy),
         policy_hash=policy.hash,
         solver_version=SOLVER_VERSION,
@@ -86,9 +86,12 @@ def _jac(calibration: Calibration, view: View, policy: Policy) -> float | None:
 
 
 def _sight(view: View, solved: ViewSolution) -> Sight | None:
-    """The ball as this view sees it; None without camera, ball or inclusion."""
+    """The ball as this view sees it; None without camera, ball or inclusion.
+
+    A ball that was put where the others see it is no sight: it would confirm itself.
+    """
     ball = view.ball
-    if solved.calibration.camera is None or ball is None or not view.included:
+    if solved.calibration.camera is None or ball is None or not view.included or ball.inferred:
         return None
     assert ball.center is not None
     diameter = ball.box.diameter if ball.box is not None else 0.0
@@ -101,7 +104,11 @@ def _with_ball(
 ) -> ViewSolution:
     if ball is None:
         return solved
-    solved = replace(solved, included=view.key in ball.views)
+    solved = replace(
+        solved,
+        included=view.key in ball.views,
+        expected=expect_ball(solved.calibration, view.size, ball, policy.ball_diameter_m),
+    )
     if solved.calibration.camera is None or view.ball is None:
         return solved
     fit = fit_ball(
@@ -122,9 +129,14 @@ def _judged(group: Group, views: Sequence[ViewSolution], policy: Policy) -> tupl
             calibration=solved.calibration,
             jac=_jac(solved.calibration, view, policy),
             tau_px=policy.tau_percent / 100 * view.size.diagonal,
-            has_ball=view.ball is not None,
+            has_ball=view.ball is not None and not view.ball.inferred,
             failed=solved.failed,
         )
         for index, (view, solved) in enumerate(zip(group.views, views, strict=True))
         if view.included
     )
+
+
+def _left_out(group: Group) -> tuple[str, ...]:
+    """Letters of the views that a person left out."""
+    return tuple(view_letter(i) for i, view in enumerate(group.views) if not view.included)

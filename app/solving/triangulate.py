@@ -163,7 +163,7 @@ def pixel_spread(sight: Sight, point: FloatArray, policy: Policy) -> FloatArray:
     """
     click = policy.click_sigma_px * sight.size.diagonal / CLICK_DIAGONAL
     click = float(np.hypot(click, policy.box_sigma_share * sight.diameter_px))
-    return click**2 * np.eye(2) + _calibration_spread(sight, point)
+    return click**2 * np.eye(2) + calibration_spread(sight.calibration, sight.size, point)
 
 
 def _pair(a: Sight, b: Sight, point: FloatArray, policy: Policy) -> Pair:
@@ -207,13 +207,19 @@ def _parallax(seen: Mapping[str, Sight], pair: Pair, point: FloatArray) -> float
     return float(np.degrees(parallax_angle(*positions, point[None])[0]))
 
 
-def _calibration_spread(sight: Sight, point: FloatArray) -> FloatArray:
-    """Covariance of the ball's pixel that the calibration brings, shape (2, 2)."""
-    if sight.calibration.covariance is None:
+def calibration_spread(calibration: Calibration, size: ImageSize, point: FloatArray) -> FloatArray:
+    """Covariance that the calibration brings to the pixel of a point, square pixels, (2, 2).
+
+    Args:
+        calibration: With a camera; nothing is known of the uncertainty of a given one: zeros.
+        size: Annotated size.
+        point: In front of the camera, pitch frame, metres, shape (3,).
+    """
+    if calibration.covariance is None or calibration.camera is None:
         return np.zeros((2, 2))
-    spread = np.array(sight.calibration.covariance).reshape(PARAMETERS, PARAMETERS)
-    half_diagonal = sight.size.diagonal / 2
-    parameters = parameters_from_camera(sight.camera, half_diagonal)
+    spread = np.array(calibration.covariance).reshape(PARAMETERS, PARAMETERS)
+    half_diagonal = size.diagonal / 2
+    parameters = parameters_from_camera(calibration.camera, half_diagonal)
     jacobian = projection_jacobian(parameters, point, half_diagonal)
     carried: FloatArray = jacobian @ spread @ jacobian.T
     return carried

@@ -62,17 +62,17 @@ def lines_from_json(value: Mapping[str, Any]) -> Lines:
 def ball_to_json(ball: BallAnnotation) -> Json:
     """``{"box": [x, y, w, h] | null, "point": [x, y] | null, ...}``.
 
-    ``predicted_by`` stands there only where it says something, so that digests of balls that
-    nobody predicted are what they always were.
+    ``predicted_by`` and ``inferred`` stand there only where they say something, so that digests
+    of all other balls are what they always were.
     """
     box = ball.box
-    predicted = {"predicted_by": ball.predicted_by} if ball.predicted_by else {}
+    origin = {"predicted_by": ball.predicted_by, "inferred": ball.inferred}
     return {
         "box": None if box is None else [*map(float, (box.x, box.y, box.width, box.height))],
         "point": None if ball.point is None else [*map(float, ball.point)],
         "occluded": ball.occluded,
         "out_of_view": ball.out_of_view,
-        **predicted,
+        **{name: value for name, value in origin.items() if value},
     }
 
 
@@ -85,6 +85,7 @@ def ball_from_json(value: Mapping[str, Any]) -> BallAnnotation:
         occluded=value["occluded"],
         out_of_view=value["out_of_view"],
         predicted_by=value.get("predicted_by", ""),
+        inferred=value.get("inferred", False),
     )
 
 

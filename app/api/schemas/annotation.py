@@ -143,6 +143,10 @@ class BallEdit(BaseModel):
     point: PointNumbers | None = None
     occluded: StrictBool = False
     out_of_view: StrictBool = False
+    inferred: StrictBool = Field(
+        default=False,
+        description="Put where the 3D ball of the other views is seen: exported, and no evidence.",
+    )
 
     @model_validator(mode="after")
     def _one_place(self) -> BallEdit:
@@ -165,6 +169,7 @@ class BallEdit(BaseModel):
             point=None if self.point is None else ImagePoint(*self.point),
             occluded=self.occluded,
             out_of_view=self.out_of_view,
+            inferred=self.inferred and not self.out_of_view,
         )
 
 
@@ -179,6 +184,9 @@ class Ball(BaseModel):
         description="Who says so; `prediction`: a person accepted it from `predicted_by`."
     )
     predicted_by: str | None = Field(description="Name of the set of predictions.")
+    inferred: bool = Field(
+        description="Put where the 3D ball of the other views is seen; it confirms nothing."
+    )
 
     @staticmethod
     def of(ball: BallAnnotation, *, edited: bool = False) -> Ball:
@@ -191,6 +199,7 @@ class Ball(BaseModel):
             out_of_view=ball.out_of_view,
             source="prediction" if ball.predicted_by else "person" if edited else "dataset",
             predicted_by=ball.predicted_by or None,
+            inferred=ball.inferred,
         )
 
 

@@ -15,11 +15,13 @@ Jac = dict[str, float]
 class RemedyEdit(FixDocument):
     """An edit as findings propose it, or a point moved."""
 
-    point: XY | None = Field(description="Where `move_point` or `move_ball` puts it.")
+    point: XY | None = Field(
+        description="Where `move_point` puts its point, or `look_ball` would see the ball."
+    )
 
 
 class RemedyDocument(BaseModel):
-    """An edit that the solver has tried out."""
+    """What the solver has tried out: an edit, or where a person should look and draw."""
 
     gate: str = Field(description="The gate that fails now.")
     view: str | None

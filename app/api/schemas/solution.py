@@ -15,6 +15,7 @@ from app.soccer.solution import (
     BallFit,
     BestBall,
     Calibration,
+    ExpectedBall,
     Finding,
     Gate,
     MarkingFit,
@@ -197,6 +198,23 @@ class BallFitDocument(BaseModel):
         )
 
 
+class ExpectedBallDocument(BaseModel):
+    """Where a view should show the 3D ball, whether or not anybody annotated it there."""
+
+    place: XY
+    covariance: list[Measured] = Field(description="2 x 2, row by row, square pixels.")
+    box: XYWH | None = Field(description="Tight box of the ball's outline.")
+
+    @staticmethod
+    def of(ball: ExpectedBall) -> ExpectedBallDocument:
+        """The document of an expected ball."""
+        return ExpectedBallDocument.model_construct(
+            place=(ball.place.x, ball.place.y),
+            covariance=list(ball.covariance),
+            box=_xywh(ball.box),
+        )
+
+
 class ViewSolutionDocument(BaseModel):
     """What was computed for one view."""
 
@@ -205,6 +223,7 @@ class ViewSolutionDocument(BaseModel):
     failed: str | None = Field(description="First gate that dropped this view.")
     calibration: CalibrationDocument
     ball: BallFitDocument | None
+    expected: ExpectedBallDocument | None
 
     @staticmethod
     def of(view: ViewSolution) -> ViewSolutionDocument:
@@ -215,6 +234,7 @@ class ViewSolutionDocument(BaseModel):
             failed=view.failed,
             calibration=CalibrationDocument.of(view.calibration),
             ball=None if view.ball is None else BallFitDocument.of(view.ball),
+            expected=None if view.expected is None else ExpectedBallDocument.of(view.expected),
         )
 
 

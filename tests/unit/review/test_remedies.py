@@ -10,7 +10,7 @@ from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import ImagePoint
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.soccer.solution import Fix
+from app.soccer.solution import Finding, Fix
 from app.solving.solve import solve
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, group, view
 
@@ -48,6 +48,8 @@ class TestFindRemedies:
         assert remedies[0].passes
         assert remedies[0].fix.action == "move_point"
         for remedy in remedies:
+            if remedy.fix.action == "draw_marking":
+                continue
             edited = edit_of_fix(bad, remedy.fix, remedy.point).apply(bad)
             assert solve(edited, policy).passes == remedy.passes
 
@@ -57,16 +59,70 @@ class TestFindRemedies:
         marking = sorted(bad.views[1].station.lines)[0]
         assert best.sentence.startswith(f"point 2 of {marking} in B moved ")
 
-    def test_a_ball_beside_the_other_views_ray_is_moved_onto_it(self):
+    def with_ball_off(self, pixels):
         off = view("b", BEHIND_GOAL, BALL)
         box = off.balls[0].box
-        off = replace(off, balls=(BallAnnotation(box=replace(box, y=box.y + 60.0)),))
-        bad = group(view("a", MAIN, BALL), off)
+        off = replace(off, balls=(BallAnnotation(box=replace(box, y=box.y + pixels)),))
+        return group(view("a", MAIN, BALL), off)
+
+    def test_a_ball_beside_the_other_views_ray_is_looked_for_on_it(self):
+        bad = self.with_ball_off(38.0)
         solution = solve(bad, PAPER)
         assert solution.first_failing.name == "reprojection"
         remedies = find_remedies(bad, PAPER, solution)
-        assert [remedy.fix.action for remedy in remedies] == ["move_ball", "move_ball"]
+        assert remedies
+        assert {remedy.fix.action for remedy in remedies} == {"look_ball"}
         assert all(remedy.passes for remedy in remedies)
+
+    def test_no_remedy_puts_a_ball_onto_the_ray_that_would_then_confirm_it(self):
+        bad = self.with_ball_off(40.0)
+        for remedy in find_remedies(bad, PAPER, solve(bad, PAPER)):
+            assert edit_of_fix(bad, remedy.fix, remedy.point) is None
+
+    def test_no_ball_is_looked_for_farther_off_than_a_hand_slips(self):
+        bad = self.with_ball_off(440.0)
+        solution = solve(bad, PAPER)
+        assert solution.first_failing.name == "reprojection"
+        assert find_remedies(bad, PAPER, solution) == []
+
+    def test_no_ball_is_looked_for_where_a_better_cause_is_known(self):
+        bad = self.with_ball_off(40.0)
+        solution = solve(bad, PAPER)
+        swapped = Finding("sides_swapped", "Left is right.", "b", fix=Fix("swap_sides", "b"))
+        known = replace(solution, findings=(swapped,))
+        actions = {remedy.fix.action for remedy in find_remedies(bad, PAPER, known)}
+        assert "look_ball" not in actions
+
+    def undrawn(self):
+        """A group whose second view lacks drawn lines, and a policy that asks for them."""
+        good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
+        clean = min(found.calibration.jac[0] for found in solve(good, PAPER).views)
+        lines = dict(good.views[1].station.lines)
+        missing = sorted(lines)[:2]
+        for marking in missing:
+            del lines[marking]
+        station = replace(good.views[1].station, lines=make_lines(lines))
+        bad = good.with_view(replace(good.views[1], station=station))
+        return bad, replace(PAPER, min_jac=clean - 0.01), missing
+
+    def test_lines_that_nobody_drew_are_named_as_what_keeps_a_view_from_passing(self):
+        bad, policy, missing = self.undrawn()
+        solution = solve(bad, policy)
+        assert solution.first_failing.name == "jac"
+        best = find_remedies(bad, policy, solution)[0]
+        assert (best.fix.action, best.fix.view, best.passes) == ("draw_marking", "b", True)
+        assert all(marking in best.sentence for marking in missing)
+        assert "visible over" in best.sentence
+        assert edit_of_fix(bad, best.fix) is None
+
+    def test_a_view_that_was_left_out_can_be_used_again(self):
+        good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
+        bad = good.with_view(replace(good.views[1], included=False))
+        solution = solve(bad, PAPER)
+        assert solution.first_failing.name == "two_views"
+        (remedy,) = find_remedies(bad, PAPER, solution)
+        assert (remedy.fix, remedy.passes) == (Fix("include_view", "b"), True)
+        assert "B left out by a person" in solution.first_failing.sentence
 
 
 class TestEditOfFix:

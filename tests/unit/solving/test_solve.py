@@ -173,7 +173,11 @@ class TestGates:
     def test_a_given_camera_without_lines_is_not_measured(self):
         views = given_view("a", MAIN, BALL), given_view("b", OPPOSITE, BALL)
         gate = solve(group(*views), PAPER).gates[1]
-        assert (gate.passed, gate.value, gate.sentence) == (True, None, "given, not measured")
+        assert (gate.passed, gate.value, gate.sentence) == (
+            True,
+            None,
+            "not measured, the cameras were given",
+        )
 
     def test_nine_of_twelve_is_not_above_three_quarters(self, clean):
         exactly = replace(PAPER, min_jac=1.0)
@@ -211,7 +215,7 @@ class TestFindings:
         ("place", "words"),
         [
             ((38.0, 2.0, 2.0), "below the grass"),
-            ((38.0, 2.0, -45.0), "high"),
+            ((38.0, 2.0, -45.0), "above the grass"),
             ((38.0, -48.0, -1.0), "outside the pitch"),
         ],
     )
@@ -251,10 +255,66 @@ class TestSidesSwapped:
         found = solve(group(turned, clean.views[1]), PAPER).findings
         assert [(item.kind, item.view) for item in found] == [("sides_swapped", "7.png")]
 
+    def test_views_that_are_all_labelled_from_the_other_end_agree_and_are_still_wrong(self, clean):
+        turned = []
+        for view in clean.views[:2]:
+            lines = {twin_marking(name): points for name, points in view.station.lines.items()}
+            turned.append(replace(view, station=replace(view.station, lines=make_lines(lines))))
+        solution = solve(group(*turned), PAPER)
+        assert solution.passes
+        (finding,) = [item for item in solution.findings if item.kind == "sides_swapped"]
+        assert (finding.view, finding.fix.action) == ("7.png", "swap_sides")
+        assert "far side" in finding.sentence
+
+    def test_a_pair_that_meets_far_from_any_pitch_clears_no_view(self, clean):
+        # The rays of the view as labelled meet, but high in the air and far behind the stands.
+        replay = clean.views[1]
+        lines = {twin_marking(name): points for name, points in replay.station.lines.items()}
+        turned = replace(replay, station=replace(replay.station, lines=make_lines(lines)))
+        loose = replace(PAPER, tau_percent=100.0)
+        solution = solve(group(clean.views[0], turned), loose)
+        assert [pair.valid for pair in solution.pairs] == [True]
+        assert "sides_swapped" in [item.kind for item in solution.findings]
+
     def test_another_instant_is_not_taken_for_another_side(self, clean):
         other = view("7_1.png", BEHIND_GOAL, (40.0, -9.0, -0.11))
         found = solve(group(clean.views[0], other), PAPER).findings
         assert [item.kind for item in found] == ["not_synchronous"]
+
+
+class TestExpectedBall:
+    def test_a_view_without_a_ball_says_where_it_should_show_it(self, clean):
+        blind = replace(clean.views[2], balls=())
+        solved = solve(group(*clean.views[:2], blind), PAPER).view("7_2.png")
+        assert solved.ball is None
+        assert not solved.included
+        assert np.allclose(solved.expected.place, OPPOSITE.project(np.array([BALL]))[0], atol=1.0)
+        assert solved.expected.box.diameter == pytest.approx(
+            clean.views[2].balls[0].box.diameter, rel=0.1
+        )
+
+    def test_its_uncertainty_is_that_of_the_ball_seen_from_there(self, clean):
+        solution = solve(clean, PAPER)
+        covariance = np.array(solution.view("7_2.png").expected.covariance).reshape(2, 2)
+        assert np.allclose(covariance, covariance.T)
+        sigmas = np.sqrt(np.linalg.eigvalsh(covariance))
+        assert 0.1 < sigmas[0] <= sigmas[1] < 10
+
+    def test_without_a_3d_ball_nothing_is_expected(self, clean):
+        alone = [replace(view, balls=()) for view in clean.views[1:]]
+        assert all(
+            view.expected is None for view in solve(group(clean.views[0], *alone), PAPER).views
+        )
+
+    def test_a_ball_that_was_put_where_the_others_see_it_confirms_nothing(self, clean):
+        blind = replace(clean.views[2], balls=())
+        before = solve(group(*clean.views[:2], blind), PAPER)
+        put = BallAnnotation(box=before.view("7_2.png").expected.box, inferred=True)
+        after = solve(group(*clean.views[:2], replace(blind, balls=(put,))), PAPER)
+        assert (after.ball, after.pairs) == (before.ball, before.pairs)
+        assert not after.view("7_2.png").included
+        alone = solve(group(clean.views[0], replace(clean.views[1], balls=(put,))), PAPER)
+        assert alone.first_failing.name == "ball"
 
 
 class TestCalibrationFindings:

@@ -1,0 +1,36 @@
+"""Plausible: where a ball can be, and what is wrong with a place where it cannot."""
+
+from __future__ import annotations
+
+from app.soccer.frames import height_above_grass
+from app.soccer.pitch import Pitch
+from app.soccer.policy import Policy
+
+
+def is_plausible(point: tuple[float, float, float], pitch: Pitch, policy: Policy) -> bool:
+    """Whether a ball can be there: on or near the pitch, not below it, not sky-high.
+
+    Args:
+        point: Pitch frame, metres.
+        pitch: The pitch.
+        policy: Holds the limits.
+    """
+    return not implausible(point, pitch, policy)
+
+
+def implausible(
+    point: tuple[float, float, float], pitch: Pitch, policy: Policy
+) -> list[tuple[float, float, str]]:
+    """What is wrong with a place: number and limit, metres, and the words for it."""
+    x, y, z = point
+    height = height_above_grass(z)
+    outside = max(abs(x) - pitch.length / 2, abs(y) - pitch.width / 2)
+    return [
+        (number, limit, words)
+        for number, limit, words in (
+            (z, policy.below_grass_m, f"lies {z:.1f} m below the grass"),
+            (height, policy.max_height_m, f"flies {height:.0f} m above the grass"),
+            (outside, policy.outside_pitch_m, f"is {outside:.0f} m outside the pitch"),
+        )
+        if number > limit
+    ]
