@@ -80,7 +80,7 @@ def _calibratable(views: Sequence[JudgedView], short: bool) -> Gate:
     fallen = [view for view in views if view.failed == "calibratable"]
     count = len(views) - len(fallen)
     blamed = short and bool(fallen) and count < MIN_VIEWS
-    sentence = f"{count} of {len(views)} views have a camera"
+    sentence = f"in {count} of {len(views)} views"
     if blamed:
         sentence = f"{fallen[0].letter} has no camera: {fallen[0].calibration.reason}"
     return _gate(
@@ -111,19 +111,19 @@ def _jac(views: Sequence[JudgedView], short: bool, policy: Policy) -> Gate:
     return _gate("jac", not blamed, jac, policy.min_jac, sentence, view=key)
 
 
-_FALLEN_AT = {"calibratable": "no camera", "jac": "field lines do not fit"}
+_FALLEN_AT = {"calibratable": "no camera", "jac": "lines do not fit"}
 """Why a view does not count."""
 
 
 def _two_views(
     views: Sequence[JudgedView], left: Sequence[JudgedView], left_out: Sequence[str]
 ) -> Gate:
-    sentence = f"{len(left)} of {len(views) + len(left_out)} views count"
+    sentence = f"{len(left)} of {len(views) + len(left_out)}"
     if len(left) < MIN_VIEWS:
         why = [*_fallen(views)]
         if left_out:
             why.append(f"{', '.join(left_out)} left out by a person")
-        sentence = "; ".join([sentence, *why])
+        sentence = ", ".join([sentence, *why])
     return _gate("two_views", len(left) >= MIN_VIEWS, len(left), MIN_VIEWS, sentence)
 
 
@@ -136,7 +136,7 @@ def _ball(views: Sequence[JudgedView], left: Sequence[JudgedView]) -> Gate:
         sentence += f", none in {_letters(without)}"
     if not passed:
         idle = _fallen([view for view in views if view.has_ball])
-        sentence = "; ".join([sentence, *(f"that of {reason}" for reason in idle)])
+        sentence = ", ".join([sentence, *idle])
     view = without[0].key if without and not passed else None
     return _gate("ball", passed, count, MIN_VIEWS, sentence, view=view)
 

@@ -32,6 +32,7 @@
  * @property {boolean} occluded
  * @property {boolean} out_of_view
  * @property {'dataset' | 'person' | 'prediction'} [source] who says so
+ * @property {boolean} [inferred] put where the 3D ball of the other views is seen; it confirms nothing
  * @property {string | null} [predicted_by] the set of predictions that a person accepted it from
  */
 
@@ -113,6 +114,7 @@
  * @property {string | null} failed
  * @property {CalibrationJson} calibration
  * @property {BallFitJson | null} ball
+ * @property {{place: PairJson, covariance: (number | null)[], box: BoxJson | null} | null} [expected] where the 3D ball is to be seen
  */
 
 /**

@@ -9,7 +9,7 @@ import {
 
 /**
  * @import {
- *   BallFitJson, BallJson, GroupDocument, PairSolutionJson, PolicyJson, SolutionJson, ViewJson
+ *   BallFitJson, BallJson, GroupDocument, PairSolutionJson, PolicyJson, SolutionJson, ViewJson, ViewSolutionJson
  * } from '../api/types.js'
  * @import {Camera, ImagePoint, PitchPoint} from './camera.js'
  */
@@ -67,9 +67,22 @@ export function previewBall(group, solution) {
 		views: solution.views.map((view) => {
 			const one = seen.find((candidate) => candidate.view.key === view.view);
 			const ball = one && point ? fitBall(one, point, group.policy.ball_diameter_m) : null;
-			return { ...view, included: included.has(view.view), ball };
+			return { ...view, included: included.has(view.view), ball, expected: point ? expectBall(view, point, group.policy.ball_diameter_m) : null };
 		}),
 	};
+}
+
+/**
+ * Where a view should show the ball; how far off that may be is the server's, of the last solution.
+ *
+ * @param {ViewSolutionJson} solved @param {PitchPoint} point @param {number} phi
+ * @returns {ViewSolutionJson['expected']}
+ */
+function expectBall({ calibration, expected }, point, phi) {
+	if (!calibration.camera) return null;
+	const camera = cameraFromJson(calibration.camera);
+	const image = project(camera, point);
+	return image && { place: [image.x, image.y], covariance: expected?.covariance ?? [], box: exactBox(camera, point, phi) };
 }
 
 /** @param {GroupDocument} group @param {SolutionJson} solution @returns {Seen[]} */
@@ -79,7 +92,8 @@ export function seenBalls(group, solution) {
 		const ball = ballOf(view);
 		const center = ball && ballCenter(ball);
 		const json = solved?.calibration.camera;
-		if (!view.included || !solved || !json || !center) return [];
+		// A ball that was put where the others see it confirms nothing.
+		if (!view.included || !solved || !json || !center || ball.inferred) return [];
 		const dropped = solved.failed === 'calibratable' || solved.failed === 'jac' ? solved.failed : null;
 		const tau = (group.policy.tau_percent / 100) * diagonal(view);
 		return [{ view, camera: cameraFromJson(json), center, tau, dropped }];

@@ -33,7 +33,8 @@ function drawReprojected(context, { picture, viewport }) {
 
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
 function drawBoxes(context, { picture, viewport }) {
-	const optimised = picture.ball?.optimized_box;
+	// Outside every valid pair no 3D ball stands behind a box.
+	const optimised = picture.solved?.included ? picture.ball?.optimized_box : null;
 	if (optimised) {
 		strokeBox(context, viewport, optimised, {
 			colour: colours.value.optimised, width: 1.5, dash: [4, 3],
@@ -43,7 +44,8 @@ function drawBoxes(context, { picture, viewport }) {
 	seen.forEach((ball, i) => {
 		if (!ball.box) return;
 		strokeBox(context, viewport, ball.box, {
-			colour: colours.value.human, width: 1.75, dash: ball.out_of_view ? [2, 4] : [],
+			// One that was put where the others see the ball looks like what it rests on.
+			colour: ball.inferred ? colours.value.reprojected : colours.value.human, width: 1.75, dash: ball.out_of_view || ball.inferred ? [2, 4] : [],
 		});
 		if (seen.length < 2) return;
 		const corner = toScreen(viewport, { x: ball.box[0] + ball.box[2], y: ball.box[1] });

@@ -44,6 +44,7 @@ import { pinsOf } from '../lib/pins.js';
  * @property {number} gain
  * @property {boolean} rays
  * @property {import('../state/conflict.js').Field[]} [ghosts] what a conflict keeps beside what is shown
+ * @property {import('../api/types.js').FixJson | null} [meant] what the card speaks about, in this view
  */
 
 /**
@@ -55,9 +56,7 @@ import { pinsOf } from '../lib/pins.js';
  * @returns {ViewPicture[]}
  */
 export function picturesOf(group, solution, saved) {
-	const cameras = new Map((solution?.views ?? []).flatMap((solved) => (
-		solved.calibration.camera ? [[solved.view, cameraFromJson(solved.calibration.camera)]] : []
-	)));
+	const cameras = camerasOf(solution);
 	return group.views.map((view) => {
 		const solved = solution?.views.find((candidate) => candidate.view === view.key) ?? null;
 		const camera = cameras.get(view.key);
@@ -84,6 +83,23 @@ function apartOf(key, solution) {
 	const own = (solution?.pairs ?? []).filter(({ a, b }) => a === key || b === key);
 	if (own.length === 0 || own.some(({ valid }) => valid)) return null;
 	return Math.min(...own.map(({ errors_px }) => Math.max(...errors_px)));
+}
+
+/**
+ * Where the other views' rays run in a view, image points.
+ *
+ * @param {GroupDocument} group @param {SolutionJson | null} solution @param {ViewJson} view
+ * @returns {ImagePoint[]}
+ */
+export function raysInto(group, solution, view) {
+	return epipolarsInto(group, view, camerasOf(solution)).flatMap(({ points }) => points);
+}
+
+/** @param {SolutionJson | null} solution */
+function camerasOf(solution) {
+	return new Map((solution?.views ?? []).flatMap((solved) => (
+		solved.calibration.camera ? [[solved.view, cameraFromJson(solved.calibration.camera)]] : []
+	)));
 }
 
 /**

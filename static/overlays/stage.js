@@ -4,10 +4,13 @@
 import { colours } from '../lib/colours.js';
 import Konva from '../lib/konva.js';
 import { drawBall, drawEpipolars } from './ball.js';
+import { drawExpected } from './expected_ball.js';
 import { drawGhosts } from './ghosts.js';
 import { drawMarkings } from './markings.js';
+import { drawMeant } from './meant.js';
 import { drawPins } from './pins.js';
 import { drawPoints, drawSelectedPoint, drawWhiskers } from './points.js';
+import { drawUndrawn } from './undrawn.js';
 
 /** @import {Scene} from './scene.js' */
 
@@ -83,11 +86,14 @@ export class ImageStage {
 export function drawOverlays(context, scene) {
 	context.save();
 	if (scene.projections) drawMarkings(context, scene);
+	if (scene.projections) drawUndrawn(context, scene);
 	if (scene.projections) drawWhiskers(context, scene);
 	if (scene.rays) drawEpipolars(context, scene);
 	drawPoints(context, scene);
 	if (scene.boxes) scene.picture.predictions?.draw(context, scene);
+	drawExpected(context, scene);
 	drawBall(context, scene);
+	drawMeant(context, scene);
 	drawSelectedPoint(context, scene);
 	drawGhosts(context, scene);
 	drawPins(context, scene);

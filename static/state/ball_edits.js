@@ -4,7 +4,7 @@
 import { boxDiameter, squareBox } from '../geometry/ball.js';
 import { ballOf, diagonal } from '../geometry/preview.js';
 
-/** @import {BallJson, GroupDocument, PointJson, SolutionJson, ViewJson} from '../api/types.js' */
+/** @import {BallJson, GroupDocument, PointJson, SolutionJson, ViewJson, ViewSolutionJson} from '../api/types.js' */
 /** @import {BallEdit} from './edits.js' */
 
 /** Where nothing says how large a ball looks: this share of the diagonal. */
@@ -22,6 +22,17 @@ export function newBall(view, at, diameter) {
 }
 
 /**
+ * The ball where the other views see it; it is drawn and exported, and confirms nothing.
+ *
+ * @param {ViewJson} view @param {NonNullable<ViewSolutionJson['expected']>} expected
+ * @returns {BallEdit}
+ */
+export function placeBall(view, { place: [x, y], box }) {
+	const { ball } = newBall(view, { x, y }, box ? boxDiameter(box) : TYPICAL_SHARE * diagonal(view));
+	return { kind: 'ball', view: view.key, ball: ball && { ...ball, inferred: true } };
+}
+
+/**
  * How large a new ball should be: as the 3D ball looks from here, else as large as the others.
  *
  * @param {GroupDocument} group @param {SolutionJson | null} solution @param {ViewJson} view
@@ -30,6 +41,8 @@ export function newBall(view, at, diameter) {
 export function expectedDiameter(group, solution, view) {
 	const fit = solution?.views.find((solved) => solved.view === view.key)?.ball;
 	if (fit?.optimized_diameter_px) return fit.optimized_diameter_px;
+	const expected = solution?.views.find((solved) => solved.view === view.key)?.expected?.box;
+	if (expected) return boxDiameter(expected);
 	const others = group.views.flatMap((other) => {
 		const box = ballOf(other)?.box;
 		return box ? [(boxDiameter(box) / diagonal(other)) * diagonal(view)] : [];

@@ -31,6 +31,21 @@ export function startDrawing(letter) {
 		: { view: view.key, what: 'ask', marking: '' };
 }
 
+/** Draw the ball of a view. @param {ViewJson} view */
+export function startBall(view) {
+	focused.value = view.letter;
+	drawing.value = { view: view.key, what: 'ball', marking: '' };
+	announce('Click where the ball is, or press Enter.');
+}
+
+/** Draw a marking of a view. @param {ViewJson} view @param {string} marking */
+export function startMarking(view, marking) {
+	focused.value = view.letter;
+	selected.value = null;
+	drawing.value = { view: view.key, what: 'line', marking };
+	announce(`Drawing ${marking}. Click, or press Enter, to add a point; Escape ends.`);
+}
+
 /** Stop drawing. */
 export function endDrawing() {
 	drawing.value = null;
@@ -49,8 +64,7 @@ export function chooseDrawing(marking) {
 		else announce('Click where the ball is, or press Enter.');
 		return;
 	}
-	drawing.value = { view: view.key, what: 'line', marking };
-	announce(`Drawing ${marking}. Click, or press Enter, to add a point; Escape ends.`);
+	startMarking(view, marking);
 }
 
 /** Draw what is being drawn at a place of a view. @param {ViewJson} view @param {PointJson} at */
@@ -74,11 +88,18 @@ export function drawHere() {
 	drawAt(view, over?.view === view.key ? over.at : likelyPlace(view));
 }
 
-/** Where a person without a pointer begins: at the 3D ball, else in the middle. @param {ViewJson} view */
+/** Where a person without a pointer begins: at the 3D ball, at the ends of the projected line, else in the middle. @param {ViewJson} view */
 function likelyPlace(view) {
-	const fit = solution.value?.views.find((solved) => solved.view === view.key)?.ball;
-	if (drawing.value?.what === 'ball' && fit?.reprojected) return { x: fit.reprojected[0], y: fit.reprojected[1] };
+	const solved = solution.value?.views.find((one) => one.view === view.key);
+	const { what = 'ask', marking = '' } = drawing.value ?? {};
+	const [place] = what === 'ball' ? [solved?.expected?.place] : [nextOn(solved?.calibration.markings.find((one) => one.marking === marking)?.polyline ?? [], view.lines[marking]?.length ?? 0)];
+	if (place) return { x: place[0], y: place[1] };
 	return { x: (view.width - 1) / 2, y: (view.height - 1) / 2 };
+}
+
+/** The first point goes to one end, the second to the other, then the middle. @param {[number, number][]} polyline @param {number} drawn */
+function nextOn(polyline, drawn) {
+	return [polyline[0], polyline.at(-1)][drawn] ?? polyline[Math.floor(polyline.length / 2)];
 }
 
 /**

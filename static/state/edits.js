@@ -81,9 +81,10 @@ export function previewBody(edit) {
 
 /** @param {BallJson} ball */
 function ballBody(ball) {
-	const { box, point, occluded, out_of_view } = ball;
-	if (box) return { box, occluded, out_of_view };
-	return point ? { point, occluded, out_of_view } : { occluded, out_of_view };
+	const { box, point, occluded, out_of_view, inferred } = ball;
+	const said = { occluded, out_of_view, ...(inferred ? { inferred } : {}) };
+	if (box) return { box, ...said };
+	return point ? { point, ...said } : said;
 }
 
 /** @param {GroupDocument} group @param {string} key @returns {ViewJson} */
@@ -150,9 +151,10 @@ export function twinMarking(marking) {
 export function editOfFix(group, fix) {
 	const view = group.views.find((candidate) => candidate.key === fix.view);
 	if (!view) return null;
-	if (fix.action === 'exclude_view') return { kind: 'include', view: view.key, included: false };
+	if (fix.action === 'exclude_view' || fix.action === 'include_view') {
+		return { kind: 'include', view: view.key, included: fix.action === 'include_view' };
+	}
 	if (fix.action === 'swap_sides') return swapSides(view);
-	if (fix.action === 'move_ball') return fix.point ? putBall(view, fix.point) : null;
 	const points = fix.marking ? view.lines[fix.marking] : undefined;
 	if (fix.action === 'pick_ball' && fix.index !== null) return pickBall(view, fix.index);
 	if (!fix.marking || !points) return null;
@@ -168,21 +170,6 @@ export function editOfFix(group, fix) {
 	if (fix.action !== 'relabel' || !fix.to) return null;
 	const merged = [...(view.lines[fix.to] ?? []), ...points];
 	return { kind: 'lines', view: view.key, lines: { [fix.marking]: null, [fix.to]: merged } };
-}
-
-/**
- * The ball of a view at another place, as large as it is; null where the picture does not reach.
- *
- * @param {ViewJson} view @param {[number, number]} to
- * @returns {BallEdit | null}
- */
-function putBall(view, [x, y]) {
-	const [ball] = view.balls;
-	if (!ball || view.balls.length > 1 || x < 0 || y < 0 || x >= view.width || y >= view.height) return null;
-	const { box } = ball;
-	const placed = box ? { box: /** @type {BallJson['box']} */ ([x - box[2] / 2, y - box[3] / 2, box[2], box[3]]) }
-		: { point: /** @type {BallJson['point']} */ ([x, y]) };
-	return { kind: 'ball', view: view.key, ball: { ...ball, ...placed, out_of_view: false } };
 }
 
 /** @param {ViewJson} view @param {number} index @returns {BallEdit | null} */

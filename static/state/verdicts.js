@@ -4,6 +4,7 @@
 import { signal } from '@preact/signals';
 
 import { navigate } from '../lib/router.js';
+import { doubt } from './advice.js';
 import { conflict } from './conflict.js';
 import { document, group, onRefused, open, settle, submit, submitVerdict } from './group.js';
 import { actions, did, didAgain, forget, tookBack } from './last_action.js';
@@ -38,7 +39,7 @@ export function accept() {
 		announce('This group is not solved yet and cannot be accepted.');
 		return;
 	}
-	if (!group.solution.passes) asking.value = 'override';
+	if (!group.solution.passes || doubt(group.solution)) asking.value = 'override';
 	else decide('accepted', null, null);
 }
 

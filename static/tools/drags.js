@@ -66,6 +66,7 @@ export function moveBall(view, ball, dx, dy) {
 		view: view.key,
 		ball: {
 			...ball,
+			inferred: false,
 			box: box && [box[0] + dx, box[1] + dy, box[2], box[3]],
 			point: point && [point[0] + dx, point[1] + dy],
 		},
@@ -85,7 +86,7 @@ export function growBall(view, ball, by) {
 	const height = Math.max(SMALLEST, ball.box[3] + by);
 	/** @type {BoxJson} */
 	const box = [center.x - width / 2, center.y - height / 2, width, height];
-	return { kind: 'ball', view: view.key, ball: { ...ball, box } };
+	return { kind: 'ball', view: view.key, ball: { ...ball, inferred: false, box } };
 }
 
 /**
@@ -99,6 +100,6 @@ function cornerDrag(view, ball, [x, y, width, height], { left, top }) {
 		const h = Math.max(SMALLEST, top ? fixed.y - to.y : to.y - fixed.y);
 		/** @type {BoxJson} */
 		const resized = [left ? fixed.x - w : fixed.x, top ? fixed.y - h : fixed.y, w, h];
-		return { kind: 'ball', view: view.key, ball: { ...ball, box: resized } };
+		return { kind: 'ball', view: view.key, ball: { ...ball, inferred: false, box: resized } };
 	});
 }

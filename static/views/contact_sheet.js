@@ -12,6 +12,7 @@ import { colours } from '../lib/colours.js';
 import { fixed, pixels } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
 import { drawBall } from '../overlays/ball.js';
+import { drawExpected } from '../overlays/expected_ball.js';
 import { filterOf } from '../state/adjustments.js';
 import { useFrames } from '../state/frames.js';
 import { focusView } from '../state/workspace.js';
@@ -39,14 +40,14 @@ const SMALLEST = 24;
  * @param {ViewPicture} picture @param {PolicyJson} policy
  * @returns {{center: ImagePoint, side: number} | null} side in image pixels; null without a ball
  */
-function windowOf({ view, ball: fit, predictions }, policy) {
+function windowOf({ view, solved, ball: fit, predictions }, policy) {
 	const ball = ballOf(view);
 	const offered = predictions?.marks.find(({ sure }) => sure)?.box;
 	const center = (ball && ballCenter(ball))
-		?? (fit?.reprojected && { x: fit.reprojected[0], y: fit.reprojected[1] })
+		?? (solved?.expected && { x: solved.expected.place[0], y: solved.expected.place[1] })
 		?? (offered && boxCenter(offered));
 	if (!center) return null;
-	const box = ball?.box ?? offered;
+	const box = ball?.box ?? solved?.expected?.box ?? offered;
 	const annotated = box ? (box[2] + box[3]) / 2 : null;
 	const diameter = fit?.optimized_diameter_px ?? annotated;
 	return { center, side: diameter ? (WINDOW_METRES * diameter) / policy.ball_diameter_m : 60 };
@@ -111,6 +112,7 @@ function Crop({ picture, policy, side, cell, frame }) {
 		const scene = { picture, viewport, selected: null, hidden: false, projections: false, boxes: true, gain: 1, rays: false };
 		// Where somebody said where the ball is, what was predicted would only be in the way.
 		if (view.balls.length === 0) picture.predictions?.draw(context, scene);
+		drawExpected(context, scene);
 		drawBall(context, scene);
 	}, [picture, side, frame, theme, filter]);
 	return html`

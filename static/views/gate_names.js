@@ -7,10 +7,10 @@
 export const GATE_TITLES = /** @type {Record<string, string>} */ ({
 	calibratable: 'Too few views have a camera',
 	jac: 'Field lines do not fit',
-	two_views: 'Fewer than two calibrated views',
-	ball: 'Ball in fewer than two views',
+	two_views: 'Fewer than two views are left',
+	ball: 'The ball is drawn in fewer than two views',
 	baseline: 'The cameras stand in one place',
-	reprojection: 'The views do not meet in one ball',
+	reprojection: 'The views do not agree on one ball',
 	parallax: 'The rays are nearly parallel',
 	sigma: 'The position is too uncertain',
 });
@@ -19,9 +19,9 @@ export const GATE_TITLES = /** @type {Record<string, string>} */ ({
 export function gateLabel(gate, policy) {
 	const { threshold } = gate;
 	const labels = /** @type {Record<string, string>} */ ({
-		calibratable: 'Calibrated',
+		calibratable: 'Cameras found',
 		jac: `JaC ${policy.jac_gamma_percent} % > ${policy.min_jac}`,
-		two_views: 'At least 2 views',
+		two_views: 'At least 2 views left',
 		ball: 'Ball in ≥ 2 views',
 		baseline: `Baseline ≥ ${policy.min_baseline_m} m`,
 		reprojection: `Reprojection < ${policy.tau_percent} %`,

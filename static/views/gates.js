@@ -3,14 +3,13 @@
 
 import { html } from 'htm/preact';
 
-import { editOfFix } from '../state/edits.js';
-import { submit } from '../state/group.js';
-import { remedies } from '../state/insight.js';
+import { mends } from '../state/mends.js';
 import { focusView, gatesOpen, selected } from '../state/workspace.js';
 import { gateLabel, gateMargin } from './gate_names.js';
+import { carryOut } from './mend_actions.js';
 
 /** @import {FixJson, GateJson, GroupDocument, SolutionJson} from '../api/types.js' */
-/** @import {Remedy} from '../state/insight.js' */
+/** @import {Mend} from '../state/mends.js' */
 
 /** More remedies than these nobody reads. */
 const MOST = 4;
@@ -28,48 +27,35 @@ function stateOf(gate) {
 	return { state: 'failed', glyph: '✗', word: 'failed' };
 }
 
-/** @param {FixJson} edit */
-function applyLabel({ action }) {
-	if (action === 'move_point' || action === 'move_ball') return 'Move it';
-	if (action === 'swap_sides') return 'Swap sides';
-	if (action === 'drop_point' || action === 'drop_marking') return 'Drop it';
-	return action === 'relabel' ? 'Relabel' : 'Leave out';
-}
-
-/** Show what a remedy speaks about. @param {GroupDocument} group @param {FixJson} edit */
-function show(group, edit) {
-	const view = group.views.find(({ key }) => key === edit.view);
+/** Show what a mend speaks about. @param {GroupDocument} group @param {FixJson} fix */
+function show(group, fix) {
+	const view = group.views.find(({ key }) => key === fix.view);
 	if (!view) return;
 	focusView(view.letter);
-	if (edit.action === 'move_ball') selected.value = { kind: 'ball', view: view.key };
-	else if (edit.marking && view.lines[edit.marking]) {
-		selected.value = { kind: 'point', view: view.key, marking: edit.marking, index: edit.index ?? 0 };
+	if (fix.action === 'look_ball') selected.value = { kind: 'ball', view: view.key };
+	else if (fix.marking && view.lines[fix.marking]) {
+		selected.value = { kind: 'point', view: view.key, marking: fix.marking, index: fix.index ?? 0 };
 	}
 }
 
-/** @param {{group: GroupDocument, remedy: Remedy}} props */
+/** @param {{group: GroupDocument, remedy: Mend}} props */
 function RemedyRow({ group, remedy }) {
-	const edit = editOfFix(group, remedy.edit);
-	if (!edit) return null;
 	return html`
 		<li class="remedy" data-passes=${remedy.passes}>
-			<button class="remedy__sentence" type="button" title="Show what this is about" onClick=${() => show(group, remedy.edit)}>${remedy.sentence}</button>
-			<button class="button button--fix" type="button" onClick=${() => submit(edit)}>${applyLabel(remedy.edit)}</button>
+			<button class="remedy__sentence" type="button" title="Show what this is about" onClick=${() => show(group, remedy.fix)}>${remedy.sentence}</button>
+			<button class="button button--fix" type="button" onClick=${() => carryOut(remedy)}>${remedy.label}</button>
 		</li>
 	`;
 }
 
-/** @param {{group: GroupDocument}} props */
+/** What the solver has tried out, beside what the card on top offers. @param {{group: GroupDocument}} props */
 function Remedies({ group }) {
-	const known = remedies.value;
-	if (!known?.key.startsWith(`remedies ${group.id} `)) return null;
-	const possible = known.items.filter((remedy) => editOfFix(group, remedy.edit));
-	if (possible.length === 0) return null;
-	const best = possible.toSorted((a, b) => Number(b.passes) - Number(a.passes)).slice(0, MOST);
+	const tried = mends.value.filter(({ title }) => title === null).toSorted((a, b) => Number(b.passes) - Number(a.passes)).slice(0, MOST);
+	if (tried.length === 0) return null;
 	return html`
 		<section class="remedies" aria-label="What would help">
-			<h3>${best[0].passes ? 'Would pass if' : 'Would come closer if'}</h3>
-			<ul>${best.map((remedy) => html`<${RemedyRow} key=${remedy.sentence} group=${group} remedy=${remedy} />`)}</ul>
+			<h3>What would help</h3>
+			<ul>${tried.map((remedy) => html`<${RemedyRow} key=${remedy.sentence} group=${group} remedy=${remedy} />`)}</ul>
 		</section>
 	`;
 }

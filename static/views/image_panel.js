@@ -11,6 +11,7 @@ import { conflict } from '../state/conflict.js';
 import { drawAt, insertAt } from '../state/drawing.js';
 import { draft } from '../state/group.js';
 import { decoded, loadImage } from '../state/images.js';
+import { mend } from '../state/mends.js';
 import { panPanel, viewportOf, zoomPanel } from '../state/viewports.js';
 import {
 	boxes, drawing, editing, focused, focusView, gain, overlaysHidden, pointerPlace, projections,
@@ -112,14 +113,16 @@ export function ImagePanel({ picture, first }) {
 	}, []);
 
 	useLayoutEffect(() => stage.current?.show(frame.image), [frame.image]);
-	const rays = draft.value?.kind === 'ball' || selected.value?.kind === 'ball';
+	// Where nobody has drawn the ball, the other views' rays say where to look.
+	const rays = draft.value?.kind === 'ball' || selected.value?.kind === 'ball' || view.balls.length === 0;
+	const meant = mend.value?.fix.view === view.key && !draft.value ? mend.value.fix : null;
 	const scene = useMemo(() => ({
 		picture, viewport, rays, selected: selected.value, hidden: overlaysHidden.value,
 		projections: projections.value, boxes: boxes.value, gain: gain.value,
-		ghosts: conflict.value?.fields ?? NO_GHOSTS,
+		ghosts: conflict.value?.fields ?? NO_GHOSTS, meant,
 	}), [
 		picture, viewport.scale, viewport.left, viewport.top, rays, selected.value,
-		overlaysHidden.value, projections.value, boxes.value, gain.value, conflict.value,
+		overlaysHidden.value, projections.value, boxes.value, gain.value, conflict.value, meant,
 	]);
 	const filter = filterOf(letter);
 	useLayoutEffect(() => stage.current?.adjust(filter), [filter]);
@@ -143,7 +146,7 @@ export function ImagePanel({ picture, first }) {
 			data-focused=${isFocused}
 			data-included=${view.included}
 			tabindex="0"
-			aria-label=${`View ${letter}, ${view.label}. Enter to edit its objects.`}
+			aria-label=${`View ${letter}, ${view.label}. I to walk through its objects.`}
 			onFocus=${() => focusView(letter)}
 			onDblClick=${maximise}
 		>

@@ -76,6 +76,11 @@ export function withPredictions(pictures, predicted) {
 	});
 }
 
+/** Whether something is predicted in the group on screen. */
+export function hasPredictions() {
+	return (state.value?.predicted.value?.views.size ?? 0) > 0;
+}
+
 /** Accept the selected prediction, else the surest of the view in hand. */
 export function acceptInHand() {
 	if (state.value) state.value.acceptInHand();

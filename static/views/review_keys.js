@@ -5,11 +5,13 @@ import { ballCenter, ballOf } from '../geometry/preview.js';
 import { toggleOccluded, toggleOutOfView } from '../state/ball_edits.js';
 import { drawHere, endDrawing, startDrawing } from '../state/drawing.js';
 import { swapSides } from '../state/edits.js';
-import { draft, group, submit, withdraw } from '../state/group.js';
+import { draft, group, solution, submit, withdraw } from '../state/group.js';
 import { redo, undo } from '../state/history.js';
+import { mend, mends, turnMend } from '../state/mends.js';
 import { goBy, goFlagged, goNext, goPrevious } from '../state/navigation.js';
 import { announce, dismiss, notice } from '../state/notice.js';
 import { revertSelected } from '../state/revert.js';
+import { swapWarning, swappedViews } from '../state/sides.js';
 import { accept, askReason, askViewReason, cancelAsking, defer } from '../state/verdicts.js';
 import { fitAll, fitPanel, isZoomed, zoomTo } from '../state/viewports.js';
 import {
@@ -19,7 +21,8 @@ import {
 } from '../state/workspace.js';
 import { deleteSelected, nudge, nudgeDiameter } from '../tools/nudge.js';
 import { EDITOR_DOOR } from './calibration/open.js';
-import { acceptAll, acceptInHand } from './prediction_parts.js';
+import { mendNow, placeExpected } from './mend_actions.js';
+import { acceptAll, acceptInHand, hasPredictions } from './prediction_parts.js';
 import { SCENE_KEYS } from './scene3d/scene3d.js';
 
 /** @import {Binding} from '../lib/keys.js' */
@@ -64,10 +67,12 @@ function escape() {
 function zoomToBall() {
 	const view = group.value?.views.find(({ letter }) => letter === focused.value);
 	const ball = view && ballOf(view);
-	const center = ball && ballCenter(ball);
+	const place = solution.value?.views.find((one) => one.view === view?.key)?.expected?.place;
+	// Where nobody has drawn it: to where the other views see it.
+	const center = (ball && ballCenter(ball)) ?? (place && { x: place[0], y: place[1] });
 	const stage = document.querySelector(`.image-panel[data-view="${focused.value}"] .image-panel__stage`);
 	if (!center || !stage) {
-		announce(`There is no ball in view ${focused.value}.`);
+		announce(`Nobody has drawn a ball in view ${focused.value}, and the other views do not say where it is.`);
 		return;
 	}
 	const { width, height } = stage.getBoundingClientRect();
@@ -98,12 +103,23 @@ function changeBall(change, otherwise) {
 	else announce(`${otherwise} ${view.letter}.`);
 }
 
-/** Left becomes right in the focused view, for labels that somebody took from the other end. */
-function swapFocused() {
-	const view = group.value?.views.find(({ letter }) => letter === focused.value);
-	if (!view) return;
+/** Left becomes right, for labels that somebody took from the other end: in the view that a finding names, else the focused one. */
+function swap() {
+	const shown = group.value;
+	const view = shown?.views.find(({ letter }) => letter === focused.value);
+	if (!shown || !view) return;
+	const named = swappedViews(solution.value);
+	const elsewhere = named.length > 0 && !named.includes(view.key);
 	if (Object.keys(view.lines).length === 0) announce(`View ${view.letter} has no lines.`);
+	else if (elsewhere || swapWarning(shown, solution.value, view)) asking.value = 'swap';
 	else submit(swapSides(view));
+}
+
+/** Accept the prediction in hand, else put the ball where the other views see it. */
+function takeBall() {
+	const view = viewInHand();
+	const predicted = selected.value?.kind === 'prediction' || hasPredictions();
+	if (predicted || !view || view.balls.length > 0 || !placeExpected(view)) acceptInHand();
 }
 
 /** Make the group of the view in hand, too. */
@@ -222,7 +238,16 @@ const EDIT = [
 		keys: [], label: 'Put a point on the line there', group: 'Edit', shown: 'Alt click', run: () => {},
 	},
 	{
-		keys: ['Enter'], label: 'Walk through the objects of the view', group: 'Edit',
+		keys: ['Enter'], label: 'Do what the card on the right offers', group: 'Edit', once: true,
+		when: () => !editing.value && mend.value !== null, run: mendNow,
+	},
+	{
+		keys: ['Shift+Enter'], label: 'Show another way to mend the group', group: 'Edit',
+		when: () => mends.value.length > 1, run: () => turnMend(1),
+	},
+	{
+		// Where the card offers nothing, Enter leads in.
+		keys: ['i', 'Enter'], label: 'Walk through the objects of the view', group: 'Edit',
 		when: () => !editing.value,
 		run: () => { editing.value = true; },
 	},
@@ -246,10 +271,10 @@ const EDIT = [
 		keys: ['o'], label: 'Ball out of view, or not', group: 'Edit',
 		run: () => changeBall(toggleOutOfView, ''),
 	},
-	{ keys: ['y'], label: 'Accept the selected prediction, else the surest of the view', group: 'Edit', run: acceptInHand },
+	{ keys: ['y'], label: 'Take the predicted ball, else place it where the other views see it', group: 'Edit', run: takeBall },
 	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', run: acceptAll },
 	{ keys: ['u'], label: 'Give the selected object back what it was', group: 'Edit', run: () => { revertSelected(); } },
-	{ keys: ['m'], label: 'Swap left and right in the focused view', group: 'Edit', run: swapFocused },
+	{ keys: ['m'], label: 'Swap left and right, in the view that a finding names', group: 'Edit', run: swap },
 	{ keys: ['Ctrl+z'], label: 'Undo', group: 'Edit', run: undo },
 	{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Redo', group: 'Edit', run: redo },
 ];

@@ -2,14 +2,16 @@
 /** Accept, reject with a reason, defer: buttons, with what they ask beside them. */
 
 import { html } from 'htm/preact';
-import { useLayoutEffect, useRef } from 'preact/hooks';
+import { useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
+import { doubt, suggestedReason } from '../state/advice.js';
 import {
 	accept, addNote, answer, askReason, cancelAsking, defer, lastReason, leaveOut, reject, rejectView, REASONS,
 } from '../state/verdicts.js';
 import { asking, pinPlace } from '../state/workspace.js';
 import { pinText } from '../lib/pins.js';
+import { SwapAsk } from './swap_ask.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
 
@@ -37,17 +39,19 @@ const VIEW_REASONS = {
 	title: 'Leave this view out because', choose: rejectView, again: 'Shift X', keys: reasonKeys('Leave out', 'Shift+x', rejectView),
 };
 
-/** @param {typeof GROUP_REASONS} props */
-function ReasonList({ title, choose, again, keys }) {
-	useKeys(keys);
+/** @param {typeof GROUP_REASONS & {suggested?: string | null}} props */
+function ReasonList({ title, choose, again, keys, suggested = null }) {
+	useKeys(useMemo(() => (suggested === null ? keys : [...keys, {
+		keys: ['Enter'], label: `${title}: the suggested reason`, group: 'Verdict', run: () => choose(suggested),
+	}]), [keys, suggested]));
 	return html`
 		<section class="ask" aria-label=${title}>
 			<p class="ask__title">${title} <kbd>Esc</kbd></p>
 			<ol class="reasons">
 				${REASONS.map(({ name, label }, i) => html`
 					<li key=${name}>
-						<button type="button" data-last=${name === lastReason.value} onClick=${() => choose(name)}>
-							<kbd>${i + 1}</kbd> ${label} ${name === lastReason.value ? html`<kbd>${again}</kbd>` : null}
+						<button type="button" data-last=${name === lastReason.value} data-suggested=${name === suggested} onClick=${() => choose(name)}>
+							<kbd>${i + 1}</kbd> ${label} ${name === suggested ? html`<span class="reasons__suggested">fits <kbd>Enter</kbd></span>` : null} ${name === lastReason.value ? html`<kbd>${again}</kbd>` : null}
 						</button>
 					</li>
 				`)}
@@ -97,14 +101,16 @@ function PinForm() {
 
 /** @param {{group: GroupDocument}} props */
 function Ask({ group }) {
-	if (asking.value === 'reason') return html`<${ReasonList} key="group" ...${GROUP_REASONS} />`;
+	if (asking.value === 'reason') return html`<${ReasonList} key="group" ...${GROUP_REASONS} suggested=${suggestedReason(group.solution)} />`;
 	if (asking.value === 'view') return html`<${ReasonList} key="view" ...${VIEW_REASONS} />`;
 	if (asking.value === 'viewNote') return html`<${NoteForm} title="Why is this view left out?" button="Leave out" onNote=${leaveOut} />`;
 	if (asking.value === 'note') return html`<${NoteForm} title="What is wrong with it?" button="Reject" />`;
 	if (asking.value === 'pin') return html`<${PinForm} />`;
+	if (asking.value === 'swap') return html`<${SwapAsk} group=${group} />`;
 	if (asking.value !== 'override') return null;
 	const failing = group.solution?.first_failing;
-	const title = `Accept although ${failing ? `a gate fails (${failing.sentence})` : 'a gate fails'}? Say why.`;
+	const although = failing ? `a gate fails (${failing.sentence})` : (doubt(group.solution) ?? 'a gate fails');
+	const title = `Accept although ${although.replace(/\.$/, '')}? Say why.`;
 	return html`<${NoteForm} title=${title} button="Accept" />`;
 }
 

@@ -5,13 +5,19 @@ import { html } from 'htm/preact';
 
 import { ballOf } from '../geometry/preview.js';
 import { capital, words } from '../lib/format.js';
+import { findingTitle } from '../state/advice.js';
+import { mend } from '../state/mends.js';
 import { REASONS } from '../state/verdicts.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
+import { MendBox } from './mend_box.js';
 
 /** @import {GroupDocument, SolutionJson, VerdictJson, ViewJson} from '../api/types.js' */
+/** @import {Mend} from '../state/mends.js' */
 
 /** Findings that say why a view does not meet the others. */
 const ODD = new Set(['view_disagrees', 'sides_swapped', 'not_synchronous']);
+
+/** @typedef {{tone: 'ok' | 'warn' | 'bad' | 'unseen', over: string, title: string, text: string}} Headline */
 
 /** What a gate asks, before what it got. @param {GroupDocument} group @param {SolutionJson} solution @param {string} name */
 function asked(group, solution, name) {
@@ -19,29 +25,41 @@ function asked(group, solution, name) {
 	return gate ? `${gateLabel(gate, group.policy)}: ` : '';
 }
 
-/** @param {GroupDocument} group @param {SolutionJson | null} solution */
-function headline(group, solution) {
+/**
+ * What there is to say about a group: the finding that the offered mend is for, else the one that explains most.
+ *
+ * @param {GroupDocument} group @param {SolutionJson | null} solution @param {Mend | null} offered
+ * @returns {Headline}
+ */
+export function headline(group, solution, offered) {
 	if (!solution) {
 		return { tone: 'unseen', over: 'Not solved', title: 'No numbers yet', text: 'Solve the dataset, or edit this group: it is solved with every edit.' };
 	}
 	const used = solution.ball?.views.length ?? 0;
 	const all = group.views.length;
-	const odd = solution.findings.find((finding) => finding.view !== null && ODD.has(finding.kind));
+	const [first] = solution.findings;
+	const told = offered?.title ? offered : first && { title: findingTitle(group, first), sentence: first.sentence };
 	if (!solution.passes) {
 		const failing = solution.first_failing;
 		const gate = failing ? (GATE_TITLES[failing.gate] ?? capital(words(failing.gate))) : 'A gate fails';
-		return { tone: 'bad', over: 'Does not pass', title: gate, text: failing ? `${asked(group, solution, failing.gate)}${failing.sentence}.` : '' };
+		const measured = failing ? `${asked(group, solution, failing.gate)}${failing.sentence}.` : '';
+		if (!told) return { tone: 'bad', over: 'Does not pass', title: gate, text: measured };
+		return { tone: 'bad', over: `Does not pass: ${lower(gate)}`, title: told.title ?? gate, text: told.sentence };
 	}
-	const doubt = solution.findings[0];
+	const odd = solution.findings.some(({ kind, view }) => view !== null && ODD.has(kind));
 	if (odd || used < all) {
-		const letter = group.views.find((view) => view.key === odd?.view)?.letter;
-		const title = !letter || !odd ? `${used} of ${all} views agree`
-			: odd.kind === 'view_disagrees' ? `View ${letter} disagrees with the others`
-				: `${capital(words(odd.kind))} in ${letter}`;
-		return { tone: 'warn', over: `Passes with ${used} of ${all} views`, title, text: odd?.sentence ?? missing(group, solution) };
+		return {
+			tone: 'warn', over: `Passes with ${used} of ${all} views`, title: told?.title ?? `${used} of ${all} views agree`,
+			text: told?.sentence ?? missing(group, solution),
+		};
 	}
-	if (doubt) return { tone: 'warn', over: 'Passes, worth a look', title: capital(words(doubt.kind)), text: doubt.sentence };
+	if (told) return { tone: 'warn', over: 'Passes, worth a look', title: told.title ?? '', text: told.sentence };
 	return { tone: 'ok', over: 'Passes every gate', title: all === 2 ? 'Both views agree' : `All ${all} views agree`, text: spread(solution) };
+}
+
+/** @param {string} title */
+function lower(title) {
+	return title.charAt(0).toLowerCase() + title.slice(1);
 }
 
 /** @param {GroupDocument} group @param {SolutionJson} solution */
@@ -51,14 +69,14 @@ function missing(group, solution) {
 	const others = out.filter((view) => !blind.includes(view));
 	const letters = (/** @type {ViewJson[]} */ views) => views.map(({ letter }) => letter).join(', ');
 	return [
-		blind.length ? `No ball in ${letters(blind)}.` : '', others.length ? `Not used: ${letters(others)}.` : '',
+		blind.length ? `No ball is drawn in ${letters(blind)}.` : '', others.length ? `Not used: ${letters(others)}.` : '',
 	].filter(Boolean).join(' ');
 }
 
 /** @param {SolutionJson} solution */
 function spread(solution) {
 	const errors = solution.views.flatMap(({ ball }) => (ball?.error_px === null || !ball ? [] : [ball.error_px]));
-	return errors.length ? `The ball is met within ${Math.max(...errors).toFixed(1)} px in every view.` : '';
+	return errors.length ? `Every view sees the ball in the same place, within ${Math.max(...errors).toFixed(1)} px.` : '';
 }
 
 /** @param {VerdictJson} verdict */
@@ -72,13 +90,14 @@ function verdictText({ state, reason, note, by }) {
 
 /** @param {{group: GroupDocument, solution: SolutionJson | null, live: boolean}} props */
 export function VerdictCard({ group, solution, live }) {
-	const { tone, over, title, text } = headline(group, solution);
+	const { tone, over, title, text } = headline(group, solution, mend.value);
 	const { verdict } = group;
 	return html`
 		<section class="card verdict-card" data-tone=${tone} data-live=${live} aria-label="Result">
 			<p class="verdict-card__over">${over}</p>
 			<h1>${title}</h1>
 			<p class="verdict-card__text">${text}</p>
+			<${MendBox} solution=${solution} />
 			${verdict.state === 'unreviewed' && !verdict.note ? null : html`
 				<p class="verdict-card__verdict">
 					<span class="pill" data-status=${verdict.state}>${verdictText(verdict)}</span>

@@ -9,7 +9,7 @@ import { gradeBelow, gradeOfJac } from '../geometry/residual.js';
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
 const FAILED = /** @type {Record<string, string>} */ ({
-	calibratable: 'not calibrated', jac: '', ball: 'no ball', reprojection: '', baseline: 'same place',
+	calibratable: 'no camera', jac: 'lines do not fit', ball: 'no ball', reprojection: '', baseline: 'same place',
 });
 
 /** JaC at 0.5 %, or null when it was not measured. @param {ViewSolutionJson | null} solved */
@@ -21,11 +21,13 @@ export function jacOf(solved) {
 export function gradeOfView({ view, solved, apart }) {
 	if (!view.included) return { grade: 'unseen', sentence: 'left out' };
 	if (!solved) return { grade: 'unseen', sentence: 'not solved' };
-	if (!solved.calibration.camera) return { grade: 'bad', sentence: 'not calibrated' };
-	const given = solved.calibration.source === 'given' && jacOf(solved) === null ? 'given' : '';
+	if (!solved.calibration.camera) return { grade: 'bad', sentence: 'no camera' };
+	const given = solved.calibration.source === 'given' && jacOf(solved) === null ? 'camera given' : '';
 	if (solved.failed) return { grade: 'bad', sentence: FAILED[solved.failed] ?? solved.failed };
-	if (apart !== null) return { grade: 'bad', sentence: given };
-	if (!solved.ball && !view.balls.length) return { grade: 'warn', sentence: 'no ball' };
+	if (!view.balls.length) return { grade: 'warn', sentence: 'no ball' };
+	if (view.balls.some(({ inferred }) => inferred)) return { grade: 'warn', sentence: 'ball placed, not counted' };
+	// A ball that no other view confirms is not well, wherever the camera comes from.
+	if (apart !== null || (solved.ball && !solved.included)) return { grade: 'bad', sentence: given };
 	return { grade: 'ok', sentence: given };
 }
 

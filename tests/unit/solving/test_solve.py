@@ -257,9 +257,9 @@ class TestSidesSwapped:
 
     def test_views_that_are_all_labelled_from_the_other_end_agree_and_are_still_wrong(self, clean):
         turned = []
-        for view in clean.views[:2]:
-            lines = {twin_marking(name): points for name, points in view.station.lines.items()}
-            turned.append(replace(view, station=replace(view.station, lines=make_lines(lines))))
+        for one in clean.views[:2]:
+            lines = {twin_marking(name): points for name, points in one.station.lines.items()}
+            turned.append(replace(one, station=replace(one.station, lines=make_lines(lines))))
         solution = solve(group(*turned), PAPER)
         assert solution.passes
         (finding,) = [item for item in solution.findings if item.kind == "sides_swapped"]

@@ -1,0 +1,63 @@
+// @ts-check
+/** What to make of a solution: its findings in a few words, and the reason for which a group would be rejected. */
+
+import { capital, words } from '../lib/format.js';
+
+/** @import {FindingJson, GroupDocument, SolutionJson} from '../api/types.js' */
+
+/** Titles of findings; `@` stands for the letter of the view. */
+const TITLES = /** @type {Record<string, string>} */ ({
+	wrong_label: 'A line of @ has the wrong label',
+	sides_swapped: 'Left and right are swapped in @',
+	visible_not_annotated: 'A visible line of @ is not drawn',
+	bad_point: 'A point of @ lies off its line',
+	under_constrained: 'The lines of @ do not determine its camera',
+	view_disagrees: 'View @ disagrees with the others',
+	not_synchronous: 'The views may show different instants',
+	ball_size: 'The box of the ball in @ has an odd size',
+	low_parallax: 'The rays are nearly parallel',
+	high_uncertainty: 'The position of the ball is uncertain',
+	implausible_ball: 'The ball is where no ball can be',
+	implausible_camera: 'The camera of @ is where no camera can be',
+	several_balls: 'View @ has several balls',
+	upstream_changed: 'The imported file has changed',
+});
+
+/** A finding in a few words. @param {GroupDocument} group @param {FindingJson} finding */
+export function findingTitle(group, finding) {
+	const letter = group.views.find(({ key }) => key === finding.view)?.letter;
+	const title = TITLES[finding.kind];
+	return title && (letter || !title.includes('@')) ? title.replace('@', letter ?? '') : capital(words(finding.kind));
+}
+
+/** Findings that a reason to reject follows from. */
+const OF_FINDING = /** @type {Record<string, string>} */ ({
+	sides_swapped: 'sides_confused', not_synchronous: 'not_same_instant',
+});
+/** The reason that fits when nothing but the gate is known. */
+const OF_GATE = /** @type {Record<string, string>} */ ({
+	calibratable: 'bad_field_lines', jac: 'bad_field_lines', two_views: 'bad_field_lines', ball: 'ball_not_visible',
+	baseline: 'duplicate_view', reprojection: 'not_same_instant', parallax: 'duplicate_view', sigma: 'bad_calibration',
+});
+
+/**
+ * The reason for which a group that cannot be mended would be rejected; null when it passes.
+ *
+ * @param {SolutionJson | null} solution @returns {string | null} one of the reasons of verdicts
+ */
+export function suggestedReason(solution) {
+	const failing = solution?.first_failing;
+	if (!solution || !failing) return null;
+	const telling = solution.findings.find(({ kind }) => OF_FINDING[kind]);
+	return (telling && OF_FINDING[telling.kind]) ?? OF_GATE[failing.gate] ?? null;
+}
+
+/**
+ * Why a group that passes should not be accepted without a second thought; null when nothing speaks against it.
+ *
+ * @param {SolutionJson | null} solution @returns {string | null}
+ */
+export function doubt(solution) {
+	const swapped = solution?.passes ? solution.findings.find(({ kind }) => kind === 'sides_swapped') : undefined;
+	return swapped ? `left and right seem to be swapped: ${swapped.sentence}` : null;
+}

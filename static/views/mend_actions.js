@@ -1,0 +1,82 @@
+// @ts-check
+/** Carrying out what mends a group: the edit itself, or leading the person to the place where to draw. */
+
+import { framePoints } from '../geometry/frame_points.js';
+import { raysInto } from '../overlays/scene.js';
+import { placeBall } from '../state/ball_edits.js';
+import { startBall, startMarking } from '../state/drawing.js';
+import { editOfFix } from '../state/edits.js';
+import { group, solution, submit } from '../state/group.js';
+import { mend } from '../state/mends.js';
+import { announce } from '../state/notice.js';
+import { zoomTo } from '../state/viewports.js';
+import { focusView, selected } from '../state/workspace.js';
+
+/** @import {ViewJson} from '../api/types.js' */
+/** @import {ImagePoint} from '../geometry/viewport.js' */
+/** @import {Mend} from '../state/mends.js' */
+
+/** Screen pixels per image pixel where a ball is looked for. */
+const BALL_SCALE = 8;
+/** And for a marking at most, however short it is. */
+const LINE_SCALE = 12;
+
+/** Size of the panel of a view, CSS pixels. @param {string} letter */
+function panelOf(letter) {
+	const stage = document.querySelector(`.image-panel[data-view="${letter}"] .image-panel__stage`);
+	return stage?.getBoundingClientRect() ?? null;
+}
+
+/** Bring some points of a view into sight. @param {ViewJson} view @param {ImagePoint[]} points @param {number} most */
+export function showPlace(view, points, most = BALL_SCALE) {
+	const panel = panelOf(view.letter);
+	if (!panel || points.length === 0) return;
+	const { center, scale } = framePoints(points, panel, most);
+	zoomTo(view.letter, panel, center, scale);
+}
+
+/** Put the ball where the other views see it. @param {ViewJson} view @returns {boolean} whether that is known */
+export function placeExpected(view) {
+	const expected = solution.value?.views.find((one) => one.view === view.key)?.expected;
+	const edit = expected ? placeBall(view, expected) : null;
+	if (!edit) return false;
+	submit(edit);
+	focusView(view.letter);
+	selected.value = { kind: 'ball', view: view.key };
+	announce(`Ball of ${view.letter} placed where the other views see it. It confirms nothing until you move it.`);
+	return true;
+}
+
+/** @param {ViewJson} view @param {string} marking */
+function drawMissing(view, marking) {
+	const fit = solution.value?.views.find((one) => one.view === view.key)?.calibration.markings.find((one) => one.marking === marking);
+	startMarking(view, marking);
+	showPlace(view, (fit?.polyline ?? []).map(([x, y]) => ({ x, y })), LINE_SCALE);
+}
+
+/** @param {Mend} wanted */
+export function carryOut({ fix }) {
+	const shown = group.value;
+	const view = shown?.views.find(({ key }) => key === fix.view);
+	if (!shown || !view) return;
+	focusView(view.letter);
+	if (fix.action === 'place_ball') placeExpected(view);
+	else if (fix.action === 'draw_ball') {
+		startBall(view);
+		showPlace(view, raysInto(shown, solution.value, view).filter(({ x, y }) => x >= 0 && y >= 0 && x < view.width && y < view.height));
+	}
+	else if (fix.action === 'draw_marking' && fix.marking) drawMissing(view, fix.marking);
+	else if (fix.action === 'look_ball' && fix.point) {
+		showPlace(view, [{ x: fix.point[0], y: fix.point[1] }]);
+		selected.value = { kind: 'ball', view: view.key };
+		announce('The ring is where the ball would have to be. If you see the ball there, move its box.');
+	} else {
+		const edit = editOfFix(shown, fix);
+		if (edit) submit(edit);
+	}
+}
+
+/** Carry out what the card shows. */
+export function mendNow() {
+	if (mend.value) carryOut(mend.value);
+}

@@ -1,0 +1,36 @@
+// @ts-check
+/** What would mend the group, each on one key; and the reason to reject it where nothing does. */
+
+import { html } from 'htm/preact';
+
+import { suggestedReason } from '../state/advice.js';
+import { mend, mendIndex, mends, turnMend } from '../state/mends.js';
+import { askReason, REASONS } from '../state/verdicts.js';
+import { mendNow } from './mend_actions.js';
+
+/** @import {SolutionJson} from '../api/types.js' */
+
+/** @param {{solution: SolutionJson | null}} props */
+export function MendBox({ solution }) {
+	const offered = mend.value;
+	const count = mends.value.length;
+	const reason = REASONS.find(({ name }) => name === suggestedReason(solution));
+	if (!offered && !reason) return null;
+	return html`
+		<div class="mend" role="group" aria-label="What to do">
+			${offered && !offered.title ? html`<p class="mend__sentence">${offered.sentence}</p>` : null}
+			<p class="mend__row">
+				${offered ? html`<button class="button button--fix" type="button" onClick=${mendNow}>${offered.label} <kbd>Enter</kbd></button>` : null}
+				${count > 1 ? html`
+					<button class="mend__more" type="button" title="Show another way to mend it (Shift+Enter)" onClick=${() => turnMend(1)}>
+						${mendIndex.value + 1} of ${count} <kbd>Shift Enter</kbd>
+					</button>` : null}
+			</p>
+			${reason ? html`
+				<p class="mend__reject">
+					${offered ? 'If that is not it: ' : 'Nothing here mends it: '}
+					<button class="mend__more" type="button" onClick=${askReason}>reject, ${reason.label.toLowerCase()} <kbd>X</kbd> <kbd>Enter</kbd></button>
+				</p>` : null}
+		</div>
+	`;
+}
