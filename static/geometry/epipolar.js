@@ -8,7 +8,7 @@ import { project, rayThrough } from './camera.js';
 const LOWEST = 0;
 const HIGHEST = 30;
 const FARTHEST = 300;
-const STEPS = 48;
+const STEPS = 96;
 
 /**
  * The ray through a pixel of camera a, between the grass and 30 m above it, as camera b sees it.
@@ -23,8 +23,8 @@ export function epipolarSegment(a, pixel, b) {
 	if (!range) return [];
 	const points = [];
 	for (let i = 0; i <= STEPS; i++) {
-		// Even steps in the inverse of depth look even in the other image.
-		const t = 1 / (1 / range[0] + (i / STEPS) * (1 / range[1] - 1 / range[0]));
+		// Equal ratios: the other camera may stand anywhere beside the ray, and see any stretch of it.
+		const t = range[0] * (range[1] / range[0]) ** (i / STEPS);
 		const pixelB = project(b, [a.C[0] + t * ray[0], a.C[1] + t * ray[1], a.C[2] + t * ray[2]]);
 		if (pixelB) points.push(pixelB);
 	}

@@ -17,7 +17,7 @@ import { hitTest } from './hit.js';
  * @property {() => Viewport} viewport
  * @property {() => Selection | null} selected
  * @property {() => boolean} enabled whether things can be taken hold of
- * @property {() => boolean} draws whether a click draws
+ * @property {() => 'ball' | 'line' | null} draws what a click draws
  * @property {() => PredictionAt | undefined} predictionAt
  * @property {(hit: Hit | null) => string} hint what is said of the thing under the pointer
  * @property {(at: ImagePoint) => void} draw
@@ -62,8 +62,10 @@ export function attachPointer(element, panel) {
 			panel.insert(start);
 			return;
 		}
-		const hit = event.button === 0 ? hitAt(start) : null;
-		const draws = event.button === 0 && !hit && panel.draws();
+		const drawn = event.button === 0 ? panel.draws() : null;
+		// A ball may lie on a line's point; a point beside another one is rather moved than doubled.
+		const hit = event.button === 0 && drawn !== 'ball' ? hitAt(start) : null;
+		const draws = drawn !== null && !hit;
 		if (!draws) panel.select(hit);
 		const drag = hit && dragOf(panel.view(), hit, toImage(panel.viewport(), start));
 		gesture = { id: event.pointerId, start, last: start, drag, moved: false, draws };

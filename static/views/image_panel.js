@@ -88,7 +88,7 @@ export function ImagePanel({ picture, first }) {
 			enabled: () => !overlaysHidden.value,
 			draws: () => {
 				const present = drawing.value;
-				return present?.view === latestProps.current.view.key && present.what !== 'ask';
+				return present?.view === latestProps.current.view.key && present.what !== 'ask' ? present.what : null;
 			},
 			predictionAt: () => (boxes.value ? latestProps.current.predictions?.at : undefined),
 			hint: (hit) => hintOf(latestProps.current.predictions, hit),

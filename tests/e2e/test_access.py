@@ -112,7 +112,7 @@ class TestScreens:
         if name == "queue":
             page.get_by_role("button", name="Export").first.click()
         else:
-            page.keyboard.press("Enter")
+            page.keyboard.press("i")
             page.keyboard.press("x")
         page.wait_for_selector("dialog[open], .reasons")
         assert serious_in_both(page) == []

@@ -35,7 +35,7 @@ class TestDrawing:
         screen = review(1)
         before = first_view(screen)
         x, y, width, height = before["balls"][0]["box"]
-        screen.press("Enter", "Delete")
+        screen.press("i", "Delete")
         expect(screen.page.locator(".object-list")).not_to_contain_text("Ball")
         screen.press("Escape")
         screen.page.mouse.move(*screen.place(before, x + width / 2, y + height / 2))
@@ -100,7 +100,7 @@ class TestObjects:
     def test_a_nudged_ball_is_given_back_what_it_was(self, review: Review) -> None:
         screen = review(1)
         before = first_view(screen)
-        screen.press("Enter", "Shift+ArrowRight")
+        screen.press("i", "Shift+ArrowRight")
         screen.saved()
         assert first_view(screen)["balls"] != before["balls"]
         screen.press("u")
@@ -145,7 +145,7 @@ class TestLooking:
     def test_holding_z_magnifies_and_follows_a_nudge(self, review: Review) -> None:
         screen = review(1)
         before = first_view(screen)
-        screen.press("Enter")
+        screen.press("i")
         screen.page.keyboard.down("z")
         caption = screen.page.locator(".loupe figcaption")
         expect(caption).to_contain_text("8×")

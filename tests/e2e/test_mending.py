@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import Any
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from app.soccer.pitch import twin_marking
-from tests.e2e.screen import Document, Screen, passing, rows, submitted
+from tests.e2e.screen import Document, Screen, rows, submitted
 
 OpenPage = Callable[..., Page]
 SMALL = {"width": 1100, "height": 700}
@@ -255,7 +256,7 @@ class TestUndrawnLine:
             return float(
                 sum(
                     ((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2) ** 0.5
-                    for a, b in zip(points, points[1:], strict=False)
+                    for a, b in pairwise(points)
                 )
             )
 
@@ -292,10 +293,11 @@ class TestStates:
         one.screen.saved()
         expect(one.card).to_have_attribute("data-tone", "ok")
 
-    def test_a_group_that_passes_keeps_enter_for_its_objects(self, open_page: OpenPage) -> None:
-        page = open_page(None)
-        page.goto(f"/review/{passing(page, 0)}")
-        screen = Screen(page)
-        screen.ready()
+    def test_where_nothing_is_to_mend_enter_leads_to_the_objects(
+        self, bench: Callable[..., Bench]
+    ) -> None:
+        one = bench(2)
+        screen = one.open()
+        expect(one.card).to_have_attribute("data-tone", "ok")
         screen.press("Enter")
-        expect(page.locator(".object-list")).to_be_visible()
+        expect(one.page.locator(".object-list")).to_be_visible()

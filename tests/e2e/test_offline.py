@@ -38,7 +38,7 @@ class TestOutbox:
         page = screen.page
         box = screen.document()["views"][0]["balls"][0]["box"]
         page.context.set_offline(True)
-        screen.press("Enter", "Shift+ArrowRight", "s")
+        screen.press("i", "Shift+ArrowRight", "s")
         page.wait_for_url(f"**/review/{chain[1]}")
         expect(page.locator(".save")).to_contain_text("Offline · 2 changes wait")
         screen.press("x", "4")
@@ -57,7 +57,7 @@ class TestOutbox:
         page = screen.page
         box = screen.document()["views"][0]["balls"][0]["box"]
         page.route("**/api/v1/views/**", lambda route: route.abort())
-        screen.press("Enter", "Shift+ArrowLeft")
+        screen.press("i", "Shift+ArrowLeft")
         expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
         page.unroute("**/api/v1/views/**")
         page.reload()
@@ -70,7 +70,7 @@ class TestOutbox:
         page = screen.page
         box = screen.document()["views"][0]["balls"][0]["box"]
         page.context.set_offline(True)
-        screen.press("Enter", "Shift+ArrowRight")
+        screen.press("i", "Shift+ArrowRight")
         expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
         screen.press("ArrowUp")
         expect(page.locator(".save")).to_contain_text("Offline · 2 changes wait")

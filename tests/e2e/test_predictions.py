@@ -127,7 +127,7 @@ class TestMarks:
         page.mouse.click(*place)
         chip = page.locator('.image-panel[data-view="A"] .prediction-chip')
         expect(chip).to_contain_text("detector predicts a ball, score 0.83")
-        screen.press("Enter")
+        screen.press("i")
         objects = page.get_by_role("list", name="Objects of view A")
         expect(objects.get_by_role("button", name="Predicted by detector")).to_have_count(2)
         expect(objects.locator("[aria-pressed=true]")).to_contain_text("0.83")

@@ -142,7 +142,7 @@ class TestEditing:
         screen = review(1)
         view = screen.document()["views"][0]
         box = view["balls"][0]["box"]
-        screen.press("Enter")
+        screen.press("i")
         expect(screen.page.locator(".object-list [aria-pressed=true]")).to_contain_text("Ball")
         screen.press("ArrowRight", "Shift+ArrowRight", "Alt+ArrowDown", "]")
         screen.saved()
