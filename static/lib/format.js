@@ -3,6 +3,8 @@
 
 const NONE = '–';
 const MINUS = '−';
+/** No picture is as large, pixels. */
+const BEYOND = 20_000;
 
 /**
  * @param {number | null | undefined} value
@@ -18,13 +20,14 @@ export function fixed(value, digits, unit = '') {
 }
 
 /**
- * Pixels in four characters: 7.3, 211, 1.7k. Far off is far off.
+ * Pixels in four characters: 7.3, 211, 1.7k, and ">20k" beyond every picture.
  *
  * @param {number | null | undefined} value
  * @returns {string}
  */
 export function pixels(value) {
 	const size = Math.abs(value ?? 0);
+	if (size >= BEYOND) return '>20k';
 	if (size >= 999.5) return fixed((value ?? 0) / 1000, size >= 9950 ? 0 : 1, 'k');
 	return fixed(value, size >= 99.95 ? 0 : 1);
 }

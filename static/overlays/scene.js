@@ -78,6 +78,16 @@ export function picturesOf(group, solution, saved) {
 	});
 }
 
+/**
+ * The one error of a view's ball: to the 3D ball, or where the view agrees with no other, in its best pair.
+ *
+ * @param {string} key @param {SolutionJson | null} solution
+ * @returns {number | null} pixels
+ */
+export function ballError(key, solution) {
+	return apartOf(key, solution) ?? solution?.views.find(({ view }) => view === key)?.ball?.error_px ?? null;
+}
+
 /** @param {string} key @param {SolutionJson | null} solution @returns {number | null} */
 function apartOf(key, solution) {
 	const own = (solution?.pairs ?? []).filter(({ a, b }) => a === key || b === key);

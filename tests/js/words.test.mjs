@@ -17,7 +17,8 @@ describe('fixed', () => {
 
 describe('pixels', () => {
 	it('drops the digit that nobody reads', () => {
-		assert.deepEqual([7.25, 210.6, 1656, 31940].map(pixels), ['7.3', '211', '1.7k', '32k']);
+		assert.equal(pixels(319_000), '>20k');
+		assert.deepEqual([7.25, 210.6, 1656, 12940].map(pixels), ['7.3', '211', '1.7k', '13k']);
 	});
 });
 
