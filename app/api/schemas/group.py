@@ -40,7 +40,7 @@ class VerdictDocument(BaseModel):
     by: str | None
     at: datetime | None
     stale: bool
-    fixed: bool = Field(description="Edited by a person before it was accepted.")
+    fixed: bool = Field(description="Mended: edited, accepted as such, and it fails no gate.")
     override: str | None = Field(description="The gate that it was accepted against.")
 
     @staticmethod
@@ -73,6 +73,13 @@ class StationDocument(BaseModel):
     etag: str = Field(description="For If-Match on `/stations/{id}/lines`.")
 
 
+class LeftOutDocument(BaseModel):
+    """Why a person left a view out of its group."""
+
+    reason: str
+    note: str | None
+
+
 class ViewDocument(BaseModel):
     """One image of the instant, as annotated."""
 
@@ -83,6 +90,9 @@ class ViewDocument(BaseModel):
     width: int
     height: int
     included: bool
+    left_out: LeftOutDocument | None = Field(
+        description="Why a person left the view out, where they said so."
+    )
     station: StationDocument
     lines: LineDocuments
     balls: list[Ball]
@@ -174,11 +184,17 @@ def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument
         width=view.size.width,
         height=view.size.height,
         included=view.included,
+        left_out=_left_out(view),
         station=_station(state, view),
         lines=lines_document(view.station.lines),
         balls=[Ball.of(ball, edited=view.key in state.stored.edited_views) for ball in view.balls],
         image=None if view.media is None else image_address(view_id),
     )
+
+
+def _left_out(view: View) -> LeftOutDocument | None:
+    why = view.left_out
+    return None if why is None else LeftOutDocument(reason=why.reason, note=why.note)
 
 
 def _station(state: GroupState, view: View) -> StationDocument:

@@ -6,7 +6,8 @@ from app.errors import InputError, StaleRevisionError
 from app.review.edit import SetBall
 from app.review.queue import list_groups
 from app.review.submit import history, load, submit, undo
-from app.review.verdict import REASONS, set_verdict
+from app.review.verdict import set_verdict
+from app.soccer.reasons import REASONS
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 
