@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 
 import cv2
 
@@ -23,6 +23,11 @@ CLIP_FOLDER = "img1"
 """Holds the frames of one clip in their order (SoccerNet game state, MOT)."""
 _NUMBERED = re.compile(r"(.*?)([0-9]{1,12})", re.DOTALL)
 _LAST_NUMBER = re.compile(r"([0-9]+)[^0-9]*")
+
+
+def counts_time(media: Media, group: str, static: bool) -> bool:
+    """Whether the name of a frame counts time, so that there may be neighbours; opens nothing."""
+    return media.frame is not None or _numbered(media, group, static) is not None
 
 
 def neighbours(media: Media, group: str, static: bool) -> dict[int, Media]:
@@ -63,14 +68,10 @@ def _video_length(path: Path) -> int:
 
 
 def _of_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Media]]:
-    name = PurePosixPath(media.member) if media.member is not None else Path(media.path)
-    numbered = _NUMBERED.fullmatch(name.stem)
+    numbered = _numbered(media, group, static)
     if numbered is None:
         return
-    head, digits = numbered[1], numbered[2]
-    own = static and _number(group) == int(digits)
-    if not own and name.parent.name != CLIP_FOLDER:
-        return
+    name, head, digits = numbered
     for offset in _offsets():
         number = int(digits) + offset
         # 100 may follow 099 or 99.
@@ -79,6 +80,18 @@ def _of_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Med
             if number >= 0 and there is not None:
                 yield offset, there
                 break
+
+
+def _numbered(media: Media, group: str, static: bool) -> tuple[PurePath, str, str] | None:
+    """Name of a frame, what stands before its number, and the number; None: it counts no time."""
+    name = PurePosixPath(media.member) if media.member is not None else PurePath(media.path)
+    numbered = _NUMBERED.fullmatch(name.stem)
+    if numbered is None:
+        return None
+    by_frame = static and _number(group) == int(numbered[2])
+    if not by_frame and name.parent.name != CLIP_FOLDER:
+        return None
+    return name, numbered[1], numbered[2]
 
 
 def _number(group: str) -> int | None:

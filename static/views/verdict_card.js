@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 
 import { ballOf } from '../geometry/preview.js';
 import { capital, words } from '../lib/format.js';
-import { REASONS } from '../state/verdicts.js';
+import { REASONS } from '../state/reasons.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
 
 /** @import {GroupDocument, SolutionJson, VerdictJson, ViewJson} from '../api/types.js' */
@@ -83,7 +83,7 @@ export function VerdictCard({ group, solution, live }) {
 				<p class="verdict-card__verdict">
 					<span class="pill" data-status=${verdict.state}>${verdictText(verdict)}</span>
 					${verdict.stale ? html`<span class="pill" data-status="stale">stale: changed since</span>` : null}
-					${verdict.fixed ? html`<span class="pill">fixed</span>` : null}
+					${verdict.fixed && solution?.passes !== false ? html`<span class="pill" title="Edited, and accepted as it is now">fixed</span>` : null}
 				</p>`}
 		</section>
 	`;

@@ -13,6 +13,7 @@ from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.solution import SolutionDocument
 from app.review.state import GroupState, VerdictState
 from app.soccer.group import Group, View
+from app.store.neighbours import counts_time
 
 State = Literal["unreviewed", "accepted", "rejected", "deferred"]
 
@@ -97,6 +98,10 @@ class ViewDocument(BaseModel):
     lines: LineDocuments
     balls: list[Ball]
     image: str | None = Field(description="Address of the frame, where there is one.")
+    neighbours: str | None = Field(
+        description="Address of the list of frames just before and after; null where the "
+        "dataset's frames are not numbered by time."
+    )
 
 
 class GroupDocument(BaseModel):
@@ -189,7 +194,15 @@ def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument
         lines=lines_document(view.station.lines),
         balls=[Ball.of(ball, edited=view.key in state.stored.edited_views) for ball in view.balls],
         image=None if view.media is None else image_address(view_id),
+        neighbours=_neighbours(state.key, view, view_id),
     )
+
+
+def _neighbours(group: str, view: View, view_id: int) -> str | None:
+    media = view.media
+    if media is None or not counts_time(media, group, view.station.shared):
+        return None
+    return f"/api/v1/views/{view_id}/neighbours"
 
 
 def _left_out(view: View) -> LeftOutDocument | None:
