@@ -94,15 +94,12 @@ def _unchanged(session: Session, given: list[tuple[int, int]], first: int, last:
         .group_by(VerdictModel.group_id)
     )
     ids = [row.group_id for row in session.execute(newest) if first <= row.newest <= last]
-    hashes = dict(
-        session.execute(
-            select(GroupModel.id, GroupModel.inputs_hash).where(GroupModel.id.in_(ids))
-        ).tuples()
-    )
+    heads = select(GroupModel.id, GroupModel.inputs_hash).where(GroupModel.id.in_(ids))
+    hashes = {row.id: row.inputs_hash for row in session.execute(heads)}
     judged: dict[int, str] = {}
     for start, end in given:
         statement = select(VerdictModel.group_id, VerdictModel.inputs_hash).where(
             VerdictModel.id.between(start, end), VerdictModel.group_id.in_(ids)
         )
-        judged |= dict(session.execute(statement).tuples())
+        judged |= {row.group_id: row.inputs_hash for row in session.execute(statement)}
     return [group for group in ids if judged.get(group) == hashes[group]]

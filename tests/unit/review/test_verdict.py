@@ -80,11 +80,6 @@ class TestSetVerdict:
         back = undo(store, state.id, if_match=edited.etag, actor="ben")
         assert not back.verdict.stale
 
-    def test_fixed_says_that_a_person_edited_before(self, store, state) -> None:
-        edited = submit(store, state.id, SetBall("7.png", BALL), if_match=state.etag, actor="ann")
-        after = judge(store, edited, "accepted", note="by hand")
-        assert after.verdict.fixed
-
     def test_everyones_is_kept_and_the_newest_counts(self, store, state) -> None:
         first = judge(store, state, "accepted", actor="ann")
         second = judge(store, first, "deferred", actor="ben")
