@@ -7,9 +7,9 @@ from app.review.edit import SetBall
 from app.review.queue import list_groups
 from app.review.submit import history, load, submit, undo
 from app.review.verdict import set_verdict
-from app.soccer.reasons import REASONS
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
+from app.soccer.reasons import REASONS
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 
