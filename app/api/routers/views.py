@@ -157,7 +157,7 @@ def get_image(
     return Response(content, media_type=content_type(content), headers=headers)
 
 
-@router.get("/{view}/neighbours", operation_id="getNeighbours", responses=responses(404))
+@router.get("/{view}/neighbours", operation_id="getFramesAround", responses=responses(404))
 def get_neighbours(view: Id, store: AppStore) -> NeighbourList:
     """The frames of the same camera just before and after a view's, where they are on disk.
 
