@@ -162,9 +162,7 @@ class TestManyAtOnce:
         page.keyboard.press("Control+z")
         expect(deferred).to_have_count(0)
         redo = page.locator(".queue-tools").get_by_role("button", name="Redo", exact=True)
-        expect(redo).to_have_attribute(
-            "title", "Give again: 3 groups deferred (Ctrl Shift Z)"
-        )
+        expect(redo).to_have_attribute("title", "Give again: 3 groups deferred (Ctrl Shift Z)")
         page.keyboard.press("Control+Shift+z")
         expect(page.locator(".bar")).to_contain_text("3 groups deferred again")
         expect(deferred).to_have_count(3)
