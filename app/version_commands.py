@@ -130,7 +130,7 @@ def verify(
 ) -> None:
     """Compute a version from scratch and compare it bit for bit; exit code 1 where it differs."""
     from app.errors import NotFoundError
-    from app.review.verify import verify as run_verify
+    from app.review.verify import verify_and_keep
     from app.review.versions import find_version, list_versions
 
     settings = read_settings()
@@ -143,7 +143,7 @@ def verify(
         if not known:
             raise NotFoundError(f'"{dataset}" has no version yet', hint="Freeze one first.")
         chosen = known[0] if version is None else find_version(store, dataset, version)
-        report = run_verify(store, chosen.id, executor, progress)
+        report = verify_and_keep(store, chosen.id, executor, progress, actor="local")
     print_values(report.values(), json_)
     if not report.ok:
         if not json_:

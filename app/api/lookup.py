@@ -8,7 +8,7 @@ from sqlalchemy import select
 
 from app.errors import NotFoundError
 from app.soccer.group import Media
-from app.store.models import StationModel, ViewModel
+from app.store.models import GroupModel, StationModel, ViewModel
 from app.store.session import Store
 
 
@@ -21,6 +21,9 @@ class FoundView:
     media: Media | None
     flipped: bool
     width: int
+    group_key: str
+    static: bool
+    """Whether the camera stands still for all views that share it."""
 
 
 def find_view(store: Store, view_id: int) -> FoundView:
@@ -38,8 +41,11 @@ def find_view(store: Store, view_id: int) -> FoundView:
             ViewModel.media_frame,
             StationModel.flipped,
             StationModel.width,
+            StationModel.shared,
+            GroupModel.key.label("group_key"),
         )
         .join(StationModel, StationModel.id == ViewModel.station_id)
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
         .where(ViewModel.id == view_id)
     )
     with store.read() as session:
@@ -49,4 +55,6 @@ def find_view(store: Store, view_id: int) -> FoundView:
     media = None
     if row.media_path is not None:
         media = Media(row.media_path, row.media_member, row.media_frame)
-    return FoundView(row.group_id, row.key, media, row.flipped, row.width)
+    return FoundView(
+        row.group_id, row.key, media, row.flipped, row.width, row.group_key, row.shared
+    )

@@ -200,6 +200,10 @@ def _said(name: str) -> Getter:
     return lambda row: row.said[name]
 
 
+def _left_out(name: str) -> Getter:
+    return lambda row: None if row.view.left_out is None else getattr(row.view.left_out, name)
+
+
 def _said_json(name: str) -> Getter:
     return lambda row: json_text(row.said[name])
 
@@ -224,6 +228,8 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("width", WHOLE, lambda row: row.view.size.width),
     ("height", WHOLE, lambda row: row.view.size.height),
     ("included", FLAG, _said("included")),
+    ("left_out_reason", TEXT, _left_out("reason")),
+    ("left_out_note", TEXT, _left_out("note")),
     ("station", TEXT, _said("station")),
     ("shared", FLAG, _said("shared")),
     ("flipped", FLAG, _said("flipped")),

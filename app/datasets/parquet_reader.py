@@ -31,6 +31,8 @@ OPTIONAL = (
     "pitch_length",
     "pitch_width",
     "included",
+    "left_out_reason",
+    "left_out_note",
     "shared",
     "flipped",
     "calibration",
@@ -129,6 +131,8 @@ def _view(row: Mapping[str, Any], path: str, record: str) -> PlacedView:
     pitch = [row.get("pitch_length"), row.get("pitch_width")]
     split = row.get("group_split") or row.get("split") or ""
     value = {**row, **parsed, "pitch": None if None in pitch else pitch, "split": split}
+    if row.get("left_out_reason") is not None:
+        value["left_out"] = {"reason": row["left_out_reason"], "note": row.get("left_out_note")}
     state = StateReader(value, path, record)
     view = state.view(state.size(), extras_from_json(parsed["extras"]))
     return PlacedView(state.head(), state.count("position"), view)

@@ -19,6 +19,7 @@ from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import Pitch, canonical_marking
+from app.soccer.reasons import LeftOut, left_out
 
 MAX_TEXT = 1000
 """Longest key or label, characters."""
@@ -56,10 +57,11 @@ def head_to_json(group: Group) -> dict[str, Any]:
 
 def view_to_json(view: View) -> dict[str, Any]:
     """Everything that was said of a view but its size, its media and its extras."""
-    station, given = view.station, view.station.given
+    station, given, why = view.station, view.station.given, view.left_out
     return {
         "view": view.key,
         "included": view.included,
+        **({} if why is None else {"left_out": {"reason": why.reason, "note": why.note}}),
         "station": station.key,
         "shared": station.shared,
         "flipped": station.flipped,
@@ -189,7 +191,23 @@ class StateReader:
             calibration=calibration,
             flipped=self.flag("flipped", False),
         )
-        return View(key, station, self.balls(), None, self.flag("included", True), extras)
+        included = self.flag("included", True)
+        why = None if included else self.left_out()
+        return View(key, station, self.balls(), None, included, extras, why)
+
+    def left_out(self) -> LeftOut | None:
+        """Why a view was left out: ``{"reason": ..., "note": ...}``; None where nobody said."""
+        found = self.value.get("left_out")
+        if found is None:
+            return None
+        try:
+            value = fields.mapping(found)
+            reason, note = value.get("reason"), value.get("note")
+            if not isinstance(reason, str) or not isinstance(note, str | None):
+                raise ValueError("needs a reason, and a note that is a text or null")
+            return left_out(reason, note)
+        except (ValueError, InputError) as error:
+            raise self.error("left_out", str(error)) from error
 
     def lines(self) -> Lines:
         """Back from ``lines_to_json``."""

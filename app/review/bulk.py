@@ -1,7 +1,8 @@
 """Bulk: one verdict for every group that a query matches, tried first.
 
 A batch is many short write transactions, so that others go on working; killed in between it
-leaves whole verdicts, and given again it does the rest. ``bulk_undo`` takes it back.
+leaves whole verdicts, and given again it does the rest. ``bulk_undo`` takes it back, and
+``bulk_redo`` gives it once more after that.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Integer, and_, cast, func, insert, select, update
+from sqlalchemy import ColumnElement, insert, select, update
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError
@@ -26,11 +27,9 @@ from app.store.models import (
     GroupModel,
     IdempotencyModel,
     QueueModel,
-    StationModel,
     VerdictModel,
-    ViewModel,
 )
-from app.store.queue import refresh_verdicts
+from app.store.queue import edited_groups, refresh_verdicts
 from app.store.session import Store
 from app.store.view_models import VerdictBatchModel
 
@@ -87,7 +86,12 @@ class BatchReport:
 
 @dataclass(frozen=True)
 class Batch:
-    """A bulk verdict as it is remembered; ``done`` is False while it runs or was killed."""
+    """A bulk verdict as it is remembered.
+
+    Attributes:
+        done: False while it runs, or when it was killed.
+        undone: When it was taken back; ``redone`` is the batch that gave it again after that.
+    """
 
     id: int
     at: str
@@ -100,6 +104,7 @@ class Batch:
     done: bool
     undone: str | None
     undone_by: str | None
+    redone: int | None
 
 
 def plan_verdicts(
@@ -117,8 +122,8 @@ def plan_verdicts(
     """
     verdict = check_verdict(state, reason, note)
     with store.read() as session:
-        rows = _rows(session, _where(dataset_id, query))
-    sorted_out = _sorted_out(rows, verdict)
+        rows = queue_rows(session, _where(dataset_id, query))
+    sorted_out = sort_out(rows, verdict)
     sample = [
         SampleGroup(row.group_id, row.key, row.number, row.label)
         for row in sorted_out.change[:SAMPLE]
@@ -165,7 +170,7 @@ def give_verdicts(
     with store.read() as session:
         if is_repeated(session, request):
             return _again(session, request)
-        found = _sorted_out(_rows(session, where), verdict)
+        found = sort_out(queue_rows(session, where), verdict)
     if expected is not None and expected != len(found.change):
         raise ConflictError(
             f"{len(found.change)} groups would change, not {expected}",
@@ -173,12 +178,12 @@ def give_verdicts(
         )
     if not found.change:
         return BatchReport(None, 0, found.refused)
-    run = _Run(dataset_id, query, verdict, request)
+    run = BatchRun(dataset_id, query, verdict, request)
     ids = [row.group_id for row in found.change]
     for start in range(0, len(ids), CHUNK):
         with store.write() as session:
             chosen = [*where, QueueModel.group_id.in_(ids[start : start + CHUNK])]
-            run.save(session, _sorted_out(_rows(session, chosen), verdict).change)
+            run.save(session, sort_out(queue_rows(session, chosen), verdict).change)
     with store.write() as session:
         run.close(session)
     return BatchReport(run.batch, run.changed, found.refused)
@@ -194,7 +199,7 @@ def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[Batch]:
 
 
 @dataclass(frozen=True)
-class _SortedOut:
+class SortedOut:
     """Rows that a verdict changes, and those that it is refused for."""
 
     change: list[Any]
@@ -206,7 +211,8 @@ def _where(dataset_id: int, query: str) -> list[ColumnElement[bool]]:
     return [QueueModel.dataset_id == dataset_id, *conditions]
 
 
-def _rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[Any]:
+def queue_rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[Any]:
+    """Rows of the queue with what a bulk verdict asks of them, in their order."""
     names = (
         "group_id",
         "key",
@@ -224,7 +230,8 @@ def _rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[Any]:
     return list(session.execute(statement).all())
 
 
-def _sorted_out(rows: Sequence[Any], verdict: Verdict) -> _SortedOut:
+def sort_out(rows: Sequence[Any], verdict: Verdict) -> SortedOut:
+    """The groups that a verdict changes, and how many it is refused for, and why."""
     change, refused = [], {UNSOLVED: 0, NEEDS_NOTE: 0}
     for row in rows:
         if _has(row, verdict):
@@ -236,7 +243,7 @@ def _sorted_out(rows: Sequence[Any], verdict: Verdict) -> _SortedOut:
         else:
             change.append(row)
     reasons = (Refusal(reason, count) for reason, count in refused.items() if count)
-    return _SortedOut(change, tuple(reasons))
+    return SortedOut(change, tuple(reasons))
 
 
 def _has(row: Any, verdict: Verdict) -> bool:
@@ -247,10 +254,18 @@ def _has(row: Any, verdict: Verdict) -> bool:
     return bool(same and verdict.note is None)
 
 
-class _Run:
-    """A batch while it is given, chunk by chunk."""
+class BatchRun:
+    """A batch while it is given, chunk by chunk; ``again`` is the batch that it gives again."""
 
-    def __init__(self, dataset_id: int, query: str, verdict: Verdict, request: Request):
+    def __init__(
+        self,
+        dataset_id: int,
+        query: str,
+        verdict: Verdict,
+        request: Request,
+        again: int | None = None,
+    ):
+        self._again = {} if again is None else {"again": again}
         self.batch: int | None = None
         self.changed = 0
         self._dataset_id, self._query = dataset_id, query
@@ -274,7 +289,7 @@ class _Run:
             return
         at = now()
         body = {"batch": self.batch, "q": self._query, "changed": self.changed}
-        body |= asdict(self._verdict)
+        body |= asdict(self._verdict) | self._again
         entry = Entry("verdict_batch", self._request.actor, at, body, self._dataset_id)
         (log_id,) = append(session, [entry])
         remember(session, self._request, log_id, at)
@@ -297,9 +312,9 @@ def _verdict_rows(
     session: Session, rows: Sequence[Any], verdict: Verdict, actor: str, at: str
 ) -> list[dict[str, Any]]:
     ids = [row.group_id for row in rows]
-    heads = _heads(session, ids)
+    heads, edited = _heads(session, ids), edited_groups(session, ids)
     number = next_id(session, VerdictModel)
-    overrides = verdict.state == "accepted"
+    accepts = verdict.state == "accepted"
     return [
         {
             "id": number + place,
@@ -309,29 +324,19 @@ def _verdict_rows(
             **asdict(verdict),
             "inputs_hash": heads[row.group_id].inputs_hash,
             "policy_hash": heads[row.group_id].policy_hash,
-            "fixed": bool(heads[row.group_id].fixed),
-            "override": (row.gate or "unknown") if overrides and not row.passes else None,
+            "fixed": bool(accepts and row.passes and row.group_id in edited),
+            "override": (row.gate or "unknown") if accepts and not row.passes else None,
         }
         for place, row in enumerate(rows)
     ]
 
 
 def _heads(session: Session, ids: Sequence[int]) -> dict[int, Any]:
-    """What a verdict keeps of its group: the hashes, and whether a person had edited it."""
-    own = and_(StationModel.shared.is_(False), StationModel.digest != StationModel.source_digest)
-    edited = cast(ViewModel.digest != ViewModel.source_digest, Integer)
+    """What a verdict keeps of its group: what it was given for, and under which policy."""
     statement = (
-        select(
-            GroupModel.id,
-            GroupModel.inputs_hash,
-            DatasetModel.policy_hash,
-            func.max(func.max(edited, cast(own, Integer))).label("fixed"),
-        )
+        select(GroupModel.id, GroupModel.inputs_hash, DatasetModel.policy_hash)
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(ViewModel, ViewModel.group_id == GroupModel.id)
-        .outerjoin(StationModel, StationModel.id == ViewModel.station_id)
         .where(GroupModel.id.in_(ids))
-        .group_by(GroupModel.id)
     )
     return {row.id: row for row in session.execute(statement)}
 
@@ -367,4 +372,5 @@ def _again(session: Session, request: Request) -> BatchReport:
 def _batch(row: Any) -> Batch:
     same = ("id", "at", "actor", "query", "state", "reason", "note", "changed")
     values = {name: getattr(row, name) for name in same}
-    return Batch(**values, done=row.log_id is not None, undone=row.undone, undone_by=row.undone_by)
+    taken_back = {"undone": row.undone, "undone_by": row.undone_by, "redone": row.redone}
+    return Batch(**values, done=row.log_id is not None, **taken_back)

@@ -39,17 +39,19 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
         ConflictError: It was taken back before.
     """
     with store.read() as session:
-        batch = _read_batch(session, batch_id)
+        batch = read_batch(session, batch_id)
     if batch.undone is not None:
         raise ConflictError(f"{batch.undone_by} has taken this batch back already")
-    restored = 0
+    restored, spans = 0, list[tuple[int, int]]()
     for first, last in json.loads(batch.spans):
         with store.write() as session:
-            restored += _restore(session, batch, first, last, actor)
+            rows = _restore(session, batch, first, last, actor)
+        restored += len({row["group_id"] for row in rows})
+        spans += [(rows[0]["id"], rows[-1]["id"])] if rows else []
     kept = batch.changed - restored
     with store.write() as session:
         at = now()
-        values = {"undone": at, "undone_by": actor}
+        values = {"undone": at, "undone_by": actor, "undo_spans": json.dumps(spans)}
         session.execute(
             update(VerdictBatchModel).where(VerdictBatchModel.id == batch_id).values(values)
         )
@@ -58,7 +60,12 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
     return UndoReport(batch_id, restored, kept)
 
 
-def _read_batch(session: Session, batch_id: int) -> Any:
+def read_batch(session: Session, batch_id: int) -> Any:
+    """The row of a batch.
+
+    Raises:
+        NotFoundError: There is no such batch.
+    """
     model = VerdictBatchModel
     statement = select(*model.__table__.columns).where(model.id == batch_id)
     row = session.execute(statement).one_or_none()
@@ -67,8 +74,10 @@ def _read_batch(session: Session, batch_id: int) -> Any:
     return row
 
 
-def _restore(session: Session, batch: Any, first: int, last: int, actor: str) -> int:
-    """Take one chunk back; returns the number of groups that had not been judged since."""
+def _restore(
+    session: Session, batch: Any, first: int, last: int, actor: str
+) -> list[dict[str, Any]]:
+    """Take one chunk back; returns the verdicts that do it, of groups not judged since."""
     given = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
     statement = select(*VerdictModel.__table__.columns).where(VerdictModel.group_id.in_(given))
     history: dict[int, list[Any]] = {}
@@ -82,7 +91,7 @@ def _restore(session: Session, batch: Any, first: int, last: int, actor: str) ->
     numbered = [{**row, "id": number + place} for place, row in enumerate(rows)]
     if numbered:
         save_verdicts(session, batch.dataset_id, actor, at, numbered)
-    return len({row["group_id"] for row in numbered})
+    return numbered
 
 
 def _before(verdicts: Sequence[Any], judge: str, actor: str, at: str) -> list[dict[str, Any]]:

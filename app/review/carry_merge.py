@@ -102,7 +102,9 @@ def _merged(
             continue
         ball = decide(_view_side(stored, lineage, view), _other_view(carried, other, base))
         if ball in (FOLLOW, UPSTREAM):
-            view = replace(view, balls=other.balls, included=other.included)
+            view = replace(
+                view, balls=other.balls, included=other.included, left_out=other.left_out
+            )
         kept += _kept(view, ball, "ball")
         if not view.station.shared:
             here, there = _station_side(stored, lineage, view), _other_station(carried, other, base)

@@ -13,11 +13,12 @@ from app.errors import DatasetFormatError, InputError, ReviewError
 from app.review.carry import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD, VERDICT
 from app.review.edit import CALIBRATIONS, MAX_POINTS
 from app.review.lineage import logged_group
-from app.review.verdict import MAX_NOTE, REASONS, STATES
+from app.review.verdict import STATES
 from app.soccer.annotation import Extras
-from app.soccer.group import Group, Station
+from app.soccer.group import Group, Station, View
 from app.soccer.pitch import canonical_marking
 from app.soccer.policy import Policy
+from app.soccer.reasons import MAX_NOTE, REASONS, left_out
 from app.store.codecs import Json, extras_from_json, policy_from_json, station_from_json
 
 MAX_LINE = 32 * 1024 * 1024
@@ -176,9 +177,17 @@ def _group(value: Json, shared: Mapping[str, Station]) -> Group:
         _extras(said["extras"])
         if view.included not in (True, False):
             raise InputError("says something else than yes or no of a view")
+        if view.left_out is not None:
+            _check_left_out(view)
         if not view.station.shared:
             _checked(view.station)
     return group
+
+
+def _check_left_out(view: View) -> None:
+    why = view.left_out
+    if view.included or why is None or left_out(_text(why.reason), why.note) != why:
+        raise InputError("has a view with a reason for leaving it out that is none")
 
 
 def _station(value: Json) -> Station:

@@ -15,6 +15,7 @@ from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import canonical_marking
+from app.soccer.reasons import left_out
 
 CALIBRATIONS = ("given", "lines")
 MAX_POINTS = 1000
@@ -172,14 +173,24 @@ class IncludeView:
 
     view: str
     included: bool
+    reason: str | None = None
+    """Why it is left out, one of ``REASONS``; ``note`` says it in the person's own words."""
+    note: str | None = None
 
     def apply(self, group: Group) -> Group:
         """The group with or without the view."""
-        return group.with_view(replace(need_view(group, self.view), included=self.included))
+        why = left_out(self.reason, self.note)
+        if self.included and why is not None:
+            raise InputError("only a view that is left out has a reason", pointer="/reason")
+        view = need_view(group, self.view)
+        return group.with_view(replace(view, included=self.included, left_out=why))
 
     def inverse(self, group: Group) -> IncludeView:
         """The view as it was."""
-        return IncludeView(self.view, need_view(group, self.view).included)
+        view = need_view(group, self.view)
+        if view.included or view.left_out is None:
+            return IncludeView(self.view, view.included)
+        return IncludeView(self.view, False, view.left_out.reason, view.left_out.note)
 
 
 STATION_EDITS = (SetLines, SetCalibrationSource)

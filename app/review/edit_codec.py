@@ -31,8 +31,9 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
         case SetBall(view, ball):
             one = [] if ball is None else [ball_to_json(ball)]
             return {"edit": "set_balls", "view": view, "balls": one}
-        case IncludeView(view, included):
-            return {"edit": "include_view", "view": view, "included": included}
+        case IncludeView(view, included, reason, note):
+            why = {} if reason is None else {"reason": reason, "note": note}
+            return {"edit": "include_view", "view": view, "included": included, **why}
         case SetCalibrationSource(view, calibration):
             return {"edit": "set_calibration", "view": view, "calibration": calibration}
         case SetStationLines(lines):
@@ -50,7 +51,8 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
         case "set_balls":
             return SetBalls(value["view"], tuple(map(ball_from_json, value["balls"])))
         case "include_view":
-            return IncludeView(value["view"], value["included"])
+            why = value.get("reason"), value.get("note")
+            return IncludeView(value["view"], value["included"], *why)
         case "set_calibration":
             return SetCalibrationSource(value["view"], value["calibration"])
     raise ValueError(f"the log holds an unknown edit: {value['edit']}")

@@ -19,7 +19,7 @@ from app.store.codecs import parse, policy_from_json
 from app.store.digest import digest
 from app.store.groups import StoredGroup, StoredStation, read_groups
 from app.store.models import DatasetModel, VerdictModel
-from app.store.queue import import_findings
+from app.store.queue import import_findings, is_fixed
 from app.store.solutions import SolutionKey, read_solutions
 
 
@@ -30,7 +30,7 @@ class VerdictState:
     Attributes:
         state: ``unreviewed``, ``accepted``, ``rejected`` or ``deferred``.
         stale: The group has changed since.
-        fixed: A person had edited the group before.
+        fixed: A person mended the group: it is edited, was accepted as such, and fails no gate.
         override: The gate that failed when the group was accepted all the same, or None.
     """
 
@@ -150,7 +150,8 @@ def _state(
     can_undo: bool,
     can_redo: bool,
 ) -> GroupState:
-    verdicts = _last_of_each([_verdict_state(row, stored.inputs_hash) for row in rows])
+    passes = None if solution is None else solution.passes
+    verdicts = _last_of_each([_verdict_state(row, stored, passes) for row in rows])
     return GroupState(
         id=stored.id,
         dataset_id=stored.dataset_id,
@@ -208,7 +209,7 @@ def _read_verdicts(session: Session, group_ids: list[int]) -> dict[int, list[Any
     return verdicts
 
 
-def _verdict_state(row: Any, inputs_hash: str) -> VerdictState:
+def _verdict_state(row: Any, stored: StoredGroup, passes: bool | None) -> VerdictState:
     reviewed = row.state != "unreviewed"
     return VerdictState(
         state=row.state,
@@ -216,8 +217,8 @@ def _verdict_state(row: Any, inputs_hash: str) -> VerdictState:
         note=row.note,
         actor=row.actor,
         at=row.at,
-        stale=reviewed and row.inputs_hash != inputs_hash,
-        fixed=row.fixed,
+        stale=reviewed and row.inputs_hash != stored.inputs_hash,
+        fixed=is_fixed(row, stored.edited, passes),
         override=row.override,
     )
 

@@ -103,8 +103,11 @@ def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[Kept
         return view, view, []
     kept: list[Kept] = []
     result = base = view
+    if not view.included and not old.included:
+        # Saying why is no edit of what is solved; the dataset's word counts where it has one.
+        result = replace(view, left_out=view.left_out or old.left_out)
     if view.key in stored.edited_views:
-        result = replace(view, balls=old.balls, included=old.included)
+        result = replace(view, balls=old.balls, included=old.included, left_out=old.left_out)
         # Neither what it said before nor what the person says.
         if view_digest(view) not in stored.view_digests[view.key]:
             sentence = f"the dataset has another ball in {view.key}; the edited one stays"

@@ -13,6 +13,7 @@ from app.review.idempotency import Request, is_repeated, remember
 from app.review.solver import Solver
 from app.review.state import GroupState
 from app.review.submit import load, solved
+from app.soccer.reasons import MAX_NOTE, REASONS
 from app.solving.solve import solve
 from app.store.clock import now
 from app.store.group_rows import next_id
@@ -22,17 +23,6 @@ from app.store.queue import refresh_queue
 from app.store.session import Store
 
 STATES = ("unreviewed", "accepted", "rejected", "deferred")
-REASONS = (
-    "bad_field_lines",
-    "sides_confused",
-    "not_same_instant",
-    "ball_not_visible",
-    "bad_calibration",
-    "duplicate_view",
-    "other",
-)
-"""Why a group is rejected; ``other`` needs a note."""
-MAX_NOTE = 2000
 
 
 @dataclass(frozen=True)
@@ -131,7 +121,7 @@ def _save(
         "note": verdict.note,
         "inputs_hash": state.stored.inputs_hash,
         "policy_hash": state.policy.hash,
-        "fixed": state.stored.edited,
+        "fixed": state.stored.edited and verdict.state == "accepted" and override is None,
         "override": override,
     }
     row = {**values, "id": next_id(session, VerdictModel), "group_id": state.id}

@@ -13,10 +13,12 @@ from typing import Any
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from app.errors import StorageError
+from app.errors import ReviewError, StorageError
 from app.review.fan_out import fan_out
+from app.review.jobs import JobCancelled
 from app.review.solver import Solver
 from app.review.split import Splitter
+from app.review.verification import keep_verification
 from app.review.version_hash import version_hash
 from app.review.versions import (
     Version,
@@ -51,6 +53,7 @@ CHUNK = 40
 """Groups a task."""
 NAMED = 200
 """Differences that a report names; all are counted."""
+UNEXPECTED = "something went wrong inside the server; its log says what"
 _A_GROUP = 10
 """Of them, in one group."""
 
@@ -171,6 +174,34 @@ def verify(
         done += len(results)
         if progress is not None:
             progress(done, report.groups)
+    return report
+
+
+def verify_and_keep(
+    store: Store,
+    version_id: int,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    *,
+    actor: str,
+    solver: Solver = solve,
+) -> VerifyReport:
+    """``verify``, with what comes of it kept with the version.
+
+    Raises what ``verify`` raises; a failure is kept as such, a cancelled run leaves what was
+    kept before.
+    """
+    with store.read() as session:
+        read_version(session, version_id)
+    try:
+        report = verify(store, version_id, executor, progress, solver=solver)
+    except JobCancelled:
+        raise
+    except Exception as error:
+        problem = error.message if isinstance(error, ReviewError) else UNEXPECTED
+        keep_verification(store, version_id, actor=actor, problem=problem)
+        raise
+    keep_verification(store, version_id, actor=actor, report=report.values())
     return report
 
 

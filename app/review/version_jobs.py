@@ -10,7 +10,7 @@ from app.review.datasets import get_dataset
 from app.review.freeze import FreezeRequest, freeze, plan_freeze
 from app.review.jobs import Jobs, Progress, Work
 from app.review.split import Split
-from app.review.verify import verify
+from app.review.verify import verify_and_keep
 from app.review.versions import Version, find_version, get_version
 from app.store.codecs import Json
 from app.store.jobs import Job
@@ -46,7 +46,7 @@ def request_verify(jobs: Jobs, store: Store, version_id: int, *, actor: str) -> 
     return jobs.submit(
         VERIFY,
         f"Verify {version.name} of {version.dataset}",
-        verify_work(store, version_id),
+        verify_work(store, version_id, actor),
         dataset_id=version.dataset_id,
         actor=actor,
         request={"version": version_id},
@@ -71,7 +71,7 @@ def resume_versions(jobs: Jobs, store: Store) -> None:
         return work
 
     jobs.resumes(FREEZE, freezing)
-    jobs.resumes(VERIFY, lambda job: verify_work(store, job.request["version"]))
+    jobs.resumes(VERIFY, lambda job: verify_work(store, job.request["version"], job.actor))
 
 
 def freeze_work(store: Store, dataset_id: int, request: FreezeRequest, actor: str) -> Work:
@@ -84,12 +84,13 @@ def freeze_work(store: Store, dataset_id: int, request: FreezeRequest, actor: st
     return work
 
 
-def verify_work(store: Store, version_id: int) -> Work:
-    """The work of verifying; its result is the report."""
+def verify_work(store: Store, version_id: int, actor: str) -> Work:
+    """The work of verifying; its result is the report, which the version keeps, too."""
 
     def work(progress: Progress) -> Json:
         step = _step(progress, f"Verifying {get_version(store, version_id).name}.")
-        return {"version_id": version_id, **verify(store, version_id, progress=step).values()}
+        report = verify_and_keep(store, version_id, progress=step, actor=actor)
+        return {"version_id": version_id, **report.values()}
 
     return work
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
 
@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 from app.errors import InputError, NotFoundError, StorageError
 from app.review.datasets import read_dataset
 from app.review.split import Split
+from app.review.verification import Verification, read_verifications
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
@@ -54,6 +55,8 @@ class Version:
     split: Split
     counts: Mapping[str, Any]
     previous: int | None
+    verified: Verification | None = None
+    """What came of verifying it the last time; None: nobody has."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,7 @@ def list_versions(store: Store, dataset: str | int) -> list[Version]:
         rows = session.execute(
             _VERSIONS.where(VersionModel.dataset_id == found.id).order_by(VersionModel.id.desc())
         )
-        return [_version(row) for row in rows]
+        return _versions(session, rows.all())
 
 
 def get_version(store: Store, version_id: int) -> Version:
@@ -137,7 +140,7 @@ def read_version(session: Session, version_id: int) -> Version:
     row = session.execute(_VERSIONS.where(VersionModel.id == version_id)).one_or_none()
     if row is None:
         raise NotFoundError(f"there is no version {version_id}")
-    return _version(row)
+    return _versions(session, [row])[0]
 
 
 def read_rows(
@@ -207,6 +210,11 @@ def require_frozen(keys: set[str], found: Mapping[str, bytes]) -> None:
             f"{len(missing)} frozen parts of the version are missing, {sorted(missing)[0]} first",
             hint="Restore the database from a backup.",
         )
+
+
+def _versions(session: Session, rows: Sequence[Any]) -> list[Version]:
+    verified = read_verifications(session, [row.id for row in rows])
+    return [replace(_version(row), verified=verified.get(row.id)) for row in rows]
 
 
 def _version(row: Any) -> Version:

@@ -8,6 +8,7 @@ from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
+from app.soccer.reasons import LeftOut
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,8 @@ class View:
     included: bool = True
     """False when a person left this view out of the group."""
     extras: Extras = field(default_factory=Extras)
+    left_out: LeftOut | None = None
+    """Why it was left out, where the person said so; None while it is included."""
 
     @property
     def size(self) -> ImageSize:

@@ -54,6 +54,10 @@ class Archives:
             raise NotFoundError(f"{path.name} has no member {member}") from error
         return info.file_size, info.CRC
 
+    def has(self, path: Path, member: str) -> bool:
+        """Whether the archive's directory lists a member of that name."""
+        return member in self._get(path).NameToInfo
+
     def close(self) -> None:
         """Close all archives."""
         with self._lock:

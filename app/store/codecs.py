@@ -19,6 +19,7 @@ from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, Policy
+from app.soccer.reasons import LeftOut
 
 Json = Any
 """What ``json`` makes: dict, list, str, int, float, bool or None."""
@@ -170,8 +171,23 @@ def media_from_json(value: list[Any] | None) -> Media | None:
     return None if value is None else Media(*value)
 
 
+def left_out_to_json(why: LeftOut | None) -> dict[str, Json] | None:
+    """``{"reason": ..., "note": ...}`` or None."""
+    return None if why is None else {"reason": why.reason, "note": why.note}
+
+
+def left_out_from_json(value: Mapping[str, Any] | None) -> LeftOut | None:
+    """Back from ``left_out_to_json``."""
+    return None if value is None else LeftOut(value["reason"], value["note"])
+
+
 def view_to_json(view: View, station: Json | None = None) -> Json:
-    """A view; ``station`` stands in for the station's own JSON (a shared one is a key)."""
+    """A view; ``station`` stands in for the station's own JSON (a shared one is a key).
+
+    ``left_out`` stands there only where somebody said why, so that digests of all other views
+    are what they always were.
+    """
+    why = left_out_to_json(view.left_out)
     return {
         "key": view.key,
         "station": station_to_json(view.station) if station is None else station,
@@ -179,6 +195,7 @@ def view_to_json(view: View, station: Json | None = None) -> Json:
         "media": media_to_json(view.media),
         "included": view.included,
         "extras": extras_to_json(view.extras),
+        **({} if why is None else {"left_out": why}),
     }
 
 
@@ -191,6 +208,7 @@ def view_from_json(value: Mapping[str, Any], station: Station | None = None) -> 
         media=media_from_json(value["media"]),
         included=value["included"],
         extras=extras_from_json(value["extras"]),
+        left_out=left_out_from_json(value.get("left_out")),
     )
 
 

@@ -29,7 +29,10 @@ def station_digest(station: Station) -> str:
 
 
 def view_digest(view: View) -> str:
-    """Of the view's key, its balls and whether it takes part; its station has its own."""
+    """Of the view's key, its balls and whether it takes part; its station has its own.
+
+    Why it was left out changes nothing that is computed, so it has no part in this.
+    """
     return digest([view.key, view.included, [ball_to_json(ball) for ball in view.balls]])
 
 

@@ -35,10 +35,12 @@ def station_values(station: Station) -> dict[str, Any]:
 def view_values(view: View, position: int) -> dict[str, Any]:
     """Columns of a view that follow from its value."""
     media, extras = view.media, codecs.extras_to_json(view.extras)
+    why = codecs.left_out_to_json(view.left_out)
     return {
         "key": view.key,
         "position": position,
         "included": view.included,
+        "left_out": None if why is None else codecs.canonical(why),
         "balls": codecs.canonical([codecs.ball_to_json(ball) for ball in view.balls]),
         "media_path": None if media is None else media.path,
         "media_member": None if media is None else media.member,

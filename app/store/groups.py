@@ -140,7 +140,7 @@ def _view_from_row(row: Any, station: Station) -> View:
     media = None
     if row.media_path is not None:
         media = Media(row.media_path, row.media_member, row.media_frame)
-    extras = getattr(row, "extras", None)
+    extras, why = getattr(row, "extras", None), row.left_out
     return View(
         key=row.key,
         station=station,
@@ -148,6 +148,7 @@ def _view_from_row(row: Any, station: Station) -> View:
         media=media,
         included=row.included,
         extras=Extras() if extras is None else codecs.extras_from_json(codecs.unpack(extras)),
+        left_out=None if why is None else codecs.left_out_from_json(codecs.parse(why)),
     )
 
 

@@ -83,6 +83,15 @@ def media_facts(media: Media) -> dict[str, int]:
     return {"bytes": size, "crc32": crc}
 
 
+def has_member(media: Media, member: str) -> bool:
+    """Whether the archive that a frame lies in has a member of that name.
+
+    Raises:
+        NotFoundError, ImageError, StorageError: The archive is not there, damaged or unreadable.
+    """
+    return _ARCHIVES.has(Path(media.path), member)
+
+
 def _checked(data: bytes, settings: Settings, name: str) -> bytes:
     """The bytes unchanged, once they were seen to decode."""
     _pixels(data, settings, name)

@@ -87,7 +87,10 @@ class GroupModel(Base):
 
 
 class ViewModel(Base):
-    """One image of a group: balls (JSON), media, and extras (compressed JSON)."""
+    """One image of a group: balls (JSON), media, and extras (compressed JSON).
+
+    ``left_out`` (JSON) is why a person left it out, where they said so.
+    """
 
     __tablename__ = "view"
     __table_args__ = (
@@ -101,6 +104,7 @@ class ViewModel(Base):
     position: Mapped[int]
     key: Mapped[str]
     included: Mapped[bool]
+    left_out: Mapped[str | None]
     balls: Mapped[str]
     media_path: Mapped[str | None]
     media_member: Mapped[str | None]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
-from sqlalchemy import and_, func, insert, select, update
+from sqlalchemy import and_, func, insert, or_, select, update
 from sqlalchemy.orm import Session
 
 from app.soccer.solution import SOLVER_VERSION
@@ -17,6 +17,7 @@ from app.store.models import (
     ImportFindingModel,
     QueueModel,
     SolutionModel,
+    StationModel,
     VerdictModel,
     ViewModel,
 )
@@ -38,11 +39,15 @@ def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
     for start in range(0, len(group_ids), _BATCH):
         ids = group_ids[start : start + _BATCH]
         verdicts = _verdicts(session, ids)
+        edited = edited_groups(session, ids)
         heads = session.execute(
-            select(GroupModel.id, GroupModel.inputs_hash).where(GroupModel.id.in_(ids))
+            select(GroupModel.id, GroupModel.inputs_hash, QueueModel.passes)
+            .join(QueueModel, QueueModel.group_id == GroupModel.id)
+            .where(GroupModel.id.in_(ids))
         )
         values = [
-            {"group_id": head.id, **_judged(head, verdicts.get(head.id))} for head in heads.all()
+            {"group_id": head.id, **_judged(head, verdicts.get(head.id), edited, head.passes)}
+            for head in heads.all()
         ]
         if values:
             session.execute(update(QueueModel), values)
@@ -50,10 +55,12 @@ def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
 
 def _refresh(session: Session, ids: Sequence[int]) -> None:
     views, verdicts = _views(session, ids), _verdicts(session, ids)
-    findings = import_findings(session, ids)
+    findings, edited = import_findings(session, ids), edited_groups(session, ids)
     rows = []
     for head, summary in _heads(session, ids):
-        row = {**_said(head, views[head.id]), **_judged(head, verdicts.get(head.id))}
+        passes = None if summary is None else summary.passes
+        judged = _judged(head, verdicts.get(head.id), edited, passes)
+        row = {**_said(head, views[head.id]), **judged}
         row.update(_computed(summary, [item.kind for item in findings[head.id]]))
         rows.append(row)
     if rows:
@@ -146,7 +153,39 @@ def _said(head: Any, views: Sequence[Any]) -> dict[str, Any]:
     }
 
 
-def _judged(head: Any, verdict: Any) -> dict[str, Any]:
+def edited_groups(session: Session, ids: Sequence[int]) -> set[int]:
+    """Those of the groups that are not what their dataset brought.
+
+    A shared station is not the group's: what is drawn there counts for no group.
+    """
+    own = and_(StationModel.shared.is_(False), StationModel.digest != StationModel.source_digest)
+    statement = (
+        select(ViewModel.group_id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(ViewModel.group_id.in_(ids), or_(ViewModel.digest != ViewModel.source_digest, own))
+        .distinct()
+    )
+    return set(session.scalars(statement))
+
+
+def is_fixed(verdict: Any, edited: bool, passes: bool | None) -> bool:
+    """Whether a group was mended: edited, accepted as such, and not failing as it is now.
+
+    What was edited when the verdict was given may have been undone since; a group that was
+    accepted against a gate, or rejected, was not mended.
+
+    Args:
+        verdict: With ``state``, ``override`` and ``fixed`` as they were given.
+        edited: Whether the group differs from what its dataset brought, now.
+        passes: What the gates say now; None while that is not known.
+    """
+    accepted = verdict.state == "accepted" and verdict.override is None
+    return bool(verdict.fixed and accepted and edited and passes is not False)
+
+
+def _judged(
+    head: Any, verdict: Any, edited: Collection[int], passes: bool | None
+) -> dict[str, Any]:
     if verdict is None or verdict.state == "unreviewed":
         nobody = dict.fromkeys(("reason", "reviewer", "override"))
         return {**nobody, "status": "unreviewed", "stale": False, "fixed": False}
@@ -156,7 +195,7 @@ def _judged(head: Any, verdict: Any) -> dict[str, Any]:
         "reason": verdict.reason,
         "reviewer": verdict.actor,
         "override": verdict.override,
-        "fixed": verdict.fixed,
+        "fixed": is_fixed(verdict, head.id in edited, passes),
     }
 
 

@@ -74,6 +74,24 @@ class VersionGroupModel(Base):
     frames: Mapped[bytes | None] = mapped_column(LargeBinary)
 
 
+class VersionCheckModel(Base):
+    """What came of verifying a version the last time; ``report`` (JSON) as ``VerifyReport`` has it.
+
+    ``problem`` says why nothing came of it, where it could not be done; then ``report`` is None.
+    """
+
+    __tablename__ = "version_check"
+
+    version_id: Mapped[int] = mapped_column(
+        ForeignKey("version.id", ondelete="CASCADE"), primary_key=True
+    )
+    at: Mapped[str]
+    actor: Mapped[str]
+    solver_version: Mapped[str]
+    report: Mapped[str | None]
+    problem: Mapped[str | None]
+
+
 class FrozenModel(Base):
     """Content under a key that follows from it; versions of one dataset share it.
 

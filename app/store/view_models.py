@@ -26,6 +26,8 @@ class VerdictBatchModel(Base):
     """Verdicts that were given at once; ``spans`` (JSON) are first and last id of each chunk.
 
     ``log_id`` is the entry that closed the batch, None while it runs (or was killed).
+    ``undo_spans`` are those of the verdicts that took it back, ``redone`` is the id of the batch
+    that gave it again after that.
     """
 
     __tablename__ = "verdict_batch"
@@ -44,6 +46,8 @@ class VerdictBatchModel(Base):
     log_id: Mapped[int | None]
     undone: Mapped[str | None]
     undone_by: Mapped[str | None]
+    undo_spans: Mapped[str | None]
+    redone: Mapped[int | None]
 
 
 class UsedIdModel(Base):

@@ -99,6 +99,13 @@ export function getNeighbours(id, q) {
 	return request(`/groups/${id}/neighbours${queryText({ q })}`);
 }
 
+/** @typedef {{offset: number, label: string, image: string}} NeighbourFrame   offset: frames later */
+
+/** The frames before and after that of a view. @param {string} address @returns {Promise<{items: NeighbourFrame[], sentence: string | null}>} */
+export function getFramesAround(address) {
+	return request(address);
+}
+
 /**
  * What the numbers would be; saves nothing.
  *

@@ -17,7 +17,7 @@ import { idempotencyKey, queryText, request } from './client.js';
  */
 
 /** @typedef {{batch: number | null, changed: number, refused: RefusedJson[]}} BulkResult */
-/** @typedef {{id: number, at: string, actor: string, state: string, changed: number, undone: string | null, undone_by: string | null}} BatchJson */
+/** @typedef {{id: number, at: string, actor: string, state: string, changed: number, undone: string | null, undone_by: string | null, redone: number | null}} BatchJson */
 /** @typedef {{id: number, name: string, q: string, by: string, groups: number}} SavedView */
 
 /**
@@ -58,6 +58,11 @@ export function postVerdicts(dataset, body) {
 /** @param {number} batch @returns {Promise<{restored: number, kept: number}>} */
 export function undoVerdicts(batch) {
 	return request(`/verdict-batches/${batch}/undo`, { method: 'POST', key: idempotencyKey() });
+}
+
+/** @param {number} batch that was taken back @returns {Promise<{batch: number | null, changed: number, kept: number, refused: RefusedJson[]}>} batch: the new one */
+export function redoVerdicts(batch) {
+	return request(`/verdict-batches/${batch}/redo`, { method: 'POST', key: idempotencyKey() });
 }
 
 /** @param {number} dataset @param {AbortSignal} signal @returns {Promise<{items: BatchJson[]}>} */

@@ -46,6 +46,8 @@
  * @property {string} [etag]
  */
 
+/** @typedef {{reason: string, note: string | null}} LeftOutJson */
+
 /**
  * @typedef {object} ViewJson
  * @property {number} id
@@ -55,10 +57,12 @@
  * @property {number} width
  * @property {number} height
  * @property {boolean} included
+ * @property {LeftOutJson | null} [left_out] why a person left it out
  * @property {StationJson} station
  * @property {LinesJson} lines
  * @property {BallJson[]} balls
  * @property {string | null} image
+ * @property {string | null} [neighbours] where the frames before and after are listed
  */
 
 /**

@@ -31,6 +31,21 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {any} split
  * @property {string} solver_version
  * @property {string} software_version
+ * @property {VerificationJson | null} [verified] what came of verifying it the last time
+ */
+
+/**
+ * @typedef {object} VerificationJson
+ * @property {string} at
+ * @property {string} actor
+ * @property {string} solver_version
+ * @property {boolean} ok
+ * @property {string | null} problem
+ * @property {string} sentence
+ * @property {number | null} groups
+ * @property {number | null} equal
+ * @property {number | null} different
+ * @property {{group: string | null, place: string, frozen: any, now: any}[]} differences
  */
 
 /** @param {number} dataset @param {AbortSignal} [signal] @returns {Promise<{items: VersionJson[]}>} */

@@ -3,7 +3,7 @@
 
 import { batch, computed } from '@preact/signals';
 
-import { viewOf } from './edits.js';
+import { leftOutBy, viewOf } from './edits.js';
 import { document, submit, submitVerdict } from './group.js';
 import { announce } from './notice.js';
 import { discard, outbox } from './outbox.js';
@@ -67,7 +67,9 @@ function fieldsOf(theirs, { edit, verdict, base }) {
 	if (edit.kind === 'include') {
 		return [{
 			...about, key: `include ${view.key}`, name: `View ${view.letter} used`, edit,
-			base: base?.included, mine: edit.included, theirs: view.included,
+			base: base && { included: base.included, left_out: base.left_out ?? null },
+			mine: { included: edit.included, left_out: leftOutBy(edit) },
+			theirs: { included: view.included, left_out: view.left_out ?? null },
 		}];
 	}
 	if (edit.kind === 'ball') {

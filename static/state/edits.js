@@ -1,11 +1,13 @@
 // @ts-check
 /** Edits: values that say what a person changed, and how the group looks with it. */
 
-/** @import {BallJson, FixJson, GroupDocument, PointJson, ViewJson} from '../api/types.js' */
+import { leftOutText } from './reasons.js';
+
+/** @import {BallJson, FixJson, GroupDocument, LeftOutJson, PointJson, ViewJson} from '../api/types.js' */
 
 /** @typedef {{kind: 'lines', view: string, lines: Record<string, PointJson[] | null>}} LinesEdit */
 /** @typedef {{kind: 'ball', view: string, ball: BallJson | null, prediction?: {id: number, replace: boolean}}} BallEdit   prediction: that this ball is accepted from */
-/** @typedef {{kind: 'include', view: string, included: boolean}} IncludeEdit */
+/** @typedef {{kind: 'include', view: string, included: boolean, reason?: string | null, note?: string | null}} IncludeEdit   reason: why it is left out, one of REASONS */
 /** @typedef {LinesEdit | BallEdit | IncludeEdit} Edit */
 
 /**
@@ -23,7 +25,7 @@ export function applyEdit(group, edit) {
 
 /** @param {ViewJson} view @param {Edit} edit @returns {ViewJson} */
 function editView(view, edit) {
-	if (edit.kind === 'include') return { ...view, included: edit.included };
+	if (edit.kind === 'include') return { ...view, included: edit.included, left_out: leftOutBy(edit) };
 	if (edit.kind === 'ball') return { ...view, balls: edit.ball ? [edit.ball] : [] };
 	const lines = { ...view.lines };
 	for (const [marking, points] of Object.entries(edit.lines)) {
@@ -42,7 +44,7 @@ function editView(view, edit) {
 export function requestOf(group, edit) {
 	const view = viewOf(group, edit.view);
 	if (edit.kind === 'include') {
-		return { path: `/views/${view.id}`, body: { included: edit.included }, etag: group.etag };
+		return { path: `/views/${view.id}`, body: includeBody(edit), etag: group.etag };
 	}
 	if (edit.kind === 'ball' && edit.prediction) {
 		const { id, replace } = edit.prediction;
@@ -79,6 +81,16 @@ export function previewBody(edit) {
 	return { views: { [edit.view]: { included: edit.included } } };
 }
 
+/** What an edit says of why a view is left out. @param {IncludeEdit} edit @returns {LeftOutJson | null} */
+export function leftOutBy({ included, reason, note }) {
+	return included || !reason ? null : { reason, note: note ?? null };
+}
+
+/** @param {IncludeEdit} edit */
+function includeBody(edit) {
+	return { included: edit.included, ...leftOutBy(edit) };
+}
+
 /** @param {BallJson} ball */
 function ballBody(ball) {
 	const { box, point, occluded, out_of_view, inferred } = ball;
@@ -107,7 +119,7 @@ const FEW = 3;
 /** What an edit did, in words. @param {GroupDocument} group @param {Edit} edit */
 export function describe(group, edit) {
 	const { letter } = viewOf(group, edit.view);
-	if (edit.kind === 'include') return edit.included ? `View ${letter} included` : `View ${letter} left out`;
+	if (edit.kind === 'include') return `View ${letter} ${edit.included ? 'included' : leftOutText(leftOutBy(edit))}`;
 	if (edit.kind === 'ball' && edit.prediction) return `Ball of ${letter} accepted from ${edit.ball?.predicted_by}`;
 	if (edit.kind === 'ball') return `Ball of ${letter} changed`;
 	const markings = Object.keys(edit.lines);

@@ -49,7 +49,10 @@ export const group = computed(() => {
 	if (!base) return null;
 	const said = own.value.findLast(({ verdict }) => verdict)?.verdict;
 	const edited = edits.value.reduce(applyEdit, base);
-	return said ? { ...edited, verdict: { ...base.verdict, ...said, stale: false } } : edited;
+	if (!said) return edited;
+	// Whether it was mended is the server's to say; of what was rejected it never is.
+	const fixed = base.verdict.fixed && said.state === 'accepted';
+	return { ...edited, verdict: { ...base.verdict, ...said, fixed, stale: false } };
 });
 
 /** The solution that fits `group`: the server's, with the ball computed here while it moves. */
@@ -182,8 +185,8 @@ export function submitTurn(verb) {
 
 /** What an edit or verdict found. @param {GroupDocument} at @param {string} key @returns {Base} */
 function baseOf(at, key) {
-	const { lines, balls, included } = viewOf(at, key);
-	return { lines, balls, included, verdict: at.verdict };
+	const { lines, balls, included, left_out } = viewOf(at, key);
+	return { lines, balls, included, left_out, verdict: at.verdict };
 }
 
 /**

@@ -34,7 +34,14 @@ export const undoable = computed(() => {
 	return `Take back the verdict on group ${action.number}`;
 });
 const canRedoHere = computed(() => Boolean(document.value?.can_redo) || ownStation.value !== null);
-export const canRedo = computed(() => undone.value.length > 0 || canRedoHere.value);
+/** What redo would do again, in words; null when there is nothing. */
+export const redoable = computed(() => {
+	const action = undone.value.at(-1);
+	if (!action) return canRedoHere.value ? 'Make the undone edit of this group again' : null;
+	if (action.kind === 'batch') return `Give again: ${action.text}`;
+	if (action.kind === 'edit') return `Make the undone edit of group ${action.number} again`;
+	return `Give the verdict on group ${action.number} again`;
+});
 
 /** One after the other: the next one speaks about the group to which the last one led. */
 let turn = Promise.resolve();
@@ -85,6 +92,10 @@ export function redo() {
 async function redoOne() {
 	const action = undone.value.at(-1);
 	if (action?.kind === 'verdict') await giveVerdictAgain(action);
+	else if (action?.kind === 'batch') {
+		const { giveBatchAgain } = await import('./queue_batches.js');
+		await giveBatchAgain(action);
+	}
 	else if (isAway.value) complain('Redo needs the server, which cannot be reached.');
 	else if (action) await redoThere(action);
 	else if (canRedoHere.value) submitTurn('redo');

@@ -23,7 +23,7 @@ export function withAction(before, action) {
 }
 
 /** What was taken back and can be done again, the last one last. */
-export const undone = stored('undone', /** @type {(EditDone | VerdictDone)[]} */ ([]), 'sessionStorage');
+export const undone = stored('undone', /** @type {Action[]} */ ([]), 'sessionStorage');
 
 /** Remember what was done; what was taken back before stays so. @param {Action} action */
 export function did(action) {
@@ -31,17 +31,23 @@ export function did(action) {
 	undone.value = [];
 }
 
-/** It was taken back. @param {EditDone | VerdictDone} action */
+/** It was taken back. @param {Action} action */
 export function tookBack(action) {
 	undone.value = [...undone.value.slice(1 - KEPT), action];
 }
 
-/** What was taken back last is done again. */
-export function didAgain() {
+/** What was taken back last is done again. @param {Action | undefined} [as] what it is called now, where that is something else */
+export function didAgain(as) {
 	const action = undone.value.at(-1);
 	if (!action) return;
 	undone.value = undone.value.slice(0, -1);
-	actions.value = withAction(actions.value, action);
+	actions.value = withAction(actions.value, as ?? action);
+}
+
+/** It cannot be done again, or was done again elsewhere. @param {BatchDone} action */
+export function forgetUndone(action) {
+	const rest = undone.value.filter((other) => !isSameBatch(other, action));
+	if (rest.length < undone.value.length) undone.value = rest;
 }
 
 /** It was taken back, or cannot be. @param {Action} action */

@@ -1,13 +1,13 @@
 // @ts-check
-/** Verdicts on many groups, and taking them back. */
+/** Verdicts on many groups, taking them back, and giving them again. */
 
 import { ApiError } from '../api/problem.js';
-import { undoVerdicts } from '../api/queue.js';
+import { redoVerdicts, undoVerdicts } from '../api/queue.js';
 import { count, plural } from '../lib/format.js';
 import { page } from '../lib/router.js';
 import { dataset, loadDatasets } from './datasets.js';
 import { document, open } from './group.js';
-import { did, forget } from './last_action.js';
+import { did, didAgain, forget, forgetUndone, tookBack, undone } from './last_action.js';
 import { complain, inform } from './notice.js';
 import { openQueue, queue } from './queue.js';
 
@@ -34,8 +34,9 @@ export async function takeBatchBack(action) {
 	try {
 		const { restored, kept } = await undoVerdicts(action.batch);
 		forget(action);
-		const rest = kept ? ` ${plural(kept, 'group')} ${kept === 1 ? 'was' : 'were'} judged since and ${kept === 1 ? 'stays' : 'stay'}.` : '';
-		inform(`${count(restored)} ${restored === 1 ? 'verdict is' : 'verdicts are'} taken back.${rest}`);
+		if (restored > 0) tookBack(action);
+		const text = `${count(restored)} ${restored === 1 ? 'verdict is' : 'verdicts are'} taken back.${stayed(kept, 'judged since')}`;
+		inform(text, restored > 0 ? { label: 'Redo', run: () => giveBatchAgain(action) } : undefined);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		// Somebody else may have taken it back, or it is gone with its dataset.
@@ -43,6 +44,39 @@ export async function takeBatchBack(action) {
 		complain(`Not taken back: ${error.message}`);
 	}
 	await readAgain();
+}
+
+/** Give the verdicts of a batch again that was taken back. @param {BatchDone} action */
+export async function giveBatchAgain(action) {
+	try {
+		const { batch, changed, kept, refused } = await redoVerdicts(action.batch);
+		const failing = refused.reduce((sum, { groups }) => sum + groups, 0);
+		const rest = stayed(kept, 'judged or edited since') + stayed(failing, 'not fit for it any more');
+		if (batch === null) {
+			forgetUndone(action);
+			inform(`No verdict was given again.${rest}`);
+		} else {
+			/** @type {BatchDone} */
+			const again = { kind: 'batch', batch, text: action.text.replace(/^[\d,]+ groups?/, plural(changed, 'group')) };
+			if (undone.value.some((other) => other.kind === 'batch' && other.batch === action.batch)) {
+				forgetUndone(action);
+				undone.value = [...undone.value, action];
+				didAgain(again);
+			} else did(again);
+			inform(`${again.text} again.${rest}`, { label: 'Undo', run: () => takeBatchBack(again) });
+		}
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		if (error.status === 409 || error.status === 404) forgetUndone(action);
+		complain(`Not given again: ${error.message}`);
+	}
+	await readAgain();
+}
+
+/** Groups that stay as they are, as a sentence; '' for none. @param {number} groups @param {string} why */
+function stayed(groups, why) {
+	if (groups === 0) return '';
+	return ` ${plural(groups, 'group')} ${groups === 1 ? 'was' : 'were'} ${why} and ${groups === 1 ? 'stays as it is' : 'stay as they are'}.`;
 }
 
 /** What is on screen, as it is now. */

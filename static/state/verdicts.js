@@ -10,20 +10,10 @@ import { document, group, onRefused, open, settle, submit, submitVerdict } from 
 import { actions, did, didAgain, forget, tookBack } from './last_action.js';
 import { currentId, goNext, query, queueAddress, reviewAddress } from './navigation.js';
 import { announce, complain, inform } from './notice.js';
+import { reasonText } from './reasons.js';
 import { asking, focused } from './workspace.js';
 
 /** @import {VerdictDone} from './last_action.js' */
-
-/** Reasons to reject, in the order of their digits. */
-export const REASONS = [
-	{ name: 'bad_field_lines', label: 'Bad field lines' },
-	{ name: 'sides_confused', label: 'Sides confused' },
-	{ name: 'not_same_instant', label: 'Not the same instant' },
-	{ name: 'ball_not_visible', label: 'Ball not visible' },
-	{ name: 'bad_calibration', label: 'Bad calibration' },
-	{ name: 'duplicate_view', label: 'Duplicate view' },
-	{ name: 'other', label: 'Other…' },
-];
 
 /** The server takes no longer note. */
 const MAX_NOTE = 2000;
@@ -62,20 +52,23 @@ export function askViewReason() {
 
 /** Leave the view in hand out for a reason. @param {string} reason one of REASONS */
 export function rejectView(reason) {
-	const label = REASONS.find(({ name }) => name === reason)?.label ?? reason;
 	if (reason === 'other') asking.value = 'viewNote';
-	else leaveOut(label.toLowerCase(), reason);
+	else leaveOut(reason, null);
 }
 
-/** Leave the view in hand out; why is kept as a note of its group. @param {string} why @param {string} [reason] */
-export function leaveOut(why, reason) {
+/** Leave the view in hand out in the person's own words. @param {string} note */
+export function rejectViewBecause(note) {
+	leaveOut('other', note);
+}
+
+/** The reason is part of the edit, so that undo takes both back. @param {string} reason one of REASONS @param {string | null} note */
+function leaveOut(reason, note) {
 	const view = viewInHand();
 	asking.value = null;
 	if (!view) return;
-	if (reason) lastReason.value = reason;
-	submit({ kind: 'include', view: view.key, included: false });
-	addNote(`View ${view.letter} left out: ${why}`);
-	announce(`View ${view.letter} left out: ${why}.`);
+	lastReason.value = reason;
+	submit({ kind: 'include', view: view.key, included: false, reason, note });
+	announce(`View ${view.letter} left out: ${reasonText({ reason, note })}.`);
 }
 
 /** @param {string} reason one of REASONS */

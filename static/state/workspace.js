@@ -35,6 +35,9 @@ export const drawing = signal(
 	/** @type {{view: string, what: 'ask' | 'ball' | 'line', marking: string} | null} */ (null),
 );
 
+/** Another frame than its own that a view shows, with nothing drawn on it; null: none does. `view` is an id. */
+export const otherInstant = signal(/** @type {{view: number, offset: number, label: string, image: string} | null} */ (null));
+
 export const overlaysHidden = signal(false);
 export const projections = stored('projections', true);
 export const boxes = stored('boxes', true);
@@ -69,6 +72,7 @@ export function cycleEstimator() {
 
 /** @param {string} letter */
 export function focusView(letter) {
+	if (letter !== focused.value) otherInstant.value = null;
 	focused.value = letter;
 	if (maximised.value) maximised.value = letter;
 }
@@ -86,4 +90,5 @@ export function resetForGroup() {
 	asking.value = null;
 	drawing.value = null;
 	pinPlace.value = null;
+	otherInstant.value = null;
 }

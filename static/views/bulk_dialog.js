@@ -10,7 +10,7 @@ import { sentenceOf, useResource } from '../lib/resource.js';
 import { reviewAddress } from '../state/navigation.js';
 import { readAgain, tellBatch } from '../state/queue_batches.js';
 import { clearTicks } from '../state/queue_ticks.js';
-import { REASONS } from '../state/verdicts.js';
+import { REASONS } from '../state/reasons.js';
 import { FormDialog } from './dialog.js';
 
 /** @import {BulkPreview, BulkRequest} from '../api/queue.js' */

@@ -6,8 +6,9 @@ import { html } from 'htm/preact';
 import { ballCenter } from '../geometry/preview.js';
 import { fixed, pixels } from '../lib/format.js';
 import { conflict, keepMine, mergeBoth, takeTheirs } from '../state/conflict.js';
+import { leftOutText } from '../state/reasons.js';
 
-/** @import {BallJson, PointJson} from '../api/types.js' */
+/** @import {BallJson, LeftOutJson, PointJson} from '../api/types.js' */
 /** @import {Field} from '../state/conflict.js' */
 
 /**
@@ -18,9 +19,15 @@ import { conflict, keepMine, mergeBoth, takeTheirs } from '../state/conflict.js'
  */
 function wordsFor(field, value, base) {
 	if (field.verdict) return value?.state ?? '';
-	if (field.key.startsWith('include')) return value ? 'used' : 'left out';
+	if (field.key.startsWith('include')) return includedWords(value);
 	if (field.key.startsWith('ball')) return ballWords(value?.[0], base?.[0]);
 	return lineWords(value, base);
+}
+
+/** @param {{included: boolean, left_out: LeftOutJson | null} | undefined} value */
+function includedWords(value) {
+	if (!value) return '';
+	return value.included ? 'used' : leftOutText(value.left_out);
 }
 
 /** @param {BallJson | undefined} ball @param {BallJson | undefined} base */

@@ -14,12 +14,13 @@ import { decoded, loadImage } from '../state/images.js';
 import { mend } from '../state/mends.js';
 import { panPanel, viewportOf, zoomPanel } from '../state/viewports.js';
 import {
-	boxes, drawing, editing, focused, focusView, gain, overlaysHidden, pointerPlace, projections,
+	boxes, drawing, editing, focused, focusView, gain, otherInstant, overlaysHidden, pointerPlace, projections,
 	selected, toggleMaximised,
 } from '../state/workspace.js';
 import { attachPointer } from '../tools/pointer.js';
 import { ClassChooser } from './class_chooser.js';
 import { DrawingChip } from './drawing_chip.js';
+import { InstantChip } from './instant_chip.js';
 import { ObjectList } from './object_list.js';
 import { PanelCaption } from './panel_caption.js';
 import { PanelTools } from './panel_tools.js';
@@ -71,9 +72,10 @@ export function ImagePanel({ picture, first }) {
 	const { letter } = view;
 	const [ref, size] = useSize();
 	const stage = useRef(/** @type {ImageStage | null} */ (null));
-	const frame = useFrame(view.image);
+	const instant = otherInstant.value?.view === view.id ? otherInstant.value : null;
+	const frame = useFrame(instant ? instant.image : view.image);
 	const viewport = viewportOf(letter, view, size);
-	const now = { view, size, viewport, predictions: picture.predictions };
+	const now = { view, size, viewport, predictions: picture.predictions, elsewhere: instant !== null };
 	const latestProps = useRef(now);
 	latestProps.current = now;
 
@@ -85,7 +87,7 @@ export function ImagePanel({ picture, first }) {
 			view: () => latestProps.current.view,
 			viewport: () => latestProps.current.viewport,
 			selected: () => selected.value,
-			enabled: () => !overlaysHidden.value,
+			enabled: () => !overlaysHidden.value && !latestProps.current.elsewhere,
 			draws: () => {
 				const present = drawing.value;
 				return present?.view === latestProps.current.view.key && present.what !== 'ask' ? present.what : null;
@@ -93,7 +95,9 @@ export function ImagePanel({ picture, first }) {
 			predictionAt: () => (boxes.value ? latestProps.current.predictions?.at : undefined),
 			hint: (hit) => hintOf(latestProps.current.predictions, hit),
 			draw: (at) => drawAt(latestProps.current.view, at),
-			insert: (at) => insertAt(latestProps.current.view, latestProps.current.viewport, at),
+			insert: (at) => {
+				if (!latestProps.current.elsewhere) insertAt(latestProps.current.view, latestProps.current.viewport, at);
+			},
 			over: (at) => {
 				const { letter: name, key } = latestProps.current.view;
 				if (at) pointerPlace.value = { letter: name, view: key, at };
@@ -117,12 +121,12 @@ export function ImagePanel({ picture, first }) {
 	const rays = draft.value?.kind === 'ball' || selected.value?.kind === 'ball' || view.balls.length === 0;
 	const meant = mend.value?.fix.view === view.key && !draft.value ? mend.value.fix : null;
 	const scene = useMemo(() => ({
-		picture, viewport, rays, selected: selected.value, hidden: overlaysHidden.value,
+		picture, viewport, rays, selected: selected.value, hidden: overlaysHidden.value || instant !== null,
 		projections: projections.value, boxes: boxes.value, gain: gain.value,
 		ghosts: conflict.value?.fields ?? NO_GHOSTS, meant,
 	}), [
 		picture, viewport.scale, viewport.left, viewport.top, rays, selected.value,
-		overlaysHidden.value, projections.value, boxes.value, gain.value, conflict.value, meant,
+		overlaysHidden.value, instant, projections.value, boxes.value, gain.value, conflict.value, meant,
 	]);
 	const filter = filterOf(letter);
 	useLayoutEffect(() => stage.current?.adjust(filter), [filter]);
@@ -150,12 +154,13 @@ export function ImagePanel({ picture, first }) {
 			onFocus=${() => focusView(letter)}
 			onDblClick=${maximise}
 		>
-			<div class="image-panel__stage" data-ready=${Boolean(frame.image)} data-frame=${frame.image ? view.id : undefined} ref=${ref}></div>
+			<div class="image-panel__stage" data-ready=${Boolean(frame.image)} data-frame=${frame.image ? view.id : undefined} data-offset=${instant?.offset} ref=${ref}></div>
 			${view.image ? null : html`<p class="image-panel__missing">No frame · lines and ball can be edited</p>`}
 			${frame.error ? html`<p class="image-panel__missing">The frame of this view cannot be read.</p>` : null}
 			<${PanelCaption} picture=${picture} />
 			<${PanelTools} picture=${picture} first=${first} />
 			<${DrawingChip} view=${view.key} />
+			${instant ? html`<${InstantChip} label=${instant.label} />` : null}
 			${picture.predictions && !drawing.value ? html`<${PredictionChip} picture=${picture} />` : null}
 			${drawing.value?.view === view.key && drawing.value.what === 'ask' ? html`<${ClassChooser} picture=${picture} />` : null}
 			${isFocused && editing.value ? html`<${ObjectList} picture=${picture} />` : html`

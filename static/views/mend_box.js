@@ -5,7 +5,8 @@ import { html } from 'htm/preact';
 
 import { suggestedReason } from '../state/advice.js';
 import { mend, mendIndex, mends, turnMend } from '../state/mends.js';
-import { askReason, REASONS } from '../state/verdicts.js';
+import { REASONS } from '../state/reasons.js';
+import { askReason } from '../state/verdicts.js';
 import { mendNow } from './mend_actions.js';
 
 /** @import {SolutionJson} from '../api/types.js' */

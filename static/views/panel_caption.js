@@ -15,7 +15,8 @@ export function PanelCaption({ picture }) {
 	const { view, solved } = picture;
 	const error = errorOf(picture);
 	const { grade, sentence } = gradeOfView(picture);
-	const jac = jacOf(solved);
+	// Of a view that is left out nothing counts but why.
+	const jac = view.included ? jacOf(solved) : null;
 	return html`
 		<figcaption class="caption">
 			<${Letter} letter=${view.letter} />

@@ -7,7 +7,7 @@ import { useState } from 'preact/hooks';
 import { count } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
 import { valueOf, withField, wordsOf } from '../state/query.js';
-import { redo, undo, undoable } from '../state/history.js';
+import { redo, redoable, undo, undoable } from '../state/history.js';
 import { queue, statusCounts } from '../state/queue.js';
 import { clearTicks, countOf, queryOf, ticks } from '../state/queue_ticks.js';
 import { BulkDialog } from './bulk_dialog.js';
@@ -89,6 +89,15 @@ function UndoButton() {
 	`;
 }
 
+function RedoButton() {
+	const what = redoable.value;
+	return html`
+		<button class="icon-button" type="button" aria-label="Redo" aria-disabled=${what === null} title=${`${what ?? 'Nothing to redo'} (Ctrl Shift Z)`} onClick=${redo}>
+			<svg viewBox="0 0 16 16" aria-hidden="true"><path d="m10 3 3 3-3 3M13 6H7a4 4 0 0 0 0 8h3" /></svg>
+		</button>
+	`;
+}
+
 /** @param {{dataset: DatasetJson, q: string, onQuery: (q: string) => void}} props */
 export function QueueTools({ dataset, q, onQuery }) {
 	const [deciding, setDeciding] = useState(false);
@@ -100,8 +109,8 @@ export function QueueTools({ dataset, q, onQuery }) {
 	keys.run = open;
 	const [bindings] = useState(() => [
 		{ keys: ['b'], label: 'Decide what is ticked, or all that match', group: 'Queue', run: () => keys.run() },
-		{ keys: ['Ctrl+z'], label: 'Take back the last verdict', group: 'Queue', run: undo },
-		{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Give it again', group: 'Queue', run: redo },
+		{ keys: ['Ctrl+z'], label: 'Take back the last verdict, of one group or of many', group: 'Queue', run: undo },
+		{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Give the verdict again that was taken back last', group: 'Queue', run: redo },
 	]);
 	useKeys(bindings);
 	return html`
@@ -111,6 +120,7 @@ export function QueueTools({ dataset, q, onQuery }) {
 			<${SavedViews} dataset=${dataset} q=${q} onQuery=${onQuery} />
 			<${Reviewers} dataset=${dataset} onQuery=${onQuery} />
 			<${UndoButton} />
+			<${RedoButton} />
 			<${Ticked} ticked=${ticked} />
 			<button class=${ticked > 0 ? 'button button--primary' : 'button'} type="button" aria-disabled=${reason !== ''} title=${reason} onClick=${open}>
 				${reason ? 'Decide…' : ticked > 0 ? `Decide ${count(ticked)} ticked…` : `Decide all ${count(total)}…`}

@@ -8,7 +8,7 @@ import { ago, count } from '../lib/format.js';
 import { useNow } from '../lib/hooks.js';
 import { held } from '../state/conflict.js';
 import { document as groupDocument, unsaved } from '../state/group.js';
-import { canRedo, redo, undo, undoable } from '../state/history.js';
+import { redo, redoable, undo, undoable } from '../state/history.js';
 import { goNext, goPrevious, neighbours, query, queueAddress, reviewAddress } from '../state/navigation.js';
 import { changedElsewhere } from '../state/live.js';
 import { lasting } from '../state/outbox.js';
@@ -109,7 +109,7 @@ export function ReviewHeader() {
 			<${HeaderButton} label="Undo" keys="Ctrl Z" run=${undo} path="M6 3 3 6l3 3M3 6h6a4 4 0 0 1 0 8H6"
 				reason=${undoable.value ? null : 'Nothing to undo in this group'} />
 			<${HeaderButton} label="Redo" keys="Ctrl Shift Z" run=${redo} path="m10 3 3 3-3 3M13 6H7a4 4 0 0 0 0 8h3"
-				reason=${canRedo.value ? null : 'Nothing to redo in this group'} />
+				reason=${redoable.value ? null : 'Nothing to redo in this group'} />
 		<//>
 	`;
 }

@@ -7,6 +7,7 @@ import { drawHere, endDrawing, startDrawing } from '../state/drawing.js';
 import { swapSides } from '../state/edits.js';
 import { draft, group, solution, submit, withdraw } from '../state/group.js';
 import { redo, undo } from '../state/history.js';
+import { backToInstant, stepInstant } from '../state/instants.js';
 import { mend, mends, turnMend } from '../state/mends.js';
 import { goBy, goFlagged, goNext, goPrevious } from '../state/navigation.js';
 import { announce, dismiss, notice } from '../state/notice.js';
@@ -16,7 +17,7 @@ import { accept, askReason, askViewReason, cancelAsking, defer } from '../state/
 import { fitAll, fitPanel, isZoomed, zoomTo } from '../state/viewports.js';
 import {
 	asking, boxes, cycleEstimator, cycleGain, drawing, editing, equalViews, estimator, focused, focusView, gain,
-	gatesOpen, loupe, maximised, overlaysHidden, pinPlace, pointerPlace, projections, selected,
+	gatesOpen, loupe, maximised, otherInstant, overlaysHidden, pinPlace, pointerPlace, projections, selected,
 	stripCollapsed, toggleMaximised,
 } from '../state/workspace.js';
 import { deleteSelected, nudge, nudgeDiameter } from '../tools/nudge.js';
@@ -57,6 +58,7 @@ function escape() {
 	if (asking.value) cancelAsking();
 	else if (drawing.value) endDrawing();
 	else if (draft.value) withdraw();
+	else if (otherInstant.value) backToInstant();
 	else if (editing.value) editing.value = false;
 	else if (selected.value) selected.value = null;
 	else if (maximised.value) maximised.value = null;
@@ -215,6 +217,8 @@ const VIEW = [
 		keys: ['w'], label: 'Residual whiskers × 1, 5, 20', group: 'View',
 		run: () => { cycleGain(); announce(`Whiskers times ${gain.value}.`); },
 	},
+	{ keys: [','], label: 'The focused view one frame before, where the dataset has it', group: 'View', run: () => { stepInstant(-1); } },
+	{ keys: ['.'], label: 'The focused view one frame after', group: 'View', run: () => { stepInstant(1); } },
 	{ keys: ['t'], label: '3D ball: mean of pairs, or most likely point', group: 'View', run: otherEstimator },
 	{ keys: ['g'], label: 'Gates: what they ask and by how much', group: 'View', run: showGates },
 	{

@@ -7,7 +7,7 @@ import { getBatches, getReviewers } from '../api/queue.js';
 import { ago, count } from '../lib/format.js';
 import { useNow } from '../lib/hooks.js';
 import { sentenceOf, useResource } from '../lib/resource.js';
-import { batchText, takeBatchBack } from '../state/queue_batches.js';
+import { batchText, giveBatchAgain, takeBatchBack } from '../state/queue_batches.js';
 import { Popover } from './popover.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
@@ -41,7 +41,7 @@ function People({ dataset, open }) {
 	`;
 }
 
-/** The newest verdicts on many groups, each to be taken back as a whole. @param {{dataset: DatasetJson}} props */
+/** The newest verdicts on many groups, each to be taken back as a whole, and given again. @param {{dataset: DatasetJson}} props */
 function Batches({ dataset }) {
 	const now = useNow(10_000);
 	const batches = useResource((signal) => getBatches(dataset.id, signal), [dataset.id]);
@@ -49,6 +49,11 @@ function Batches({ dataset }) {
 	/** @param {typeof items[number]} batch */
 	async function undo({ id, changed, state }) {
 		await takeBatchBack({ kind: 'batch', batch: id, text: batchText(changed, state) });
+		batches.reload();
+	}
+	/** @param {typeof items[number]} batch */
+	async function redo({ id, changed, state }) {
+		await giveBatchAgain({ kind: 'batch', batch: id, text: batchText(changed, state) });
 		batches.reload();
 	}
 	if (items.length === 0) return null;
@@ -60,9 +65,10 @@ function Batches({ dataset }) {
 					<li key=${batch.id}>
 						<span>
 							${batchText(batch.changed, batch.state)}
-							<small>${batch.actor} · ${ago(Date.parse(batch.at), now)}${batch.undone ? ` · taken back by ${batch.undone_by}` : ''}</small>
+							<small>${batch.actor} · ${ago(Date.parse(batch.at), now)}${batch.undone ? ` · taken back by ${batch.undone_by}` : ''}${batch.redone ? ' · given again' : ''}</small>
 						</span>
 						${batch.undone ? null : html`<button class="button" type="button" onClick=${() => undo(batch)}>Undo</button>`}
+						${batch.undone && !batch.redone ? html`<button class="button" type="button" title="Give these verdicts again; groups judged or edited since stay as they are" onClick=${() => redo(batch)}>Redo</button>` : null}
 					</li>`)}
 			</ul>
 		</section>

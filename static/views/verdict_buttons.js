@@ -6,8 +6,9 @@ import { useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
 import { doubt, suggestedReason } from '../state/advice.js';
+import { REASONS } from '../state/reasons.js';
 import {
-	accept, addNote, answer, askReason, cancelAsking, defer, lastReason, leaveOut, reject, rejectView, REASONS,
+	accept, addNote, answer, askReason, cancelAsking, defer, lastReason, reject, rejectView, rejectViewBecause,
 } from '../state/verdicts.js';
 import { asking, pinPlace } from '../state/workspace.js';
 import { pinText } from '../lib/pins.js';
@@ -103,7 +104,7 @@ function PinForm() {
 function Ask({ group }) {
 	if (asking.value === 'reason') return html`<${ReasonList} key="group" ...${GROUP_REASONS} suggested=${suggestedReason(group.solution)} />`;
 	if (asking.value === 'view') return html`<${ReasonList} key="view" ...${VIEW_REASONS} />`;
-	if (asking.value === 'viewNote') return html`<${NoteForm} title="Why is this view left out?" button="Leave out" onNote=${leaveOut} />`;
+	if (asking.value === 'viewNote') return html`<${NoteForm} title="Why is this view left out?" button="Leave out" onNote=${rejectViewBecause} />`;
 	if (asking.value === 'note') return html`<${NoteForm} title="What is wrong with it?" button="Reject" />`;
 	if (asking.value === 'pin') return html`<${PinForm} />`;
 	if (asking.value === 'swap') return html`<${SwapAsk} group=${group} />`;

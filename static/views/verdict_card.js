@@ -7,7 +7,7 @@ import { ballOf } from '../geometry/preview.js';
 import { capital, words } from '../lib/format.js';
 import { findingTitle } from '../state/advice.js';
 import { mend } from '../state/mends.js';
-import { REASONS } from '../state/verdicts.js';
+import { REASONS } from '../state/reasons.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
 import { MendBox } from './mend_box.js';
 
@@ -102,7 +102,7 @@ export function VerdictCard({ group, solution, live }) {
 				<p class="verdict-card__verdict">
 					<span class="pill" data-status=${verdict.state}>${verdictText(verdict)}</span>
 					${verdict.stale ? html`<span class="pill" data-status="stale">stale: changed since</span>` : null}
-					${verdict.fixed ? html`<span class="pill">fixed</span>` : null}
+					${verdict.fixed && solution?.passes !== false ? html`<span class="pill" title="Edited, and accepted as it is now">fixed</span>` : null}
 				</p>`}
 		</section>
 	`;

@@ -9,6 +9,7 @@ import { plural } from '../lib/format.js';
 import { sentenceOf, useResource } from '../lib/resource.js';
 import { FreezeDialog } from './freeze_dialog.js';
 import { pageAddress } from './dataset_menu.js';
+import { verifiedWord } from './verify_report.js';
 import { When } from './when.js';
 
 /** @import {VersionJson} from '../api/versions.js' */
@@ -21,7 +22,8 @@ function Line({ version, address }) {
 	return html`
 		<div class="version-line">
 			<h3><a class="link" href=${address}>${version.name}</a> · frozen <${When} at=${version.created} /></h3>
-			<p class="note">${plural(version.counts.groups, 'group')} · sha ${version.hash.slice(0, 8)}</p>
+			<p class="note">${plural(version.counts.groups, 'group')} · sha ${version.hash.slice(0, 8)} · ${version.verified ? html`
+				<span data-grade=${version.verified.ok ? 'ok' : 'bad'} title=${version.verified.sentence}>${version.verified.ok ? '✓' : '✗'} ${verifiedWord(version.verified)}</span> <${When} at=${version.verified.at} />` : 'not verified yet'}</p>
 			${version.note ? html`<p>${version.note}</p>` : null}
 		</div>
 	`;

@@ -63,7 +63,7 @@ function VersionSection({ version, others, job, verify, compare, ask }) {
 					<h2 id=${`version-${version.id}`}>${version.name}</h2>
 					<p class="note">frozen <${When} at=${version.created} />${version.actor ? ` by ${version.actor}` : ''}</p>
 					<div class="buttons">
-						<button class="button" type="button" onClick=${verify}>Verify</button>
+						<button class="button" type="button" onClick=${verify} title="Compute every group again and compare it with what was frozen">Verify</button>
 						<select class="field" aria-label=${`Compare ${version.name} with`} disabled=${others.length === 0} title=${others.length ? '' : 'There is no other version yet'} onChange=${choose}>
 							<option value="">Compare with…</option>
 							${others.map(({ id, name }) => html`<option key=${id} value=${String(id)}>${name}</option>`)}
@@ -74,14 +74,14 @@ function VersionSection({ version, others, job, verify, compare, ask }) {
 				</header>
 				${version.note ? html`<p>${version.note}</p>` : null}
 				<${Facts} version=${version} />
-				${job ? html`<${VerifyReport} job=${job} />` : null}
+				<${VerifyReport} job=${job} found=${version.verified ?? null} />
 			</section>
 		</li>
 	`;
 }
 
-/** Verifications under way or done, by version. */
-function useVerify() {
+/** Verifications under way or done, by version. @param {() => void} kept called when a result is kept with its version */
+function useVerify(kept) {
 	const [jobs, setJobs] = useState(/** @type {{[id: number]: JobJson}} */ ({}));
 	const [problem, setProblem] = useState('');
 	/** @param {VersionJson} version */
@@ -89,6 +89,7 @@ function useVerify() {
 		setProblem('');
 		try {
 			await follow(await verifyVersion(version.id), (job) => setJobs((before) => ({ ...before, [version.id]: job })));
+			kept();
 		} catch (error) {
 			setProblem(sentenceOf(error));
 		}
@@ -99,7 +100,7 @@ function useVerify() {
 /** @param {{one: DatasetJson}} props */
 function VersionsOf({ one }) {
 	const versions = useResource((signal) => getVersions(one.id, signal), [one.id]);
-	const { jobs, problem, verify } = useVerify();
+	const { jobs, problem, verify } = useVerify(versions.reload);
 	const [diff, setDiff] = useState(/** @type {{older: VersionJson, newer: VersionJson} | null} */ (null));
 	const [asked, setAsked] = useState(/** @type {VersionJson | 'freeze' | null} */ (null));
 	if (versions.error) return html`<${Trouble} title="The versions cannot be shown" error=${versions.error} retry=${versions.reload} />`;

@@ -3,6 +3,7 @@
 
 import { diagonal } from '../geometry/preview.js';
 import { gradeBelow, gradeOfJac } from '../geometry/residual.js';
+import { leftOutText } from '../state/reasons.js';
 
 /** @import {PolicyJson, ViewSolutionJson} from '../api/types.js' */
 /** @import {Grade} from '../geometry/residual.js' */
@@ -19,7 +20,7 @@ export function jacOf(solved) {
 
 /** @param {ViewPicture} picture @returns {{grade: Grade, sentence: string}} */
 export function gradeOfView({ view, solved, apart }) {
-	if (!view.included) return { grade: 'unseen', sentence: 'left out' };
+	if (!view.included) return { grade: 'unseen', sentence: leftOutText(view.left_out) };
 	if (!solved) return { grade: 'unseen', sentence: 'not solved' };
 	if (!solved.calibration.camera) return { grade: 'bad', sentence: 'no camera' };
 	const given = solved.calibration.source === 'given' && jacOf(solved) === null ? 'camera given' : '';

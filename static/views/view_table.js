@@ -6,6 +6,7 @@ import { html } from 'htm/preact';
 import { gradeOfSize } from '../geometry/residual.js';
 import { fixed, percent, pixels } from '../lib/format.js';
 import { submit } from '../state/group.js';
+import { leftOutText } from '../state/reasons.js';
 import { focused, focusView } from '../state/workspace.js';
 import { Letter } from './letter.js';
 import { errorOf, gradesOf, jacOf } from './view_state.js';
@@ -68,5 +69,9 @@ function ViewRow({ group, picture }) {
 				/>
 			</td>
 		</tr>
+		${view.left_out ? html`
+			<tr class="numbers__aside" data-why=${view.left_out.reason}>
+				<td colspan="7">View ${view.letter} is ${leftOutText(view.left_out)}</td>
+			</tr>` : null}
 	`;
 }

@@ -51,6 +51,13 @@ describe('conflictOf', () => {
 		assert.ok(mergeable);
 	});
 
+	it('compares the reasons of two who left out the same view', () => {
+		const mine = { kind: 'include', view: '7.png', included: false, reason: 'duplicate_view' };
+		const left = (reason) => ({ ...group, views: [{ ...view, included: false, left_out: { reason, note: null } }] });
+		assert.ok(conflictOf(left('not_same_instant'), [item(mine)]).fields[0].overlaps);
+		assert.ok(!conflictOf(left('duplicate_view'), [item(mine)]).fields[0].overlaps);
+	});
+
 	it('holds a verdict against theirs', () => {
 		const theirs = { ...group, verdict: { ...none, state: 'accepted' } };
 		const verdict = { state: 'rejected', reason: 'other', note: 'x' };

@@ -2,8 +2,9 @@ import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
 import {
-	applyEdit, editOfFix, movePoint, previewBody, requestOf, sameTarget,
+	applyEdit, describe as describe_, editOfFix, movePoint, previewBody, requestOf, sameTarget,
 } from '../../static/state/edits.js';
+import { leftOutText } from '../../static/state/reasons.js';
 
 const view = {
 	id: 31, key: '7.png', letter: 'A', label: 'Main camera', width: 1280, height: 720, included: true,
@@ -47,6 +48,26 @@ describe('requestOf', () => {
 	it('sends a box without a point', () => {
 		const { body } = requestOf(group, { kind: 'ball', view: '7.png', ball: view.balls[0] });
 		assert.deepEqual(body, { box: [10, 10, 4, 4], occluded: false, out_of_view: false });
+	});
+});
+
+describe('an edit that leaves a view out', () => {
+	const edit = { kind: 'include', view: '7.png', included: false, reason: 'not_same_instant', note: 'a moment later' };
+
+	it('sends its reason, which is no part of what is computed', () => {
+		const { reason, note } = edit;
+		assert.deepEqual(requestOf(group, edit).body, { included: false, reason, note });
+		assert.deepEqual(requestOf(group, { ...edit, included: true }).body, { included: true });
+		assert.deepEqual(previewBody(edit), { views: { '7.png': { included: false } } });
+	});
+
+	it('shows why, until the view is taken in again', () => {
+		const left = applyEdit(group, edit);
+		assert.equal(leftOutText(left.views[0].left_out), 'left out: not the same instant (a moment later)');
+		assert.equal(describe_(group, edit), 'View A left out: not the same instant (a moment later)');
+		assert.equal(applyEdit(left, { ...edit, included: true }).views[0].left_out, null);
+		assert.equal(leftOutText(applyEdit(group, { ...edit, reason: undefined }).views[0].left_out), 'left out');
+		assert.equal(leftOutText({ reason: 'other', note: 'blurred' }), 'left out: blurred');
 	});
 });
 

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { beforeEach, describe, it } from 'node:test';
 
-import { actions, did, didAgain, forget, forgetEdit, nextBack, tookBack, undone, withAction } from '../../static/state/last_action.js';
+import { actions, did, didAgain, forget, forgetEdit, forgetUndone, nextBack, tookBack, undone, withAction } from '../../static/state/last_action.js';
 
 const edit = (group) => ({ kind: 'edit', group, number: group, times: 1 });
 const verdict = (group) => ({ kind: 'verdict', group, number: group, given: {}, before: {} });
@@ -66,5 +66,16 @@ describe('what was taken back', () => {
 		assert.deepEqual(undone.value, []);
 		didAgain();
 		assert.deepEqual(actions.value, [verdict(2), verdict(3)]);
+	});
+
+	it('is a batch under its new number once it was given again', () => {
+		actions.value = [];
+		undone.value = [];
+		tookBack(batch);
+		didAgain({ ...batch, batch: 4 });
+		assert.deepEqual([actions.value, undone.value], [[{ ...batch, batch: 4 }], []]);
+		tookBack(batch);
+		forgetUndone({ ...batch });
+		assert.deepEqual(undone.value, []);
 	});
 });

@@ -1,4 +1,4 @@
-"""Verdicts for every group that a query matches, and their undo."""
+"""Verdicts for every group that a query matches, their undo and redo."""
 
 from __future__ import annotations
 
@@ -8,8 +8,15 @@ from fastapi import APIRouter, Query
 
 from app.api.deps import Actor, AppStore, DatasetPath, Id, IdempotencyKey
 from app.api.problem import responses
-from app.api.schemas.bulk import BatchDocument, BatchList, BulkResult, BulkVerdict, UndoDocument
-from app.review import bulk, bulk_undo
+from app.api.schemas.bulk import (
+    BatchDocument,
+    BatchList,
+    BulkResult,
+    BulkVerdict,
+    RedoDocument,
+    UndoDocument,
+)
+from app.review import bulk, bulk_redo, bulk_undo
 from app.review.datasets import dataset_id
 
 router = APIRouter(tags=["verdicts"])
@@ -57,6 +64,20 @@ def list_batches(
     """The newest bulk verdicts of a dataset."""
     batches = bulk.list_batches(store, dataset_id(store, dataset), limit)
     return BatchList(items=[BatchDocument.of(item) for item in batches])
+
+
+@router.post(
+    "/verdict-batches/{batch}/redo",
+    operation_id="redoVerdictBatch",
+    responses=responses(404, 409),
+)
+def redo_batch(batch: Id, store: AppStore, actor: Actor) -> RedoDocument:
+    """Give the verdicts of a batch again that was taken back, as a new batch.
+
+    Groups that somebody has judged or edited since stay as they are. 409 when the batch was not
+    taken back, or was given again already.
+    """
+    return RedoDocument.of(bulk_redo.redo_batch(store, batch, actor=actor))
 
 
 @router.post(

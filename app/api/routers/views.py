@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -22,12 +23,14 @@ from app.api.problem import Responses, responses
 from app.api.routers.groups import CHANGED, CONFLICTS, answer, load_document
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
-from app.api.schemas.view import ViewEdit
+from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.edit import Edit, IncludeView, SetBall, SetCalibrationSource, SetLines
 from app.review.submit import submit
+from app.soccer.group import Media
 from app.store.media import content_type, read_frame
+from app.store.neighbours import FARTHEST, neighbours
 from app.store.session import Store
 
 router = APIRouter(prefix="/views", tags=["views"])
@@ -39,6 +42,7 @@ SECONDS = 3600
 NO_FRAME_HINT = (
     "The import's report says why; importing again after the files are mended attaches the frames."
 )
+NO_NEIGHBOURS = "This dataset has no frames before or after this one."
 IMAGES: Responses = {
     200: {
         "description": "The frame as JPEG, PNG or WebP.",
@@ -98,9 +102,9 @@ def patch_view(
     key: IdempotencyKey,
     response: Response,
 ) -> GroupDocument:
-    """Leave the view out of its group or take it in again, or choose its calibration."""
+    """Leave the view out of its group and say why, take it in again, or choose its calibration."""
     found = find_view(store, view)
-    edit: Edit = IncludeView(found.key, change.included)
+    edit: Edit = IncludeView(found.key, change.included, change.reason, change.note)
     if "calibration" in change.model_fields_set:
         edit = SetCalibrationSource(found.key, change.calibration)
     return _submit(store, found.group_id, edit, if_match, actor, key, response)
@@ -134,14 +138,51 @@ def get_image(
         int | None,
         Query(ge=1, le=100_000, description="Wanted width in pixels; never enlarged."),
     ] = None,
+    offset: Annotated[
+        int,
+        Query(
+            ge=-FARTHEST,
+            le=FARTHEST,
+            description="So many frames later of the same camera; `neighbours` lists which exist.",
+        ),
+    ] = 0,
 ) -> Response:
-    """The frame of a view, scaled down when a width is given."""
-    content = _frame(find_view(services.store, view), width, services.settings)
+    """The frame of a view, or one just before or after it, scaled down when a width is given."""
+    found = find_view(services.store, view)
+    content = _frame(_moved(found, offset), width, services.settings)
     etag = f'"{hashlib.sha256(content).hexdigest()[:32]}"'
     headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
     if etag_matches(request, etag):
         return Response(status_code=304, headers=headers)
     return Response(content, media_type=content_type(content), headers=headers)
+
+
+@router.get("/{view}/neighbours", operation_id="getFramesAround", responses=responses(404))
+def get_neighbours(view: Id, store: AppStore) -> NeighbourList:
+    """The frames of the same camera just before and after a view's, where they are on disk.
+
+    Only videos and folders of frames that are numbered by time have them: the files of most
+    datasets are numbered by action.
+    """
+    found = neighbours_of(find_view(store, view))
+    return NeighbourList.of(view, sorted(found), NO_NEIGHBOURS)
+
+
+def neighbours_of(view: FoundView) -> dict[int, Media]:
+    """Where the frames before and after a view's lie, by how many frames later."""
+    return {} if view.media is None else neighbours(view.media, view.group_key, view.static)
+
+
+def _moved(view: FoundView, offset: int) -> FoundView:
+    """The same view so many frames later."""
+    if offset == 0:
+        return view
+    found = neighbours_of(view)
+    if not found:
+        raise NotFoundError(f"view {view.key}: {NO_NEIGHBOURS}")
+    if offset not in found:
+        raise NotFoundError(f"view {view.key}: there is no frame {frames_away(offset)}")
+    return replace(view, media=found[offset])
 
 
 def _frame(view: FoundView, width: int | None, settings: Settings) -> bytes:

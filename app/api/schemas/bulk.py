@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.api.schemas.group import State
 from app.api.schemas.verdict import Reason
 from app.review.bulk import Batch, BatchReport, BulkPlan, Refusal
+from app.review.bulk_redo import RedoReport
 from app.review.query import MAX_LISTED_LENGTH
 
 
@@ -119,6 +120,7 @@ class BatchDocument(BaseModel):
     done: bool = Field(description="false while it runs, or when it was interrupted.")
     undone: datetime | None
     undone_by: str | None
+    redone: int | None = Field(description="The batch that gave it again after it was undone.")
 
     @staticmethod
     def of(batch: Batch) -> BatchDocument:
@@ -139,3 +141,20 @@ class UndoDocument(BaseModel):
     batch: int
     restored: int = Field(description="Groups that have the verdict of before again.")
     kept: int = Field(description="Groups that somebody has judged since.")
+
+
+class RedoDocument(BaseModel):
+    """What giving a batch again did."""
+
+    batch: int | None = Field(
+        description="The new batch, which can be taken back; null when nothing changed."
+    )
+    changed: int = Field(description="Groups that have the verdict again.")
+    kept: int = Field(description="Groups that somebody has judged or edited since.")
+    refused: list[RefusalDocument]
+
+    @staticmethod
+    def of(report: RedoReport) -> RedoDocument:
+        """The document of what was done."""
+        refused = [RefusalDocument.of(item) for item in report.refused]
+        return RedoDocument(**{**vars(report), "refused": refused})

@@ -13,6 +13,7 @@ from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.solution import SolutionDocument
 from app.review.state import GroupState, VerdictState
 from app.soccer.group import Group, View
+from app.store.neighbours import counts_time
 
 State = Literal["unreviewed", "accepted", "rejected", "deferred"]
 
@@ -40,7 +41,7 @@ class VerdictDocument(BaseModel):
     by: str | None
     at: datetime | None
     stale: bool
-    fixed: bool = Field(description="Edited by a person before it was accepted.")
+    fixed: bool = Field(description="Mended: edited, accepted as such, and it fails no gate.")
     override: str | None = Field(description="The gate that it was accepted against.")
 
     @staticmethod
@@ -73,6 +74,13 @@ class StationDocument(BaseModel):
     etag: str = Field(description="For If-Match on `/stations/{id}/lines`.")
 
 
+class LeftOutDocument(BaseModel):
+    """Why a person left a view out of its group."""
+
+    reason: str
+    note: str | None
+
+
 class ViewDocument(BaseModel):
     """One image of the instant, as annotated."""
 
@@ -83,10 +91,17 @@ class ViewDocument(BaseModel):
     width: int
     height: int
     included: bool
+    left_out: LeftOutDocument | None = Field(
+        description="Why a person left the view out, where they said so."
+    )
     station: StationDocument
     lines: LineDocuments
     balls: list[Ball]
     image: str | None = Field(description="Address of the frame, where there is one.")
+    neighbours: str | None = Field(
+        description="Address of the list of frames just before and after; null where the "
+        "dataset's frames are not numbered by time."
+    )
 
 
 class GroupDocument(BaseModel):
@@ -174,11 +189,25 @@ def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument
         width=view.size.width,
         height=view.size.height,
         included=view.included,
+        left_out=_left_out(view),
         station=_station(state, view),
         lines=lines_document(view.station.lines),
         balls=[Ball.of(ball, edited=view.key in state.stored.edited_views) for ball in view.balls],
         image=None if view.media is None else image_address(view_id),
+        neighbours=_neighbours(state.key, view, view_id),
     )
+
+
+def _neighbours(group: str, view: View, view_id: int) -> str | None:
+    media = view.media
+    if media is None or not counts_time(media, group, view.station.shared):
+        return None
+    return f"/api/v1/views/{view_id}/neighbours"
+
+
+def _left_out(view: View) -> LeftOutDocument | None:
+    why = view.left_out
+    return None if why is None else LeftOutDocument(reason=why.reason, note=why.note)
 
 
 def _station(state: GroupState, view: View) -> StationDocument:

@@ -10,10 +10,13 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt
 from app.api.schemas.policy import PolicyDocument
 from app.review.freeze import MAX_LICENCE, MAX_NOTE, FreezePlan, FreezeRequest
 from app.review.split import TEST_CAMERAS, Split
+from app.review.verification import Verification
 from app.review.version_diff import VersionDiff
 from app.review.versions import Version
 
 Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+SHOWN_DIFFERENCES = 40
+"""Differences that a version's document names; all are counted."""
 Camera = Annotated[str, Field(min_length=1, max_length=200)]
 
 
@@ -76,6 +79,51 @@ class FreezePlanDocument(BaseModel):
         return FreezePlanDocument.model_validate(vars(plan))
 
 
+class DifferenceDocument(BaseModel):
+    """Something that did not come out as it was frozen; `group` null: the version itself."""
+
+    group: str | None
+    place: str
+    frozen: Any
+    now: Any
+
+
+class VerificationDocument(BaseModel):
+    """What came of computing a version once more, the last time that somebody asked for it."""
+
+    at: datetime
+    actor: str
+    solver_version: str = Field(description="Of the solver that computed it again.")
+    ok: bool = Field(description="Whether everything came out as it was frozen.")
+    problem: str | None = Field(description="Why nothing came of it, where it failed.")
+    sentence: str
+    groups: int | None = Field(description="Groups of the version; null where it failed.")
+    equal: int | None = Field(description="Groups that came out as they were frozen.")
+    different: int | None = Field(description="Values that did not.")
+    differences: list[DifferenceDocument] = Field(description="The first of them.")
+
+    @staticmethod
+    def of(found: Verification) -> VerificationDocument:
+        """The document of a verification."""
+        report = found.report or {}
+        sentence = f"The version could not be verified: {found.problem}."
+        return VerificationDocument(
+            at=datetime.fromisoformat(found.at),
+            actor=found.actor,
+            solver_version=found.solver_version,
+            ok=bool(report.get("ok")),
+            problem=found.problem,
+            sentence=report.get("sentence", sentence),
+            groups=report.get("groups"),
+            equal=report.get("equal"),
+            different=report.get("different"),
+            differences=[
+                DifferenceDocument.model_validate(item)
+                for item in report.get("differences", ())[:SHOWN_DIFFERENCES]
+            ],
+        )
+
+
 class VersionDocument(BaseModel):
     """A frozen version."""
 
@@ -99,12 +147,19 @@ class VersionDocument(BaseModel):
     solver_version: str
     software_version: str
     previous: int | None = Field(description="Id of the version frozen before.")
+    verified: VerificationDocument | None = Field(
+        description="What came of verifying it the last time; null: nobody has."
+    )
 
     @staticmethod
     def of(version: Version) -> VersionDocument:
         """The document of a version."""
         values = {name: getattr(version, name) for name in VersionDocument.model_fields}
-        changed = {"split": version.split.values(), "policy": PolicyDocument.of(version.policy)}
+        changed = {
+            "split": version.split.values(),
+            "policy": PolicyDocument.of(version.policy),
+            "verified": version.verified and VerificationDocument.of(version.verified),
+        }
         return VersionDocument.model_validate({**values, **changed})
 
 

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Sequence
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, StrictBool, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
+
+from app.api.schemas.group import image_address
+from app.api.schemas.verdict import Reason
+from app.soccer.reasons import MAX_NOTE
 
 
 class ViewEdit(BaseModel):
@@ -13,19 +18,28 @@ class ViewEdit(BaseModel):
     model_config = ConfigDict(
         extra="forbid",
         json_schema_extra={
-            "minProperties": 1,
-            "maxProperties": 1,
-            "examples": [{"included": False}, {"calibration": "lines"}],
+            "oneOf": [{"required": ["included"]}, {"required": ["calibration"]}],
+            "examples": [
+                {"included": False, "reason": "not_same_instant"},
+                {"included": True},
+                {"calibration": "lines"},
+            ],
         },
     )
 
     included: StrictBool = True
+    reason: Reason | None = Field(default=None, description="Why the view is left out.")
+    note: Annotated[str, Field(max_length=MAX_NOTE)] | None = Field(
+        default=None, description="The same in one's own words; `other` needs it."
+    )
     calibration: Literal["given", "lines"] = "given"
 
     @model_validator(mode="after")
     def _one_thing(self) -> ViewEdit:
-        if len(self.model_fields_set) != 1:
+        if len({"included", "calibration"} & self.model_fields_set) != 1:
             raise ValueError("change one of included and calibration at a time")
+        if "calibration" in self.model_fields_set and (self.reason or self.note):
+            raise ValueError("a reason and a note belong to a view that is left out")
         return self
 
 
@@ -37,3 +51,37 @@ class StationEdit(BaseModel):
     )
 
     calibration: Literal["given", "lines"]
+
+
+class Neighbour(BaseModel):
+    """A frame of the same camera just before or after that of a view."""
+
+    offset: int = Field(description="Frames later; below zero: before.")
+    label: str
+    image: str = Field(description="Address of the frame.")
+
+
+class NeighbourList(BaseModel):
+    """The frames around a view's, in their order; `sentence` says why there are none."""
+
+    items: list[Neighbour]
+    sentence: str | None
+
+    @staticmethod
+    def of(view: int, offsets: Sequence[int], why_none: str) -> NeighbourList:
+        """The document for a view and the offsets that there are."""
+        items = [
+            Neighbour(
+                offset=offset,
+                label=frames_away(offset),
+                image=f"{image_address(view)}?offset={offset}",
+            )
+            for offset in offsets
+        ]
+        return NeighbourList(items=items, sentence=None if items else why_none)
+
+
+def frames_away(offset: int) -> str:
+    """``1 frame later``, ``3 frames before``."""
+    frames = "1 frame" if abs(offset) == 1 else f"{abs(offset)} frames"
+    return f"{frames} {'later' if offset > 0 else 'before'}"

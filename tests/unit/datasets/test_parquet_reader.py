@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -13,6 +14,7 @@ from app.datasets.parquet import write_parquet
 from app.datasets.parquet_reader import read_parquet
 from app.datasets.report import Report
 from app.soccer.group import Group
+from app.soccer.reasons import LeftOut
 
 Solved = Callable[..., ExportRecord]
 Make = Callable[..., Group]
@@ -24,6 +26,8 @@ class TestReadParquet:
         report: Report,
     ) -> None:  # fmt: skip
         groups = [soccer_group(), soccer_group("8.png", split="test", label="x")]
+        why = LeftOut("other", "another match")
+        groups[1] = groups[1].with_view(replace(groups[1].views[1], included=False, left_out=why))
         folder = tmp_path / "out"
         folder.mkdir()
         write_parquet(folder, [solved(group) for group in groups])

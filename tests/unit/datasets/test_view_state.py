@@ -19,6 +19,7 @@ from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
 from app.soccer.pitch import Pitch
+from app.soccer.reasons import LeftOut
 
 Make = Callable[..., Group]
 
@@ -38,7 +39,8 @@ class TestStateReader:
         station = replace(
             group.views[0].station, given=camera, calibration="lines", flipped=True, shared=True
         )
-        view = replace(group.views[0], balls=balls, included=False, station=station)
+        why = LeftOut("duplicate_view", "as camera 2")
+        view = replace(group.views[0], balls=balls, included=False, station=station, left_out=why)
         assert read(view_to_json(view)).view(view.size, Extras()) == view
         head = read(head_to_json(group)).head()
         assert head.group(group.views) == group

@@ -27,6 +27,8 @@ EDITS = [
     SetBall("7.png", None),
     SetBalls("7.png", (BALL, BallAnnotation(point=ImagePoint(1.0, 2.0)))),
     IncludeView("7_1.png", False),
+    IncludeView("7_1.png", False, "not_same_instant"),
+    IncludeView("7_1.png", False, "other", "another match"),
     SetCalibrationSource("7.png", "lines"),
 ]
 STATION_EDITS = [

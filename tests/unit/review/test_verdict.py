@@ -6,9 +6,10 @@ from app.errors import InputError, StaleRevisionError
 from app.review.edit import SetBall
 from app.review.queue import list_groups
 from app.review.submit import history, load, submit, undo
-from app.review.verdict import REASONS, set_verdict
+from app.review.verdict import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
+from app.soccer.reasons import REASONS
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 
@@ -78,11 +79,6 @@ class TestSetVerdict:
         assert (edited.verdict.state, edited.verdict.stale) == ("accepted", True)
         back = undo(store, state.id, if_match=edited.etag, actor="ben")
         assert not back.verdict.stale
-
-    def test_fixed_says_that_a_person_edited_before(self, store, state) -> None:
-        edited = submit(store, state.id, SetBall("7.png", BALL), if_match=state.etag, actor="ann")
-        after = judge(store, edited, "accepted", note="by hand")
-        assert after.verdict.fixed
 
     def test_everyones_is_kept_and_the_newest_counts(self, store, state) -> None:
         first = judge(store, state, "accepted", actor="ann")

@@ -1,0 +1,48 @@
+"""Reasons: why a group is rejected, or one of its views left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.errors import InputError
+
+REASONS = (
+    "bad_field_lines",
+    "sides_confused",
+    "not_same_instant",
+    "ball_not_visible",
+    "bad_calibration",
+    "duplicate_view",
+    "other",
+)
+"""``other`` needs a note."""
+MAX_NOTE = 2000
+"""Characters."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Why a person left a view out of its group; ``note`` says it in their own words."""
+
+    reason: str
+    note: str | None = None
+
+
+def left_out(reason: str | None, note: str | None) -> LeftOut | None:
+    """What a person says of a view that is left out; None when they say nothing.
+
+    Raises:
+        InputError: The reason is none, or a note is missing, stands alone or is too long.
+    """
+    note = (note or "").strip() or None
+    if note is not None and len(note) > MAX_NOTE:
+        raise InputError(f"a note has at most {MAX_NOTE} characters", pointer="/note")
+    if reason is None and note is None:
+        return None
+    if reason not in REASONS:
+        known = ", ".join(REASONS)
+        said = "a note needs a reason beside it" if reason is None else f'"{reason}" is no reason'
+        raise InputError(f"{said}; reasons are {known}", pointer="/reason")
+    if reason == "other" and note is None:
+        raise InputError('the reason "other" needs a note', pointer="/note")
+    return LeftOut(reason, note)
