@@ -14,6 +14,7 @@ import { followQueue } from '../state/queue_live.js';
 import { resume } from '../state/queue_place.js';
 import { NoticeBar } from './bars.js';
 import { ExportButton } from './export_dialog.js';
+import { FirstSteps } from './first_steps.js';
 import { Header } from './header.js';
 import { Histograms } from './histograms.js';
 import { ProgressCard } from './progress_card.js';
@@ -80,6 +81,7 @@ export function QueuePage() {
 			<main class="queue__main">
 				<h1 class="hidden-text">Queue</h1>
 				${one ? html`
+					<${FirstSteps} dataset=${one.name} />
 					<div class="queue__cards"><${Histograms} q=${q} onQuery=${setQuery} /><${ProgressCard} dataset=${one} /></div>
 					<${QueueTools} dataset=${one} q=${q} onQuery=${setQuery} />` : null}
 				${nothing ? html`<${QueueEmpty} q=${q} />` : html`<${QueueTable} q=${q} onQuery=${setQuery} />`}
