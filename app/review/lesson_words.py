@@ -24,7 +24,7 @@ class LessonWords:
 
 WORDS = {
     "clean": LessonWords(
-        question="Read the card on top and compare it with the pictures. Would you let this group "
+        question="Read the card with the result and compare it with the pictures. Would you let this group "
         "into the dataset?",
         hint="Look at the blue lines on the white paint and at the ball in the small pictures "
         "below. When both fit in every view, nothing is wrong.",
@@ -37,8 +37,7 @@ WORDS = {
         hint="Compare the names: click a red line to read which marking it is said to be. Is that "
         "the line that you see?",
         fault="In view {view} the line called “{marking}” is really “{true_marking}”.",
-        best="Take the fix that the card on top offers (it gives the line its right name), then "
-        "press A.",
+        best="Take the fix that the card offers (it gives the line its right name), then press A.",
     ),
     "swapped_sides": LessonWords(
         question="Each view fits its own lines. Do they show the ball at the same place of the "

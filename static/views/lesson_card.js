@@ -18,7 +18,7 @@ import { openHelpAt } from '../state/workspace.js';
 export const MARKS = { open: '○', mended: '○', right: '✓', almost: '≈', wrong: '✗' };
 export const WORDS = { open: 'not judged yet', mended: 'mended', right: 'right', almost: 'nearly right', wrong: 'look again' };
 
-/** Backquoted and bare keys stay as they are written. @param {{lesson: LessonJson, of?: string}} props */
+/** @param {{lesson: LessonJson, of?: string}} props */
 function Feedback({ lesson, of = '' }) {
 	return html`
 		<div class="lesson__feedback" data-state=${lesson.state} role="status">
@@ -68,7 +68,7 @@ export function LessonCard({ group }) {
 	const right = judged.filter(({ state }) => state === 'right').length;
 	return html`
 		<section class="card lesson" aria-label="Practice">
-			<h2>Practice · ${lesson.title}<${Dots} lessons=${lessons} current=${lesson.number} /></h2>
+			<h2>${lesson.title}<${Dots} lessons=${lessons} current=${lesson.number} /></h2>
 			${last ? html`<${Feedback} key=${last.number} lesson=${last} of=${`Lesson ${last.number}.`} />` : null}
 			${lesson.feedback ? html`<${Feedback} key="here" lesson=${lesson} />` : null}
 			${isJudged(lesson) ? null : html`

@@ -77,11 +77,10 @@ export function QueuePage() {
 	return html`
 		<div class="queue">
 			<${QueueHeader} field=${field} />
-			<div class="bars"><${NoticeBar} /></div>
+			<div class="bars"><${NoticeBar} />${one ? html`<${FirstSteps} dataset=${one.name} />` : null}</div>
 			<main class="queue__main">
 				<h1 class="hidden-text">Queue</h1>
 				${one ? html`
-					<${FirstSteps} dataset=${one.name} />
 					<div class="queue__cards"><${Histograms} q=${q} onQuery=${setQuery} /><${ProgressCard} dataset=${one} /></div>
 					<${QueueTools} dataset=${one} q=${q} onQuery=${setQuery} />` : null}
 				${nothing ? html`<${QueueEmpty} q=${q} />` : html`<${QueueTable} q=${q} onQuery=${setQuery} />`}

@@ -17,6 +17,7 @@ import { ViewTable } from './view_table.js';
 /** @import {GroupDocument, SolutionJson} from '../api/types.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
+const FirstSteps = lazy(async () => (await import('./first_steps.js')).FirstSteps);
 const LessonCard = lazy(async () => (await import('./lesson_card.js')).LessonCard);
 
 /**
@@ -38,6 +39,7 @@ export function Rail({ group, solution, pictures, live }) {
 					<${Findings} group=${group} solution=${solution} />
 				` : null}
 				<${ViewLines} group=${group} pictures=${pictures} />
+				<${FirstSteps} dataset=${group.dataset.name} />
 			</div>
 			<${VerdictButtons} group=${group} />
 		</aside>

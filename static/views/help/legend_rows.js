@@ -41,7 +41,7 @@ function onGrass(scene, ...draws) {
 const LETTERS = ['A', 'B', 'C', 'D', 'E', 'F'];
 const FIT = { reprojected: [66, 26], optimized_diameter_px: 24, optimized_box: [54, 14, 24, 24] };
 const fit = /** @type {any} */ (FIT);
-const solid = { selected: /** @type {const} */ ({ kind: 'point', view: KEY, marking: 'Middle line', index: 0 }) };
+const solid = { selected: /** @type {const} */ ({ kind: 'point', view: KEY, marking: 'Side', index: 0 }) };
 /** @param {boolean} sure */
 const mark = (sure) => ({ id: sure ? 1 : 2, name: 'detector', score: sure ? 0.93 : 0.31, scored: true, sure, box: /** @type {[number, number, number, number]} */ ([18, 14, 24, 24]) });
 /** @param {boolean} sure */
@@ -65,7 +65,7 @@ const PICTURES = {
 		{ name: 'Point of a wrong line', meaning: 'The ring is red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12)] }), drawMarkings, drawPoints) },
 		{ name: 'Point that is not used', meaning: 'The solver left its line out because it contradicts all others. Filled red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { used: false })] }), drawPoints) },
 		{ name: 'Whisker', meaning: 'Leads from the line to the annotated point; W makes it 1, 5 or 20 times as long as it is.', tokens: 'canvas-warn canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf(gradeAt(12), 12)] }), drawMarkings, drawWhiskers, drawPoints) },
-		{ name: 'Selected point', meaning: 'The yellow ring: arrows move this point.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('ok', 2)] }, solid), drawPoints, (context, scene) => drawSelectedPoint(context, { ...scene, viewport: { scale: 1, left: -48, top: 6 } })) },
+		{ name: 'Selected point', meaning: 'The yellow ring: arrows move this point.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('ok', 2, { marking: 'Side' })] }, { ...solid, viewport: { scale: 1, left: -50, top: 9 } }), drawPoints, drawSelectedPoint) },
 		{ name: 'Note', meaning: 'A remark that somebody left at this place.', tokens: 'canvas-warn canvas-point canvas-plate', draw: onGrass(sceneOf({ pins: [{ at: { x: 22, y: 40 }, text: 'check this' }] }), drawPins) },
 	],
 };
