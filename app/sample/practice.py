@@ -19,11 +19,13 @@ from app.datasets.soccernet_v3 import write_soccernet_v3
 from app.sample.faults import FaultPlan
 from app.sample.render import render
 from app.sample.scene import Scene
-from app.sample.scenes import make_scene, make_stage
+from app.sample.scenes import Stage, make_scene, make_stage
 from app.sample.truth import TRUTH, TruthWriter, truth_to_json
 from app.sample.write import JPEG_QUALITY, ZIP_DATE
 
 SEED = 20_260_808
+MATCH_GROUPS = 800
+"""Groups that the match of the lessons has; most of them are never made."""
 CLEAN = "clean"
 """Kind of a lesson without a fault."""
 
@@ -62,8 +64,13 @@ LESSONS = (
 
 def make_practice() -> list[Scene]:
     """The scenes of all lessons, in their order."""
-    stage = make_stage(0, len(LESSONS), SEED)
+    stage = practice_stage()
     return [make_scene(stage, lesson.number, _plan(lesson)) for lesson in LESSONS]
+
+
+def practice_stage() -> Stage:
+    """The match that all lessons are from."""
+    return make_stage(0, MATCH_GROUPS, SEED)
 
 
 def _plan(lesson: Lesson) -> FaultPlan | None:

@@ -9,9 +9,10 @@ import pytest
 from app.review.lesson_words import WORDS
 from app.review.lessons import Feedback, judge
 from app.review.state import VerdictState
-from app.sample.practice import CLEAN, LESSONS, SEED, make_practice
+from app.sample.faults import FaultPlan
+from app.sample.practice import CLEAN, LESSONS, make_practice, practice_stage
 from app.sample.scene import PRACTICE_KINDS, Scene
-from app.sample.scenes import make_scene, make_stage
+from app.sample.scenes import make_scene
 from app.soccer.annotation import make_lines
 from app.soccer.group import Group, View
 from app.soccer.pitch import twin_marking
@@ -33,7 +34,7 @@ def scenes() -> dict[str, Scene]:
 def mended(scene: Scene, kind: str) -> Group:
     """The group with the view as it was before the fault."""
     lesson = next(item for item in LESSONS if item.kind == kind)
-    sound = make_scene(make_stage(0, len(LESSONS), SEED), lesson.number, None).group
+    sound = make_scene(practice_stage(), lesson.number, None).group
     return with_view(scene.group, sound.views[lesson.view])
 
 
@@ -146,9 +147,7 @@ class TestRejectable:
         assert told(scene, scene.group, ACCEPTED).state == "wrong"
 
     def test_leaving_the_view_of_another_moment_out_is_right_where_two_others_remain(self):
-        stage = make_stage(0, len(LESSONS), SEED)
-        from app.sample.faults import FaultPlan
-
+        stage = practice_stage()
         numbers = range(501, 560)
         made = (make_scene(stage, n, FaultPlan("not_synchronous", 1, 1)) for n in numbers)
         scene = next(item for item in made if len(item.group.views) == 3)

@@ -10,9 +10,15 @@ import numpy as np
 import pytest
 
 from app.datasets.match_frames import ARCHIVE
-from app.sample.practice import CLEAN, LESSONS, make_practice, write_practice
+from app.sample.practice import (
+    CLEAN,
+    LESSONS,
+    make_practice,
+    practice_stage,
+    write_practice,
+)
 from app.sample.scene import PRACTICE_KINDS, Scene
-from app.sample.scenes import make_scene, make_stage
+from app.sample.scenes import make_scene
 from app.sample.truth import read_truth
 from app.soccer.policy import PAPER
 from app.soccer.solution import Solution
@@ -81,7 +87,7 @@ class TestLessons:
     @pytest.mark.parametrize("kind", MENDABLE)
     def test_what_was_there_before_the_fault_mends_it(self, scenes: dict[str, Scene], kind: str):
         lesson = next(item for item in LESSONS if item.kind == kind)
-        sound = make_scene(make_stage(0, len(LESSONS), 20_260_808), lesson.number, None)
+        sound = make_scene(practice_stage(), lesson.number, None)
         spoilt = scenes[kind].group
         views = [replace(view, media=None) for view in spoilt.views]
         views[lesson.view] = sound.group.views[lesson.view]
