@@ -67,5 +67,5 @@ export function App() {
 		const timer = setTimeout(fetchAhead, FETCH_AHEAD_AFTER);
 		return () => clearTimeout(timer);
 	}, []);
-	return html`<${Page} />${helpOpen.value ? html`<${Help} key=${helpOpen.value} opening=${helpOpen.value} />` : null}${paletteOpen.value ? html`<${Palette} key=${paletteOpen.value} />` : null}<${Announcer} />`;
+	return html`<${Page} />${helpOpen.value && page.value.page !== 'help' ? html`<${Help} key=${helpOpen.value} opening=${helpOpen.value} />` : null}${paletteOpen.value ? html`<${Palette} key=${paletteOpen.value} />` : null}<${Announcer} />`;
 }
