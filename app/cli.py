@@ -289,6 +289,28 @@ def sample(
 
 
 @app.command()
+def practice(
+    again: Annotated[
+        bool, typer.Option("--again", help="Forget what was answered and begin afresh.")
+    ] = False,
+    json_: Json = False,
+) -> None:
+    """Make eight practice groups with known answers, as the dataset practice; done once."""
+    from app.review.practice import make_practice_dataset
+
+    settings = read_settings()
+    with _store(settings) as store, show_progress("Making the practice groups") as progress:
+        made = make_practice_dataset(
+            store,
+            settings,
+            lambda done, total, _: progress(done, total),
+            again=again,
+            actor="local",
+        )
+    print_values(made, json_)
+
+
+@app.command()
 def migrate() -> None:
     """Bring the database to this version's schema."""
     from app.store.migrate import migrate as run_migrations

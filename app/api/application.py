@@ -28,6 +28,7 @@ from app.api.routers import (
     jobs,
     pitch,
     policies,
+    practice,
     predictions,
     saved_views,
     stations,
@@ -69,6 +70,7 @@ ROUTERS = (
     bulk,
     saved_views,
     statistics,
+    practice,
 )
 
 

@@ -18,6 +18,7 @@ from app.errors import InputError
 from app.review.evaluation_jobs import resume_evaluations
 from app.review.import_jobs import resume_imports
 from app.review.jobs import Jobs, Pool
+from app.review.practice import resume_practice
 from app.review.solve_job import resume_solving, solve_leftovers
 from app.review.version_jobs import resume_versions
 from app.review.yield_store import YieldStore
@@ -57,6 +58,7 @@ class Services:
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
         resume_evaluations(self.jobs, self.store)
+        resume_practice(self.jobs, self.store, self.settings)
         self.jobs.start()
         solve_leftovers(self.jobs, self.store, actor=LOCAL_USER)
 

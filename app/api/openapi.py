@@ -33,6 +33,7 @@ TAGS = {
     "versions": "Datasets as they were frozen.",
     "exports": "Datasets as files.",
     "policies": "The thresholds that judge a dataset.",
+    "practice": "Eight groups with known answers, to learn on.",
     "jobs": "Work that outlasts a request: how far it is and what came of it.",
     "events": "What changes, as it changes.",
     "pitch": "Names and shapes of the 26 markings.",

@@ -36,6 +36,7 @@ PAGES = (
     "/exports",
     "/findings",
     "/help",
+    "/help/{tab}",
     "/import",
     "/jobs",
 )

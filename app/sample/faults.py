@@ -17,6 +17,10 @@ FAULT_SHARE = 1 / 3
 POINT_SHIFT_PX = (30.0, 90.0)
 TINY_BASELINE_M = (0.1, 0.7)
 BALL_SHIFT_M = (1.8, 7.0)
+PLAIN_PX = 250.0
+"""Length from which on nobody can miss a line."""
+UNDRAWN = 2
+"""Lines that are left undrawn: with one alone most views still pass."""
 SMALLEST_GAP_M = 1.2
 """Distance of two rays that no longer meet, so that the fault can be seen at all."""
 
@@ -98,6 +102,23 @@ def spoil_view(plan: FaultPlan, view: View) -> tuple[View, PlantedFault]:
     if plan.kind == "bad_point":
         return _move_point(rng, view)
     return _mislabel(rng, view)
+
+
+def leave_undrawn(plan: FaultPlan, view: View) -> tuple[View, tuple[PlantedFault, ...]]:
+    """Take the points of straight markings away that are plain to see, as if nobody drew them.
+
+    Args:
+        plan: Of kind ``undrawn_line``.
+    """
+    rng = np.random.default_rng([plan.seed, 0xBAD])
+    lines = dict(view.station.lines)
+    plain = sorted(n for n, p in lines.items() if n not in CIRCLES and _span(p) > PLAIN_PX)
+    count = min(UNDRAWN, len(plain))
+    chosen = [str(name) for name in rng.choice(plain or [""], count, replace=False)]
+    for name in chosen:
+        del lines[name]
+    faults = tuple(PlantedFault(plan.kind, view.key, name) for name in chosen)
+    return _with_lines(view, make_lines(lines)), faults
 
 
 def _move_point(rng: np.random.Generator, view: View) -> tuple[View, PlantedFault]:

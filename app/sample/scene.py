@@ -19,6 +19,8 @@ FAULT_KINDS = (
     "missing_ball",
     "wrong_label",
 )
+PRACTICE_KINDS = (*FAULT_KINDS, "undrawn_line")
+"""With the one kind that only the practice groups have: ordinary samples stay what they are."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +28,10 @@ class PlantedFault:
     """One mistake that was put into a scene on purpose.
 
     Attributes:
-        kind: One of ``FAULT_KINDS``.
+        kind: One of ``PRACTICE_KINDS``.
         view: Key of the view that carries it.
-        marking: The marking concerned, as the annotation names it; None for a whole view.
+        marking: The marking concerned, as the annotation names (or, when undrawn, should name)
+            it; None for a whole view.
         true_marking: What a mislabelled marking really is.
         index: Which point of the marking was displaced.
         amount: By how much: pixels for ``bad_point``; metres that the ball moved for

@@ -16,7 +16,14 @@ from app.geometry.camera import Camera
 from app.geometry.sphere import tight_box
 from app.sample.annotate import click_lines, loose_box, person_boxes, person_tags
 from app.sample.cameras import MIN_PARALLAX, Rig, aim, make_rig, parallax, replay_seat
-from app.sample.faults import FaultPlan, another_instant, beside_main, plan_fault, spoil_view
+from app.sample.faults import (
+    FaultPlan,
+    another_instant,
+    beside_main,
+    leave_undrawn,
+    plan_fault,
+    spoil_view,
+)
 from app.sample.fixture import Fixture, group_counts, make_fixture
 from app.sample.instant import (
     BALL_DIAMETER,
@@ -82,19 +89,42 @@ def make_match(
         groups: How many groups it has.
         numbers: Which groups to make, all when None.
     """
-    rng = np.random.default_rng([seed, match, 0x21])
-    stage = Stage(make_fixture(match, seed), make_rig(rng), shirt_numbers(rng), seed, groups)
+    stage = make_stage(match, groups, seed)
     wanted = range(groups) if numbers is None else numbers
     return [_make_scene(stage, number, faults) for number in wanted]
 
 
+def make_stage(match: int, groups: int, seed: int) -> Stage:
+    """What the groups of a match share: the same for the same seed."""
+    rng = np.random.default_rng([seed, match, 0x21])
+    return Stage(make_fixture(match, seed), make_rig(rng), shirt_numbers(rng), seed, groups)
+
+
 def _make_scene(stage: Stage, number: int, faults: bool) -> Scene:
-    rng = np.random.default_rng([stage.seed, stage.fixture.index, number])
-    replays = 1 + int(rng.choice(3, p=REPLAY_COUNT_SHARE))
     # Faults draw from their own stream, so that a scene without them is else the same.
     fault_rng = np.random.default_rng([stage.seed, stage.fixture.index, number, 0xFA])
-    plan = plan_fault(fault_rng, replays + 1)
-    plan = plan if faults else None
+    plan = plan_fault(fault_rng, _replays(_scene_rng(stage, number)) + 1)
+    return make_scene(stage, number, plan if faults else None)
+
+
+def _scene_rng(stage: Stage, number: int) -> np.random.Generator:
+    return np.random.default_rng([stage.seed, stage.fixture.index, number])
+
+
+def _replays(rng: np.random.Generator) -> int:
+    return 1 + int(rng.choice(3, p=REPLAY_COUNT_SHARE))
+
+
+def make_scene(stage: Stage, number: int, plan: FaultPlan | None) -> Scene:
+    """One scene of a match, with the fault that somebody planned for it, or none.
+
+    Args:
+        stage: The match.
+        number: Number of the group in its match, from 0; it decides all but the fault.
+        plan: What shall be wrong with it.
+    """
+    rng = _scene_rng(stage, number)
+    replays = _replays(rng)
     shots, planted = _film(rng, stage, replays, plan)
     keys = [f"{number}.png"] + [f"{number}_{index}.png" for index in range(1, replays + 1)]
     tags = person_tags(rng, shots[0].instant)
@@ -111,7 +141,9 @@ def _make_scene(stage: Stage, number: int, faults: bool) -> Scene:
         people = person_boxes(rng, shot.camera, shot.instant, tags)
         views.append(View(key, station, (ball,), extras=Extras(people, metadata=metadata)))
     recorded = _record(plan, planted, keys)
-    if plan is not None and planted is None:
+    if plan is not None and plan.kind == "undrawn_line":
+        views[plan.view_index], recorded = leave_undrawn(plan, views[plan.view_index])
+    elif plan is not None and planted is None:
         views[plan.view_index], fault = spoil_view(plan, views[plan.view_index])
         recorded = (fault,)
     group = Group(

@@ -15,7 +15,7 @@ from app.datasets.camera_json import camera_from_json, camera_to_json
 from app.datasets.fields import whole
 from app.datasets.json_text import read_json
 from app.errors import DatasetFormatError
-from app.sample.scene import FAULT_KINDS, PlantedFault, SceneTruth, ViewTruth
+from app.sample.scene import PRACTICE_KINDS, PlantedFault, SceneTruth, ViewTruth
 from app.soccer.frames import Box
 
 TRUTH = "truth.json"
@@ -99,7 +99,7 @@ def _truth_from_json(key: str, value: Any, path: str) -> SceneTruth:
 
 
 def _fault_from_json(value: dict[str, Any]) -> PlantedFault:
-    if value["kind"] not in FAULT_KINDS:
+    if value["kind"] not in PRACTICE_KINDS:
         raise ValueError(f"{value['kind']} is no kind of fault")
     index, amount = value.get("index"), value.get("amount")
     return PlantedFault(

@@ -156,3 +156,10 @@ export function upload(path, file, progress, signal) {
 		sending.send(file);
 	});
 }
+
+/** A file of the application itself. @param {string} url absolute @returns {Promise<any>} its JSON */
+export async function getOwn(url) {
+	const response = await fetch(url);
+	if (!response.ok) throw new ApiError(response.status, null);
+	return response.json();
+}

@@ -15,7 +15,7 @@ export const place = signal(here());
 
 /** @typedef {'yield' | 'policy' | 'statistics' | 'versions' | 'evaluation'} DatasetPage */
 /** @typedef {'queue' | 'datasets' | 'import' | 'jobs' | 'exports' | 'unknown'} PlainPage */
-/** @typedef {{page: PlainPage} | {page: 'review', group: number | null} | {page: 'calibration', group: number} | {page: DatasetPage, dataset: string}} Page */
+/** @typedef {{page: PlainPage} | {page: 'help', tab: string} | {page: 'review', group: number | null} | {page: 'calibration', group: number} | {page: DatasetPage, dataset: string}} Page */
 
 const PLAIN = /** @type {{[path: string]: PlainPage}} */ ({
 	'/': 'queue', '/groups': 'queue', '/datasets': 'datasets', '/import': 'import', '/jobs': 'jobs', '/exports': 'exports',
@@ -31,6 +31,8 @@ export const page = computed(/** @returns {Page} */ () => {
 	if (review) return { page: 'review', group: review[1] ? Number(review[1]) : null };
 	const editor = /^\/review\/(\d+)\/calibration\/?$/.exec(path);
 	if (editor) return { page: 'calibration', group: Number(editor[1]) };
+	const help = /^\/help(?:\/(keys|legend|words|guide|practice))?\/?$/.exec(path);
+	if (help) return { page: 'help', tab: help[1] ?? 'keys' };
 	const found = OF_DATASET.exec(path);
 	if (found) return { page: /** @type {DatasetPage} */ (found[2] ?? 'yield'), dataset: textOf(found[1]) };
 	return { page: 'unknown' };

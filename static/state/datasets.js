@@ -16,6 +16,9 @@ export const datasets = signal(/** @type {DatasetJson[] | null} */ (null));
 /** Why the list could not be read; null when it could. */
 export const failure = signal(/** @type {ApiError | null} */ (null));
 
+/** The dataset of practice groups, as the server calls it. */
+export const PRACTICE = 'practice';
+
 const remembered = stored('dataset', '');
 
 /** The dataset of the address bar, else the last one used, else the first. */
@@ -23,7 +26,9 @@ export const dataset = computed(() => {
 	const all = datasets.value ?? [];
 	const named = pageDataset.value || param('dataset');
 	if (named) return all.find((one) => one.name === named) ?? null;
-	return all.find((one) => one.name === remembered.value) ?? all[0] ?? null;
+	// Nobody is sent to the practice who did not ask for it.
+	const first = all.find((one) => one.name !== PRACTICE) ?? all[0];
+	return all.find((one) => one.name === remembered.value) ?? first ?? null;
 });
 
 /** Read the list again. */

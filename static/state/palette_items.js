@@ -6,6 +6,7 @@ import { ApiError } from '../api/problem.js';
 import { activeBindings, keysOf, written } from '../lib/keys.js';
 import { navigate } from '../lib/router.js';
 import { reviewAddress } from './navigation.js';
+import { openHelpAt } from './workspace.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
 /** @import {Binding} from '../lib/keys.js' */
@@ -20,6 +21,22 @@ import { reviewAddress } from './navigation.js';
  */
 
 const MOST = 8;
+
+/** The parts of the help: name, label, and what else people may call it. */
+export const HELP_PARTS = [
+	{ name: 'keys', label: 'Keys', hint: 'help, shortcuts, keyboard' },
+	{ name: 'legend', label: 'Legend', hint: 'help, colours, dashes, marks' },
+	{ name: 'words', label: 'Glossary', hint: 'help, words, terms' },
+	{ name: 'guide', label: 'Guide', hint: 'help, how to review' },
+	{ name: 'practice', label: 'Practice', hint: 'help, learn on eight groups' },
+];
+
+/** Each part of the help opens over the page, so that nobody loses their place. @returns {Item[]} */
+export function helpItems() {
+	return HELP_PARTS.map(({ name, label, hint }) => ({
+		id: `help-${name}`, kind: 'Pages', label, hint, run: () => openHelpAt(name),
+	}));
+}
 
 /** What can be done on this page: its own keys. @returns {Item[]} */
 export function actionItems() {

@@ -50,14 +50,23 @@ export const gatesOpen = stored('gates-open', false);
 export const equalViews = stored('equal-views', false);
 export const stripCollapsed = stored('strip-collapsed', false);
 
-/** Which opening of the page of keys is shown; 0: none. */
+/** Which opening of the help is shown; 0: none. */
 export const helpOpen = signal(0);
 let openings = 0;
 
-/** Show the page of keys, though one that was just left may still be closing. */
-export function openHelp() {
+/** Which part of the help is shown. */
+export const helpTab = signal('keys');
+
+/** Show a part of the help over the page, though one that was just left may still be closing. @param {string} tab */
+export function openHelpAt(tab) {
 	openings += 1;
+	helpTab.value = tab;
 	helpOpen.value = openings;
+}
+
+/** Show the keys of the page. */
+export function openHelp() {
+	openHelpAt('keys');
 }
 
 /** The next whisker gain. */

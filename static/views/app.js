@@ -13,13 +13,14 @@ import { Announcer } from './bars.js';
 import { Header } from './header.js';
 import { LazyPage, loadPage } from './lazy_page.js';
 import { ReviewPage } from './review_page.js';
+import { explainTerms } from './term.js';
 
 /** Milliseconds. */
 const FETCH_AHEAD_AFTER = 1500;
 
 /** @type {import('../lib/keys.js').Binding[]} */
 const GLOBAL_KEYS = [
-	{ keys: ['?', 'Shift+?'], label: 'This page', group: 'Everywhere', shown: '?', run: openHelp },
+	{ keys: ['?', 'Shift+?'], label: 'Help: keys, legend, words, guide, practice', group: 'Everywhere', shown: '?', run: openHelp },
 	{ keys: ['Ctrl+k'], label: 'Go to a page, dataset, group or action', group: 'Everywhere', typing: true, run: openPalette },
 	// Pages with a search field of their own bind it to that.
 	{ keys: ['/'], label: 'Search', group: 'Everywhere', run: openPalette },
@@ -61,9 +62,10 @@ function fetchAhead() {
 
 export function App() {
 	useKeys(GLOBAL_KEYS);
+	useEffect(explainTerms, []);
 	useEffect(() => {
 		const timer = setTimeout(fetchAhead, FETCH_AHEAD_AFTER);
 		return () => clearTimeout(timer);
 	}, []);
-	return html`<${Page} />${helpOpen.value ? html`<${Help} key=${helpOpen.value} opening=${helpOpen.value} />` : null}${paletteOpen.value ? html`<${Palette} key=${paletteOpen.value} />` : null}<${Announcer} />`;
+	return html`<${Page} />${helpOpen.value && page.value.page !== 'help' ? html`<${Help} key=${helpOpen.value} opening=${helpOpen.value} />` : null}${paletteOpen.value ? html`<${Palette} key=${paletteOpen.value} />` : null}<${Announcer} />`;
 }

@@ -24,6 +24,7 @@ export const PLAIN_PAGES = [
 	{ name: 'import', label: 'Import', href: '/import' },
 	{ name: 'jobs', label: 'Jobs', href: '/jobs' },
 	{ name: 'exports', label: 'Exports', href: '/exports' },
+	{ name: 'help', label: 'Help', href: '/help' },
 ];
 
 /** The address of a page of a dataset. @param {string} dataset @param {string} page */

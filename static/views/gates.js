@@ -74,7 +74,7 @@ export function Gates({ group, solution }) {
 					return html`
 						<li key=${gate.name} data-state=${state} data-gate=${gate.name}>
 							<span aria-hidden="true">${glyph}</span>
-							<span class="gates__name">${gateLabel(gate, group.policy)}<span class="hidden-text">, ${word}:</span></span>
+							<span class="gates__name term" tabindex="0" data-term=${`gate:${gate.name}`}>${gateLabel(gate, group.policy)}<span class="hidden-text">, ${word}:</span></span>
 							<span class="gates__value" title=${margin}>${unbroken(gate.sentence)}</span>
 							${gatesOpen.value && margin ? html`<span class="gates__margin">${margin}</span>` : null}
 						</li>`;

@@ -46,7 +46,7 @@ export function Header({ current, children }) {
 			<${DatasetMenu} current=${current} name=${name} />
 			<${Navigation} current=${current} name=${name} />
 			${children ?? html`<span class="header__middle"></span>`}
-			<button class="header__help" type="button" aria-label="Keys" title="Keys" onClick=${openHelp}><kbd>?</kbd></button>
+			<button class="header__help" type="button" aria-label="Help" title="Help: keys, legend, words, guide, practice" onClick=${openHelp}><kbd>?</kbd></button>
 		</header>
 	`;
 }

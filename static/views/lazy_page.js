@@ -20,6 +20,7 @@ const LOADERS = {
 	evaluation: async () => (await import('./evaluation/evaluation_page.js')).EvaluationPage,
 	exports: async () => (await import('./exports_page.js')).ExportsPage,
 	import: async () => (await import('./import_page.js')).ImportPage,
+	help: async () => (await import('./help/page.js')).HelpPage,
 	jobs: async () => (await import('./jobs_page.js')).JobsPage,
 };
 

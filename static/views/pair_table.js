@@ -5,6 +5,7 @@ import { html } from 'htm/preact';
 
 import { fixed, pixels, words } from '../lib/format.js';
 import { Letter } from './letter.js';
+import { Term } from './term.js';
 
 /** @import {GroupDocument, SolutionJson} from '../api/types.js' */
 
@@ -20,9 +21,9 @@ export function PairTable({ group, solution }) {
 				<thead>
 					<tr>
 						<th scope="col">pair</th>
-						<th scope="col" title="Parallax angle">β</th>
-						<th scope="col" title="Distance of the cameras">base m</th>
-						<th scope="col" title="Reprojection error in both views">errors px</th>
+						<th scope="col"><${Term} word="parallax">β<//></th>
+						<th scope="col"><${Term} word="column:pair_baseline">base m<//></th>
+						<th scope="col"><${Term} word="column:pair_errors">errors px<//></th>
 						<th scope="col"><span class="hidden-text">valid</span></th>
 					</tr>
 				</thead>

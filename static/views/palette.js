@@ -10,7 +10,7 @@ import { navigate, page } from '../lib/router.js';
 import { dataset, datasets, loadDatasets, useDataset } from '../state/datasets.js';
 import { document as shownGroup } from '../state/group.js';
 import { paletteOpen, takeTyped } from '../state/palette.js';
-import { actionItems, groupItems, matching } from '../state/palette_items.js';
+import { actionItems, groupItems, helpItems, matching } from '../state/palette_items.js';
 import { DATASET_PAGES, pageAddress, PLAIN_PAGES } from './dataset_menu.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
@@ -95,7 +95,7 @@ export function Palette() {
 		setChosen(typed.chosen);
 	}, []);
 	useEffect(() => { loadDatasets(); }, []);
-	const fixed = matching([...pageItems(present()), ...datasetItems(), ...actions], text.trim());
+	const fixed = matching([...pageItems(present()), ...helpItems(), ...datasetItems(), ...actions], text.trim());
 	const all = [...groups, ...fixed];
 	const [opening] = useState(paletteOpen.value);
 	const items = KINDS.flatMap((kind) => all.filter((item) => item.kind === kind));

@@ -14,6 +14,7 @@ import { followQueue } from '../state/queue_live.js';
 import { resume } from '../state/queue_place.js';
 import { NoticeBar } from './bars.js';
 import { ExportButton } from './export_dialog.js';
+import { FirstSteps } from './first_steps.js';
 import { Header } from './header.js';
 import { Histograms } from './histograms.js';
 import { ProgressCard } from './progress_card.js';
@@ -76,7 +77,7 @@ export function QueuePage() {
 	return html`
 		<div class="queue">
 			<${QueueHeader} field=${field} />
-			<div class="bars"><${NoticeBar} /></div>
+			<div class="bars"><${NoticeBar} />${one ? html`<${FirstSteps} dataset=${one.name} />` : null}</div>
 			<main class="queue__main">
 				<h1 class="hidden-text">Queue</h1>
 				${one ? html`

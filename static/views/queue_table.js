@@ -27,10 +27,10 @@ const COLUMNS = [
 	{ label: 'First failing gate', sort: 'gate' },
 	{ label: 'margin', sort: 'margin', numeric: true },
 	{ label: 'min JaC', sort: 'jac', numeric: true },
-	{ label: 'px', sort: 'error', numeric: true, title: 'Largest reprojection error of the ball' },
-	{ label: 'σ m', sort: 'sigma', numeric: true, title: 'Uncertainty of the ball’s position' },
-	{ label: 'β', sort: 'parallax', numeric: true, title: 'Parallax: the largest angle between two rays' },
-	{ label: 'Ø', sort: 'ratio', numeric: true, title: 'Ball box against the expected diameter' },
+	{ label: 'px', sort: 'error', numeric: true },
+	{ label: 'σ m', sort: 'sigma', numeric: true },
+	{ label: 'β', sort: 'parallax', numeric: true },
+	{ label: 'Ø', sort: 'ratio', numeric: true },
 	{ label: 'views', sort: 'views', numeric: true },
 	{ label: 'split', sort: 'split', narrow: true },
 	{ label: 'Findings', sort: 'findings' },
@@ -50,9 +50,9 @@ function HeadCell({ column, q, onQuery }) {
 	/** @param {string} name */
 	const turn = (name) => onQuery(withField(q, 'sort', [`sort:${name}${order === 'ascending' ? '-desc' : ''}`]));
 	return html`
-		<div role="columnheader" class="queue-cell" data-narrow=${Boolean(column.narrow)} data-numeric=${Boolean(column.numeric)} title=${column.title} aria-sort=${sort ? (order ?? 'none') : undefined}>
+		<div role="columnheader" class="queue-cell" data-narrow=${Boolean(column.narrow)} data-numeric=${Boolean(column.numeric)} aria-sort=${sort ? (order ?? 'none') : undefined}>
 			${sort ? html`
-				<button type="button" onClick=${() => turn(sort)}>
+				<button type="button" data-term=${`column:${sort}`} onClick=${() => turn(sort)}>
 					${column.label}<span aria-hidden="true">${order === 'ascending' ? ' ↑' : order === 'descending' ? ' ↓' : ''}</span>
 				</button>` : html`${column.label}${column.hidden ? html`<span class="hidden-text">${column.hidden}</span>` : null}`}
 		</div>

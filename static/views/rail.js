@@ -3,6 +3,8 @@
 
 import { html } from 'htm/preact';
 
+import { lazy } from '../lib/lazy.js';
+import { PRACTICE } from '../state/datasets.js';
 import { Findings } from './findings.js';
 import { Gates } from './gates.js';
 import { PairTable } from './pair_table.js';
@@ -15,6 +17,9 @@ import { ViewTable } from './view_table.js';
 /** @import {GroupDocument, SolutionJson} from '../api/types.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
+const FirstSteps = lazy(async () => (await import('./first_steps.js')).FirstSteps);
+const LessonCard = lazy(async () => (await import('./lesson_card.js')).LessonCard);
+
 /**
  * @param {{
  *   group: GroupDocument, solution: SolutionJson | null, pictures: ViewPicture[], live: boolean
@@ -24,6 +29,7 @@ export function Rail({ group, solution, pictures, live }) {
 	return html`
 		<aside class="rail" aria-label="Numbers and verdict">
 			<div class="rail__scroll" tabindex="0" role="group" aria-label="Numbers">
+				${group.dataset.name === PRACTICE ? html`<${LessonCard} group=${group} />` : null}
 				<${VerdictCard} group=${group} solution=${solution} live=${live} />
 				${solution ? html`<${Gates} group=${group} solution=${solution} />` : null}
 				<${ViewTable} group=${group} pictures=${pictures} />
@@ -33,6 +39,7 @@ export function Rail({ group, solution, pictures, live }) {
 					<${Findings} group=${group} solution=${solution} />
 				` : null}
 				<${ViewLines} group=${group} pictures=${pictures} />
+				<${FirstSteps} dataset=${group.dataset.name} />
 			</div>
 			<${VerdictButtons} group=${group} />
 		</aside>

@@ -9,6 +9,7 @@ import { submit } from '../state/group.js';
 import { leftOutText } from '../state/reasons.js';
 import { focused, focusView } from '../state/workspace.js';
 import { Letter } from './letter.js';
+import { Term } from './term.js';
 import { errorOf, gradesOf, jacOf } from './view_state.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
@@ -28,11 +29,11 @@ export function ViewTable({ group, pictures }) {
 				<thead>
 					<tr>
 						<th scope="col">view</th>
-						<th scope="col" title="Share of markings within 0.5 % of the diagonal">JaC</th>
-						<th scope="col" title="Ball, annotated to reprojected">px</th>
-						<th scope="col" title="The same in per cent of the diagonal">%</th>
-						<th scope="col" title="Diameter that fits the 3D ball, pixels">Ø px</th>
-						<th scope="col" title="Annotated over fitting diameter">ratio</th>
+						<th scope="col"><${Term} word="jac">JaC<//></th>
+						<th scope="col"><${Term} word="column:view_error">px<//></th>
+						<th scope="col"><${Term} word="column:view_percent">%<//></th>
+						<th scope="col"><${Term} word="column:view_diameter">Ø px<//></th>
+						<th scope="col"><${Term} word="column:view_ratio">ratio<//></th>
 						<th scope="col"><span class="hidden-text">included</span></th>
 					</tr>
 				</thead>

@@ -153,7 +153,7 @@ class TestDialogs:
             ("/datasets", "Delete…"),
             ("/datasets/sample/versions", "Freeze a version…"),
             ("/datasets/sample/evaluation", "Upload predictions…"),
-            ("/jobs", "Keys"),
+            ("/jobs", "Help"),
             ("/jobs", "Dataset and pages"),
         ],
     )

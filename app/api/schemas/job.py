@@ -9,7 +9,9 @@ from pydantic import BaseModel, Field
 
 from app.store.jobs import Job
 
-JobKind = Literal["solve", "import", "export", "freeze", "verify", "evaluate", "detect", "bulk"]
+JobKind = Literal[
+    "solve", "import", "export", "freeze", "verify", "evaluate", "detect", "bulk", "practice"
+]
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 
 

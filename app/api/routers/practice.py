@@ -1,0 +1,46 @@
+"""Practice: eight groups with known answers, and what was said to them."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+
+from app.api.deps import Actor, AppServices, Id
+from app.api.jobs import ACCEPTED, accepted
+from app.api.problem import responses
+from app.api.schemas.job import JobDocument
+from app.api.schemas.practice import LessonDocument, PracticeBody, PracticeDocument
+from app.review.practice import read_lesson, read_practice, request_practice
+from app.review.submit import load
+
+router = APIRouter(tags=["practice"])
+
+
+@router.get("/practice", operation_id="getPractice", responses=responses())
+def get_practice(services: AppServices) -> PracticeDocument:
+    """Every lesson and what has come of it; none until the practice is made."""
+    return PracticeDocument.of(read_practice(services.store, services.settings))
+
+
+@router.post(
+    "/practice",
+    operation_id="startPractice",
+    status_code=202,
+    responses={**responses(409, 413, 415, 503), **ACCEPTED},
+)
+def start_practice(
+    request: PracticeBody, services: AppServices, actor: Actor, response: Response
+) -> JobDocument:
+    """Make the dataset `practice`; sent again it changes nothing, with `again` it begins afresh.
+
+    The job's result has `dataset`, `groups` and `first`, the id of the first lesson's group.
+    """
+    job = request_practice(
+        services.jobs, services.store, services.settings, again=request.again, actor=actor
+    )
+    return accepted(job, response)
+
+
+@router.get("/groups/{group}/lesson", operation_id="getLesson", responses=responses(404))
+def get_lesson(group: Id, services: AppServices) -> LessonDocument:
+    """What a practice group asks, and whether it was answered rightly; 404 for other groups."""
+    return LessonDocument.of(read_lesson(services.settings, load(services.store, group)))

@@ -1,0 +1,30 @@
+// @ts-check
+/** Requests about the practice groups. */
+
+import { request } from './client.js';
+
+/** @import {JobJson} from './jobs.js' */
+
+/**
+ * @typedef {object} LessonJson
+ * @property {number} group
+ * @property {number} number from 1
+ * @property {number} total
+ * @property {string} title
+ * @property {string} question
+ * @property {string} hint
+ * @property {string} verdict
+ * @property {'open' | 'mended' | 'right' | 'almost' | 'wrong'} state
+ * @property {string | null} feedback
+ * @property {string | null} best
+ */
+
+/** @param {AbortSignal} [signal] @returns {Promise<{dataset: string, lessons: LessonJson[]}>} */
+export function getPractice(signal) {
+	return request('/practice', { signal });
+}
+
+/** @param {boolean} again forget what was answered @returns {Promise<JobJson>} */
+export function postPractice(again) {
+	return request('/practice', { method: 'POST', body: { again } });
+}

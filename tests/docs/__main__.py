@@ -1,0 +1,9 @@
+"""Write the pages that follow from others: ``python -m tests.docs``."""
+
+from __future__ import annotations
+
+from tests.docs.pages import GLOSSARY_PAGE, GUIDE, glossary_page, guide_text
+
+if __name__ == "__main__":
+    GLOSSARY_PAGE.write_text(glossary_page(), encoding="utf-8")
+    GUIDE.write_text(guide_text(), encoding="utf-8")

@@ -1,0 +1,259 @@
+"""Help inside the product: found, true, readable by everybody; and a practice that answers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.e2e.conftest import Console, _serving, _touchline
+from tests.e2e.screen import Screen
+from tests.e2e.test_access import serious, serious_in_both
+
+OpenPage = Callable[..., Page]
+Json = dict[str, Any]
+TOKENS = Path(__file__).resolve().parents[2] / "static" / "css" / "tokens.css"
+STRUCTURE = frozenset({"canvas-halo", "canvas-chalk", "canvas-chalk-soft"})
+"""Colours below and around marks, which mean nothing themselves."""
+
+
+def open_help(page: Page) -> None:
+    page.keyboard.press("?")
+    expect(page.get_by_role("tab", name="Keys")).to_be_visible()
+
+
+class TestFound:
+    def test_a_question_mark_opens_it_over_the_review_and_nobody_loses_their_place(
+        self, review: Callable[[int], Screen]
+    ) -> None:
+        screen = review(0)
+        page, address = screen.page, screen.page.url
+        open_help(page)
+        page.get_by_role("tab", name="Keys").focus()
+        for name, words in (
+            ("Legend", "Line that nobody drew"),
+            ("Glossary", "Jaccard index"),
+            ("Guide", "The loop"),
+            ("Practice", "Eight made-up groups"),
+        ):
+            page.keyboard.press("ArrowRight")
+            expect(page.get_by_role("tab", name=name)).to_be_focused()
+            expect(page.get_by_role("tabpanel")).to_contain_text(words)
+        page.keyboard.press("Escape")
+        expect(page.locator("dialog[open]")).to_have_count(0)
+        assert page.url == address
+        # The keys of the review work again.
+        page.keyboard.press("2")
+        expect(page.locator('.image-panel[data-view="B"][data-focused="true"]')).to_be_visible()
+
+    def test_the_palette_finds_every_part(self, open_page: OpenPage) -> None:
+        page = open_page("/jobs")
+        page.wait_for_selector(".page__main > :nth-child(2)")
+        for typed in ("legend", "glossary", "guide", "practice"):
+            page.keyboard.press("Control+k")
+            expect(page.get_by_role("combobox")).to_be_focused()
+            page.keyboard.type(typed)
+            page.keyboard.press("Enter")
+            chosen = page.get_by_role("tab", name=re.compile(typed, re.I))
+            expect(chosen).to_have_attribute("aria-selected", "true")
+            page.keyboard.press("Escape")
+            expect(page.locator("dialog[open]")).to_have_count(0)
+        assert page.url.endswith("/jobs")
+
+    def test_the_palette_finds_help_itself(self, open_page: OpenPage) -> None:
+        page = open_page("/jobs")
+        page.wait_for_selector(".page__main > :nth-child(2)")
+        page.keyboard.press("Control+k")
+        page.keyboard.type("help")
+        found = page.locator(".palette__item")
+        expect(found.filter(has_text="Help").first).to_be_visible()
+        for part in ("Keys", "Legend", "Glossary", "Guide", "Practice"):
+            expect(found.filter(has_text=part).first).to_be_visible()
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("tablist")).to_be_visible()
+
+    def test_each_part_has_an_address(self, open_page: OpenPage) -> None:
+        page = open_page("/help/words")
+        expect(page.get_by_role("tab", name="Glossary")).to_have_attribute("aria-selected", "true")
+        page.get_by_label("Find a word").fill("lineage")
+        expect(page.locator(".help-words dt")).to_have_text(["lineage"])
+        page.get_by_role("tab", name="Legend").click()
+        expect(page.locator(".legend__row").first).to_be_visible()
+        assert page.url.endswith("/help/legend")
+        page.goto("/help")
+        expect(page.get_by_role("tabpanel")).to_contain_text("Accept and next")
+
+
+class TestFirstStart:
+    def test_somebody_new_is_offered_practice_and_guide_until_they_wave_it_away(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/groups?dataset=sample")
+        card = page.get_by_role("region", name="First steps")
+        expect(card.get_by_role("button", name="Practice with eight groups")).to_be_visible()
+        card.get_by_role("button", name="Read the guide").click()
+        expect(page.get_by_role("tabpanel")).to_contain_text("The loop")
+        page.keyboard.press("Escape")
+        card.get_by_role("button", name="No, thanks").click()
+        expect(card).to_have_count(0)
+        page.reload()
+        page.wait_for_selector(".queue-row a")
+        expect(card).to_have_count(0)
+
+
+LEGEND_FAULTS = """() => [...document.querySelectorAll('.legend__row')].flatMap((row) => {
+  const canvas = row.querySelector('canvas');
+  const name = row.querySelector('.legend__name').textContent;
+  if (!canvas) return row.querySelector('.legend__picture').children.length ? [] : [`${name}: no picture`];
+  if (canvas.width === 0) return [`${name}: not drawn`];
+  const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  const colours = new Set();
+  for (let i = 0; i < data.length; i += 4) colours.add(`${data[i]} ${data[i + 1]} ${data[i + 2]}`);
+  return colours.size > 2 || name === 'View without a frame' ? [] : [`${name}: nothing but ground`];
+})"""
+
+
+class TestLegend:
+    def test_it_has_every_colour_that_marks_are_drawn_with(self, open_page: OpenPage) -> None:
+        page = open_page("/help/legend")
+        page.wait_for_selector(".legend__row")
+        rows = page.locator(".legend__row")
+        named = page.eval_on_selector_all(
+            ".legend__row", "rows => rows.map((row) => row.dataset.tokens).join(' ')"
+        )
+        drawn = set(
+            re.findall(r"--((?:canvas|scene|view)-[\w-]+):", TOKENS.read_text(encoding="utf-8"))
+        )
+        assert drawn - STRUCTURE - set(named.split()) == set()
+        assert rows.count() >= 40
+
+    def test_every_row_has_a_picture_that_shows_something(self, open_page: OpenPage) -> None:
+        page = open_page("/help/legend")
+        page.wait_for_selector(".legend__row canvas")
+        page.wait_for_load_state("networkidle")
+        assert page.evaluate(LEGEND_FAULTS) == []
+
+
+class TestTerms:
+    def test_a_gate_explains_itself_to_the_keyboard_and_nothing_moves(
+        self, review: Callable[[int], Screen]
+    ) -> None:
+        page = review(0).page
+        gate = page.locator('.gates [data-gate="jac"] .gates__name')
+        before = gate.bounding_box()
+        page.get_by_role("button", name="margins").focus()
+        page.keyboard.press("Tab")
+        page.keyboard.press("Tab")
+        tip = page.get_by_role("tooltip")
+        expect(gate).to_be_focused()
+        expect(tip).to_contain_text("Do the field lines fit?")
+        described = gate.get_attribute("aria-describedby")
+        assert described == tip.get_attribute("id")
+        assert gate.bounding_box() == before
+        page.keyboard.press("Escape")
+        expect(tip).to_be_hidden()
+        expect(gate).to_be_focused()
+
+    def test_a_column_of_the_queue_explains_itself_to_the_pointer(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/groups?dataset=sample")
+        page.wait_for_selector(".queue-row a")
+        page.get_by_role("columnheader", name="σ m").get_by_role("button").hover()
+        tip = page.get_by_role("tooltip")
+        expect(tip).to_contain_text("How uncertain the 3D ball is")
+        page.mouse.move(5, 5)
+        expect(tip).to_be_hidden()
+
+
+@pytest.fixture(scope="module")
+def practice(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Address of a server over a home of its own, with the practice groups."""
+    home = tmp_path_factory.mktemp("practice-home")
+    _touchline("migrate", home=home)
+    _touchline("practice", home=home)
+    with _serving(home) as address:
+        yield address
+
+
+@pytest.fixture
+def lessons(browser: Browser, practice: str, console: Console) -> Iterator[tuple[Page, list[Json]]]:
+    """A window and the lessons, all of them open again."""
+    context = browser.new_context(base_url=practice, viewport={"width": 1440, "height": 900})
+    page = context.new_page()
+    page.set_default_timeout(20_000)
+    page.on("console", console.hear)
+    found: list[Json] = page.request.get("/api/v1/practice").json()["lessons"]
+    yield page, found
+    context.close()
+
+
+class TestPractice:
+    def test_a_wrong_and_a_right_answer_are_told_on_the_next_group(
+        self, lessons: tuple[Page, list[Json]]
+    ) -> None:
+        page, found = lessons
+        page.goto(f"/review/{found[0]['group']}")
+        card = page.get_by_role("region", name="Practice")
+        expect(card).to_contain_text("Lesson 1 of 8")
+        expect(card).to_contain_text("Would you let this group into the dataset?")
+        page.keyboard.press("Shift+h")
+        expect(card).to_contain_text("Hint:")
+        # Rightly: the first group is sound.
+        page.keyboard.press("a")
+        expect(card).to_contain_text("Lesson 2 of 8")
+        expect(card).to_contain_text("Right: nothing is wrong with this group")
+        # Wrongly: the second one could be mended.
+        page.keyboard.press("x")
+        page.keyboard.press("1")
+        expect(card).to_contain_text("Lesson 3 of 8")
+        expect(card).to_contain_text("Look again: it could have been mended")
+        expect(card).to_contain_text("Best:")
+        # Mended by a key: told before the verdict, too.
+        page.wait_for_selector('.image-panel[data-view="B"] .image-panel__stage[data-ready="true"]')
+        page.keyboard.press("2")
+        page.keyboard.press("m")
+        expect(card).to_contain_text("Right: the fault is mended.", timeout=60_000)
+        page.keyboard.press("?")
+        page.get_by_role("tab", name="Practice").click()
+        expect(page.get_by_role("tabpanel")).to_contain_text("1 of 8 right")
+
+    def test_starting_again_forgets_the_answers_and_opens_the_first_lesson(
+        self, lessons: tuple[Page, list[Json]]
+    ) -> None:
+        page, found = lessons
+        page.goto("/help/practice")
+        page.get_by_role("button", name="Start again").click()
+        card = page.get_by_role("region", name="Practice")
+        expect(card).to_contain_text("Lesson 1 of 8", timeout=60_000)
+        assert int(page.url.split("/review/")[1]) not in {lesson["group"] for lesson in found}
+        states = {
+            lesson["state"] for lesson in page.request.get("/api/v1/practice").json()["lessons"]
+        }
+        assert states == {"open"}
+        assert serious_in_both(page) == []
+
+
+class TestEverybody:
+    @pytest.mark.parametrize("part", ["keys", "legend", "practice"])
+    def test_axe_finds_nothing_serious_in_both_schemes(
+        self, open_page: OpenPage, part: str
+    ) -> None:
+        page = open_page(f"/help/{part}")
+        page.wait_for_load_state("networkidle")
+        expect(page.get_by_role("tabpanel").locator("p, dt").first).to_be_visible()
+        assert serious_in_both(page) == []
+
+    def test_axe_finds_nothing_serious_in_long_texts(self, open_page: OpenPage) -> None:
+        # They have the colours of the other parts, so one scheme each is enough.
+        page = open_page("/help/guide", scheme="light")
+        expect(page.locator(".guide")).to_contain_text("The loop")
+        assert serious(page) == []
+        page.get_by_role("tab", name="Glossary").click()
+        page.get_by_label("Find a word").fill("gate")
+        page.emulate_media(color_scheme="dark", reduced_motion="reduce")
+        assert serious(page) == []
