@@ -9,6 +9,7 @@ import { filterOf } from '../state/adjustments.js';
 import { endDrawing, startDrawing } from '../state/drawing.js';
 import { editorAddress } from '../state/editor_address.js';
 import { group } from '../state/group.js';
+import { filled, toggleFilled } from '../state/viewports.js';
 import { drawing, equalViews, maximised, toggleMaximised } from '../state/workspace.js';
 
 /** @import {ViewPicture} from '../overlays/scene.js' */
@@ -21,6 +22,7 @@ const PATHS = {
 	light: 'M8 5.2a2.8 2.8 0 1 0 0 5.6 2.8 2.8 0 0 0 0-5.6M8 1.5v1.6M8 12.9v1.6M1.5 8h1.6M12.9 8h1.6M3.4 3.4l1.1 1.1M11.5 11.5l1.1 1.1M3.4 12.6l1.1-1.1M11.5 4.5l1.1-1.1',
 	equal: 'M2.5 3.5h5v9h-5zM8.5 3.5h5v9h-5z',
 	main: 'M2.5 3.5h7v9h-7zM10.5 3.5h3v4h-3zM10.5 8.5h3v4h-3z',
+	crop: 'M4.5 1.5v10h10M1.5 4.5h10v10',
 	larger: 'M9 3h4v4M7 13H3V9',
 	smaller: 'M7 3v4H3M9 13V9h4',
 };
@@ -34,8 +36,8 @@ function Tool({ label, title, path, pressed, onClick }) {
 	`;
 }
 
-/** @param {{picture: ViewPicture, first: boolean}} props */
-export function PanelTools({ picture, first }) {
+/** @param {{picture: ViewPicture, sizes: boolean}} props sizes: whether the views may have other sizes */
+export function PanelTools({ picture, sizes }) {
 	const [open, setOpen] = useState(false);
 	const { key, letter } = picture.view;
 	const draws = drawing.value?.view === key;
@@ -49,10 +51,13 @@ export function PanelTools({ picture, first }) {
 			</a>
 			<${Tool} label=${`Brightness and contrast of view ${letter}`} title="Brightness and contrast" path=${PATHS.light}
 				pressed=${open || filterOf(letter) !== 'none'} onClick=${() => setOpen(!open)} />
-			${first && !alone ? html`
+			${sizes && !alone ? html`
 				<${Tool} label=${equalViews.value ? 'Main camera large' : 'All views equally large'}
 					title=${equalViews.value ? 'Main camera large (Shift+L)' : 'All views equally large (Shift+L)'}
 					path=${equalViews.value ? PATHS.main : PATHS.equal} onClick=${() => { equalViews.value = !equalViews.value; }} />` : null}
+			<${Tool} label=${filled.value ? 'Show whole images' : 'Fill the panels with the images'}
+				title=${filled.value ? 'Images are cropped to fill their panels; show them whole (I)' : 'Crop the images so that they fill their panels (I)'}
+				path=${PATHS.crop} pressed=${filled.value} onClick=${toggleFilled} />
 			<${Tool} label=${alone ? 'Show all views' : `Show only view ${letter}`} title=${alone ? 'Show all views' : 'Show only this view'}
 				path=${alone ? PATHS.smaller : PATHS.larger} onClick=${() => toggleMaximised(letter)} />
 		</div>

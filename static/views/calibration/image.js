@@ -65,7 +65,10 @@ export function EditorImage({ picture, before }) {
 		const detach = attachEditor(element, {
 			viewport: () => now.current.viewport,
 			fits: () => now.current.picture.markings,
-			pan: (dx, dy) => panPanel(panelKey(now.current.view.letter), dx, dy),
+			pan: (dx, dy) => {
+				const { view: v, size: s } = now.current;
+				panPanel(panelKey(v.letter), v, s, dx, dy);
+			},
 			zoom: (at, factor) => {
 				const { view: v, size: s } = now.current;
 				zoomPanel(panelKey(v.letter), v, s, at, factor);
