@@ -31,6 +31,16 @@ export function strokeLine(context, viewport, points, stroke) {
 	strokePath(context, stroke);
 }
 
+/**
+ * Several lines with one stroke.
+ *
+ * @param {CanvasRenderingContext2D} context @param {Viewport} viewport
+ * @param {ImagePoint[][]} lines @param {Stroke} stroke
+ */
+export function strokeLines(context, viewport, lines, stroke) {
+	for (const line of lines) strokeLine(context, viewport, line, stroke);
+}
+
 /** @param {CanvasRenderingContext2D} context @param {Stroke} stroke */
 function strokePath(context, { colour, width, dash = [], halo = true }) {
 	const share = shareOf(context);

@@ -51,7 +51,7 @@ function Strip({ row, width, pixels: data }) {
 	const theme = colours.value;
 	const draw = useCallback((/** @type {CanvasRenderingContext2D} */ context) => {
 		const scale = data ? data.width / picture.view.width : 1;
-		drawStrip(context, { width, height: STRIP }, marking, data ?? null, scale);
+		drawStrip(context, { width, height: STRIP }, marking, data ?? null, scale, picture.view);
 	}, [marking, width, data, theme]);
 	return html`
 		<li class="line-row">
@@ -84,7 +84,7 @@ export function LineList({ pictures }) {
 				${size.width < 100 ? null : shown.map((row) => html`
 					<${Strip}
 						key=${`${row.picture.view.key} ${row.marking.marking}`} row=${row}
-						width=${Math.max(24, size.width - (narrow ? 190 : 232))} pixels=${read.get(row.picture.view.key)}
+						width=${Math.max(24, size.width - (narrow ? 210 : 232))} pixels=${read.get(row.picture.view.key)}
 					/>`)}
 			</ul>
 		</section>
