@@ -126,8 +126,9 @@ function along(tracks, first, count, room) {
 
 /** The strip is this high at least, and less on low screens. */
 const LOWEST = { height: 276, low: 216, below: 720 };
-/** Beside the views it needs the width of a line with its picture. */
+/** Beside the views it needs the width of a line with its picture; folded, that of the pitch's numbers. */
 const NARROWEST = 288;
+const FOLDED = { height: 120, width: 200 };
 /** Two wide pictures one above the other leave room at their side; more do not. */
 const BESIDE_UP_TO = 2;
 /** Height of the strip at most, as a share. */
@@ -140,18 +141,21 @@ const STEP = 16;
  * Where the strip stands so that the pictures are largest.
  *
  * @param {Size[]} images @param {Size} room of views and strip together, CSS pixels
- * @param {boolean} equal @param {boolean} beside whether the strip may stand beside the views
+ * @param {{equal: boolean, beside: boolean, folded: boolean}} how equal: all views equally large;
+ *   beside: the strip may stand beside the views; folded: it shows the least
  * @returns {Screen}
  */
-export function arrangeScreen(images, room, equal, beside) {
-	const lowest = room.height < LOWEST.below ? LOWEST.low : LOWEST.height;
+export function arrangeScreen(images, room, { equal, beside, folded }) {
+	const lowest = folded ? FOLDED.height : room.height < LOWEST.below ? LOWEST.low : LOWEST.height;
+	const highest = folded ? lowest : Math.max(lowest, HIGHEST * room.height);
 	/** @type {Screen[]} */
 	const screens = [];
-	for (let strip = lowest; strip <= Math.max(lowest, HIGHEST * room.height); strip += STEP) {
+	for (let strip = lowest; strip <= highest; strip += STEP) {
 		const left = { width: room.width, height: room.height - strip - GAP };
 		screens.push({ side: 'below', strip, score: panelGrid(images, left, equal).score });
 	}
-	for (let strip = NARROWEST; beside && images.length <= BESIDE_UP_TO && images.length > 1 && strip <= room.width / 2; strip += STEP) {
+	const stands = beside && images.length > 1 && images.length <= BESIDE_UP_TO;
+	for (let strip = folded ? FOLDED.width : NARROWEST; stands && strip <= room.width / 2; strip += STEP) {
 		const left = { width: room.width - strip - GAP, height: room.height };
 		screens.push({ side: 'beside', strip, score: panelGrid(images, left, equal).score });
 	}

@@ -4,7 +4,10 @@
 /** @typedef {{x: number, y: number}} Place */
 /** @typedef {{left: number, top: number, right: number, bottom: number}} Box */
 
-const ROUNDS = 200;
+const ROUNDS = 300;
+const PATIENCE = 40;
+/** Radians. */
+const SWIRL = 0.6;
 /** Marks in the very same place go apart in this direction, radians: a different one for each. */
 const TURN = 2.4;
 
@@ -21,10 +24,12 @@ export function spreadApart(places, apart, box, taken = []) {
 	const spread = places.map((place) => within(place, box));
 	for (let round = 0; round < ROUNDS; round++) {
 		let moved = false;
-		spread.forEach((a, i) => {
-			for (const [j, b] of [...spread.entries()].slice(i + 1)) moved = push(a, b, apart, i + j, 0.5) || moved;
-			for (const b of taken) moved = push(a, { ...b }, apart, i, 1) || moved;
-		});
+		// What is caught in a corner leaves it sideways.
+		const swirl = round < PATIENCE ? 0 : SWIRL;
+		for (let i = 0; i < spread.length; i++) {
+			for (let j = i + 1; j < spread.length; j++) moved = push(spread[i], spread[j], apart, i + j, 0.5, swirl) || moved;
+			for (const b of taken) moved = push(spread[i], { ...b }, apart, i, 1, swirl) || moved;
+		}
 		if (!moved) break;
 		spread.forEach((place) => Object.assign(place, within(place, box)));
 	}
@@ -36,12 +41,12 @@ export function within({ x, y }, { left, top, right, bottom }) {
 	return { x: Math.min(right, Math.max(left, x)), y: Math.min(bottom, Math.max(top, y)) };
 }
 
-/** @param {Place} a @param {Place} b @param {number} apart @param {number} turn @param {number} share of the way that a goes */
-function push(a, b, apart, turn, share) {
+/** @param {Place} a @param {Place} b @param {number} apart @param {number} turn @param {number} share of the way that a goes @param {number} swirl radians by which they go past each other */
+function push(a, b, apart, turn, share, swirl) {
 	const distance = Math.hypot(b.x - a.x, b.y - a.y);
 	if (distance >= apart - 1e-6) return false;
-	const [dx, dy] = distance > 1e-9
-		? [(b.x - a.x) / distance, (b.y - a.y) / distance] : [Math.cos(TURN * turn), Math.sin(TURN * turn)];
+	const angle = swirl + (distance > 1e-9 ? Math.atan2(b.y - a.y, b.x - a.x) : TURN * turn);
+	const [dx, dy] = [Math.cos(angle), Math.sin(angle)];
 	// A little more than is needed, so that it comes to an end.
 	const way = apart - distance + 1e-3 * apart;
 	a.x -= share * way * dx;

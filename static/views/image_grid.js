@@ -27,8 +27,9 @@ function screenOf(pictures, room) {
 	const images = shownOf(pictures).map(({ view: { width, height } }) => ({ width, height }));
 	// The timeline and the 3D view need the width.
 	const beside = !isStatic.value && !sceneShown.value && maximised.value === null;
-	const key = JSON.stringify([images, room, equalViews.value, beside]);
-	const known = screens.get(key) ?? arrangeScreen(images, room, equalViews.value, beside);
+	const how = { equal: equalViews.value, beside, folded: stripCollapsed.value };
+	const key = JSON.stringify([images, room, how]);
+	const known = screens.get(key) ?? arrangeScreen(images, room, how);
 	if (screens.size > 100) screens.clear();
 	screens.set(key, known);
 	return known;
@@ -41,12 +42,11 @@ function screenOf(pictures, room) {
  */
 export function ReviewMain({ pictures, children }) {
 	const [ref, size] = useSize();
-	const folded = stripCollapsed.value;
-	const screen = size.width > 0 && !folded && pictures.length > 0 ? screenOf(pictures, size) : null;
+	const screen = size.width > 0 && pictures.length > 0 ? screenOf(pictures, size) : null;
 	const side = screen?.side ?? 'below';
 	const strip = screen && { [side === 'below' ? '--strip-height' : '--strip-width']: `${screen.strip}px` };
 	return html`
-		<main ref=${ref} class="review__main" data-collapsed=${folded} data-side=${side} style=${strip}>${children}</main>
+		<main ref=${ref} class="review__main" data-collapsed=${stripCollapsed.value} data-side=${side} style=${strip}>${children}</main>
 	`;
 }
 

@@ -183,7 +183,7 @@ export function ImagePanel({ picture, area, sizes }) {
 			onDblClick=${maximise}
 		>
 			<div class="image-panel__stage" data-ready=${Boolean(frame.image)} data-frame=${frame.image ? view.id : undefined} ref=${ref}></div>
-			${view.image ? null : html`<p class="image-panel__missing">No frame · lines and ball can be edited</p>`}
+			${view.image ? null : html`<p class="image-panel__missing">No frame<span class="image-panel__rest"> · lines and ball can be edited</span></p>`}
 			${frame.error ? html`<p class="image-panel__missing">The frame of this view cannot be read.</p>` : null}
 			<${PanelCaption} picture=${picture} />
 			<${PanelTools} picture=${picture} sizes=${sizes} />

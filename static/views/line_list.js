@@ -77,7 +77,7 @@ export function LineList({ pictures }) {
 	const shown = rows.slice(0, fitting);
 	const rest = rows[fitting];
 	return html`
-		<section class="card strip-card" aria-label="Lines, worst first">
+		<section class="card strip-card" data-card="lines" aria-label="Lines, worst first">
 			<h2>Lines, ±12 px${rest ? html`<span class="card__aside">${narrow ? '+ ' : ''}${rows.length - fitting}${narrow ? '' : ' more'} up to ${pixels(rest.marking.largest)} px</span>` : null}</h2>
 			<ul class="line-list" ref=${ref} data-narrow=${narrow}>
 				${rows.length ? null : html`<li class="empty-note">No lines are annotated in this group.</li>`}

@@ -213,7 +213,7 @@ const VIEW = [
 		run: () => { equalViews.value = !equalViews.value; },
 	},
 	{
-		keys: ['l'], label: 'Fold the strip below', group: 'View',
+		keys: ['l'], label: 'Fold the strip with ball, lines and pitch', group: 'View',
 		run: () => { stripCollapsed.value = !stripCollapsed.value; },
 	},
 ];

@@ -160,8 +160,10 @@ function framing(points, { azimuth, elevation }, aspect) {
 	const side = tall * aspect * (1 - 2 * MARGINS.side);
 	const [across, wide] = edges(0, side, side);
 	const [along, high] = edges(1, tall * (1 - 2 * MARGINS.bottom), tall * (1 - 2 * MARGINS.top));
-	const target = /** @type {WorldPoint} */ ([0, 1, 2].map((i) => across * right[i] + along * up[i]));
-	return { target, distance: Math.max(wide, high), azimuth, elevation };
+	// The same eye, but turning about a place on the grass.
+	const ahead = -(along * up[1]) / rise;
+	const target = /** @type {WorldPoint} */ ([0, 1, 2].map((i) => across * right[i] + along * up[i] + ahead * back[i]));
+	return { target: [target[0], 0, target[2]], distance: Math.max(wide, high) - ahead, azimuth, elevation };
 }
 
 /**
