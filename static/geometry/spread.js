@@ -7,7 +7,7 @@
 const ROUNDS = 300;
 const PATIENCE = 40;
 /** Radians. */
-const SWIRL = 0.6;
+const SWIRL = 1.2;
 /** Marks in the very same place go apart in this direction, radians: a different one for each. */
 const TURN = 2.4;
 
