@@ -2,6 +2,7 @@
 /** Polylines in an image: nearest place, length, and the band beside them. */
 
 /** @import {ImagePoint} from './camera.js' */
+/** @typedef {{width: number, height: number}} Size */
 /** @typedef {{point: ImagePoint, distance: number, along: number, side: number}} Nearest */
 
 /**
@@ -36,6 +37,37 @@ export function nearestOn(polyline, point) {
 		best = { point: polyline[0], distance, along: 0, side: distance };
 	}
 	return best;
+}
+
+/** As the server rounds what is drawn, pixels. */
+const ROUNDED = 1e-3;
+
+/**
+ * A clipped polyline as it is seen: cut where it leaves the image and comes back.
+ *
+ * The server joins what is inside into one polyline, because JaC measures it so (the public
+ * evaluator does); nothing is painted along the border between the two crossings, though.
+ * Markings are sampled finely, so two neighbours on the border are always such crossings.
+ *
+ * @param {ImagePoint[]} polyline clipped at the image border
+ * @param {Size} image
+ * @returns {ImagePoint[][]} pieces of two points or more
+ */
+export function piecesOf(polyline, { width, height }) {
+	/** @param {ImagePoint} point */
+	const onBorder = ({ x, y }) => x <= ROUNDED || y <= ROUNDED || x >= width - 1 - ROUNDED || y >= height - 1 - ROUNDED;
+	const pieces = [];
+	/** @type {ImagePoint[]} */
+	let piece = [];
+	polyline.forEach((point, i) => {
+		if (i > 0 && polyline.length > 2 && onBorder(point) && onBorder(polyline[i - 1])) {
+			pieces.push(piece);
+			piece = [];
+		}
+		piece.push(point);
+	});
+	pieces.push(piece);
+	return pieces.filter((one) => one.length > 1);
 }
 
 /** @param {ImagePoint[]} polyline @returns {number} pixels */
@@ -78,4 +110,41 @@ export function frames(polyline, count) {
 		});
 	}
 	return result;
+}
+
+/**
+ * As `frames`, over pieces that are looked at as one: each has its share of the places.
+ *
+ * @param {ImagePoint[][]} pieces
+ * @param {number} count at least 2
+ * @returns {{point: ImagePoint, normal: ImagePoint}[]}
+ */
+export function framesOf(pieces, count) {
+	const total = pieces.reduce((sum, piece) => sum + lengthOf(piece), 0);
+	if (total === 0) return [];
+	let [before, taken] = [0, 0];
+	return pieces.flatMap((piece) => {
+		before += lengthOf(piece);
+		const share = Math.round((count * before) / total) - taken;
+		taken += share;
+		return share > 1 ? frames(piece, share) : frames(piece, 2).slice(0, share);
+	});
+}
+
+/**
+ * As `nearestOn`, over pieces: `along` counts from the start of the first.
+ *
+ * @param {ImagePoint[][]} pieces @param {ImagePoint} point
+ * @returns {Nearest | null}
+ */
+export function nearestOfPieces(pieces, point) {
+	/** @type {Nearest | null} */
+	let best = null;
+	let start = 0;
+	for (const piece of pieces) {
+		const near = nearestOn(piece, point);
+		if (near && (!best || near.distance < best.distance)) best = { ...near, along: start + near.along };
+		start += lengthOf(piece);
+	}
+	return best;
 }

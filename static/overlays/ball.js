@@ -4,7 +4,7 @@
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { toScreen } from '../geometry/viewport.js';
 import { colours, viewColour } from '../lib/colours.js';
-import { label, strokeBox, strokeCross, strokeLine, widthOf } from './pen.js';
+import { label, shareOf, strokeBox, strokeCross, strokeLine, widthOf } from './pen.js';
 import { CORNERS_FROM } from './sizes.js';
 
 /** @import {Scene} from './scene.js' */
@@ -27,8 +27,9 @@ function drawReprojected(context, { picture, viewport }) {
 	strokeLine(context, viewport, picture.outline, { ...stroke, closed: true });
 	// On a small crop the outline says enough.
 	if (widthOf(context) < SMALL) return;
-	const radius = Math.max(9, (viewport.scale * (picture.ball?.optimized_diameter_px ?? 0)) / 2 + 3);
-	strokeCross(context, toScreen(viewport, { x: at[0], y: at[1] }), radius, radius + 8, stroke);
+	const share = shareOf(context);
+	const radius = Math.max(9 * share, (viewport.scale * (picture.ball?.optimized_diameter_px ?? 0)) / 2 + 3);
+	strokeCross(context, toScreen(viewport, { x: at[0], y: at[1] }), radius, radius + 8 * share, stroke);
 }
 
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
@@ -63,7 +64,7 @@ function drawAnnotated(context, { picture, viewport, selected }) {
 	if (!ball.box) {
 		const at = toScreen(viewport, center);
 		context.beginPath();
-		context.arc(at.x, at.y, 6, 0, 2 * Math.PI);
+		context.arc(at.x, at.y, 6 * shareOf(context), 0, 2 * Math.PI);
 		context.lineWidth = 1.75;
 		context.strokeStyle = colour;
 		context.stroke();

@@ -1,9 +1,10 @@
 // @ts-check
 /** The band beside a projected marking, straightened: a misfit is seen at a glance. */
 
-import { frames, lengthOf, nearestOn } from '../geometry/polyline.js';
+import { framesOf, lengthOf, nearestOfPieces, piecesOf } from '../geometry/polyline.js';
 import { colours } from '../lib/colours.js';
 
+/** @import {ImagePoint} from '../geometry/camera.js' */
 /** @import {MarkingResiduals} from '../geometry/residual.js' */
 
 /** Pixels of the annotated image to either side. */
@@ -15,25 +16,27 @@ const BAND = 12;
  * @param {MarkingResiduals} marking
  * @param {ImageData | null} pixels of the frame, null without one
  * @param {number} scale frame pixels per annotated pixel
+ * @param {{width: number, height: number}} image annotated size
  */
-export function drawStrip(context, size, marking, pixels, scale) {
+export function drawStrip(context, size, marking, pixels, scale, image) {
+	const pieces = piecesOf(marking.polyline, image);
 	context.fillStyle = colours.value.grass;
 	context.fillRect(0, 0, size.width, size.height);
-	if (pixels) context.drawImage(straighten(marking, size.width, pixels, scale), 0, 0, size.width, size.height);
+	if (pixels) context.drawImage(straighten(pieces, size.width, pixels, scale), 0, 0, size.width, size.height);
 	drawMiddle(context, size, marking);
-	drawStripPoints(context, size, marking);
+	drawStripPoints(context, size, marking, pieces);
 }
 
 /**
- * @param {MarkingResiduals} marking @param {number} columns @param {ImageData} pixels
+ * @param {ImagePoint[][]} pieces @param {number} columns @param {ImageData} pixels
  * @param {number} scale
  */
-function straighten(marking, columns, pixels, scale) {
+function straighten(pieces, columns, pixels, scale) {
 	const rows = 2 * BAND + 1;
 	const canvas = new OffscreenCanvas(columns, rows);
 	const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext('2d'));
 	const strip = context.createImageData(columns, rows);
-	frames(marking.polyline, columns).forEach(({ point, normal }, column) => {
+	framesOf(pieces, columns).forEach(({ point, normal }, column) => {
 		for (let row = 0; row < rows; row++) {
 			const off = row - BAND;
 			const x = Math.round((point.x + normal.x * off + 0.5) * scale - 0.5);
@@ -67,12 +70,12 @@ function drawMiddle(context, { width, height }, marking) {
 
 /**
  * @param {CanvasRenderingContext2D} context @param {{width: number, height: number}} size
- * @param {MarkingResiduals} marking
+ * @param {MarkingResiduals} marking @param {ImagePoint[][]} pieces
  */
-function drawStripPoints(context, { width, height }, marking) {
-	const length = lengthOf(marking.polyline) || 1;
+function drawStripPoints(context, { width, height }, marking, pieces) {
+	const length = pieces.reduce((sum, piece) => sum + lengthOf(piece), 0) || 1;
 	for (const { point } of marking.points) {
-		const on = nearestOn(marking.polyline, point);
+		const on = nearestOfPieces(pieces, point);
 		if (!on) continue;
 		const x = Math.min(width - 4, Math.max(4, (on.along / length) * width));
 		const off = Math.max(-BAND, Math.min(BAND, on.side));

@@ -1,9 +1,10 @@
 // @ts-check
 /** Projected markings, coloured and dashed by how far the annotation is off. */
 
+import { piecesOf } from '../geometry/polyline.js';
 import { DASHES } from '../geometry/residual.js';
 import { colours } from '../lib/colours.js';
-import { strokeLine } from './pen.js';
+import { strokeLines } from './pen.js';
 
 /** @import {Scene} from './scene.js' */
 
@@ -12,7 +13,7 @@ export function drawMarkings(context, { picture, viewport, selected }) {
 	for (const { marking, grade, polyline } of picture.markings) {
 		const chosen = selected?.kind === 'point' && selected.marking === marking
 			&& selected.view === picture.view.key;
-		strokeLine(context, viewport, polyline, {
+		strokeLines(context, viewport, piecesOf(polyline, picture.view), {
 			colour: colours.value[grade],
 			width: grade === 'unseen' ? 1.25 : chosen ? 3 : 2,
 			dash: DASHES[grade],

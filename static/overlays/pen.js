@@ -3,9 +3,15 @@
 
 import { toScreen } from '../geometry/viewport.js';
 import { colours } from '../lib/colours.js';
+import { markShare } from './sizes.js';
 
 /** @import {ImagePoint, Viewport} from '../geometry/viewport.js' */
 /** @typedef {{colour: string, width: number, dash?: number[], halo?: boolean, closed?: boolean}} Stroke */
+
+/** Thinner lines are not told apart by their colour, CSS pixels. */
+const THINNEST = 1.1;
+/** Below this share words are smaller too. */
+const SMALL_WORDS = 0.75;
 
 /**
  * A line through image points.
@@ -25,19 +31,31 @@ export function strokeLine(context, viewport, points, stroke) {
 	strokePath(context, stroke);
 }
 
+/**
+ * Several lines with one stroke.
+ *
+ * @param {CanvasRenderingContext2D} context @param {Viewport} viewport
+ * @param {ImagePoint[][]} lines @param {Stroke} stroke
+ */
+export function strokeLines(context, viewport, lines, stroke) {
+	for (const line of lines) strokeLine(context, viewport, line, stroke);
+}
+
 /** @param {CanvasRenderingContext2D} context @param {Stroke} stroke */
 function strokePath(context, { colour, width, dash = [], halo = true }) {
+	const share = shareOf(context);
+	const thick = Math.max(THINNEST, width * share);
 	context.lineJoin = 'round';
 	context.lineCap = 'butt';
 	context.setLineDash([]);
 	if (halo) {
 		context.strokeStyle = colours.value.halo;
-		context.lineWidth = width + 2;
+		context.lineWidth = thick + 2 * share;
 		context.stroke();
 	}
 	context.setLineDash(dash);
 	context.strokeStyle = colour;
-	context.lineWidth = width;
+	context.lineWidth = thick;
 	context.stroke();
 	context.setLineDash([]);
 }
@@ -73,6 +91,11 @@ export function widthOf(context) {
 	return context.canvas.width / devicePixelRatio;
 }
 
+/** How large marks are drawn there. @param {CanvasRenderingContext2D} context @returns {number} a share */
+export function shareOf(context) {
+	return markShare(widthOf(context));
+}
+
 /**
  * A word beside a place, on a dark plate.
  *
@@ -81,14 +104,16 @@ export function widthOf(context) {
  * @param {string} colour
  */
 export function label(context, text, { x, y }, colour) {
-	context.font = '12px Inter, system-ui, "DejaVu Sans", sans-serif';
+	const small = shareOf(context) < SMALL_WORDS;
+	context.font = `${small ? 11 : 12}px Inter, system-ui, "DejaVu Sans", sans-serif`;
 	context.textBaseline = 'middle';
 	const { width } = context.measureText(text);
 	const last = widthOf(context) - width - 10;
 	const left = Math.max(10, Math.min(x, last));
 	context.fillStyle = colours.value.plate;
 	context.beginPath();
-	context.roundRect(left - 5, y - 10, width + 10, 20, 5);
+	const half = small ? 8 : 10;
+	context.roundRect(left - 5, y - half, width + 10, 2 * half, 5);
 	context.fill();
 	context.fillStyle = colour;
 	context.fillText(text, left, y + 0.5);

@@ -5,7 +5,7 @@ import { gradeOfResidual } from '../geometry/residual.js';
 import { toScreen } from '../geometry/viewport.js';
 import { colours } from '../lib/colours.js';
 import { fixed } from '../lib/format.js';
-import { label, strokeLine } from './pen.js';
+import { label, shareOf, strokeLine } from './pen.js';
 
 /** @import {Scene} from './scene.js' */
 
@@ -33,14 +33,15 @@ export function drawWhiskers(context, { picture, viewport, gain }) {
 
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
 export function drawPoints(context, { picture, viewport }) {
+	const share = shareOf(context);
 	for (const { points, used, grade } of picture.markings) {
 		for (const { point } of points) {
 			const { x, y } = toScreen(viewport, point);
 			context.beginPath();
-			context.arc(x, y, RADIUS, 0, 2 * Math.PI);
+			context.arc(x, y, RADIUS * share, 0, 2 * Math.PI);
 			context.fillStyle = used ? colours.value.point : colours.value.bad;
 			context.fill();
-			context.lineWidth = 1.6;
+			context.lineWidth = Math.max(1, 1.6 * share);
 			context.strokeStyle = grade === 'bad' ? colours.value.bad : colours.value.ink;
 			context.stroke();
 		}
@@ -56,7 +57,8 @@ export function drawSelectedPoint(context, { picture, viewport, selected }) {
 	if (!residual) return;
 	const { x, y } = toScreen(viewport, residual.point);
 	context.beginPath();
-	context.arc(x, y, RADIUS + 4.5, 0, 2 * Math.PI);
+	const share = shareOf(context);
+	context.arc(x, y, (RADIUS + 4.5) * share, 0, 2 * Math.PI);
 	context.lineWidth = 2;
 	context.strokeStyle = colours.value.selected;
 	context.stroke();

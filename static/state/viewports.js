@@ -3,58 +3,79 @@
 
 import { signal } from '@preact/signals';
 
-import { centeredOn, fit, pan, zoomAbout } from '../geometry/viewport.js';
+import { centeredOn, fill, fit, inPanel, pan, zoomAbout } from '../geometry/viewport.js';
+import { stored } from '../lib/storage.js';
 
 /** @import {ImagePoint, ScreenPoint, Size, Viewport} from '../geometry/viewport.js' */
 
-/** A panel without an entry shows its whole image. */
-const viewports = signal(/** @type {Record<string, Viewport>} */ ({}));
+/** A panel without an entry shows its image as `filled` says. @type {import('@preact/signals').Signal<Record<string, {viewport: Viewport, panel: Size}>>} */
+const viewports = signal({});
 
-/** @param {string} letter @param {Size} image @param {Size} panel @returns {Viewport} */
-export function viewportOf(letter, image, panel) {
-	return viewports.value[letter] ?? fit(image, panel);
+/** Whether images are cropped to fill their panels; else each is shown whole. */
+export const filled = stored('panels-filled', false);
+
+/**
+ * @param {string} letter @param {Size} image @param {Size} panel
+ * @param {ImagePoint | null} [center] what a cropped image shows in its middle; without it the image stays whole
+ * @returns {Viewport}
+ */
+export function viewportOf(letter, image, panel, center) {
+	const present = viewports.value[letter];
+	if (present) return inPanel(present.viewport, present.panel, image, panel);
+	return filled.value && center !== undefined ? fill(image, panel, center) : fit(image, panel);
 }
 
-/** @param {string} letter @param {Viewport} viewport */
-function put(letter, viewport) {
-	viewports.value = { ...viewports.value, [letter]: viewport };
+/** Crop every image to its panel, or show all whole. */
+export function toggleFilled() {
+	filled.value = !filled.value;
+	viewports.value = {};
 }
 
-/** Whether a panel shows less than its whole image. @param {string} letter */
+/** @param {string} letter @param {Viewport} viewport @param {Size} panel */
+function put(letter, viewport, panel) {
+	const { width, height } = panel;
+	viewports.value = { ...viewports.value, [letter]: { viewport, panel: { width, height } } };
+}
+
+/** Whether somebody zoomed or moved a panel. @param {string} letter */
 export function isZoomed(letter) {
 	return letter in viewports.value;
 }
 
-/** @param {string} letter */
+/** Give a panel the view back that it had before somebody zoomed. @param {string} letter */
 export function fitPanel(letter) {
 	const { [letter]: _, ...rest } = viewports.value;
 	viewports.value = rest;
 }
 
-/** Show every image whole. */
+/** Leave the zoom of every panel. */
 export function fitAll() {
 	viewports.value = {};
 }
 
 /**
  * @param {string} letter @param {Size} image @param {Size} panel @param {ScreenPoint} at
- * @param {number} factor
+ * @param {number} factor @param {ImagePoint | null} [center] as for `viewportOf`
  */
-export function zoomPanel(letter, image, panel, at, factor) {
-	const whole = fit(image, panel).scale;
-	const next = zoomAbout(viewportOf(letter, image, panel), at, factor, whole);
-	if (next.scale <= whole * 1.001) fitPanel(letter);
-	else put(letter, next);
+export function zoomPanel(letter, image, panel, at, factor, center) {
+	const next = zoomAbout(viewportOf(letter, image, panel, center), at, factor, image, panel);
+	const cropped = filled.value && center !== undefined;
+	if (!cropped && next.scale <= fit(image, panel).scale * 1.001) fitPanel(letter);
+	else put(letter, next, panel);
 }
 
-/** @param {string} letter @param {number} dx @param {number} dy */
-export function panPanel(letter, dx, dy) {
-	const present = viewports.value[letter];
+/**
+ * @param {string} letter @param {Size} image @param {Size} panel @param {number} dx @param {number} dy
+ * @param {ImagePoint | null} [center] as for `viewportOf`
+ */
+export function panPanel(letter, image, panel, dx, dy, center) {
+	const present = viewportOf(letter, image, panel, center);
+	const next = pan(present, dx, dy, image, panel);
 	// A whole image has nowhere to go.
-	if (present) put(letter, pan(present, dx, dy));
+	if (next.left !== present.left || next.top !== present.top) put(letter, next, panel);
 }
 
 /** @param {string} letter @param {Size} panel @param {ImagePoint} point @param {number} scale */
 export function zoomTo(letter, panel, point, scale) {
-	put(letter, centeredOn(point, panel, scale));
+	put(letter, centeredOn(point, panel, scale), panel);
 }

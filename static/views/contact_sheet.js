@@ -7,6 +7,7 @@ import { useCallback } from 'preact/hooks';
 import { boxCenter } from '../geometry/ball.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { gradeOfSize } from '../geometry/residual.js';
+import { centeredOn } from '../geometry/viewport.js';
 import { Canvas } from '../lib/canvas.js';
 import { colours } from '../lib/colours.js';
 import { fixed, pixels } from '../lib/format.js';
@@ -60,49 +61,53 @@ function sizeText({ view, ball, predictions }) {
 	return box ? `box ${pixels((box[2] + box[3]) / 2)} px` : predictions?.marks.some(({ sure }) => sure) ? 'predicted' : '';
 }
 
+/** A crop is not more than this much longer one way than the other. */
+const LONGEST = 2.2;
+
 /**
- * How many columns make the largest squares, in cells that are not narrower than `least`.
+ * Crops that fill the width of the card: as many columns as give the largest window.
  *
- * @param {number} n @param {number} width @param {number} height @param {number} least
+ * @param {number} n @param {number} width @param {number} height @param {number} least width of a crop
  */
 function largest(n, width, height, least) {
-	let best = { columns: 1, side: 0, cell: 0 };
+	let best = { columns: 1, wide: 0, tall: 0, side: 0 };
 	for (let columns = 1; columns <= n; columns++) {
 		const rows = Math.ceil(n / columns);
-		const wide = (width - GAP * (columns - 1)) / columns;
-		const tall = (height - GAP * (rows - 1)) / rows - CAPTION;
-		const side = Math.floor(Math.min(wide, tall));
-		if (wide >= least && side > best.side) best = { columns, side, cell: Math.max(side, least) };
+		const wide = Math.floor((width - GAP * (columns - 1)) / columns);
+		const room = Math.floor((height - GAP * (rows - 1)) / rows - CAPTION);
+		const tall = Math.min(room, Math.floor(LONGEST * wide));
+		const side = Math.min(wide, tall);
+		if (wide >= least && side > best.side) best = { columns, wide, tall, side };
 	}
 	return best;
 }
 
-/** With a number below each crop where there is room for it. @param {number} n @param {number} width @param {number} height */
-function layout(n, width, height) {
+/**
+ * The crops of a card, with a number below each where there is room for it.
+ *
+ * @param {number} n @param {number} width @param {number} height CSS pixels
+ */
+export function layout(n, width, height) {
 	const numbered = largest(n, width, height, NUMBERED);
 	return numbered.side >= SMALLEST ? numbered : largest(n, width, height, 0);
 }
 
 /**
  * @param {{
- *   picture: ViewPicture, policy: PolicyJson, side: number, cell: number, frame: ImageBitmap | undefined
- * }} props
+ *   picture: ViewPicture, policy: PolicyJson, wide: number, tall: number, frame: ImageBitmap | undefined
+ * }} props wide, tall: CSS pixels; the shorter of the two shows one metre
  */
-function Crop({ picture, policy, side, cell, frame }) {
+function Crop({ picture, policy, wide, tall, frame }) {
 	const { view, ball } = picture;
 	const part = windowOf(picture, policy);
 	const theme = colours.value;
 	const filter = filterOf(view.letter);
 	const draw = useCallback((/** @type {CanvasRenderingContext2D} */ context) => {
 		context.fillStyle = theme.stage;
-		context.fillRect(0, 0, side, side);
+		context.fillRect(0, 0, wide, tall);
 		if (!part) return;
-		const scale = side / part.side;
-		const viewport = {
-			scale,
-			left: side / 2 - (part.center.x + 0.5) * scale,
-			top: side / 2 - (part.center.y + 0.5) * scale,
-		};
+		const scale = Math.min(wide, tall) / part.side;
+		const viewport = centeredOn(part.center, { width: wide, height: tall }, scale);
 		if (frame) {
 			context.imageSmoothingEnabled = false;
 			context.filter = filter;
@@ -114,16 +119,16 @@ function Crop({ picture, policy, side, cell, frame }) {
 		if (view.balls.length === 0) picture.predictions?.draw(context, scene);
 		drawExpected(context, scene);
 		drawBall(context, scene);
-	}, [picture, side, frame, theme, filter]);
+	}, [picture, wide, tall, frame, theme, filter]);
 	return html`
-		<li class="crop" style=${{ width: `${cell}px` }}>
+		<li class="crop" style=${{ width: `${wide}px` }}>
 			<button class="crop__button" type="button" title=${`Focus view ${view.letter}`} onClick=${() => focusView(view.letter)}>
-				<${Canvas} class="crop__canvas" width=${side} height=${side} draw=${draw} name=${`Ball in view ${view.letter}`} />
+				<${Canvas} class="crop__canvas" width=${wide} height=${tall} draw=${draw} name=${`Ball in view ${view.letter}`} />
 			</button>
-			<p class="crop__caption" data-narrow=${side < NARROW}>
+			<p class="crop__caption" data-narrow=${wide < NARROW}>
 				<${Letter} letter=${view.letter} />
-				${part && side >= ROOMY ? html`<span>${sizeText(picture)}</span>` : null}
-				${cell < NUMBERED ? null : part ? html`<span data-grade=${gradeOfSize(ball?.size_ratio)}>${ball?.size_ratio ? `${fixed(ball.size_ratio, 2)}×` : ''}</span>` : html`<span title="no ball">${cell >= NARROW ? 'no ball' : '–'}</span>`}
+				${part && wide >= ROOMY ? html`<span>${sizeText(picture)}</span>` : null}
+				${wide < NUMBERED ? null : part ? html`<span data-grade=${gradeOfSize(ball?.size_ratio)}>${ball?.size_ratio ? `${fixed(ball.size_ratio, 2)}×` : ''}</span>` : html`<span title="no ball">${wide >= NARROW ? 'no ball' : '–'}</span>`}
 			</p>
 		</li>
 	`;
@@ -133,14 +138,14 @@ function Crop({ picture, policy, side, cell, frame }) {
 export function ContactSheet({ pictures, policy }) {
 	const [ref, size] = useSize();
 	const frames = useFrames(pictures.map(({ view }) => view));
-	const { columns, side, cell } = layout(pictures.length, size.width, size.height);
+	const { columns, wide, tall, side } = layout(pictures.length, size.width, size.height);
 	return html`
 		<section class="card strip-card" aria-label="Ball, one metre window">
-			<h2>Ball, 1 m window</h2>
+			<h2 title="The shorter side of every crop is one metre at the ball: the balls must look equally large">Ball, 1 m window</h2>
 			<ul class="crops" ref=${ref} style=${{ gridTemplateColumns: `repeat(${columns}, max-content)` }}>
 				${side < SMALLEST ? null : pictures.map((picture) => html`
 					<${Crop}
-						key=${picture.view.key} picture=${picture} policy=${policy} side=${side} cell=${cell}
+						key=${picture.view.key} picture=${picture} policy=${policy} wide=${wide} tall=${tall}
 						frame=${frames.get(picture.view.key)}
 					/>`)}
 			</ul>

@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
 
+import { ballCenter, ballOf } from '../geometry/preview.js';
 import { useSize } from '../lib/hooks.js';
 import { ImageStage } from '../overlays/stage.js';
 import { filterOf } from '../state/adjustments.js';
@@ -26,6 +27,7 @@ import { PanelCaption } from './panel_caption.js';
 import { PanelTools } from './panel_tools.js';
 import { PredictionChip } from './prediction_parts.js';
 
+/** @import {ImagePoint} from '../geometry/camera.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
 /** @import {Hit} from '../tools/hit.js' */
 
@@ -52,6 +54,31 @@ function useFrame(url) {
 	return frame.url === url ? frame : { url, image: decoded(url), error: false };
 }
 
+/** @type {Map<number, ImagePoint | null>} */
+const middles = new Map();
+
+/**
+ * What a picture shows in its middle when it is cropped: the ball, else the markings. It stays
+ * as it was when the view was first shown, or the picture would run away under a drag.
+ *
+ * @param {ViewPicture} picture @returns {ImagePoint | null}
+ */
+function middleOf({ view, ball: fit, markings }) {
+	const known = middles.get(view.id);
+	if (known !== undefined) return known;
+	const ball = ballOf(view);
+	const points = markings.flatMap((marking) => marking.points.map(({ point }) => point));
+	const mean = points.length === 0 ? null : {
+		x: points.reduce((sum, { x }) => sum + x, 0) / points.length,
+		y: points.reduce((sum, { y }) => sum + y, 0) / points.length,
+	};
+	const seen = fit?.reprojected ? { x: fit.reprojected[0], y: fit.reprojected[1] } : null;
+	const middle = (ball && ballCenter(ball)) ?? seen ?? mean;
+	if (middles.size > 400) middles.clear();
+	middles.set(view.id, middle);
+	return middle;
+}
+
 /** @param {string} key @param {Hit | null} hit @returns {import('../state/workspace.js').Selection | null} */
 function selectionOf(key, hit) {
 	if (!hit) return null;
@@ -66,16 +93,20 @@ function hintOf(predictions, hit) {
 	return mark ? `${mark.name} predicts a ball here, score ${mark.score.toFixed(2)}. Click to select it, Y accepts it.` : '';
 }
 
-/** @param {{picture: ViewPicture, first: boolean}} props */
-export function ImagePanel({ picture, first }) {
+/**
+ * @param {{picture: ViewPicture, area: string, sizes: boolean}} props area: its place in the grid;
+ *   sizes: whether the views may have other sizes
+ */
+export function ImagePanel({ picture, area, sizes }) {
 	const { view } = picture;
 	const { letter } = view;
 	const [ref, size] = useSize();
 	const stage = useRef(/** @type {ImageStage | null} */ (null));
 	const instant = otherInstant.value?.view === view.id ? otherInstant.value : null;
 	const frame = useFrame(instant ? instant.image : view.image);
-	const viewport = viewportOf(letter, view, size);
-	const now = { view, size, viewport, predictions: picture.predictions, elsewhere: instant !== null };
+	const center = middleOf(picture);
+	const viewport = viewportOf(letter, view, size, center);
+	const now = { view, size, viewport, center, predictions: picture.predictions, elsewhere: instant !== null };
 	const latestProps = useRef(now);
 	latestProps.current = now;
 
@@ -107,10 +138,13 @@ export function ImagePanel({ picture, first }) {
 				focusView(latestProps.current.view.letter);
 				selected.value = selectionOf(latestProps.current.view.key, hit);
 			},
-			pan: (dx, dy) => panPanel(latestProps.current.view.letter, dx, dy),
+			pan: (dx, dy) => {
+				const { view: v, size: s, center: c } = latestProps.current;
+				panPanel(v.letter, v, s, dx, dy, c);
+			},
 			zoom: (at, factor) => {
-				const { view: v, size: s } = latestProps.current;
-				zoomPanel(v.letter, v, s, at, factor);
+				const { view: v, size: s, center: c } = latestProps.current;
+				zoomPanel(v.letter, v, s, at, factor, c);
 			},
 		});
 		return () => { detach(); made.destroy(); };
@@ -150,15 +184,16 @@ export function ImagePanel({ picture, first }) {
 			data-focused=${isFocused}
 			data-included=${view.included}
 			tabindex="0"
+			style=${{ gridArea: area }}
 			aria-label=${`View ${letter}, ${view.label}. I to walk through its objects.`}
 			onFocus=${() => focusView(letter)}
 			onDblClick=${maximise}
 		>
 			<div class="image-panel__stage" data-ready=${Boolean(frame.image)} data-frame=${frame.image ? view.id : undefined} data-offset=${instant?.offset} ref=${ref}></div>
-			${view.image ? null : html`<p class="image-panel__missing">No frame · lines and ball can be edited</p>`}
+			${view.image ? null : html`<p class="image-panel__missing">No frame<span class="image-panel__rest"> · lines and ball can be edited</span></p>`}
 			${frame.error ? html`<p class="image-panel__missing">The frame of this view cannot be read.</p>` : null}
 			<${PanelCaption} picture=${picture} />
-			<${PanelTools} picture=${picture} first=${first} />
+			<${PanelTools} picture=${picture} sizes=${sizes} />
 			<${DrawingChip} view=${view.key} />
 			${instant ? html`<${InstantChip} label=${instant.label} />` : null}
 			${picture.predictions && !drawing.value ? html`<${PredictionChip} picture=${picture} />` : null}

@@ -51,7 +51,7 @@ function Strip({ row, width, pixels: data }) {
 	const theme = colours.value;
 	const draw = useCallback((/** @type {CanvasRenderingContext2D} */ context) => {
 		const scale = data ? data.width / picture.view.width : 1;
-		drawStrip(context, { width, height: STRIP }, marking, data ?? null, scale);
+		drawStrip(context, { width, height: STRIP }, marking, data ?? null, scale, picture.view);
 	}, [marking, width, data, theme]);
 	return html`
 		<li class="line-row">
@@ -77,14 +77,14 @@ export function LineList({ pictures }) {
 	const shown = rows.slice(0, fitting);
 	const rest = rows[fitting];
 	return html`
-		<section class="card strip-card" aria-label="Lines, worst first">
+		<section class="card strip-card" data-card="lines" aria-label="Lines, worst first">
 			<h2>Lines, ±12 px${rest ? html`<span class="card__aside">${narrow ? '+ ' : ''}${rows.length - fitting}${narrow ? '' : ' more'} up to ${pixels(rest.marking.largest)} px</span>` : null}</h2>
 			<ul class="line-list" ref=${ref} data-narrow=${narrow}>
 				${rows.length ? null : html`<li class="empty-note">No lines are annotated in this group.</li>`}
 				${size.width < 100 ? null : shown.map((row) => html`
 					<${Strip}
 						key=${`${row.picture.view.key} ${row.marking.marking}`} row=${row}
-						width=${Math.max(24, size.width - (narrow ? 190 : 232))} pixels=${read.get(row.picture.view.key)}
+						width=${Math.max(24, size.width - (narrow ? 210 : 232))} pixels=${read.get(row.picture.view.key)}
 					/>`)}
 			</ul>
 		</section>

@@ -6,6 +6,7 @@ import { html } from 'htm/preact';
 import { cameraFromJson, rayThrough } from '../geometry/camera.js';
 import { pitchMarkings } from '../geometry/pitch.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
+import { clipSegment, spreadApart, within as inBox } from '../geometry/spread.js';
 import { fixed } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
 import { cycleEstimator, estimator } from '../state/workspace.js';
@@ -18,6 +19,13 @@ const MARGIN = 52;
 
 /** How far a ray is drawn when it meets nothing, metres. */
 const RAY = 130;
+/** Rays that miss the 3D ball end this far beyond the pitch at the latest, metres. */
+const APRON = 4;
+/** Radius of a camera's mark, and least distance of two, CSS pixels. */
+const MARK = 7;
+const APART = 16;
+/** A mark that was moved farther than this shows where its camera stands, CSS pixels. */
+const MOVED = 3;
 
 /** @typedef {{letter: string, x: number, y: number, ray: PitchPoint | null}} Stand */
 
@@ -57,6 +65,24 @@ function frameOf(group, cameras) {
 	return { left, top, width: Math.max(...xs) + 7 - left, height: Math.max(...ys) + 7 - top };
 }
 
+/**
+ * The ray as far as it is drawn: from where its camera stands to the ball, or to where it leaves
+ * the ground that is shown.
+ *
+ * @param {Stand} stand @param {GroupDocument} group @param {ReturnType<typeof frameOf>} frame
+ * @returns {PitchPoint[] | null}
+ */
+function rayOf({ x, y, ray }, { pitch }, { left, top, width, height }) {
+	if (!ray) return null;
+	const shown = { left, top, right: left + width, bottom: top + height };
+	const inner = clipSegment({ x, y }, { x: ray[0], y: ray[1] }, shown);
+	if (!inner) return null;
+	const [l, w] = [pitch.length / 2 + APRON, pitch.width / 2 + APRON];
+	const over = clipSegment(inner[0], inner[1], { left: -l, top: -w, right: l, bottom: w });
+	const end = over ? over[1] : inner[1];
+	return [[inner[0].x, inner[0].y, 0], [end.x, end.y, 0]];
+}
+
 /** @type {Map<string, string[]>} */
 const drawn = new Map();
 
@@ -87,20 +113,38 @@ function Drawing({ group, solution }) {
 	const pixel = Math.max(frame.width / Math.max(1, size.width), frame.height / Math.max(1, size.height));
 	const ball = solution.ball?.point;
 	const [l, w] = [group.pitch.length, group.pitch.width];
+	const rim = (MARK + 1) * pixel;
+	const room = {
+		left: frame.left + rim, top: frame.top + rim, right: frame.left + frame.width - rim, bottom: frame.top + frame.height - rim,
+	};
+	const marks = spreadApart(cameras, APART * pixel, room, ball ? [{ x: ball[0], y: ball[1] }] : []);
 	return html`
 		<div class="mini-pitch__drawing" ref=${ref}>
 			<svg viewBox=${`${frame.left} ${frame.top} ${frame.width} ${frame.height}`} role="img" aria-label="The pitch from above">
 				<rect class="mini-pitch__grass" x=${-l / 2} y=${-w / 2} width=${l} height=${w} rx=${pixel} />
 				${linesOf(l, w).map((line) => html`<path class="mini-pitch__line" d=${line} stroke-width=${pixel} />`)}
-				${cameras.map(({ letter, x, y, ray }) => (ray ? html`
-					<path class="mini-pitch__ray" data-letter=${letter} d=${path([[x, y, 0], ray])} stroke-width=${1.3 * pixel} />` : null))}
+				${cameras.map((stand) => {
+					const ray = rayOf(stand, group, frame);
+					return ray ? html`<path class="mini-pitch__ray" data-letter=${stand.letter} d=${path(ray)} stroke-width=${1.3 * pixel} />` : null;
+				})}
 				${solution.pairs.filter(({ point }) => within(frame, point)).map(({ point, valid }) => html`
 					<circle class="mini-pitch__pair" data-valid=${valid} cx=${point[0]} cy=${point[1]} r=${2.4 * pixel} stroke-width=${1.2 * pixel} />`)}
-				${cameras.map(({ letter, x, y }) => html`
-					<g class="mini-pitch__camera" data-letter=${letter}>
-						<circle cx=${x} cy=${y} r=${7 * pixel} />
-						<text x=${x} y=${y} dy=${3.6 * pixel} font-size=${10 * pixel}>${letter}</text>
-					</g>`)}
+				${cameras.map(({ letter, ...stand }, i) => {
+					const [{ x, y }, at] = [marks[i], inBox(stand, room)];
+					return Math.hypot(x - at.x, y - at.y) < MOVED * pixel ? null : html`
+						<g class="mini-pitch__leader" data-letter=${letter} stroke-width=${pixel}>
+							<path d=${path([[at.x, at.y, 0], [x, y, 0]])} />
+							<circle cx=${at.x} cy=${at.y} r=${1.8 * pixel} />
+						</g>`;
+				})}
+				${cameras.map(({ letter }, i) => {
+					const { x, y } = marks[i];
+					return html`
+						<g class="mini-pitch__camera" data-letter=${letter}>
+							<circle cx=${x} cy=${y} r=${MARK * pixel} />
+							<text x=${x} y=${y} dy=${3.6 * pixel} font-size=${10 * pixel}>${letter}</text>
+						</g>`;
+				})}
 				${ball ? html`<circle class="mini-pitch__ball" cx=${ball[0]} cy=${ball[1]} r=${3.4 * pixel} stroke-width=${1.5 * pixel} />` : null}
 			</svg>
 		</div>

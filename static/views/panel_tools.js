@@ -10,7 +10,9 @@ import { endDrawing, startDrawing } from '../state/drawing.js';
 import { editorAddress } from '../state/editor_address.js';
 import { group } from '../state/group.js';
 import { findFramesAround, framesAround, stepInstant } from '../state/instants.js';
+import { filled, toggleFilled } from '../state/viewports.js';
 import { drawing, equalViews, focusView, maximised, toggleMaximised } from '../state/workspace.js';
+
 
 /** @import {ViewJson} from '../api/types.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
@@ -25,6 +27,7 @@ const PATHS = {
 	main: 'M2.5 3.5h7v9h-7zM10.5 3.5h3v4h-3zM10.5 8.5h3v4h-3z',
 	before: 'M12.5 3.5h-4v9h4M6 5 3 8l3 3',
 	after: 'M3.5 3.5h4v9h-4M10 5l3 3-3 3',
+	crop: 'M4.5 1.5v10h10M1.5 4.5h10v10',
 	larger: 'M9 3h4v4M7 13H3V9',
 	smaller: 'M7 3v4H3M9 13V9h4',
 };
@@ -58,8 +61,8 @@ function step(letter, by) {
 	stepInstant(by);
 }
 
-/** @param {{picture: ViewPicture, first: boolean}} props */
-export function PanelTools({ picture, first }) {
+/** @param {{picture: ViewPicture, sizes: boolean}} props sizes: whether the views may have other sizes */
+export function PanelTools({ picture, sizes }) {
 	const [open, setOpen] = useState(false);
 	const { key, letter } = picture.view;
 	const draws = drawing.value?.view === key;
@@ -77,10 +80,13 @@ export function PanelTools({ picture, first }) {
 			</a>
 			<${Tool} label=${`Brightness and contrast of view ${letter}`} title="Brightness and contrast" path=${PATHS.light}
 				pressed=${open || filterOf(letter) !== 'none'} onClick=${() => setOpen(!open)} />
-			${first && !alone ? html`
+			${sizes && !alone ? html`
 				<${Tool} label=${equalViews.value ? 'Main camera large' : 'All views equally large'}
 					title=${equalViews.value ? 'Main camera large (Shift+L)' : 'All views equally large (Shift+L)'}
 					path=${equalViews.value ? PATHS.main : PATHS.equal} onClick=${() => { equalViews.value = !equalViews.value; }} />` : null}
+			<${Tool} label=${filled.value ? 'Show whole images' : 'Fill the panels with the images'}
+				title=${filled.value ? 'Images are cropped to fill their panels; show them whole (I)' : 'Crop the images so that they fill their panels (I)'}
+				path=${PATHS.crop} pressed=${filled.value} onClick=${toggleFilled} />
 			<${Tool} label=${alone ? 'Show all views' : `Show only view ${letter}`} title=${alone ? 'Show all views' : 'Show only this view'}
 				path=${alone ? PATHS.smaller : PATHS.larger} onClick=${() => toggleMaximised(letter)} />
 		</div>

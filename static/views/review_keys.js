@@ -14,7 +14,7 @@ import { announce, dismiss, notice } from '../state/notice.js';
 import { revertSelected } from '../state/revert.js';
 import { swapWarning, swappedViews } from '../state/sides.js';
 import { accept, askReason, askViewReason, cancelAsking, defer } from '../state/verdicts.js';
-import { fitAll, fitPanel, isZoomed, zoomTo } from '../state/viewports.js';
+import { filled, fitAll, fitPanel, isZoomed, toggleFilled, zoomTo } from '../state/viewports.js';
 import {
 	asking, boxes, cycleEstimator, cycleGain, drawing, editing, equalViews, estimator, focused, focusView, gain,
 	gatesOpen, loupe, maximised, otherInstant, overlaysHidden, pinPlace, pointerPlace, projections, selected,
@@ -80,6 +80,12 @@ function zoomToBall() {
 	const { width, height } = stage.getBoundingClientRect();
 	if (isZoomed(focused.value)) fitPanel(focused.value);
 	else zoomTo(focused.value, { width, height }, center, BALL_SCALE);
+}
+
+/** Crop the images to their panels, or show them whole. */
+function fillPanels() {
+	toggleFilled();
+	announce(filled.value ? 'Images fill their panels. Drag to move them.' : 'Images are shown whole.');
 }
 
 /** @param {string} word @param {boolean} on */
@@ -200,7 +206,8 @@ const VIEW = [
 		run: zoomToBall,
 		hold: { start: () => { loupe.value = true; }, end: () => { loupe.value = false; } },
 	},
-	{ keys: ['0'], label: 'Show images whole', group: 'View', run: fitAll },
+	{ keys: ['0'], label: 'Leave the zoom of every view', group: 'View', run: fitAll },
+	{ keys: ['i'], label: 'Crop the images to fill their panels, or show them whole', group: 'View', run: fillPanels },
 	{
 		keys: ['h'], label: 'Hide or show everything drawn; held: peek below', group: 'View',
 		run: flipOverlays, hold: { start: flipOverlays, end: flipOverlays },
@@ -226,7 +233,7 @@ const VIEW = [
 		run: () => { equalViews.value = !equalViews.value; },
 	},
 	{
-		keys: ['l'], label: 'Fold the strip below', group: 'View',
+		keys: ['l'], label: 'Fold the strip with ball, lines and pitch', group: 'View',
 		run: () => { stripCollapsed.value = !stripCollapsed.value; },
 	},
 ];

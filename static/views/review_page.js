@@ -12,9 +12,9 @@ import { absent } from '../state/arrival.js';
 import { conflict } from '../state/conflict.js';
 import { document, group, isPreview, solution } from '../state/group.js';
 import { sceneShown } from '../state/scene3d.js';
-import { estimator, focused, loupe, maximised, stripCollapsed } from '../state/workspace.js';
+import { estimator, focused, loupe, maximised } from '../state/workspace.js';
 import { NoticeBar } from './bars.js';
-import { ImageGrid } from './image_grid.js';
+import { ImageGrid, ReviewMain } from './image_grid.js';
 import { usePredictions, withPredictions } from './prediction_parts.js';
 import { Rail } from './rail.js';
 import { ReviewHeader } from './review_header.js';
@@ -56,10 +56,10 @@ function Workspace() {
 	useEffect(() => keepWithin(pictures.map(({ view }) => view.letter)), [pictures]);
 	if (!shown) return html`<${Absent} />`;
 	return html`
-		<main class="review__main" data-collapsed=${stripCollapsed.value} data-count=${maximised.value ? 1 : pictures.length}>
+		<${ReviewMain} pictures=${pictures}>
 			${sceneShown.value ? html`<${Scene3D} group=${shown} solution=${found} />` : html`<${ImageGrid} pictures=${pictures} />`}
 			<${BottomStrip} group=${shown} solution=${solved} pictures=${pictures} />
-		</main>
+		<//>
 		<${Rail} group=${shown} solution=${solved} pictures=${pictures} live=${live} />
 		${loupe.value ? html`<${Loupe} pictures=${pictures} />` : null}
 	`;

@@ -18,6 +18,11 @@ OpenPage = Callable[..., Page]
 MORE_THAN_CHROMIUM_KEEPS = 18
 """Times the view is opened: sixteen contexts that nobody gave back make Chromium complain."""
 
+LABELS = """() => [...document.querySelectorAll('.scene3d__camera')].map((label) => {
+  const { x, y, width, height } = label.getBoundingClientRect();
+  return { x: x + width / 2, y: y + height / 2, hidden: label.hidden };
+})"""
+
 
 def show(page: Page) -> None:
     """Open the 3D view."""
@@ -132,3 +137,27 @@ class TestScene:
         Screen(page).ready()
         show(page)
         assert serious(page) == []
+
+
+class TestWhole:
+    def test_shows_every_camera_with_a_letter_of_its_own(
+        self, open_page: OpenPage, film: str
+    ) -> None:
+        page = open_page(None, size={"width": 1100, "height": 700})
+        first = page.request.get(f"{film}/api/v1/groups?dataset=film&limit=1").json()["items"][0]
+        page.goto(f"{film}/review/{first['id']}")
+        page.wait_for_selector(".mini-pitch__camera")
+        page.keyboard.press("\\")
+        page.wait_for_selector('.scene3d__stage[data-ready="true"]')
+        page.wait_for_function("() => !document.querySelector('.scene3d__camera')?.hidden")
+        page.wait_for_timeout(300)
+        labels = page.evaluate(LABELS)
+        assert len(labels) == 6
+        assert not any(label["hidden"] for label in labels)
+        stage = page.locator(".scene3d__stage").bounding_box()
+        assert stage is not None
+        for i, label in enumerate(labels):
+            assert stage["x"] < label["x"] < stage["x"] + stage["width"]
+            assert stage["y"] < label["y"] < stage["y"] + stage["height"]
+            for other in labels[i + 1 :]:
+                assert np.hypot(label["x"] - other["x"], label["y"] - other["y"]) > 24

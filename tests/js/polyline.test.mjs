@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { frames, lengthOf, nearestOn } from '../../static/geometry/polyline.js';
+import { frames, framesOf, lengthOf, nearestOfPieces, nearestOn, piecesOf } from '../../static/geometry/polyline.js';
 import { DASHES, gradeOfJac, gradeOfResidual, residualsOf } from '../../static/geometry/residual.js';
 import { close } from './scene.mjs';
 
@@ -81,5 +81,37 @@ describe('grades', () => {
 
 	it('do not let a JaC of exactly the limit pass', () => {
 		assert.equal(gradeOfJac(0.75, 0.75), 'bad');
+	});
+});
+
+describe('piecesOf', () => {
+	const image = { width: 100, height: 60 };
+	// A circle that leaves at the bottom and comes back, as the server clips it.
+	const circle = [[20, 40], [30, 50], [36.2, 59], [63.8, 59], [70, 50], [80, 40]].map(([x, y]) => ({ x, y }));
+
+	it('draws nothing along the border between leaving and coming back', () => {
+		const pieces = piecesOf(circle, image);
+		assert.deepEqual(pieces.map((piece) => piece.length), [3, 3]);
+		assert.deepEqual(pieces.flat(), circle);
+	});
+
+	it('cuts where a line leaves at one border and comes back at another', () => {
+		const corner = [[80, 20], [99, 30], [70, 59], [50, 40]].map(([x, y]) => ({ x, y }));
+		assert.deepEqual(piecesOf(corner, image).map((piece) => piece.length), [2, 2]);
+	});
+
+	it('leaves a line whole that crosses the image, and one of two points', () => {
+		const across = [[0, 10], [50, 20], [99, 30]].map(([x, y]) => ({ x, y }));
+		assert.deepEqual(piecesOf(across, image), [across]);
+		assert.deepEqual(piecesOf([across[0], across[2]], image), [[across[0], across[2]]]);
+		assert.deepEqual(piecesOf([], image), []);
+	});
+
+	it('is looked at as one line without the gap', () => {
+		const pieces = piecesOf(circle, image);
+		assert.equal(framesOf(pieces, 50).length, 50);
+		assert.ok(framesOf(pieces, 50).every(({ point }) => point.x <= 36.3 || point.x >= 63.7));
+		const end = nearestOfPieces(pieces, { x: 80, y: 40 });
+		assert.ok(Math.abs(end.along - (lengthOf(pieces[0]) + lengthOf(pieces[1]))) < 1e-9);
 	});
 });

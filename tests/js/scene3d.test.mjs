@@ -52,6 +52,17 @@ describe('seenAt', () => {
 	});
 });
 
+/** Where an orbit shows a point of the pitch: -1 to 1 across and up the panel. */
+function seenFrom(orbit, aspect, point) {
+	const [sin, cos] = [Math.sin(orbit.azimuth), Math.cos(orbit.azimuth)];
+	const [rise, flat] = [Math.sin(orbit.elevation), Math.cos(orbit.elevation)];
+	const axes = [[cos, 0, -sin], [-rise * sin, flat, -rise * cos], [flat * sin, rise, flat * cos]];
+	const offset = toWorld(point).map((value, i) => value - eyeOf(orbit)[i]);
+	const [right, up, back] = axes.map((axis) => dot(axis, offset));
+	const rows = freeProjection(aspect);
+	return { x: (rows[0] * right) / -back, y: (rows[5] * up) / -back };
+}
+
 describe('orbits', () => {
 	const scene = { pitch: { length: 105, width: 68 }, stands: [], pairs: [], ball: null, best: null, diameter: 0.22 };
 
@@ -68,6 +79,33 @@ describe('orbits', () => {
 			const [halfWidth, halfHeight] = [orbit.distance / rows[0], orbit.distance / rows[5]];
 			assert.ok(halfWidth > 52.5 && halfHeight > 34, `${aspect}`);
 		}
+	});
+
+	it('show the whole pitch and every camera at any shape of panel', () => {
+		const at = (position) => {
+			const camera = cameraFromJson({ ...CAMERA, position_meters: position });
+			const corners = [[0, 0], [1280, 0], [1280, 720], [0, 720]].map(([x, y]) => seenAt(camera, { x, y }, 9));
+			return { camera, corners };
+		};
+		const arrangements = [
+			[[0, 60, -14]], [[-34, 88, -20], [-34, -88, -20], [2, 90, -21], [-2, -90, -21], [34, 88, -20], [34, -88, -20]],
+			[[-120, 5, -3], [110, -70, -30], [0, 200, -45]],
+		];
+		for (const positions of arrangements) {
+			const stands = positions.map(at);
+			for (const aspect of [0.5, 1, 1.6, 3]) {
+				const orbit = presetOrbit('whole', { ...scene, stands }, aspect);
+				const shown = [...positions, ...stands.flatMap(({ corners }) => corners), [-52.5, -34, 0], [52.5, 34, 0], [-52.5, 34, 0]];
+				for (const point of shown) {
+					const { x, y } = seenFrom(orbit, aspect, point);
+					assert.ok(Math.abs(x) < 0.95 && y > -0.95 && y < 0.8, `${aspect}: ${point} at ${x}, ${y}`);
+				}
+			}
+		}
+	});
+
+	it('come close when all is on the pitch', () => {
+		assert.ok(presetOrbit('whole', scene, 1.6).distance < 180);
 	});
 
 	it('look at the goal that the ball is near', () => {

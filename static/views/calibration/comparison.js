@@ -17,7 +17,7 @@ export function Comparison({ group, view, before, after }) {
 	const staged = changed.value;
 	return html`
 		<section class="card strip-card" aria-label="Before and after" aria-busy=${!isCurrent.value}>
-			<h2>Before → after<span class="card__aside">${staged ? (isCurrent.value ? 'preview, not saved' : 'asking…') : 'nothing staged'}</span></h2>
+			<h2>Before → after<span class="card__aside">${staged ? (isCurrent.value ? 'not saved' : 'asking…') : 'nothing staged'}</span></h2>
 			<div class="editor__scroll" tabindex="0" role="group" aria-label="Before and after in numbers">
 				<p class="comparison__summary" data-grade=${refusal.value ? 'bad' : grade} role="status">${refusal.value || text}</p>
 				<table class="numbers comparison" data-live=${staged && !isCurrent.value}>

@@ -37,7 +37,7 @@ const MEASURES = [
 	})),
 	{ name: 'median', label: 'Median point', read: (_, solved) => solved?.calibration.error_px, say: to(2, ' px'), better: -1, step: 0.005 },
 	{ name: 'worst', label: 'Worst point', read: (_, solved) => worstLine(solved), say: to(1, ' px'), better: -1, step: 0.05 },
-	{ name: 'ball', label: 'Ball here', read: (solution, solved) => (solved ? ballError(solved.view, solution) : null), say: (value) => `${pixels(value)} px`, better: -1, step: 0.05 },
+	{ name: 'ball', label: 'Ball here', read: (solution, solved) => (solved ? ballError(solved.view, solution) : null), say: (value) => (value === null || value === undefined ? pixels(value) : `${pixels(value)} px`), better: -1, step: 0.05 },
 	{ name: 'ratio', label: 'Ball Ø ratio', read: (_, solved) => solved?.ball?.size_ratio, say: to(2, '×'), better: 0, step: 0.005 },
 	{ name: 'gates', label: 'Gates passed', read: (solution) => solution?.gates.filter(({ active, passed }) => active && passed).length, say: to(0), better: 1, step: 0.5 },
 	{ name: 'views', label: 'Views used', read: (solution) => solution?.ball?.views.length ?? 0, say: to(0), better: 1, step: 0.5 },

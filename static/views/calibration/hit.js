@@ -1,12 +1,12 @@
 // @ts-check
 /** What lies under the pointer in the editor: a point, else the line of a marking. */
 
-import { nearestOn } from '../../geometry/polyline.js';
+import { nearestOn, piecesOf } from '../../geometry/polyline.js';
 import { toScreen } from '../../geometry/viewport.js';
 
 /** @import {LinesJson, PointJson} from '../../api/types.js' */
 /** @import {MarkingResiduals} from '../../geometry/residual.js' */
-/** @import {ScreenPoint, Viewport} from '../../geometry/viewport.js' */
+/** @import {ScreenPoint, Size, Viewport} from '../../geometry/viewport.js' */
 /** @import {Choice} from '../../state/calibration.js' */
 
 const POINT_REACH = 11;
@@ -36,9 +36,10 @@ export function pointAt(lines, viewport, at, preferred) {
  * The marking whose annotated or projected line runs under a place.
  *
  * @param {LinesJson} lines @param {MarkingResiduals[]} fits @param {Viewport} viewport @param {ScreenPoint} at
+ * @param {Size} size of the image
  * @returns {string | null}
  */
-export function lineAt(lines, fits, viewport, at) {
+export function lineAt(lines, fits, viewport, at, size) {
 	let best = { marking: /** @type {string | null} */ (null), distance: LINE_REACH };
 	/** @param {string} marking @param {PointJson[]} polyline */
 	const consider = (marking, polyline) => {
@@ -47,14 +48,16 @@ export function lineAt(lines, fits, viewport, at) {
 		if (near && near.distance < best.distance) best = { marking, distance: near.distance };
 	};
 	for (const [marking, points] of Object.entries(lines)) consider(marking, points);
-	for (const { marking, polyline } of fits) consider(marking, polyline);
+	for (const { marking, polyline } of fits) {
+		for (const piece of piecesOf(polyline, size)) consider(marking, piece);
+	}
 	return best.marking;
 }
 
-/** What the pointer finds. @param {LinesJson} lines @param {MarkingResiduals[]} fits @param {Viewport} viewport @param {ScreenPoint} at @param {string | null} preferred @returns {Choice | null} */
-export function choiceAt(lines, fits, viewport, at, preferred) {
+/** What the pointer finds. @param {LinesJson} lines @param {MarkingResiduals[]} fits @param {Viewport} viewport @param {ScreenPoint} at @param {string | null} preferred @param {Size} size of the image @returns {Choice | null} */
+export function choiceAt(lines, fits, viewport, at, preferred, size) {
 	const point = pointAt(lines, viewport, at, preferred);
 	if (point) return point;
-	const marking = lineAt(lines, fits, viewport, at);
+	const marking = lineAt(lines, fits, viewport, at, size);
 	return marking ? { marking, index: null } : null;
 }

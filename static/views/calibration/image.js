@@ -65,7 +65,11 @@ export function EditorImage({ picture, before }) {
 		const detach = attachEditor(element, {
 			viewport: () => now.current.viewport,
 			fits: () => now.current.picture.markings,
-			pan: (dx, dy) => panPanel(panelKey(now.current.view.letter), dx, dy),
+			size: () => now.current.view,
+			pan: (dx, dy) => {
+				const { view: v, size: s } = now.current;
+				panPanel(panelKey(v.letter), v, s, dx, dy);
+			},
 			zoom: (at, factor) => {
 				const { view: v, size: s } = now.current;
 				zoomPanel(panelKey(v.letter), v, s, at, factor);
@@ -85,7 +89,7 @@ export function EditorImage({ picture, before }) {
 		if (size.width === 0 || !drawn) return;
 		drawn.resize(size.width, size.height);
 		drawn.marks = {
-			viewport, lines: lines.value, fits: picture.markings, saved, choice: chosen, hovered: hovered.value,
+			viewport, size: view, lines: lines.value, fits: picture.markings, saved, choice: chosen, hovered: hovered.value,
 		};
 		drawn.draw({
 			picture, viewport, hidden: overlaysHidden.value, projections: projections.value, boxes: false,

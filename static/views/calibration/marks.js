@@ -1,18 +1,20 @@
 // @ts-check
 /** What the editor draws on top of the review screen's overlays. */
 
+import { piecesOf } from '../../geometry/polyline.js';
 import { toScreen } from '../../geometry/viewport.js';
 import { colours } from '../../lib/colours.js';
-import { strokeLine } from '../../overlays/pen.js';
+import { strokeLine, strokeLines } from '../../overlays/pen.js';
 
 /** @import {LinesJson} from '../../api/types.js' */
 /** @import {MarkingResiduals} from '../../geometry/residual.js' */
-/** @import {ImagePoint, Viewport} from '../../geometry/viewport.js' */
+/** @import {ImagePoint, Size, Viewport} from '../../geometry/viewport.js' */
 /** @import {Choice} from '../../state/calibration.js' */
 
 /**
  * @typedef {object} EditorMarks
  * @property {Viewport} viewport
+ * @property {Size} size of the image
  * @property {LinesJson} lines as shown
  * @property {MarkingResiduals[]} fits of the camera as shown
  * @property {ImagePoint[][]} saved where the saved camera puts the markings; empty without changes
@@ -24,9 +26,9 @@ const NUMBERS_UP_TO = 40;
 
 /** @param {CanvasRenderingContext2D} context @param {EditorMarks} marks */
 export function drawEditorMarks(context, marks) {
-	const { viewport, saved, hovered, choice } = marks;
+	const { viewport, size, saved, hovered, choice } = marks;
 	for (const polyline of saved) {
-		strokeLine(context, viewport, polyline, { colour: colours.value.unseen, width: 1.25, dash: [2, 5], halo: false });
+		strokeLines(context, viewport, piecesOf(polyline, size), { colour: colours.value.unseen, width: 1.25, dash: [2, 5], halo: false });
 	}
 	if (hovered && hovered !== choice?.marking) light(context, marks, hovered, 3);
 	if (choice) {
@@ -36,10 +38,10 @@ export function drawEditorMarks(context, marks) {
 }
 
 /** @param {CanvasRenderingContext2D} context @param {EditorMarks} marks @param {string} marking @param {number} width */
-function light(context, { viewport, lines, fits }, marking, width) {
+function light(context, { viewport, size, lines, fits }, marking, width) {
 	const colour = colours.value.selected;
 	const projected = fits.find((fit) => fit.marking === marking)?.polyline ?? [];
-	strokeLine(context, viewport, projected, { colour, width });
+	strokeLines(context, viewport, piecesOf(projected, size), { colour, width });
 	const points = lines[marking] ?? [];
 	strokeLine(context, viewport, points, { colour, width: 1, dash: [1, 3], halo: false });
 	for (const point of points) {

@@ -15,6 +15,7 @@ import { choiceAt } from './hit.js';
  * @typedef {object} Panel
  * @property {() => Viewport} viewport
  * @property {() => MarkingResiduals[]} fits
+ * @property {() => {width: number, height: number}} size of the image
  * @property {(dx: number, dy: number) => void} pan
  * @property {(at: ScreenPoint, factor: number) => void} zoom
  */
@@ -35,7 +36,7 @@ export function attachEditor(element, panel) {
 
 	/** @param {ScreenPoint} place */
 	function find(place) {
-		return choiceAt(lines.value, panel.fits(), panel.viewport(), place, choice.value?.marking ?? null);
+		return choiceAt(lines.value, panel.fits(), panel.viewport(), place, choice.value?.marking ?? null, panel.size());
 	}
 
 	/** @param {PointerEvent} event */

@@ -5,13 +5,16 @@ import { html } from 'htm/preact';
 
 import { colours } from '../../lib/colours.js';
 import { drawBall, drawEpipolars } from '../../overlays/ball.js';
+import { drawExpected } from '../../overlays/expected_ball.js';
 import { drawGhosts } from '../../overlays/ghosts.js';
 import { drawStrip } from '../../overlays/line_strip.js';
 import { drawMarkings } from '../../overlays/markings.js';
+import { drawMeant } from '../../overlays/meant.js';
 import { drawPins } from '../../overlays/pins.js';
 import { drawPixelGrid } from '../../overlays/pixel_grid.js';
 import { drawPoints, drawSelectedPoint, drawWhiskers } from '../../overlays/points.js';
 import { drawPredictions } from '../../overlays/predictions.js';
+import { drawUndrawn } from '../../overlays/undrawn.js';
 import { drawCurve } from '../timeline/drawing.js';
 import { ballAt, circle, drawGrass, gradeAt, HEIGHT, KEY, lineOf, sceneOf, WIDTH } from './legend_scene.js';
 
@@ -41,6 +44,7 @@ function onGrass(scene, ...draws) {
 const LETTERS = ['A', 'B', 'C', 'D', 'E', 'F'];
 const FIT = { reprojected: [66, 26], optimized_diameter_px: 24, optimized_box: [54, 14, 24, 24] };
 const fit = /** @type {any} */ (FIT);
+const expecting = /** @type {any} */ ({ expected: { place: [66, 26], covariance: [36, 4, 4, 16], box: [57, 17, 18, 18] } });
 const solid = { selected: /** @type {const} */ ({ kind: 'point', view: KEY, marking: 'Side', index: 0 }) };
 /** @param {boolean} sure */
 const mark = (sure) => ({ id: sure ? 1 : 2, name: 'detector', score: sure ? 0.93 : 0.31, scored: true, sure, box: /** @type {[number, number, number, number]} */ ([18, 14, 24, 24]) });
@@ -50,7 +54,7 @@ const ghosts = /** @type {Field[]} */ (/** @type {unknown} */ ([{
 	view: KEY, key: 'ball', base: [{ box: [14, 22, 20, 20] }], mine: [{ box: [70, 12, 20, 20] }],
 }]));
 const strip = (/** @type {'ok' | 'bad'} */ grade, /** @type {number} */ off) => (/** @type {CanvasRenderingContext2D} */ context) => {
-	drawStrip(context, { width: WIDTH, height: HEIGHT }, lineOf(grade, off, { polyline: [{ x: 0, y: 25 }, { x: WIDTH, y: 25 }], points: [{ point: { x: 66, y: 25 + off }, nearest: { x: 66, y: 25 }, distance: off }] }), null, 1);
+	drawStrip(context, { width: WIDTH, height: HEIGHT }, lineOf(grade, off, { polyline: [{ x: 0, y: 25 }, { x: WIDTH, y: 25 }], points: [{ point: { x: 66, y: 25 + off }, nearest: { x: 66, y: 25 }, distance: off }] }), null, 1, { width: WIDTH, height: HEIGHT });
 };
 
 /** @type {Section} */
@@ -60,7 +64,7 @@ const PICTURES = {
 		{ name: 'Line that fits', meaning: 'Where the camera puts a marking; every annotated point of it is close. Blue, solid.', tokens: 'canvas-ok', draw: onGrass(sceneOf({ markings: [lineOf('ok', 1)] }), drawMarkings) },
 		{ name: 'Line worth a look', meaning: 'A point is more than half as far off as JaC allows. Orange, long dashes.', tokens: 'canvas-warn', draw: onGrass(sceneOf({ markings: [lineOf('warn', 5)] }), drawMarkings) },
 		{ name: 'Line that is wrong', meaning: 'A point is farther off than JaC allows, so the marking counts against the view. Red, short dashes.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12)] }), drawMarkings) },
-		{ name: 'Line that nobody drew', meaning: 'It should be visible here and has no points: it counts as missed. Grey dots.', tokens: 'canvas-unseen', draw: onGrass(sceneOf({ markings: [lineOf('unseen', null)] }), drawMarkings) },
+		{ name: 'Line that nobody drew', meaning: 'It should be visible here and has no points: it counts as missed. White on black dots, so that it is seen on white paint too; yellow with its name when the card offers to draw it.', tokens: 'canvas-unseen canvas-point canvas-ink', draw: onGrass(sceneOf({ markings: [lineOf('unseen', null, { points: [] })] }), drawMarkings, drawUndrawn) },
 		{ name: 'Annotated point', meaning: 'A click of a person. White with a dark ring.', tokens: 'canvas-point canvas-ink', draw: onGrass(sceneOf({ markings: [lineOf('ok', 1)] }), drawMarkings, drawPoints) },
 		{ name: 'Point of a wrong line', meaning: 'The ring is red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12)] }), drawMarkings, drawPoints) },
 		{ name: 'Point that is not used', meaning: 'The solver left its line out because it contradicts all others. Filled red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { used: false })] }), drawPoints) },
@@ -77,8 +81,11 @@ const BALLS = {
 		{ name: 'Annotated box', meaning: 'What a person drew. Red, solid.', tokens: 'canvas-human', draw: onGrass(sceneOf({}, {}, [ballAt()]), drawBall) },
 		{ name: 'Box marked out of view', meaning: 'A person said that the ball is not in the picture. Red dots.', tokens: 'canvas-human', draw: onGrass(sceneOf({}, {}, [ballAt({ out_of_view: true })]), drawBall) },
 		{ name: 'Ball without a box', meaning: 'Only its place is known. Red ring.', tokens: 'canvas-human', draw: onGrass(sceneOf({}, {}, [ballAt({ box: null, point: [66, 26] })]), drawBall) },
-		{ name: 'Fitting box', meaning: 'The box that the 3D ball would have here. White, dashed.', tokens: 'canvas-optimised', draw: onGrass(sceneOf({ ball: /** @type {any} */ ({ ...FIT, reprojected: null }) }), drawBall) },
+		{ name: 'Fitting box', meaning: 'The box that the 3D ball would have here. White, dashed.', tokens: 'canvas-optimised', draw: onGrass(sceneOf({ ball: /** @type {any} */ ({ ...FIT, reprojected: null }), solved: /** @type {any} */ ({ included: true }) }), drawBall) },
 		{ name: 'Outline and cross', meaning: 'Where the 3D ball lies in this picture. Green; where a person marked the ball it must lie on it.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({ ball: fit, outline: circle(66, 26, 12) }, { boxes: false }), drawBall) },
+		{ name: 'Expected ball', meaning: 'Nobody has drawn the ball here; the other views see it at the green cross, and in 95 of 100 cases within the dashed ring.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({ solved: expecting, outline: circle(66, 26, 9) }), drawExpected) },
+		{ name: 'Placed ball', meaning: 'It was put where the other views see it (Y). It is exported and confirms nothing until somebody moves it. Green dots.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({}, {}, [ballAt({ inferred: true })]), drawBall) },
+		{ name: 'What the card speaks about', meaning: 'The point, line or view that Enter would mend. Yellow.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { marking: 'Side' })] }, { meant: /** @type {any} */ ({ action: 'drop_point', marking: 'Side', index: 0 }) }), drawMarkings, drawPoints, drawMeant) },
 		{ name: 'Selected ball', meaning: 'Yellow with corners: drag it, or its corners; arrows move it.', tokens: 'canvas-selected', draw: onGrass(sceneOf({}, { selected: { kind: 'ball', view: KEY } }, [ballAt()]), drawBall) },
 		{ name: 'Several balls', meaning: 'More than one is marked: choose the one in play.', tokens: 'canvas-human', draw: onGrass(sceneOf({}, {}, [ballAt({ box: [10, 28, 14, 14] }), ballAt({ box: [70, 28, 14, 14] })]), drawBall) },
 		{ name: 'Ray of another view', meaning: 'The ball of that view lies somewhere on this line. Dotted, in the colour of the view, with its letter.', tokens: 'view-b', draw: onGrass(sceneOf({ epipolars: [{ letter: 'B', points: [{ x: 130, y: 2 }, { x: 4, y: 48 }] }] }), drawEpipolars) },

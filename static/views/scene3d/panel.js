@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 
+import { spreadApart } from '../../geometry/spread.js';
 import { colours } from '../../lib/colours.js';
 import { fixed } from '../../lib/format.js';
 import { useKeys, useSize } from '../../lib/hooks.js';
@@ -33,13 +34,28 @@ const PRESETS = [
 
 const calm = matchMedia('(prefers-reduced-motion: reduce)');
 
+/** Letters of cameras stand above them, at least this far apart, CSS pixels. */
+const ABOVE = 18;
+const APART = 26;
+
 /** Move the labels to where their things are drawn. @param {HTMLElement | null} layer @param {Place[]} places */
 function placeLabels(layer, places) {
-	for (const { name, x, y, shown } of places) {
-		const label = /** @type {HTMLElement | null | undefined} */ (layer?.querySelector(`[data-label="${name}"]`));
+	if (!layer) return;
+	const { width, height } = layer.getBoundingClientRect();
+	const box = { left: 13, top: 13, right: Math.max(13, width - 13), bottom: Math.max(13, height - 13) };
+	const letters = places.filter(({ name, shown }) => shown && name !== 'ball');
+	const apart = spreadApart(letters.map(({ x, y }) => ({ x, y: y - ABOVE })), APART, box);
+	const spread = new Map(letters.map(({ name }, i) => [name, apart[i]]));
+	for (const place of places) {
+		const { name, shown } = place;
+		const label = /** @type {HTMLElement | null} */ (layer.querySelector(`[data-label="${name}"]`));
 		if (!label) continue;
+		const { x, y } = spread.get(name) ?? place;
 		label.hidden = !shown;
 		label.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+		const leader = layer.querySelector(`[data-leader="${name}"]`);
+		const far = shown && Math.hypot(x - place.x, y - place.y) > ABOVE + 4;
+		leader?.setAttribute('d', far ? `M${x.toFixed(1)} ${y.toFixed(1)}L${place.x.toFixed(1)} ${place.y.toFixed(1)}` : '');
 	}
 }
 
@@ -75,7 +91,12 @@ function Stage({ scene, images }) {
 		if (!stage || !ready) return;
 		if (at.kind === 'camera') stage.lookThrough(at.letter);
 		else stage.goTo(presetOrbit(at.preset, scene, stage.aspect), !calm.matches);
-	}, [stage, ready, at, scene.stands.length]);
+	}, [stage, ready, at]);
+	// Another group or another panel asks for another distance, unless somebody has turned the scene.
+	useEffect(() => {
+		if (!stage?.untouched || at.kind !== 'preset') return;
+		stage.goTo(presetOrbit(at.preset, scene, stage.aspect), false);
+	}, [scene, size.width, size.height]);
 	const keys = useMemo(() => sceneKeys(() => stage), [stage]);
 	useKeys(keys);
 
@@ -84,6 +105,7 @@ function Stage({ scene, images }) {
 			<canvas ref=${canvas} role="img" tabindex="0" aria-label="The scene in 3D. Arrow keys turn it, plus and minus come closer. The table says the same in words."></canvas>
 			${missing ? html`<p class="scene3d__missing" role="status">This browser shows no 3D graphics (WebGL 2). The table below says the same in words.</p>` : html`
 				<div class="scene3d__labels" ref=${labels}>
+					<svg class="scene3d__leaders" aria-hidden="true">${scene.stands.map(({ letter }) => html`<path key=${letter} data-leader=${letter} />`)}</svg>
 					${scene.stands.map(({ letter, label }) => html`
 						<button key=${letter} class="scene3d__camera letter" type="button" data-letter=${letter} data-label=${letter} title=${`Look through ${label}`} aria-label=${`Look through camera ${letter}`} onClick=${() => lookThrough(letter)}>${letter}</button>`)}
 					${scene.ball || scene.best ? html`<span class="scene3d__height" data-label="ball">${fixed((scene.best ?? scene.ball)?.height, 2, ' m')}</span>` : null}

@@ -36,9 +36,12 @@ export class SceneStage {
 		this.orbit = null;
 		/** @type {Stand | null} */
 		this.through = null;
+		/** The orbit of the preset, until somebody turns it. @type {Orbit | null} */
+		this.preset = null;
 		this.placed = placed;
 		this.frame = 0;
 		this.flight = 0;
+		this.flying = false;
 	}
 
 	/** @param {number} width @param {number} height CSS pixels */
@@ -82,9 +85,16 @@ export class SceneStage {
 		return group;
 	}
 
+	/** Whether nobody has turned the scene since it went to a preset. */
+	get untouched() {
+		return this.preset !== null && (this.flying || this.orbit === this.preset);
+	}
+
 	/** Go to an orbit. @param {Orbit} orbit @param {boolean} smoothly */
 	goTo(orbit, smoothly) {
 		cancelAnimationFrame(this.flight);
+		this.preset = orbit;
+		this.flying = false;
 		const from = this.orbit;
 		this.leaveCamera();
 		if (!from || !smoothly) {
@@ -94,8 +104,9 @@ export class SceneStage {
 		const start = performance.now();
 		const step = () => {
 			const t = Math.min(1, (performance.now() - start) / FLIGHT);
-			this.set(between(from, orbit, t * t * (3 - 2 * t)));
-			if (t < 1) this.flight = requestAnimationFrame(step);
+			this.flying = t < 1;
+			this.set(this.flying ? between(from, orbit, t * t * (3 - 2 * t)) : orbit);
+			if (this.flying) this.flight = requestAnimationFrame(step);
 		};
 		step();
 	}

@@ -23,7 +23,7 @@ import { fit } from '../../geometry/viewport.js';
  */
 
 const NEAREST = 0.5;
-const FARTHEST = 400;
+const FARTHEST = 1200;
 const LOWEST = 0.01;
 const HIGHEST = Math.PI / 2 - 0.001;
 /** Vertical field of view of the free camera, radians. */
@@ -112,8 +112,58 @@ export function presetOrbit(preset, scene, aspect) {
 		const side = (ball?.point[0] ?? 1) < 0 ? -1 : 1;
 		return { target: [side * (length / 2 - 8), 1, 0], distance: 46, azimuth: -side * 1.15, elevation: 0.24 };
 	}
-	const distance = Math.max(48 / tall, 68 / (tall * aspect));
-	return { target: [0, 0, 6], distance, azimuth: 0, elevation: 0.62 };
+	return framing(wholeOf(scene), { azimuth: 0, elevation: 0.62 }, aspect);
+}
+
+/** Shares of the panel that *Whole* leaves free: cameras carry their letters above them. */
+const MARGINS = { side: 0.06, top: 0.14, bottom: 0.05 };
+/** Metres of grass around the lines. */
+const GRASS = 4;
+/** A camera farther than this from the middle of the pitch is a mistake; showing it would make all else a dot. */
+const MISTAKEN = 400;
+
+/** What *Whole* must show: the corners of the pitch and every camera. @param {SceneValues} scene @returns {WorldPoint[]} */
+function wholeOf({ pitch: { length, width }, stands }) {
+	const [l, w] = [length / 2 + GRASS, width / 2 + GRASS];
+	const corners = /** @type {WorldPoint[]} */ ([[-l, 0, -w], [l, 0, -w], [l, 0, w], [-l, 0, w]]);
+	return [...corners, ...stands.flatMap(({ camera, corners: ends }) => (
+		Math.hypot(...camera.C) > MISTAKEN ? [] : [camera.C, ...ends].map(toWorld)
+	))];
+}
+
+/**
+ * The orbit that shows all points as large as the panel allows.
+ *
+ * Seen along one direction a point at depth `d` in front of the target stands at `right / (D - d)`
+ * of an eye at distance `D`; each edge of the panel therefore asks for
+ * `D >= d + (right - middle) / tan`, which is linear: the middle that makes opposite edges ask for
+ * the same is found in closed form.
+ *
+ * @param {WorldPoint[]} points @param {{azimuth: number, elevation: number}} from @param {number} aspect
+ * @returns {Orbit}
+ */
+function framing(points, { azimuth, elevation }, aspect) {
+	const tall = Math.tan(FIELD / 2);
+	const [sin, cos, rise, flat] = [Math.sin(azimuth), Math.cos(azimuth), Math.sin(elevation), Math.cos(elevation)];
+	const right = [cos, 0, -sin];
+	const up = [-rise * sin, flat, -rise * cos];
+	const back = [flat * sin, rise, flat * cos];
+	const seen = points.map((point) => [right, up, back].map((axis) => axis.reduce((sum, value, i) => sum + value * point[i], 0)));
+	/** @param {number} axis @param {number} low tangent of the lower edge @param {number} high of the upper @returns {[number, number]} middle and distance */
+	const edges = (axis, low, high) => {
+		// D - d >= (value - m) / high and D - d >= (m - value) / low for every point.
+		const above = Math.max(...seen.map((point) => point[2] + point[axis] / high));
+		const below = Math.max(...seen.map((point) => point[2] - point[axis] / low));
+		const middle = (above - below) / (1 / high + 1 / low);
+		return [middle, above - middle / high];
+	};
+	const side = tall * aspect * (1 - 2 * MARGINS.side);
+	const [across, wide] = edges(0, side, side);
+	const [along, high] = edges(1, tall * (1 - 2 * MARGINS.bottom), tall * (1 - 2 * MARGINS.top));
+	// The same eye, but turning about a place on the grass.
+	const ahead = -(along * up[1]) / rise;
+	const target = /** @type {WorldPoint} */ ([0, 1, 2].map((i) => across * right[i] + along * up[i] + ahead * back[i]));
+	return { target: [target[0], 0, target[2]], distance: Math.max(wide, high) - ahead, azimuth, elevation };
 }
 
 /**

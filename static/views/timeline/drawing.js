@@ -93,6 +93,9 @@ export function drawCurve(context, size, curve, look) {
 	drawHead(context, toX(curve.span, width, curve.position), height, curve.position >= 0, look);
 }
 
+/** Height of a number beside the curve, CSS pixels. */
+const LABEL = 12;
+
 /**
  * @param {CanvasRenderingContext2D} context @param {number} width @param {(error: number) => number} toY
  * @param {number} limit @param {number} top @param {Look} look
@@ -104,9 +107,15 @@ function drawLevels(context, width, toY, limit, top, look) {
 	context.font = '10px Inter, system-ui, "DejaVu Sans", sans-serif';
 	context.textAlign = 'right';
 	context.textBaseline = 'bottom';
+	let free = Infinity;
 	for (const level of LEVELS.filter((one) => one < top)) {
-		line(context, 0, toY(level), width);
-		context.fillText(`${level} px`, width - 2, toY(level));
+		const y = toY(level);
+		line(context, 0, y, width);
+		// A low curve has no room for every number, and none for one on the dashes of the limit.
+		const onLimit = toY(limit) > y - LABEL - 1 && toY(limit) < y + 1;
+		if (y > free || onLimit) continue;
+		context.fillText(`${level} px`, width - 2, y);
+		free = y - LABEL;
 	}
 	context.setLineDash([4, 4]);
 	context.strokeStyle = look.warn;
