@@ -15,8 +15,10 @@ class Summary:
     """What a list shows of a solution; None where there is no such number.
 
     Attributes:
-        margin: Of the first failing gate, or of the gate nearest to failing, in its unit.
-        value: The smallest distance of a gate to its threshold, as a share of the threshold.
+        margin: Of the first failing gate, or of the gate nearest to failing: a share of its
+            threshold (``solution.margin_of``), negative when it fails.
+        value: How close the gate nearest to its threshold is to it, from either side: the
+            smallest margin without its sign. Where it is small, a small mistake decides.
         min_jac: The lowest JaC of the views at the policy's gamma.
         error_px: The largest reprojection error of the ball, or, without a ball, that of the
             best pair; ``error_percent`` the same in per cent of the diagonal.
@@ -59,8 +61,8 @@ def summarize(group: Group, solution: Solution) -> Summary:
         gate=failing.name if failing else None,
         gate_view=failing.view if failing else None,
         gate_sentence=failing.sentence if failing else None,
-        margin=_finite(decisive.margin) if decisive else None,
-        value=_relative_margin(nearest) if nearest else None,
+        margin=decisive.margin if decisive else None,
+        value=_distance_to_threshold(nearest) if nearest else None,
         min_jac=_min_jac(solution),
         error_px=error_px,
         error_percent=error_percent,
@@ -84,10 +86,8 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _relative_margin(gate: Gate) -> float | None:
-    if gate.margin is None or gate.threshold is None or not math.isfinite(gate.margin):
-        return None
-    return abs(gate.margin) / (abs(gate.threshold) or 1.0)
+def _distance_to_threshold(gate: Gate) -> float | None:
+    return None if gate.margin is None else abs(gate.margin)
 
 
 def _nearest(gates: tuple[Gate, ...]) -> Gate | None:
@@ -96,10 +96,10 @@ def _nearest(gates: tuple[Gate, ...]) -> Gate | None:
         gate
         for gate in gates
         if gate.active
-        and _relative_margin(gate) is not None
+        and gate.margin is not None
         and not (gate.passed and gate.name in COUNTED)
     ]
-    return min(measured, key=lambda gate: _relative_margin(gate) or 0.0, default=None)
+    return min(measured, key=lambda gate: _distance_to_threshold(gate) or 0.0, default=None)
 
 
 def _min_jac(solution: Solution) -> float | None:
