@@ -95,9 +95,7 @@ def _nearest(gates: tuple[Gate, ...]) -> Gate | None:
     measured = [
         gate
         for gate in gates
-        if gate.active
-        and gate.margin is not None
-        and not (gate.passed and gate.name in COUNTED)
+        if gate.active and gate.margin is not None and not (gate.passed and gate.name in COUNTED)
     ]
     return min(measured, key=lambda gate: _distance_to_threshold(gate) or 0.0, default=None)
 
