@@ -17,8 +17,8 @@ class Summary:
     Attributes:
         margin: Of the first failing gate, or of the gate nearest to failing: a share of its
             threshold (``solution.margin_of``), negative when it fails.
-        value: How close the gate nearest to its threshold is to it, from either side: the
-            smallest margin without its sign. Where it is small, a small mistake decides.
+        value: The margin without its sign: how close the group is to passing, or to failing.
+            Where it is small, a small mistake decides.
         min_jac: The lowest JaC of the views at the policy's gamma.
         error_px: The largest reprojection error of the ball, or, without a ball, that of the
             best pair; ``error_percent`` the same in per cent of the diagonal.
@@ -53,16 +53,16 @@ class Summary:
 def summarize(group: Group, solution: Solution) -> Summary:
     """The summary of a group's solution."""
     failing, ball = solution.first_failing, solution.ball
-    nearest = _nearest(solution.gates)
-    decisive = failing or nearest
+    decisive = failing or _nearest(solution.gates)
+    margin = decisive.margin if decisive else None
     error_px, error_percent = _error(group, solution)
     return Summary(
         passes=solution.passes,
         gate=failing.name if failing else None,
         gate_view=failing.view if failing else None,
         gate_sentence=failing.sentence if failing else None,
-        margin=decisive.margin if decisive else None,
-        value=_distance_to_threshold(nearest) if nearest else None,
+        margin=margin,
+        value=None if margin is None else abs(margin),
         min_jac=_min_jac(solution),
         error_px=error_px,
         error_percent=error_percent,
@@ -86,18 +86,14 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _distance_to_threshold(gate: Gate) -> float | None:
-    return None if gate.margin is None else abs(gate.margin)
-
-
 def _nearest(gates: tuple[Gate, ...]) -> Gate | None:
-    """The gate nearest to its threshold; two views of two are enough and not near to failing."""
+    """Of gates that pass, the one nearest to failing; two views of two are enough, not near."""
     measured = [
         gate
         for gate in gates
-        if gate.active and gate.margin is not None and not (gate.passed and gate.name in COUNTED)
+        if gate.active and gate.margin is not None and gate.name not in COUNTED
     ]
-    return min(measured, key=lambda gate: _distance_to_threshold(gate) or 0.0, default=None)
+    return min(measured, key=lambda gate: gate.margin or 0.0, default=None)
 
 
 def _min_jac(solution: Solution) -> float | None:

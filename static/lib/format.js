@@ -57,8 +57,10 @@ export function sharePercent(value) {
  */
 export function marginText(value) {
 	if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
-	const text = sharePercent(value).replace('over ', '>');
-	return `${text === '0.0 %' ? '' : value < 0 ? MINUS : '+'}${text}`;
+	const text = sharePercent(value);
+	if (text === '0.0 %') return text;
+	const signed = `${value < 0 ? MINUS : '+'}${text.replace('over ', '')}`;
+	return text === signed.slice(1) ? signed : `${value < 0 ? '<' : '>'}${signed}`;
 }
 
 /** 12764 -> "12,764". @param {number} value */

@@ -15,6 +15,7 @@ import { rowAt } from '../state/queue_pages.js';
 import { arrivals, leftAt, remember } from '../state/queue_place.js';
 import { countOf, extendTicks, isTicked, ticks, turnAll, turnTick } from '../state/queue_ticks.js';
 import { QueueRow } from './queue_row.js';
+import { VALUE_OF_REVIEW } from './value_of_review.js';
 
 const ROW = 72;
 /** Rows drawn while nobody knows yet how many there are. */
@@ -24,13 +25,13 @@ const COLUMNS = [
 	{ label: '', hidden: 'Frame' },
 	{ label: 'Group', sort: 'number' },
 	{ label: 'Status', sort: 'status' },
-	{ label: 'First failing gate', sort: 'gate' },
-	{ label: 'margin', sort: 'margin', numeric: true },
-	{ label: 'min JaC', sort: 'jac', numeric: true },
-	{ label: 'px', sort: 'error', numeric: true, title: 'Largest reprojection error of the ball' },
-	{ label: 'σ m', sort: 'sigma', numeric: true, title: 'Uncertainty of the ball’s position' },
-	{ label: 'β', sort: 'parallax', numeric: true, title: 'Parallax: the largest angle between two rays' },
-	{ label: 'Ø', sort: 'ratio', numeric: true, title: 'Ball box against the expected diameter' },
+	{ label: 'First failing gate', sort: 'gate', title: 'The first gate that the group fails, in the order in which gates are judged' },
+	{ label: 'margin', sort: 'margin', numeric: true, value: true, title: 'How far the failing gate, or else the gate nearest to failing, is from its threshold, in per cent of the threshold. Negative: it fails.' },
+	{ label: 'min JaC', sort: 'jac', numeric: true, title: 'The lowest share of field lines that fit, of the views of the group' },
+	{ label: 'px', sort: 'error', numeric: true, title: 'Largest reprojection error of the ball, pixels' },
+	{ label: 'σ m', sort: 'sigma', numeric: true, title: 'Uncertainty of the ball’s position, metres' },
+	{ label: 'β', sort: 'parallax', numeric: true, title: 'Parallax: the largest angle between two rays to the ball' },
+	{ label: 'Ø', sort: 'ratio', numeric: true, title: 'Drawn diameter of the ball over the expected one' },
 	{ label: 'views', sort: 'views', numeric: true },
 	{ label: 'split', sort: 'split', narrow: true },
 	{ label: 'Findings', sort: 'findings' },
@@ -47,6 +48,7 @@ function orderOf(q, name) {
 function HeadCell({ column, q, onQuery }) {
 	const { sort } = column;
 	const order = sort ? orderOf(q, sort) : undefined;
+	const byValue = column.value && orderOf(q, 'value') !== undefined;
 	/** @param {string} name */
 	const turn = (name) => onQuery(withField(q, 'sort', [`sort:${name}${order === 'ascending' ? '-desc' : ''}`]));
 	return html`
@@ -54,7 +56,7 @@ function HeadCell({ column, q, onQuery }) {
 			${sort ? html`
 				<button type="button" onClick=${() => turn(sort)}>
 					${column.label}<span aria-hidden="true">${order === 'ascending' ? ' ↑' : order === 'descending' ? ' ↓' : ''}</span>
-				</button>` : html`${column.label}${column.hidden ? html`<span class="hidden-text">${column.hidden}</span>` : null}`}
+				</button>${byValue ? html`<small class="queue-cell__order" title=${VALUE_OF_REVIEW}>by value</small>` : null}` : html`${column.label}${column.hidden ? html`<span class="hidden-text">${column.hidden}</span>` : null}`}
 		</div>
 	`;
 }

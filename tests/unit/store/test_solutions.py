@@ -156,8 +156,10 @@ class TestSummary:
         assert (found.passes, found.gate, found.gate_view) == (False, "reprojection", "cam1")
         assert found.margin == pytest.approx(-8 / 22)
 
-    def test_value_is_the_smallest_share_of_a_threshold(self, group, solution) -> None:
-        assert summarize(group, solution).value == pytest.approx(0.2)
+    def test_value_is_the_margin_without_its_sign(self, group, solution) -> None:
+        assert summarize(group, solution).value == pytest.approx(8 / 22)
+        passing = replace(solution, gates=solution.gates[:1])
+        assert summarize(group, passing).value == pytest.approx(0.2)
 
     def test_numbers_come_from_the_ball_and_the_views_behind_it(self, group, solution) -> None:
         found = summarize(group, solution)
