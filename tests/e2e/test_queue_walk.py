@@ -96,7 +96,9 @@ class TestWalk:
         page.keyboard.press("s")
         stands(page, queue[1], "group 2 of 6", "1 done, 5 left")
         for name in ("Review", "Queue", "Yield", "Evaluation"):
-            link = page.get_by_role("navigation", name="Pages").get_by_role("link", name=name)
+            link = page.get_by_role("navigation", name="Pages", exact=True).get_by_role(
+                "link", name=name
+            )
             expect(link).to_be_visible()
         assert collisions(page, ".header") == []
 
@@ -107,7 +109,7 @@ COLLISIONS = """(selector) => {
     const own = [...node.childNodes].some((one) => one.nodeType === 3 && one.data.trim());
     const style = getComputedStyle(node);
     const hidden = node.closest('.hidden-text, [popover], script, title, option, select, kbd');
-    if (!own || hidden || style.visibility === 'hidden' || style.opacity === '0') continue;
+    if (!own || hidden || !node.checkVisibility() || style.visibility === 'hidden' || style.opacity === '0') continue;
     const range = document.createRange();
     range.selectNodeContents(node);
     for (const box of range.getClientRects()) {
