@@ -5,33 +5,50 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from sqlalchemy import select
+from sqlalchemy.orm import InstrumentedAttribute
 
+from app.review.bins import ERROR_PERCENT, SIGMA_M, even, places
 from app.review.query import STATUSES, parse_query
 from app.store.models import QueueModel
 from app.store.session import Store
 
-BINS = 20
-RANGES = {
-    "jac": (QueueModel.min_jac, 0.0, 1.0),
-    "error_percent": (QueueModel.error_percent, 0.0, 2.0),
-    "sigma": (QueueModel.sigma_m, 0.0, 2.0),
-    "parallax": (QueueModel.parallax_degrees, 0.0, 180.0),
-    "size_ratio": (QueueModel.size_ratio, 0.0, 2.0),
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the queue with the bins of its histogram; the first bin has no lower end.
+
+    Attributes:
+        open_high: The last bin has no upper end.
+        log: Its bins are powers of ten apart (see ``bins.decades``).
+    """
+
+    column: InstrumentedAttribute[Any]
+    edges: tuple[float, ...]
+    open_high: bool = True
+    log: bool = False
+
+
+COLUMNS = {
+    "jac": Column(QueueModel.min_jac, even(0, 1, 20), open_high=False),
+    "error_percent": Column(QueueModel.error_percent, ERROR_PERCENT, log=True),
+    "sigma": Column(QueueModel.sigma_m, SIGMA_M, log=True),
+    "parallax": Column(QueueModel.parallax_degrees, even(0, 180, 20), open_high=False),
+    "size_ratio": Column(QueueModel.size_ratio, even(0, 2, 20)),
 }
-"""Column and range of each histogram: fixed, so that the bins stay put while one filters."""
+"""The bins are fixed, so that they stay put while one filters."""
 
 
 @dataclass(frozen=True)
 class Histogram:
-    """Counts in bins of equal width from ``low`` to ``high``; the end bins hold what lies
-    beyond."""
+    """Counts of a column over the groups that match; ``unknown`` ones have no such number."""
 
-    low: float
-    high: float
+    column: Column
     counts: tuple[int, ...]
+    unknown: int
 
 
 @dataclass(frozen=True)
@@ -55,27 +72,29 @@ def summary(store: Store, dataset_id: int, query: str = "") -> Summary:
         InputError: The query cannot be understood.
     """
     where = [QueueModel.dataset_id == dataset_id, *parse_query(query).conditions]
-    columns = [column for column, _, _ in RANGES.values()]
+    columns = [item.column for item in COLUMNS.values()]
     # One pass for all of it: seven statements over ten thousand groups take seven times as long.
     statement = select(QueueModel.status, QueueModel.solved, QueueModel.stale, *columns)
     with store.read() as session:
         rows = session.execute(statement.where(*where)).all()
-    status, solved, stale, *numbers = zip(*rows, strict=True) if rows else ((),) * (3 + len(RANGES))
+    status, solved, stale, *numbers = (
+        zip(*rows, strict=True) if rows else ((),) * (3 + len(COLUMNS))
+    )
     states = Counter(status)
     return Summary(
         groups=len(rows),
         solved=sum(solved),
         stale=sum(stale),
         histograms={
-            name: _histogram(values, low, high)
-            for (name, (_, low, high)), values in zip(RANGES.items(), numbers, strict=True)
+            name: _histogram(column, values)
+            for (name, column), values in zip(COLUMNS.items(), numbers, strict=True)
         },
         **{state: states[state] for state in STATUSES},
     )
 
 
-def _histogram(values: Sequence[float | None], low: float, high: float) -> Histogram:
+def _histogram(column: Column, values: Sequence[float | None]) -> Histogram:
     numbers = np.array(values, float)
-    place = np.floor((numbers[~np.isnan(numbers)] - low) * (BINS / (high - low)))
-    counts = np.bincount(np.clip(place, 0, BINS - 1).astype(np.int64), minlength=BINS)
-    return Histogram(low, high, tuple(counts.tolist()))
+    place = places(column.edges, numbers, open_low=True, open_high=column.open_high)
+    counts = np.bincount(place[place >= 0], minlength=len(column.edges) - 1)
+    return Histogram(column, tuple(counts.tolist()), int(np.isnan(numbers).sum()))

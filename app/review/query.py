@@ -2,6 +2,10 @@
 
     status:unreviewed jac<0.95 sigma>0.5 finding:low_parallax match:"league/2015" sort:value-desc
 
+``margin`` and ``value`` are shares of a gate's threshold: ``margin<0.1`` finds groups that fail,
+or pass by less than a tenth; ``sort:value`` lists first the groups that are closest to a gate's
+threshold, on either side.
+
 Terms must all hold; ``field:a,b`` means either; ``-field:a`` means not; a bare word is looked
 for in key and label; ``id:12,15`` names groups. There are no patterns: text is compared, never
 interpreted.

@@ -11,6 +11,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import InstrumentedAttribute
 
 from app.geometry.arrays import FloatArray
+from app.review.bins import ERROR_PERCENT, SIGMA_M, even, places
 from app.review.query import parse_query
 from app.review.yield_table import IntArray
 from app.store.models import QueueModel
@@ -22,7 +23,8 @@ class Measure:
     """A number of each group, the bins that it is counted in, and its field in queries.
 
     Bins stay the same for every query and every dataset, so that two pictures compare; with an
-    open end the last one holds what lies beyond, too.
+    open end the last one holds what lies beyond, too. Where ``log`` is set they are powers of
+    ten apart, and the first one holds 0 and all that is smaller than the first power.
     """
 
     name: str
@@ -33,6 +35,7 @@ class Measure:
     edges: tuple[float, ...]
     open_low: bool = False
     open_high: bool = True
+    log: bool = False
 
 
 @dataclass(frozen=True)
@@ -85,13 +88,9 @@ class Statistics:
     splits: tuple[Share, ...]
 
 
-def _even(low: float, high: float, bins: int) -> tuple[float, ...]:
-    return tuple(np.round(np.linspace(low, high, bins + 1), 6).tolist())
-
-
 MEASURES = (
     Measure(
-        "distance", "Camera to ball", "m", "distance", QueueModel.distance_m, _even(0, 120, 24)
+        "distance", "Camera to ball", "m", "distance", QueueModel.distance_m, even(0, 120, 24)
     ),
     Measure(
         "parallax",
@@ -99,31 +98,31 @@ MEASURES = (
         "°",
         "parallax",
         QueueModel.parallax_degrees,
-        _even(0, 180, 36),
+        even(0, 180, 36),
         open_high=False,
     ),
-    Measure("sigma", "Uncertainty", "m", "sigma", QueueModel.sigma_m, _even(0, 2, 20)),
-    Measure("box", "Ball diameter in the image", "px", "box", QueueModel.box_px, _even(0, 40, 20)),
+    Measure("sigma", "Uncertainty", "m", "sigma", QueueModel.sigma_m, SIGMA_M, log=True),
+    Measure("box", "Ball diameter in the image", "px", "box", QueueModel.box_px, even(0, 40, 20)),
     Measure(
         "size_ratio", "Annotated over expected size", "", "ratio", QueueModel.size_ratio,
-        _even(0, 3, 30),
+        even(0, 3, 30),
     ),
     Measure(
-        "height", "Height above the grass", "m", "height", QueueModel.height_m, _even(-1, 11, 24),
+        "height", "Height above the grass", "m", "height", QueueModel.height_m, even(-1, 11, 24),
         open_low=True,
     ),
     Measure(
         "error", "Reprojection error", "% of the diagonal", "error_percent",
-        QueueModel.error_percent, _even(0, 2, 20),
+        QueueModel.error_percent, ERROR_PERCENT, log=True,
     ),
     Measure(
-        "jac", "Lowest JaC of the views", "", "jac", QueueModel.min_jac, _even(0, 1, 20),
+        "jac", "Lowest JaC of the views", "", "jac", QueueModel.min_jac, even(0, 1, 20),
         open_high=False,
     ),
 )  # fmt: skip
 
-X_EDGES = _even(-60, 60, 24)
-Y_EDGES = _even(-40, 40, 16)
+X_EDGES = even(-60, 60, 24)
+Y_EDGES = even(-40, 40, 16)
 """Cells of 5 m, with a rim around the pitch."""
 
 
@@ -181,14 +180,8 @@ def _histogram(
     measure: Measure, values: FloatArray, splits: Sequence[str], of_split: IntArray
 ) -> Histogram:
     bins = len(measure.edges) - 1
-    # As the queries compare: from an edge on, and below the next one.
-    place = np.searchsorted(np.array(measure.edges), values, "right") - 1
-    if measure.open_low:
-        place = np.maximum(place, 0)
-    place[values == measure.edges[-1]] = bins - 1
-    if measure.open_high:
-        place = np.minimum(place, bins - 1)
-    inside = ~np.isnan(values) & (place >= 0) & (place < bins)
+    place = places(measure.edges, values, open_low=measure.open_low, open_high=measure.open_high)
+    inside = place >= 0
     series = []
     for number, split in enumerate(splits):
         mine = of_split == number

@@ -234,11 +234,36 @@ class ViewSolution:
     """Where the 3D ball is to be seen; None without a camera, and where it is not in front of it."""
 
 
+def margin_of(value: float, threshold: float | None, *, at_most: bool = False) -> float | None:
+    """How far a value is from its threshold, as a share of the threshold.
+
+    Shares of different gates compare with each other, which metres and pixels do not.
+
+    Args:
+        value: What was measured.
+        threshold: What is asked, in the unit of the value; None when nothing is asked.
+        at_most: Whether less is better: the threshold is the largest value that is allowed.
+
+    Returns:
+        0.25 when the value is better than asked by a quarter of the threshold, -0.25 when it
+        is worse by as much, 0 at the threshold. None where there is no share: nothing is asked,
+        the threshold is 0, or the value is infinite or NaN.
+
+    Example:
+        >>> margin_of(15.0, 10.0), margin_of(15.0, 10.0, at_most=True), margin_of(15.0, 0.0)
+        (0.5, -0.5, None)
+    """
+    if not threshold:
+        return None
+    share = (threshold - value if at_most else value - threshold) / abs(threshold)
+    return float(share) if math.isfinite(share) else None
+
+
 @dataclass(frozen=True)
 class Gate:
     """One gate as judged for the group.
 
-    ``margin`` is positive when passed: how far the value is from the threshold, in its unit.
+    ``margin`` is how far the value is from the threshold, as ``margin_of`` counts it.
     """
 
     name: str

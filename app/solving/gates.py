@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from app.soccer.policy import Policy
-from app.soccer.solution import Ball3D, Calibration, Gate, Pair
+from app.soccer.solution import Ball3D, Calibration, Gate, Pair, margin_of
 
 MIN_VIEWS = 2
 
@@ -181,7 +181,8 @@ def _reprojection(left: Sequence[JudgedView], pairs: Sequence[Pair]) -> Gate:
     left_out = [pair for _, pair in judged if not pair.valid]
     if best.valid and left_out:
         sentence += f"; {', '.join(_name(pair, views) for pair in left_out)} left out"
-    return Gate("reprojection", best.valid, error, tau, tau - error, sentence)
+    margin = margin_of(error, tau, at_most=True)
+    return Gate("reprojection", best.valid, error, tau, margin, sentence)
 
 
 def _shares(
@@ -213,8 +214,8 @@ def _sigma(ball: Ball3D | None, policy: Policy) -> Gate:
     if ball is None:
         return _unjudged("sigma", threshold, active=active)
     value = ball.sigma_m
-    margin = None if threshold is None else threshold - value
-    passed = margin is None or margin >= 0
+    margin = margin_of(value, threshold, at_most=True)
+    passed = threshold is None or threshold - value >= 0
     return Gate("sigma", passed, value, threshold, margin, f"{value:.2f} m", active=active)
 
 
@@ -228,7 +229,7 @@ def _gate(
     view: str | None = None,
     active: bool = True,
 ) -> Gate:
-    margin = None if threshold is None else float(value - threshold)
+    margin = margin_of(value, threshold)
     return Gate(name, passed, float(value), threshold, margin, sentence, view, active)
 
 

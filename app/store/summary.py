@@ -15,8 +15,10 @@ class Summary:
     """What a list shows of a solution; None where there is no such number.
 
     Attributes:
-        margin: Of the first failing gate, or of the gate nearest to failing, in its unit.
-        value: The smallest distance of a gate to its threshold, as a share of the threshold.
+        margin: Of the first failing gate, or of the gate nearest to failing: a share of its
+            threshold (``solution.margin_of``), negative when it fails.
+        value: The margin without its sign: how close the group is to passing, or to failing.
+            Where it is small, a small mistake decides.
         min_jac: The lowest JaC of the views at the policy's gamma.
         error_px: The largest reprojection error of the ball, or, without a ball, that of the
             best pair; ``error_percent`` the same in per cent of the diagonal.
@@ -51,16 +53,16 @@ class Summary:
 def summarize(group: Group, solution: Solution) -> Summary:
     """The summary of a group's solution."""
     failing, ball = solution.first_failing, solution.ball
-    nearest = _nearest(solution.gates)
-    decisive = failing or nearest
+    decisive = failing or _nearest(solution.gates)
+    margin = decisive.margin if decisive else None
     error_px, error_percent = _error(group, solution)
     return Summary(
         passes=solution.passes,
         gate=failing.name if failing else None,
         gate_view=failing.view if failing else None,
         gate_sentence=failing.sentence if failing else None,
-        margin=_finite(decisive.margin) if decisive else None,
-        value=_relative_margin(nearest) if nearest else None,
+        margin=margin,
+        value=None if margin is None else abs(margin),
         min_jac=_min_jac(solution),
         error_px=error_px,
         error_percent=error_percent,
@@ -84,22 +86,14 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _relative_margin(gate: Gate) -> float | None:
-    if gate.margin is None or gate.threshold is None or not math.isfinite(gate.margin):
-        return None
-    return abs(gate.margin) / (abs(gate.threshold) or 1.0)
-
-
 def _nearest(gates: tuple[Gate, ...]) -> Gate | None:
-    """The gate nearest to its threshold; two views of two are enough and not near to failing."""
+    """Of gates that pass, the one nearest to failing; two views of two are enough, not near."""
     measured = [
         gate
         for gate in gates
-        if gate.active
-        and _relative_margin(gate) is not None
-        and not (gate.passed and gate.name in COUNTED)
+        if gate.active and gate.margin is not None and gate.name not in COUNTED
     ]
-    return min(measured, key=lambda gate: _relative_margin(gate) or 0.0, default=None)
+    return min(measured, key=lambda gate: gate.margin or 0.0, default=None)
 
 
 def _min_jac(solution: Solution) -> float | None:

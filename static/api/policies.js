@@ -42,6 +42,7 @@ import { idempotencyKey, request, requestTagged } from './client.js';
  * @property {number} groups
  * @property {number} passing
  * @property {FunnelStep[]} funnel
+ * @property {number} unsolved
  * @property {number} given_not_measured
  * @property {YieldCurve[]} curves
  * @property {{split: string, groups: number, passing: number}[]} splits

@@ -12,6 +12,7 @@ import { queryText, request } from './client.js';
  * @property {number[]} edges
  * @property {boolean} open_low the first bar also holds what lies below
  * @property {boolean} open_high
+ * @property {boolean} log bars are powers of ten apart; the first holds 0 and what is smaller
  * @property {string[]} queries for each bar, the words that find its groups
  * @property {{split: string, counts: number[], unknown: number}[]} series
  */

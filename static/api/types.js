@@ -283,7 +283,7 @@
  * @property {string} created
  */
 
-/** @typedef {{low: number, high: number, counts: number[], log?: boolean}} Histogram */
+/** @typedef {{edges: number[], open_high: boolean, log: boolean, counts: number[], unknown: number}} Histogram */
 /** @typedef {{[key: string]: number}} Counts */
 
 /**

@@ -38,6 +38,34 @@ export function percent(value) {
 	return fixed(value, size >= 99.95 ? 0 : size >= 9.995 ? 1 : 2);
 }
 
+/** Beyond this many per cent nobody compares any more. */
+const MOST_PERCENT = 999;
+
+/**
+ * A share without its sign, as per cent in few characters: 0.352 -> "35 %", 0.041 -> "4.1 %".
+ *
+ * @param {number} value
+ */
+export function sharePercent(value) {
+	const size = Math.abs(100 * value);
+	if (size >= MOST_PERCENT + 0.5) return `over ${MOST_PERCENT} %`;
+	return `${size.toFixed(size >= 9.95 ? 0 : 1)} %`;
+}
+
+/**
+ * A margin: how far a value is from its threshold, as a share of the threshold; positive when it is met.
+ *
+ * @param {number | null | undefined} value 0.352
+ * @returns {string} "+35 %"
+ */
+export function marginText(value) {
+	if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
+	const text = sharePercent(value);
+	if (text === '0.0 %') return text;
+	const signed = `${value < 0 ? MINUS : '+'}${text.replace('over ', '')}`;
+	return text === signed.slice(1) ? signed : `${value < 0 ? '<' : '>'}${signed}`;
+}
+
 /** 12764 -> "12,764". @param {number} value */
 export function count(value) {
 	return value.toLocaleString('en-GB');

@@ -54,6 +54,19 @@ export async function locate(id) {
 	await prefetch([id, ...found.next]);
 }
 
+/** Ask once more where the group on screen stands: the queue has changed meanwhile. */
+export async function recount() {
+	const at = neighbours.value;
+	if (!at) return;
+	try {
+		const found = await getNeighbours(at.id, at.q);
+		// Somebody who has gone on has asked already.
+		if (neighbours.value === at) neighbours.value = { ...found, id: at.id, q: at.q };
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+	}
+}
+
 /** @returns {number | null} */
 export function currentId() {
 	return page.value.page === 'review' ? page.value.group : null;

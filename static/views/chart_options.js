@@ -63,10 +63,23 @@ function drawIntervals(plot, { low, high }, colour) {
 	ctx.stroke();
 }
 
+/** Room beside the outermost values, as a share of the axis, so that no mark is cut at the border. */
+const ROOM = 0.02;
+
+/** @param {[number, number] | undefined} asked @param {number} low @param {number} high @returns {uPlot.Range.MinMax} */
+function rangeX(asked, low, high) {
+	const [from, to] = asked ?? [low, high > low ? high : low + 1];
+	const room = ROOM * (to - from);
+	return [from - room, to + room];
+}
+
 /** @param {[number | null, number | null] | undefined} asked @param {number} low @param {number} high @returns {uPlot.Range.MinMax} */
 function rangeY(asked, low, high) {
 	const room = high > low ? (high - low) * 0.06 : Math.max(1, Math.abs(high) * 0.1);
-	return [asked?.[0] ?? low - room, asked?.[1] ?? high + room];
+	const [from, to] = [asked?.[0] ?? low - room, asked?.[1] ?? high + room];
+	// A curve along the end of the axis would be drawn by half.
+	const half = (ROOM / 2) * (to - from);
+	return [from - half, to + half];
 }
 
 /**
@@ -83,7 +96,7 @@ export function chartOptions(props, { width, height, colours, setAt }) {
 		padding: [10, 12, 0, 0],
 		cursor: { y: false, drag: { x: false, y: false }, points: { size: 6 } },
 		scales: {
-			x: { time: false, range: (_plot, low, high) => props.current.xRange ?? [low, high > low ? high : low + 1] },
+			x: { time: false, range: (_plot, low, high) => rangeX(props.current.xRange, low, high) },
 			y: { range: (_plot, low, high) => rangeY(props.current.yRange, low ?? 0, high ?? 1) },
 		},
 		axes: [{ ...axis(xLabel, colours), size: 34 }, { ...axis(yLabel, colours), size: 52 }],

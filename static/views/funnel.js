@@ -3,9 +3,10 @@
 
 import { html } from 'htm/preact';
 
-import { count } from '../lib/format.js';
+import { count, plural } from '../lib/format.js';
 import { queueAddress } from '../state/navigation.js';
 import { gateLabel } from './gate_names.js';
+import { isUnmeasured } from './yield_cards.js';
 
 /** @import {FunnelStep, YieldJson} from '../api/policies.js' */
 
@@ -14,6 +15,16 @@ function labelOf({ gate, label }, policy) {
 	const thresholds = /** @type {{[gate: string]: number | null}} */ ({ parallax: policy.min_parallax_degrees, sigma: policy.max_sigma_m });
 	const asked = gateLabel(/** @type {any} */ ({ name: gate, threshold: thresholds[gate] ?? null }), policy);
 	return asked === gate ? label : asked;
+}
+
+/** A gate that had nothing to judge: no bar, for it says nothing about the groups. @param {{step: FunnelStep}} props */
+function Unmeasured({ step }) {
+	return html`
+		<tr data-measured="false">
+			<th scope="row">${step.label}</th>
+			<td class="funnel__unmeasured" colspan="3">not measured: the cameras were given</td>
+		</tr>
+	`;
 }
 
 /** @param {{step: FunnelStep, all: number, link: string | null}} props */
@@ -31,7 +42,7 @@ function Row({ step, all, link }) {
 
 /** @param {{answer: YieldJson, dataset: string, linked: boolean}} props `linked`: the queue knows the same gates, for nothing is tried out */
 export function Funnel({ answer, dataset, linked }) {
-	const steps = answer.funnel;
+	const unmeasured = isUnmeasured(answer);
 	const all = { gate: 'all', label: 'Groups', left: answer.groups, dropped: 0 };
 	/** @param {FunnelStep} step */
 	const link = ({ gate }) => (linked ? queueAddress(dataset, gate === 'unsolved' ? 'solved:no' : `gate:${gate}`) : null);
@@ -42,11 +53,15 @@ export function Funnel({ answer, dataset, linked }) {
 				<thead class="hidden-text"><tr><th>Gate</th><th>Share</th><th>left</th><th>dropped</th></tr></thead>
 				<tbody>
 					<${Row} step=${all} all=${answer.groups} link=${null} />
-					${steps.filter(({ gate }) => gate !== 'all').map((step) => html`<${Row} key=${step.gate} step=${{ ...step, label: labelOf(step, answer.policy) }} all=${answer.groups} link=${link(step)} />`)}
+					${answer.funnel.map((step) => {
+						const said = { ...step, label: labelOf(step, answer.policy) };
+						if (step.gate === 'jac' && unmeasured) return html`<${Unmeasured} key=${step.gate} step=${said} />`;
+						return html`<${Row} key=${step.gate} step=${said} all=${answer.groups} link=${link(step)} />`;
+					})}
 				</tbody>
 			</table>
-			${answer.given_not_measured ? html`
-				<p class="note">${count(answer.given_not_measured)} groups have given cameras without lines: their JaC is not measured.</p>` : null}
+			${answer.given_not_measured && !unmeasured ? html`
+				<p class="note">${plural(answer.given_not_measured, 'group')} with given cameras and no field lines: JaC is not measured there, and its gate passes.</p>` : null}
 		</section>
 	`;
 }

@@ -1,6 +1,8 @@
 // @ts-check
 /** The gates in words: what each asks, and what it means when it fails. */
 
+import { sharePercent } from '../lib/format.js';
+
 /** @import {GateJson, PolicyJson} from '../api/types.js' */
 
 /** What is wrong when the gate fails. */
@@ -31,16 +33,12 @@ export function gateLabel(gate, policy) {
 	return labels[gate.name] ?? gate.name;
 }
 
-const UNITS = /** @type {Record<string, [number, string]>} */ ({
-	jac: [2, ''], baseline: [1, ' m'], reprojection: [1, ' px'], parallax: [1, '°'], sigma: [2, ' m'],
-});
-
-/** How far the value is from its threshold, or "". @param {GateJson} gate */
+/** How far the value is from its threshold, as a share of the threshold, or "". @param {GateJson} gate */
 export function gateMargin(gate) {
-	const unit = UNITS[gate.name];
-	if (!unit || gate.margin === null || !gate.active) return '';
-	const size = Math.abs(gate.margin).toFixed(unit[0]);
+	const { margin, passed, active } = gate;
+	if (margin === null || !active) return '';
+	const size = sharePercent(margin);
 	// A gate may ask for more than its threshold.
-	if (!gate.passed && Number(size) === 0) return 'at the threshold: more is asked';
-	return `margin ${gate.margin < 0 ? '−' : '+'}${size}${unit[1]}`;
+	if (size === '0.0 %') return passed ? 'exactly as much as is asked' : 'exactly at the threshold, which is not enough';
+	return margin < 0 ? `misses by ${size}` : `margin ${size.startsWith('over') ? '' : '+'}${size}`;
 }

@@ -11,10 +11,10 @@ import { DatasetMenu, pageAddress } from './dataset_menu.js';
 
 /** @import {ComponentChildren} from 'preact' */
 
-/** The pages of a dataset that stand in the header; the menu has them all. */
+/** The pages of a dataset that stand in the header, the optional one where there is room; the menu has them all. */
 const PAGES = [
 	{ name: 'yield', label: 'Yield' },
-	{ name: 'versions', label: 'Versions' },
+	{ name: 'versions', label: 'Versions', optional: true },
 	{ name: 'evaluation', label: 'Evaluation' },
 ];
 
@@ -29,7 +29,7 @@ function Navigation({ current, name }) {
 			<a href=${queueAddress(name, query.value)} aria-current=${mark('queue')}>Queue</a>
 			${PAGES.map((page) => html`
 				<a
-					key=${page.name} class="header__optional" aria-current=${mark(page.name)}
+					key=${page.name} class=${page.optional ? 'header__optional' : undefined} aria-current=${mark(page.name)}
 					href=${name ? pageAddress(name, page.name) : '/datasets'}
 				>${page.label}</a>`)}
 		</nav>

@@ -4,53 +4,47 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
+import { plural } from '../lib/format.js';
 import { rangeOf, withField } from '../state/query.js';
 import { summary } from '../state/queue.js';
+import { BinAxis, endsOf, short } from './bin_axis.js';
 
 /** @import {Histogram} from '../api/types.js' */
 
-/** `beyond`: the last bin also holds what is larger, so it has no upper end. */
 const COLUMNS = [
-	{ name: 'jac', field: 'jac', label: 'min JaC 0.5 %', digits: 2, beyond: false },
-	{ name: 'error_percent', field: 'error_percent', label: 'ball error, % diagonal', digits: 2, beyond: true },
-	{ name: 'sigma', field: 'sigma', label: 'σ, m', digits: 2, beyond: true },
-	{ name: 'parallax', field: 'parallax', label: 'parallax, °', digits: 0, beyond: false },
-	{ name: 'size_ratio', field: 'size_ratio', label: 'ball Ø ratio', digits: 2, beyond: true },
+	{ name: 'jac', field: 'jac', label: 'min JaC 0.5 %', title: 'The lowest share of field lines that fit, of the views of a group', none: 'JaC is measured from drawn field lines, and no group here has any.' },
+	{ name: 'error_percent', field: 'error_percent', label: 'ball error, % diagonal', title: 'Reprojection error of the ball, in per cent of the picture’s diagonal; logarithmic' },
+	{ name: 'sigma', field: 'sigma', label: 'σ, m', title: 'Uncertainty of the ball’s position, metres; logarithmic' },
+	{ name: 'parallax', field: 'parallax', label: 'parallax, °', title: 'The largest angle between two rays to the ball' },
+	{ name: 'size_ratio', field: 'size_ratio', label: 'ball Ø ratio', title: 'Drawn diameter of the ball over the expected one', none: 'Only balls drawn as boxes have a size to compare.' },
 ];
 const WIDTH = 200;
 const HEIGHT = 44;
 
-/** @typedef {typeof COLUMNS[number]} Column */
+/** @typedef {{name: string, field: string, label: string, title: string, none?: string}} Column */
 
-/** @param {number} value @param {number} digits */
-function short(value, digits) {
-	return String(Number(value.toFixed(digits)));
+/** The words of a query that ask for the bins from `first` to `last`, and for nothing beside them. @param {Column} column @param {Histogram} data @param {number} first @param {number} last */
+function wordsFor({ field }, { edges, open_high: beyond }, first, last) {
+	const from = `${field}>=${edges[first]}`;
+	if (last < edges.length - 2) return [from, `${field}<${edges[last + 1]}`];
+	return beyond ? [from] : [from, `${field}<=${edges[last + 1]}`];
 }
 
-/** The words of a query that ask for the bins from `first` to `last`. @param {Column} column @param {Histogram} data @param {number} first @param {number} last */
-function wordsFor(column, { low, high, counts }, first, last) {
-	const width = (high - low) / counts.length;
-	const from = `${column.field}>=${short(low + first * width, 3)}`;
-	const to = `${column.field}<=${short(low + (last + 1) * width, 3)}`;
-	return column.beyond && last === counts.length - 1 ? [from] : [from, to];
-}
-
-/** The bins that a query asks for. @param {Column} column @param {Histogram} data @param {string} q @returns {[number, number]} */
-function binsOf(column, { low, high, counts }, q) {
-	const range = rangeOf(q, column.field);
-	const bin = (/** @type {number} */ value) => ((value - low) / (high - low)) * counts.length;
-	const first = range.low === null ? 0 : Math.round(bin(range.low));
-	const last = range.high === null ? counts.length - 1 : Math.round(bin(range.high)) - 1;
-	const clamp = (/** @type {number} */ value) => Math.max(0, Math.min(counts.length - 1, value));
-	return [clamp(first), Math.max(clamp(first), clamp(last))];
+/** The bins that a query asks for, wholly or in part. @param {Column} column @param {Histogram} data @param {string} q @returns {[number, number]} */
+function binsOf({ field }, { edges }, q) {
+	const { low, high } = rangeOf(q, field);
+	const most = edges.length - 2;
+	const first = low === null ? 0 : Math.max(0, edges.findLastIndex((edge) => edge <= low));
+	const end = high === null ? -1 : edges.findIndex((edge) => edge >= high);
+	const last = end < 0 ? most : end - 1;
+	return [Math.min(first, most), Math.max(Math.min(first, most), last)];
 }
 
 /** The two ends of the range for the keyboard. @param {{column: Column, data: Histogram, bins: [number, number], choose: (first: number, last: number) => void}} props */
 function Ends({ column, data, bins, choose }) {
 	const most = data.counts.length - 1;
-	const width = (data.high - data.low) / data.counts.length;
 	/** @param {number} at @param {boolean} upper */
-	const said = (at, upper) => short(data.low + (at + (upper ? 1 : 0)) * width, column.digits);
+	const said = (at, upper) => `${short(data.edges[at + (upper ? 1 : 0)])}${upper && at === most && data.open_high ? ' and more' : ''}`;
 	const value = (/** @type {Event} */ event) => Number(/** @type {HTMLInputElement} */ (event.target).value);
 	return html`
 		<input
@@ -69,7 +63,8 @@ function Ends({ column, data, bins, choose }) {
  */
 function OneHistogram({ column, data, q, onQuery }) {
 	const [brush, setBrush] = useState(/** @type {[number, number] | null} */ (null));
-	const { counts, low, high } = data;
+	const { counts } = data;
+	const known = counts.some((n) => n > 0);
 	const most = Math.max(1, ...counts);
 	const step = WIDTH / counts.length;
 	const bins = binsOf(column, data, q);
@@ -102,19 +97,19 @@ function OneHistogram({ column, data, q, onQuery }) {
 	const range = rangeOf(q, column.field);
 	const filtered = range.low !== null || range.high !== null;
 	return html`
-		<section class="card histogram" aria-label=${column.label}>
-			<h2>${column.label}${filtered ? html`<button type="button" class="histogram__clear" onClick=${() => onQuery(withField(q, column.field, []))}>clear<span class="hidden-text"> ${column.label}</span></button>` : null}</h2>
+		<section class="card histogram" aria-label=${column.label} data-known=${known}>
+			<h2 title=${column.title}><span class="histogram__label">${column.label}</span>${filtered ? html`<button type="button" class="histogram__clear" onClick=${() => onQuery(withField(q, column.field, []))}>clear<span class="hidden-text"> ${column.label}</span></button>` : null}</h2>
 			<svg
 				viewBox=${`0 0 ${WIDTH} ${HEIGHT}`} preserveAspectRatio="none" role="img"
-				aria-label=${`${column.label} from ${short(low, column.digits)} to ${short(high, column.digits)}`}
+				aria-label=${known ? `${column.label}: ${counts.flatMap((n, bin) => (n ? [`${endsOf(data, bin)}: ${n}`] : [])).join('; ')}` : `${column.label}: no group has this number`}
 				onPointerDown=${down} onPointerMove=${move} onPointerUp=${up} onPointerCancel=${() => setBrush(null)}
 			>
 				${counts.map((n, bin) => {
 					const tall = n === 0 ? 1 : Math.max(2, (n / most) * HEIGHT);
-					return html`<rect key=${bin} data-inside=${bin >= first && bin <= last} x=${bin * step + 0.8} y=${HEIGHT - tall} width=${step - 1.6} height=${tall} rx="0.8" />`;
+					return html`<rect key=${bin} data-inside=${bin >= first && bin <= last} x=${bin * step + 0.8} y=${HEIGHT - tall} width=${step - 1.6} height=${tall} rx="0.8"><title>${endsOf(data, bin)}: ${plural(n, 'group')}</title></rect>`;
 				})}
 			</svg>
-			<p class="histogram__ends"><span>${short(low, column.digits)}</span><span>${short(high, column.digits)}${column.beyond ? '+' : ''}</span></p>
+			${known ? html`<${BinAxis} bins=${data} />` : html`<p class="histogram__none">${data.unknown === 0 ? 'No group matches.' : column.none ?? 'No group here has this number.'}</p>`}
 			<${Ends} column=${column} data=${data} bins=${bins} choose=${choose} />
 		</section>
 	`;
@@ -128,7 +123,7 @@ export function Histograms({ q, onQuery }) {
 			const data = histograms[column.name];
 			return data
 				? html`<${OneHistogram} key=${column.name} column=${column} data=${data} q=${q} onQuery=${onQuery} />`
-				: html`<section key=${column.name} class="card histogram" aria-busy="true"><h2>${column.label}</h2><svg></svg><p class="histogram__ends">–</p></section>`;
+				: html`<section key=${column.name} class="card histogram" aria-busy="true"><h2>${column.label}</h2><svg></svg><p class="bin-axis">–</p></section>`;
 		})}
 	`;
 }

@@ -43,7 +43,7 @@ function PolicyText({ one, policy, etag, busy, send }) {
 			<h2 id="text-title">As YAML, the same in the browser and on the command line</h2>
 			<form class="form" onSubmit=${submit}>
 				<textarea
-					class="field policy__text" aria-label="Policy as YAML" spellcheck=${false} rows="26" value=${text}
+					class="field policy__text" aria-label="Policy as YAML" spellcheck=${false} wrap="off" rows="26" value=${text}
 					onInput=${(/** @type {InputEvent} */ event) => setText(/** @type {HTMLTextAreaElement} */ (event.target).value)}
 				></textarea>
 				<p class="buttons">

@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { fixed, pixels, words } from '../lib/format.js';
+import { fixed, marginText, pixels, words } from '../lib/format.js';
 import { navigate } from '../lib/router.js';
 import { reviewAddress } from '../state/navigation.js';
 import { activeRow } from '../state/queue.js';
@@ -35,13 +35,6 @@ function gateOf(row) {
 function byWhom(row) {
 	if (row.status === 'unreviewed') return '';
 	return [row.reviewer, row.fixed ? 'fixed' : ''].filter(Boolean).join(' · ');
-}
-
-/** How far the failing gate, or the nearest one, is from its threshold. @param {GroupRow} row */
-function margin(row) {
-	if (row.margin === null) return '–';
-	const size = Math.abs(row.margin);
-	return `${row.margin > 0 ? '+' : ''}${fixed(row.margin, size >= 99.5 ? 0 : size >= 9.95 ? 1 : 2)}`;
 }
 
 /** @param {{row: GroupRow, index: number, active: boolean, ticked: boolean}} props */
@@ -83,7 +76,7 @@ function Cells({ row, index, q, active, ticked }) {
 		<div role="gridcell" class="queue-cell queue-cell--two" data-passes=${row.passes === true}>
 			<span>${title}</span><span class="queue-cell__sub">${detail}</span>
 		</div>
-		<div role="gridcell" class="queue-cell" data-numeric="true" data-short=${row.margin !== null && row.margin < 0}>${margin(row)}</div>
+		<div role="gridcell" class="queue-cell" data-numeric="true" data-short=${row.margin !== null && row.margin < 0}>${marginText(row.margin)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.min_jac, 2)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${pixels(row.error_px)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.sigma_m, 2)}</div>

@@ -15,6 +15,7 @@ import { rowAt } from '../state/queue_pages.js';
 import { arrivals, leftAt, remember } from '../state/queue_place.js';
 import { countOf, extendTicks, isTicked, ticks, turnAll, turnTick } from '../state/queue_ticks.js';
 import { QueueRow } from './queue_row.js';
+import { VALUE_OF_REVIEW } from './value_of_review.js';
 
 const ROW = 72;
 /** Rows drawn while nobody knows yet how many there are. */
@@ -25,7 +26,7 @@ const COLUMNS = [
 	{ label: 'Group', sort: 'number' },
 	{ label: 'Status', sort: 'status' },
 	{ label: 'First failing gate', sort: 'gate' },
-	{ label: 'margin', sort: 'margin', numeric: true },
+	{ label: 'margin', sort: 'margin', numeric: true, value: true },
 	{ label: 'min JaC', sort: 'jac', numeric: true },
 	{ label: 'px', sort: 'error', numeric: true },
 	{ label: 'σ m', sort: 'sigma', numeric: true },
@@ -47,6 +48,7 @@ function orderOf(q, name) {
 function HeadCell({ column, q, onQuery }) {
 	const { sort } = column;
 	const order = sort ? orderOf(q, sort) : undefined;
+	const byValue = column.value && orderOf(q, 'value') !== undefined;
 	/** @param {string} name */
 	const turn = (name) => onQuery(withField(q, 'sort', [`sort:${name}${order === 'ascending' ? '-desc' : ''}`]));
 	return html`
@@ -54,7 +56,7 @@ function HeadCell({ column, q, onQuery }) {
 			${sort ? html`
 				<button type="button" data-term=${`column:${sort}`} onClick=${() => turn(sort)}>
 					${column.label}<span aria-hidden="true">${order === 'ascending' ? ' ↑' : order === 'descending' ? ' ↓' : ''}</span>
-				</button>` : html`${column.label}${column.hidden ? html`<span class="hidden-text">${column.hidden}</span>` : null}`}
+				</button>${byValue ? html`<small class="queue-cell__order" title=${VALUE_OF_REVIEW}>by value</small>` : null}` : html`${column.label}${column.hidden ? html`<span class="hidden-text">${column.hidden}</span>` : null}`}
 		</div>
 	`;
 }

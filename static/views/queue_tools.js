@@ -13,6 +13,7 @@ import { clearTicks, countOf, queryOf, ticks } from '../state/queue_ticks.js';
 import { BulkDialog } from './bulk_dialog.js';
 import { Reviewers } from './reviewers.js';
 import { SavedViews } from './saved_views.js';
+import { VALUE_OF_REVIEW, ValueOfReview } from './value_of_review.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
 
@@ -25,8 +26,8 @@ const FLAGS = [
 	{ word: 'stale:yes', label: 'stale' },
 ];
 const ORDERS = [
-	{ sort: '', label: 'Order of the dataset' }, { sort: 'value', label: 'Value of review' },
-	{ sort: 'sigma-desc', label: 'Worst σ' }, { sort: 'newest-desc', label: 'Newest change' },
+	{ sort: '', label: 'Order of the dataset', title: 'As the groups were imported' }, { sort: 'value', label: 'Value of review', title: VALUE_OF_REVIEW },
+	{ sort: 'sigma-desc', label: 'Largest σ first', title: 'First the balls whose position is least certain' }, { sort: 'newest-desc', label: 'Newest change first', title: 'First the groups that were changed or judged last' },
 ];
 
 /** @param {{q: string, onQuery: (q: string) => void}} props */
@@ -65,8 +66,8 @@ function OrderChoice({ q, onQuery }) {
 		onQuery(withField(q, 'sort', value ? [`sort:${value}`] : []));
 	}
 	return html`
-		<select class="field field--select" aria-label="Order" value=${sort} onChange=${choose}>
-			${ORDERS.map((order) => html`<option key=${order.sort} value=${order.sort}>${order.label}</option>`)}
+		<select class="field field--select" aria-label="Order" aria-describedby=${sort.startsWith('value') ? 'order-explained' : undefined} title=${ORDERS.find((order) => order.sort === sort)?.title} value=${sort} onChange=${choose}>
+			${ORDERS.map((order) => html`<option key=${order.sort} value=${order.sort} title=${order.title}>${order.label}</option>`)}
 			${known ? null : html`<option value=${sort}>By ${sort.replace('-desc', ', descending')}</option>`}
 		</select>
 	`;
@@ -125,6 +126,7 @@ export function QueueTools({ dataset, q, onQuery }) {
 			<button class=${ticked > 0 ? 'button button--primary' : 'button'} type="button" aria-disabled=${reason !== ''} title=${reason} onClick=${open}>
 				${reason ? 'Decide…' : ticked > 0 ? `Decide ${count(ticked)} ticked…` : `Decide all ${count(total)}…`}
 			</button>
+			<${ValueOfReview} q=${q} />
 			${deciding ? html`
 				<${BulkDialog}
 					dataset=${dataset} q=${q} total=${total} onClose=${() => setDeciding(false)}

@@ -10,10 +10,13 @@ import { held } from '../state/conflict.js';
 import { document as groupDocument, unsaved } from '../state/group.js';
 import { redo, redoable, undo, undoable } from '../state/history.js';
 import { goNext, goPrevious, neighbours, query, queueAddress, reviewAddress } from '../state/navigation.js';
+import { standing } from '../state/walk.js';
 import { changedElsewhere } from '../state/live.js';
 import { lasting } from '../state/outbox.js';
 import { isAway, isSending, savedAt, waiting, wake, wasRefused } from '../state/sending.js';
 import { Header } from './header.js';
+
+/** @import {Standing} from '../state/walk.js' */
 
 /** Saving is worth a word only when it takes long enough to wonder. */
 const SPINNER_AFTER = 300;
@@ -71,13 +74,23 @@ export function SaveState() {
 	`;
 }
 
+/** "group 3 of 6". @param {Standing} at */
+function placeText({ place, total }) {
+	return place === null ? `not in this queue of ${count(total)}` : `group ${count(place)} of ${count(total)}`;
+}
+
 function Place() {
-	const at = neighbours.value;
+	const at = standing.value;
 	const group = groupDocument.value;
-	if (!group || at?.id !== group.id) return null;
-	const place = at.index === null ? `${count(at.total)} in` : `group ${count(at.index + 1)} of ${count(at.total)} in`;
+	if (!group || !at) return null;
+	const queue = query.value || group.dataset.name;
+	const { done, left } = at;
 	return html`
-		<span class="header__place">${place} <a href=${queueAddress(group.dataset.name, query.value)}>${query.value || group.dataset.name}</a></span>
+		<span class="header__place">
+			<a href=${queueAddress(group.dataset.name, query.value)} title=${`Back to the queue: ${queue}`}>${placeText(at)}</a>
+			<span class="header__queue"> in ${queue}</span>
+			${left !== null && done > 0 ? html`<span class="header__done" title=${`Since you began with this queue of ${count(at.total)}`}> · ${count(done)} done, ${count(left)} left</span>` : null}
+		</span>
 	`;
 }
 

@@ -7,6 +7,7 @@ import { useRef, useState } from 'preact/hooks';
 import { count, plural } from '../lib/format.js';
 import { queueAddress } from '../state/navigation.js';
 import { withField, wordsOf } from '../state/query.js';
+import { BinAxis, endsOf } from './bin_axis.js';
 
 /** @import {SpreadJson} from '../api/statistics.js' */
 
@@ -17,22 +18,22 @@ export function seriesColour(index) {
 	return COLOURS[index % COLOURS.length];
 }
 
-/** Up to four digits, none that says nothing. @param {number} value */
-function short(value) {
-	return String(Number(value.toPrecision(4))).replace('-', '−');
-}
-
 /** The query that asks for one bar of those that match. @param {SpreadJson} spread @param {number} bin @param {string} q */
 function queryOf({ field, queries }, bin, q) {
 	return withField(q, field, wordsOf(queries[bin]));
 }
 
-/** The ends of a bar in words. @param {SpreadJson} spread @param {number} bin */
-function endsOf({ edges, unit, open_low: below, open_high: beyond }, bin) {
-	const [from, to] = [short(edges[bin]), short(edges[bin + 1])];
-	const of = unit ? ` ${unit}` : '';
-	if (below && bin === 0) return `below ${to}${of}`;
-	return beyond && bin === edges.length - 2 ? `${from}${of} and more` : `${from} to ${to}${of}`;
+/** Why nobody has a number, where that is known. */
+const NONE = /** @type {{[name: string]: string}} */ ({
+	jac: 'JaC is measured from drawn field lines, and none of these groups has any.',
+	size_ratio: 'Only balls drawn as boxes have a size to compare; none of these is.',
+});
+
+/** What the picture does not say: how tall it is, and who is not in it. @param {{most: number, unknown: number, name: string}} props */
+function Aside({ most, unknown, name }) {
+	if (most === 0) return html`<p class="note">${NONE[name] ?? 'None of these groups has this number.'}</p>`;
+	const without = unknown ? ` · ${plural(unknown, 'group')} without this number` : '';
+	return html`<p class="note">Tallest bar: ${plural(most, 'group')}${without}</p>`;
 }
 
 /** @param {{spread: SpreadJson, dataset: string, q: string}} props */
@@ -41,7 +42,7 @@ export function Spread({ spread, dataset, q }) {
 	const list = useRef(/** @type {HTMLUListElement | null} */ (null));
 	const [at, setAt] = useState(0);
 	const totals = edges.slice(1).map((_, bin) => series.reduce((sum, { counts }) => sum + counts[bin], 0));
-	const most = Math.max(1, ...totals);
+	const most = Math.max(0, ...totals);
 	const unknown = series.reduce((sum, one) => sum + one.unknown, 0);
 	/** @param {KeyboardEvent} event */
 	function key(event) {
@@ -57,9 +58,9 @@ export function Spread({ spread, dataset, q }) {
 			<h2 id=${`spread-${name}`}>${label}${unit ? `, ${unit}` : ''} <span class="card__aside">${count(totals.reduce((a, b) => a + b, 0))}</span></h2>
 			<ul class="spread__bars" ref=${list} onKeyDown=${key}>
 				${totals.map((total, bin) => {
-					const said = `${endsOf(spread, bin)}: ${plural(total, 'group')}`;
+					const said = `${endsOf(spread, bin, unit)}: ${plural(total, 'group')}`;
 					const parts = series.map(({ split, counts }, index) => html`
-						<i key=${split} data-colour=${seriesColour(index)} style=${{ height: `${(100 * counts[bin]) / most}%` }}></i>`);
+						<i key=${split} data-colour=${seriesColour(index)} style=${{ height: `${(100 * counts[bin]) / Math.max(1, most)}%` }}></i>`);
 					return html`
 						<li key=${bin}>
 							<a
@@ -69,8 +70,8 @@ export function Spread({ spread, dataset, q }) {
 						</li>`;
 				})}
 			</ul>
-			<p class="bar-chart__ends" aria-hidden="true"><span>${short(edges[0])}</span><span>most ${count(most)}</span><span>${short(edges[edges.length - 1])}${spread.open_high ? '+' : ''}</span></p>
-			${unknown ? html`<p class="note">${plural(unknown, 'group')} without this number</p>` : null}
+			<${BinAxis} bins=${spread} />
+			<${Aside} most=${most} unknown=${unknown} name=${name} />
 		</section>
 	`;
 }

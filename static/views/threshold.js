@@ -68,10 +68,10 @@ function Choice({ field, id, value, change }) {
 /**
  * @param {{
  *   field: PolicyField, value: Value, present: Value, switched: Value,
- *   change: (value: Value) => void
- * }} props `present` is what the saved policy asks; `switched` what is asked when it is switched on
+ *   change: (value: Value) => void, idle: string
+ * }} props `idle`: why it changes nothing here; `present` is what the saved policy asks; `switched` what is asked when it is switched on
  */
-export function Threshold({ field, value, present, switched, change }) {
+export function Threshold({ field, value, present, switched, change, idle }) {
 	const id = `threshold-${field.name.replace('.', '-')}`;
 	const checked = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.target).checked;
 	const changed = value !== present;
@@ -84,7 +84,7 @@ export function Threshold({ field, value, present, switched, change }) {
 	}
 	return html`
 		<div class="threshold" data-changed=${changed}>
-			<label class="threshold__label" for=${id}>${field.label}</label>
+			<label class="threshold__label" for=${id}>${field.label}${idle ? html`<small class="threshold__idle">${idle}</small>` : null}</label>
 			${field.optional ? html`
 				<label class="threshold__switch">
 					<input type="checkbox" checked=${value !== null} onChange=${(/** @type {Event} */ event) => change(checked(event) ? switched : null)} />

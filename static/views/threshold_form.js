@@ -7,6 +7,8 @@ import { Threshold } from './threshold.js';
 
 /** @import {PolicyField, ShippedPolicy, Threshold as Value, Values} from '../api/policies.js' */
 
+const OF_JAC = new Set(['jac_gamma_percent', 'min_jac']);
+
 /** What is asked when an optional threshold is switched on: what a shipped policy asks, or the middle. @param {PolicyField} field @param {ShippedPolicy[]} shipped @returns {Value} */
 function switchedOn(field, shipped) {
 	const asked = shipped.map(({ values }) => values[field.name]).find((value) => value !== null && value !== undefined);
@@ -16,16 +18,16 @@ function switchedOn(field, shipped) {
 /**
  * @param {{
  *   fields: PolicyField[], shipped: ShippedPolicy[], present: Values, values: Values,
- *   change: (name: string, value: Value) => void
- * }} props `values` are those that differ from `present`
+ *   change: (name: string, value: Value) => void, idle?: string
+ * }} props `values` are those that differ from `present`; `idle`: why the thresholds of JaC change nothing
  */
-export function ThresholdForm({ fields, shipped, present, values, change }) {
+export function ThresholdForm({ fields, shipped, present, values, change, idle = '' }) {
 	/** @param {PolicyField} field */
 	const one = (field) => html`
 		<${Threshold}
 			key=${field.name} field=${field} present=${present[field.name] ?? null}
 			value=${field.name in values ? values[field.name] : present[field.name] ?? null}
-			switched=${switchedOn(field, shipped)} change=${(/** @type {Value} */ value) => change(field.name, value)}
+			idle=${OF_JAC.has(field.name) ? idle : ''} switched=${switchedOn(field, shipped)} change=${(/** @type {Value} */ value) => change(field.name, value)}
 		/>`;
 	return html`
 		${fields.filter(({ gate }) => gate).map(one)}

@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useMemo } from 'preact/hooks';
 
-import { count } from '../lib/format.js';
+import { count, plural } from '../lib/format.js';
 import { queueAddress } from '../state/navigation.js';
 import { Chart } from './chart.js';
 
@@ -14,18 +14,35 @@ const LOOKS = /** @type {const} */ ([
 	{ colour: 'chart-a', dash: [2, 4] }, { colour: 'chart-b', dash: [9, 5] }, { colour: 'chart-c', dash: undefined },
 ]);
 
+/** Whether nobody measured the JaC of any group: every camera came with the data. @param {YieldJson} answer */
+export function isUnmeasured({ given_not_measured: given, groups, unsolved }) {
+	return given > 0 && given === groups - unsolved;
+}
+
+/** In the place of the curves where there is nothing to draw. */
+function Unmeasured() {
+	return html`
+		<section class="card" aria-labelledby="curves-title">
+			<h2 id="curves-title">Groups that qualify, by JaC threshold</h2>
+			<p class="yield__unmeasured"><strong>JaC was not measured here: the cameras were given.</strong> It compares a camera with the field lines drawn in its pictures, and this dataset has no lines. Every group therefore passes this gate, whatever its threshold. Draw field lines, or import them, to measure it.</p>
+		</section>
+	`;
+}
+
 /** @param {{answer: YieldJson, marker: number | null}} props */
 export function YieldCurves({ answer, marker }) {
-	const { curves } = answer;
+	const { curves, given_not_measured: given } = answer;
 	const x = curves[0]?.thresholds ?? [];
 	// The solid one first: where they coincide, the broken ones are seen on it.
 	const drawn = useMemo(() => curves.map(({ gamma_percent: gamma, groups }, index) => ({
 		label: `γ = ${gamma} %`, values: groups, ...LOOKS[index % LOOKS.length],
 	})).reverse(), [curves]);
 	const said = curves.map(({ gamma_percent: gamma, groups }) => `γ ${gamma} %: ${count(groups[0] ?? 0)} to ${count(groups.at(-1) ?? 0)}`).join('; ');
+	if (isUnmeasured(answer)) return html`<${Unmeasured} />`;
 	return html`
 		<section class="card" aria-labelledby="curves-title">
 			<h2 id="curves-title">Groups that qualify, by JaC threshold</h2>
+			${given ? html`<p class="note">${plural(given, 'group')} without a measured JaC (${given === 1 ? 'its' : 'their'} cameras were given) ${given === 1 ? 'counts' : 'count'} at every threshold.</p>` : null}
 			<${Chart}
 				name=${`Groups with the ball in two views that qualify, as the JaC threshold grows from 0 to 1. ${said}`}
 				xLabel="JaC above" yLabel="groups" x=${x} curves=${drawn} xRange=${[0, 1]} yRange=${[0, null]} marker=${marker} format=${count} height=${330}

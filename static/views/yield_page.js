@@ -16,7 +16,7 @@ import { Loading, Trouble } from './page_frame.js';
 import { SavePolicy } from './save_policy.js';
 import { ThresholdForm } from './threshold_form.js';
 import { VersionCard } from './version_card.js';
-import { Distances, Splits, YieldCurves } from './yield_cards.js';
+import { Distances, isUnmeasured, Splits, YieldCurves } from './yield_cards.js';
 
 /** @import {PolicyField, PolicyState, ShippedPolicy, Threshold, Values, YieldJson} from '../api/policies.js' */
 /** @import {DatasetJson} from '../api/types.js' */
@@ -52,7 +52,7 @@ function YieldBody({ one, loaded, reload }) {
 		<div class="yield">
 			<section class="card yield__policy" aria-labelledby="policy-title">
 				<h2 id="policy-title">Policy <a class="card__aside link" href=${pageAddress(one.name, 'policy')}>${policy.name}, version ${policy.version}</a></h2>
-				<${ThresholdForm} fields=${fields} shipped=${shipped} present=${policy.values} values=${values} change=${change} />
+				<${ThresholdForm} fields=${fields} shipped=${shipped} present=${policy.values} values=${values} change=${change} idle=${answer && isUnmeasured(answer) ? 'no effect: JaC was not measured' : ''} />
 				${answer ? html`<${Difference} answer=${answer} name=${policy.name} changed=${changed} />` : null}
 				${error ? html`<p class="form__error" role="alert">${error.message}</p>` : null}
 				<p class="buttons">

@@ -52,11 +52,22 @@ class Progress(BaseModel):
 
 
 class Histogram(BaseModel):
-    """Counts of one number over the groups that match, in bins of equal width."""
+    """Counts of one number over the groups that match.
+
+    A bin holds what is at least its left edge and below its right one; the first one also what
+    is smaller, the last one its right edge.
+    """
 
     low: float = Field(description="Left end of the first bin.")
     high: float = Field(description="Right end of the last bin.")
+    edges: list[float] = Field(description="One more than there are bins.")
+    open_high: bool = Field(description="The last bin also holds what lies beyond.")
+    log: bool = Field(
+        description="The bins are equally wide on a logarithmic scale, but the first: it holds 0 "
+        "and all that is smaller than the second edge."
+    )
     counts: list[int]
+    unknown: int = Field(description="Groups that have no such number.")
 
 
 class SummaryDocument(BaseModel):
@@ -73,7 +84,15 @@ class SummaryDocument(BaseModel):
         return SummaryDocument(
             progress=Progress(**{name: getattr(summary, name) for name in Progress.model_fields}),
             histograms={
-                name: Histogram(low=item.low, high=item.high, counts=list(item.counts))
+                name: Histogram(
+                    low=item.column.edges[0],
+                    high=item.column.edges[-1],
+                    edges=list(item.column.edges),
+                    open_high=item.column.open_high,
+                    log=item.column.log,
+                    counts=list(item.counts),
+                    unknown=item.unknown,
+                )
                 for name, item in summary.histograms.items()
             },
         )

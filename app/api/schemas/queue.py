@@ -36,7 +36,11 @@ class GroupRow(BaseModel):
     stale: bool
     passes: bool | None = Field(description="null while it is not solved.")
     first_failing: FailingGate | None
-    margin: float | None
+    margin: float | None = Field(
+        description="Of the first failing gate, else of the gate nearest to failing: how far its "
+        "value is from its threshold, as a share of the threshold (0.1 is 10 %), negative when "
+        "the gate fails; null where there is no such share."
+    )
     min_jac: float | None
     error_px: float | None
     error_percent: float | None

@@ -314,7 +314,11 @@ class GateDocument(BaseModel):
     active: bool
     value: float | None
     threshold: float | None
-    margin: float | None
+    margin: float | None = Field(
+        description="How far the value is from the threshold, as a share of the threshold: 0.25 "
+        "is better than asked by a quarter of it, -0.25 worse by as much. null where there is no "
+        "share: nothing is asked, not judged, or the threshold is 0."
+    )
     sentence: str
     view: str | None
 

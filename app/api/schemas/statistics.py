@@ -25,6 +25,10 @@ class StatisticsHistogram(BaseModel):
     edges: list[float] = Field(description="One more than there are bars.")
     open_low: bool = Field(description="The first bar also holds what lies below.")
     open_high: bool = Field(description="The last bar also holds what lies beyond.")
+    log: bool = Field(
+        description="The bars are equally wide on a logarithmic scale, but the first: it holds 0 "
+        "and all that is smaller than the second edge."
+    )
     queries: list[str] = Field(description="For each bar, the query that finds its groups.")
     series: list[SplitSeries]
 
@@ -32,7 +36,7 @@ class StatisticsHistogram(BaseModel):
     def of(histogram: Histogram) -> StatisticsHistogram:
         """The document of a histogram."""
         measure = histogram.measure
-        names = ("name", "label", "unit", "field", "open_low", "open_high")
+        names = ("name", "label", "unit", "field", "open_low", "open_high", "log")
         return StatisticsHistogram(
             **{name: getattr(measure, name) for name in names},
             edges=list(measure.edges),

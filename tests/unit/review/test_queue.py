@@ -57,7 +57,7 @@ def queue_rows(count: int, seed: int = 5) -> list[dict[str, object]]:
             "min_jac": number(0.5, 0.75, 0.75, 0.9),
             "error_px": number(1.0, 2.0),
             "error_percent": number(0.1, 3.0),
-            "sigma_m": number(0.1, 0.1, 2.5),
+            "sigma_m": number(0.1, 0.1, 250.0),
             "parallax_degrees": number(1.0, 90.0),
             "size_ratio": number(0.9, 1.1),
             "height_m": number(0.1, 2.0),
@@ -300,7 +300,7 @@ class TestSummary:
     def test_what_lies_beyond_counts_in_the_end_bins(self, store) -> None:
         dataset = fill_queue(store, COUNT)
         found = summary(store, dataset).histograms["sigma"]
-        rows = list_groups(store, dataset, "sigma>2", 500).items
+        rows = list_groups(store, dataset, "sigma>=100", 500).items
         assert found.counts[-1] == len(rows) > 0
 
     def test_an_empty_dataset_has_zeros(self, store) -> None:

@@ -67,9 +67,9 @@ def solution(camera) -> Solution:
         pairs=(pair, replace(pair, valid=False, failed="baseline")),
         ball=Ball3D((1.0, 2.0, -0.5), (0.1,) * 9, 0.3, 75.0, ("7.png",)),
         gates=(
-            Gate("jac", True, 0.9, 0.75, 0.15, "worst 0.90 · A", "7.png"),
-            Gate("reprojection", False, 30.0, 22.0, -8.0, "30 px · B", "cam1"),
-            Gate("sigma", False, 3.0, 0.5, -2.5, "3 m", active=False),
+            Gate("jac", True, 0.9, 0.75, 0.2, "worst 0.90 · A", "7.png"),
+            Gate("reprojection", False, 30.0, 22.0, -8 / 22, "30 px · B", "cam1"),
+            Gate("sigma", False, 3.0, 0.5, -5.0, "3 m", active=False),
         ),
         findings=(
             Finding("low_parallax", "3 degrees", number=3.0, threshold=5.0),
@@ -154,10 +154,12 @@ class TestSummary:
     def test_names_the_first_failing_gate_with_its_margin(self, group, solution) -> None:
         found = summarize(group, solution)
         assert (found.passes, found.gate, found.gate_view) == (False, "reprojection", "cam1")
-        assert found.margin == -8.0
+        assert found.margin == pytest.approx(-8 / 22)
 
-    def test_value_is_the_smallest_share_of_a_threshold(self, group, solution) -> None:
-        assert summarize(group, solution).value == pytest.approx(0.15 / 0.75)
+    def test_value_is_the_margin_without_its_sign(self, group, solution) -> None:
+        assert summarize(group, solution).value == pytest.approx(8 / 22)
+        passing = replace(solution, gates=solution.gates[:1])
+        assert summarize(group, passing).value == pytest.approx(0.2)
 
     def test_numbers_come_from_the_ball_and_the_views_behind_it(self, group, solution) -> None:
         found = summarize(group, solution)
