@@ -50,9 +50,10 @@ def write_coco(
         info: What stands under ``info``.
 
     Returns:
-        Counts: ``groups``, ``images``, ``annotations``.
+        Counts: ``groups``, ``images``, ``annotations`` (boxes), ``balls`` (views in which the 3D
+        ball holds).
     """
-    counts = {"groups": 0, "images": 0, "annotations": 0}
+    counts = {"groups": 0, "images": 0, "annotations": 0, "balls": 0}
     folder = root / "annotations"
     folder.mkdir()
     with ExitStack() as stack:
@@ -65,6 +66,7 @@ def write_coco(
                     path = folder / f"{PREFIX}{split}.json"
                     files[split] = stack.enter_context(_Instances(path, info or {}))
                 counts["images"] += 1
+                counts["balls"] += record.has_ball_3d(view)
                 files[split].add_image(_image(record, view, counts["images"], everything))
                 annotation = _annotation(record, view, counts, everything, boxes)
                 if annotation is not None:

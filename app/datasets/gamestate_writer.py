@@ -64,12 +64,12 @@ def write_gamestate(root: Path, groups: Iterable[Group]) -> dict[str, int]:
         groups: Groups; one run of a match is in memory at a time.
 
     Returns:
-        Counts: ``groups``, ``images``, ``balls``.
+        Counts: ``groups``, ``images``, ``annotated_balls``.
 
     Raises:
         UnsafePathError: A key would leave ``root``.
     """
-    counts = {"groups": 0, "images": 0, "balls": 0}
+    counts = {"groups": 0, "images": 0, "annotated_balls": 0}
     written: set[Path] = set()
     for match, run in groupby(groups, key=lambda group: group.match):
         name = match or "sequence"
@@ -101,7 +101,7 @@ def _add(file: _File, group: Group, view: View, counts: dict[str, int]) -> None:
         own = {"id": f"{identity}{number:03d}", "image_id": identity}
         file.annotations.append(own | annotation)
     counts["images"] += 1
-    counts["balls"] += sum(ball.center is not None for ball in view.balls)
+    counts["annotated_balls"] += sum(ball.center is not None for ball in view.balls)
 
 
 def _image(kept: Mapping[str, Any], view: View, number: int, group: Group) -> dict[str, Any]:

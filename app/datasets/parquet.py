@@ -79,13 +79,13 @@ def write_parquet(
         provenance: Values of the columns of ``PROVENANCE``.
 
     Returns:
-        Counts: ``groups``, ``views``, ``balls`` (views with a 3D ball).
+        Counts: ``groups``, ``views``, ``boxes`` and ``balls`` (views in which the 3D ball holds).
 
     Raises:
         InputError: pyarrow is not installed.
     """
     pyarrow, parquet = pyarrow_modules()
-    counts = {"groups": 0, "views": 0, "balls": 0}
+    counts = {"groups": 0, "views": 0, "boxes": 0, "balls": 0}
     schema = pyarrow.schema([(name, _type(pyarrow, kind)) for name, kind, _ in COLUMNS])
     waiting: list[dict[str, Any]] = []
     with parquet.ParquetWriter(root / TABLE, schema, compression="zstd") as writer:
@@ -95,7 +95,8 @@ def write_parquet(
                 row = Row(record, view, position, boxes, everything, provenance or {})
                 waiting.append({name: get(row) for name, _, get in COLUMNS})
                 counts["views"] += 1
-                counts["balls"] += row.fit is not None
+                counts["boxes"] += _chosen(row) is not None
+                counts["balls"] += record.has_ball_3d(view)
             if len(waiting) >= ROWS:
                 writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
                 waiting.clear()

@@ -69,7 +69,7 @@ def write_soccernet_v3d(
         boxes: Ball box of Labels-v3D.json, one of ``BOX_KINDS``.
 
     Returns:
-        Counts: ``groups``, ``views``, ``balls`` (rows with a 3D ball).
+        Counts: ``groups``, ``views``, ``balls`` (views in which the 3D ball holds).
 
     Raises:
         InputError: A group is not from SoccerNet.
@@ -107,7 +107,7 @@ def _add_rows(
         verdict = (record.verdict_text,) if everything else ()
         table.add((*_row(record, view, fit), *verdict))
         counts["views"] += 1
-        counts["balls"] += fit is not None
+        counts["balls"] += record.has_ball_3d(view)
         if record.split(view) in lists:
             lists[record.split(view)].write(f"{match}/{Path(view.key).stem}\n")
 

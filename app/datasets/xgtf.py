@@ -58,12 +58,12 @@ def write_issia(
         spare: People of frames that no group's view holds.
 
     Returns:
-        Counts: ``groups``, ``balls``, ``persons``, ``cameras`` (files).
+        Counts: ``groups``, ``annotated_balls``, ``persons``, ``cameras`` (files).
 
     Raises:
         InputError: A group is not from ISSIA.
     """
-    counts = {"groups": 0, "balls": 0, "persons": 0, "cameras": 0}
+    counts = {"groups": 0, "annotated_balls": 0, "persons": 0, "cameras": 0}
     stations: dict[int, Station] = {}
     with open_spill() as spill:
         for group in groups:
@@ -89,7 +89,7 @@ def _add_balls(spill: Spill, camera: int, frame: int, view: View, counts: dict[s
         if ball.center is not None:
             x, y = map(_number, ball.center)
             spill.add((camera, _BALL, "", frame), f"<data:point {_span(frame)} x={x} y={y}/>")
-            counts["balls"] += 1
+            counts["annotated_balls"] += 1
     notes = view.extras.metadata.get("ball")
     for name, value in (notes if isinstance(notes, dict) else {}).items():
         body = f"<data:svalue {_span(frame)} value={_quoted(value)}/>"

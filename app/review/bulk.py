@@ -37,9 +37,9 @@ from app.store.view_models import VerdictBatchModel
 CHUNK = 500
 """Groups a transaction: a few hundredths of a second."""
 SAMPLE = 5
-UNSOLVED, NEEDS_NOTE = "unsolved", "needs_note"
-"""Why a group is left alone: its gates are not known, or it fails one and nobody says why it
-shall be accepted all the same."""
+UNSOLVED, NEEDS_NOTE, NO_PICTURE = "unsolved", "needs_note", "no_picture"
+"""Why a group is left alone: its gates are not known, or it fails one, or no view of it has a
+picture, and nobody says why it shall be accepted all the same."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def give_verdicts(
     """Give a verdict to all groups of a query, as each of them is when its turn comes.
 
     Accepting a group that fails a gate overrides the policy, as it does for one group alone:
-    without a note such groups are refused and counted.
+    without a note such groups are refused and counted, and so are groups without any picture.
 
     Args:
         store: The database.
@@ -218,6 +218,7 @@ def _rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[Any]:
         "solved",
         "passes",
         "gate",
+        "pictures",
     )
     columns = [getattr(QueueModel, name) for name in names]
     statement = select(*columns).where(*where).order_by(QueueModel.number)
@@ -225,7 +226,7 @@ def _rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[Any]:
 
 
 def _sorted_out(rows: Sequence[Any], verdict: Verdict) -> _SortedOut:
-    change, refused = [], {UNSOLVED: 0, NEEDS_NOTE: 0}
+    change, refused = [], {UNSOLVED: 0, NEEDS_NOTE: 0, NO_PICTURE: 0}
     for row in rows:
         if _has(row, verdict):
             continue
@@ -233,6 +234,8 @@ def _sorted_out(rows: Sequence[Any], verdict: Verdict) -> _SortedOut:
             refused[UNSOLVED] += 1
         elif verdict.state == "accepted" and not row.passes and verdict.note is None:
             refused[NEEDS_NOTE] += 1
+        elif verdict.state == "accepted" and not row.pictures and verdict.note is None:
+            refused[NO_PICTURE] += 1
         else:
             change.append(row)
     reasons = (Refusal(reason, count) for reason, count in refused.items() if count)

@@ -277,6 +277,14 @@ def _gate(term: _Term, value: str) -> ColumnElement[bool]:
     return QueueModel.gate == _choice(term, value, GATES)
 
 
+def _pictures(term: _Term, value: str) -> ColumnElement[bool]:
+    """Whether views have a picture: ``none`` of them, ``any``, or ``all``."""
+    choice = _choice(term, value, ("none", "any", "all"))
+    if choice == "all":
+        return QueueModel.pictures >= QueueModel.views
+    return QueueModel.pictures == 0 if choice == "none" else QueueModel.pictures > 0
+
+
 def _view(_term: _Term, value: str) -> ColumnElement[bool]:
     """A view's key (``cam3``, ``7_1.png``), or how many views there are."""
     if value.isascii() and value.isdigit():
@@ -308,6 +316,7 @@ _TESTS: dict[str, Callable[[_Term, str], ColumnElement[bool]]] = {
     "finding": _finding,
     "gate": _gate,
     "view": _view,
+    "pictures": _pictures,
     "match": _match,
     "label": _text,
     "": _text,

@@ -33,7 +33,8 @@ function drawReprojected(context, { picture, viewport }) {
 
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
 function drawBoxes(context, { picture, viewport }) {
-	const optimised = picture.ball?.optimized_box;
+	// Only a view in a valid pair helped to find the 3D ball, so only it has a box made from it.
+	const optimised = picture.solved?.included ? picture.ball?.optimized_box : null;
 	if (optimised) {
 		strokeBox(context, viewport, optimised, {
 			colour: colours.value.optimised, width: 1.5, dash: [4, 3],

@@ -85,16 +85,16 @@ READ: dict[str, Callable[[Path], tuple[int | None, int]]] = {
 
 
 class TestCounts:
-    @pytest.mark.parametrize("format", READ)
+    @pytest.mark.parametrize("format_", READ)
     @pytest.mark.parametrize("boxes", ["optimized", "exact", "annotated"])
     def test_version_manifest_and_files_count_the_same_balls(
-        self, mixed: Store, tmp_path: Path, format: str, boxes: str
+        self, mixed: Store, tmp_path: Path, format_: str, boxes: str
     ) -> None:
         dataset = get_dataset(mixed, "demo")
         version = find_version(mixed, dataset.id, "v1")
-        export(mixed, "demo", format, tmp_path / "out", boxes=boxes, version="v1")
+        export(mixed, "demo", format_, tmp_path / "out", boxes=boxes, version="v1")
         manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
-        balls, written = READ[format](tmp_path / "out")
+        balls, written = READ[format_](tmp_path / "out")
         assert version.counts["balls"] == 4
         assert manifest["counts"]["balls"] == 4
         assert balls in (None, 4)
@@ -103,11 +103,11 @@ class TestCounts:
         named = manifest["counts"].get("boxes", manifest["counts"].get("annotations", 5))
         assert named == 5
 
-    @pytest.mark.parametrize("format", READ)
+    @pytest.mark.parametrize("format_", READ)
     def test_an_export_of_everything_counts_the_same(
-        self, mixed: Store, tmp_path: Path, format: str
+        self, mixed: Store, tmp_path: Path, format_: str
     ) -> None:
-        report = export(mixed, "demo", format, tmp_path / "out", everything=True)
+        report = export(mixed, "demo", format_, tmp_path / "out", everything=True)
         assert report.counts["balls"] == 4
 
     def test_static_cameras_count_alike(
@@ -116,8 +116,8 @@ class TestCounts:
         fill(make_static(10), make_static(11))
         freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
         version = find_version(store, get_dataset(store, "demo").id, "v1")
-        for format in ("issia-3d", "coco", "parquet", "yolo"):
-            report = export(store, "demo", format, tmp_path / format, version="v1")
+        for name in ("issia-3d", "coco", "parquet", "yolo"):
+            report = export(store, "demo", name, tmp_path / name, version="v1")
             assert report.counts["balls"] == version.counts["balls"] == 6
 
     def test_the_evaluation_judges_the_same_balls(self, mixed: Store) -> None:
