@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,6 +12,7 @@ from app.datasets.camera_json import camera_to_json
 from app.datasets.export_record import ExportRecord, chosen_box
 from app.datasets.frame_names import likely_suffix, match_frame
 from app.datasets.view_state import head_to_json, view_to_json
+from app.finite import json_text
 from app.soccer.frames import Box
 from app.soccer.group import View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit
@@ -115,7 +115,7 @@ class _Instances:
 
 
 def _text(value: Mapping[str, Any]) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    return json_text(value)
 
 
 def frame_name(record: ExportRecord, view: View) -> str:

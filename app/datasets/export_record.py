@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -70,8 +71,9 @@ class ExportRecord:
 
     @property
     def point(self) -> tuple[float, float, float] | None:
-        """The 3D ball, pitch frame, metres, z down."""
-        return self.solution.ball.point if self.solution and self.solution.ball else None
+        """The 3D ball, pitch frame, metres, z down; None where it is not a finite place."""
+        ball = self.solution.ball if self.solution else None
+        return ball.point if ball is not None and all(map(math.isfinite, ball.point)) else None
 
     @property
     def verdict_text(self) -> str:

@@ -13,6 +13,7 @@ from app.datasets.archive import resolve_inside
 from app.datasets.gamestate import BALL_ID, LABELS, METADATA, PITCH_ID
 from app.datasets.per_view import view_stem
 from app.datasets.sn_calibration import lines_to_json
+from app.finite import json_text
 from app.soccer.annotation import BallAnnotation
 from app.soccer.group import Group, View
 from app.soccer.pitch import MARKINGS
@@ -83,7 +84,7 @@ def write_gamestate(root: Path, groups: Iterable[Group]) -> dict[str, int]:
             for view in group.views:
                 _add(file, group, view, counts)
         path.parent.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(file.value(), ensure_ascii=False, allow_nan=False)
+        text = json_text(file.value())
         path.write_text(text + "\n", encoding="utf-8")
         written.add(path)
     return counts

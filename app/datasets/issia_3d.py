@@ -14,6 +14,7 @@ from app.datasets.issia import CALIBRATION
 from app.datasets.issia_3d_reader import TABLE
 from app.datasets.spill import Spill, open_spill
 from app.errors import InputError
+from app.finite import json_text
 from app.geometry.camera import Camera
 from app.soccer.group import Group, View
 from app.soccer.solution import BallFit
@@ -59,7 +60,7 @@ def write_issia_3d(
             if annotating:
                 verdict = (record.verdict_text,) if everything else ()
                 cells = [cell(value) for value in (*_row(record, annotating), *verdict)]
-                spill.add((frame_number(record.group), 0, "", 0), json.dumps(cells))
+                spill.add((frame_number(record.group), 0, "", 0), json_text(cells))
                 counts["groups"] += 1
                 counts["points"] += record.point is not None
                 counts["balls"] += sum(map(record.has_ball_3d, annotating.values()))
@@ -154,5 +155,5 @@ def _of(fit: BallFit | None, name: str) -> float | None:
 
 def _write_calibration(root: Path, cameras: dict[int, Camera]) -> None:
     value = {f"cam{number}": camera_to_json(cameras[number]) for number in sorted(cameras)}
-    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
+    text = json_text(value, indent=1, ascii_=True) + "\n"
     (root / CALIBRATION).write_text(text, encoding="utf-8")

@@ -21,6 +21,7 @@ from app.datasets.soccernet_v3 import (
     labels_to_json,
     split_key,
 )
+from app.finite import finite
 from app.soccer.frames import Box
 from app.soccer.group import Group, View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit
@@ -122,7 +123,7 @@ def _row(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Valu
     yield from (action, replay is None, None if replay is None else float(replay))
     yield from (view.size.width, view.size.height, view.ball is not None)
     yield box_text(box) if box else None
-    yield repr(camera_to_json(camera)) if camera else None
+    yield repr(finite(camera_to_json(camera))) if camera else None
     yield from _jac(record, view) or (None,) * len(JAC_NAMES)
     yield f"[array({plain_list(record.point)})]" if fit and record.point else None
     yield from (fit.error_px, fit.optimized_error_m) if fit else (None, None)

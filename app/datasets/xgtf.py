@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import groupby
@@ -16,6 +15,7 @@ from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons
 from app.datasets.issia_3d import frame_number, view_camera
 from app.datasets.sn_calibration import line_file_text
 from app.datasets.spill import Key, Spill, open_spill
+from app.finite import json_text
 from app.soccer.group import Group, Station, View
 
 _BALL, _NOTE, _PERSON = 0, 1, 2
@@ -174,7 +174,7 @@ def _write_stations(root: Path, stations: Mapping[int, Station]) -> None:
         if station.given is not None
     }
     if given:
-        text = json.dumps(given, indent=1, allow_nan=False) + "\n"
+        text = json_text(given, indent=1, ascii_=True) + "\n"
         (root / CALIBRATION).write_text(text, encoding="utf-8")
     for number, station in sorted(stations.items()):
         if station.lines:

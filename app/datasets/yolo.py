@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
@@ -102,7 +103,7 @@ def label_line(box: Box, size: ImageSize) -> str | None:
     """
     left, right = max(box.x, 0.0), min(box.x + box.width, float(size.width))
     top, bottom = max(box.y, 0.0), min(box.y + box.height, float(size.height))
-    if right <= left or bottom <= top:
+    if not all(map(math.isfinite, (left, right, top, bottom))) or right <= left or bottom <= top:
         return None
     numbers = (
         (left + right) / 2 / size.width,

@@ -6,7 +6,6 @@ leaves whole verdicts, and given again it does the rest. ``bulk_undo`` takes it 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -15,6 +14,7 @@ from sqlalchemy import ColumnElement, Integer, and_, cast, func, insert, select,
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError
+from app.finite import json_text
 from app.review.idempotency import Request, is_repeated, remember
 from app.review.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdict import Verdict, check_verdict
@@ -285,7 +285,7 @@ class _Run:
         session.execute(update(VerdictBatchModel).where(mine).values(log_id=log_id))
 
     def _save_batch(self, session: Session, at: str) -> None:
-        values: dict[str, Any] = {"changed": self.changed, "spans": json.dumps(self._spans)}
+        values: dict[str, Any] = {"changed": self.changed, "spans": json_text(self._spans)}
         if self.batch is not None:
             mine = VerdictBatchModel.id == self.batch
             session.execute(update(VerdictBatchModel).where(mine).values(values))

@@ -9,7 +9,6 @@ interpreted.
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Callable, Iterator
@@ -20,6 +19,7 @@ from sqlalchemy import ColumnElement, and_, case, func, not_, or_, select
 from sqlalchemy.orm import InstrumentedAttribute
 
 from app.errors import InputError
+from app.finite import json_text
 from app.soccer.solution import FINDING_KINDS, GATES
 from app.store.models import QueueModel
 
@@ -204,7 +204,7 @@ def _condition(term: _Term) -> ColumnElement[bool]:
 def _listed_groups(term: _Term) -> ColumnElement[bool]:
     ids = [_id(term, text) for text in term.value.split(",")]
     # One parameter, however many there are: a statement takes a limited number of them.
-    listed = func.json_each(json.dumps(ids)).table_valued("value")
+    listed = func.json_each(json_text(ids)).table_valued("value")
     return QueueModel.group_id.in_(select(listed.c.value))
 
 

@@ -7,6 +7,7 @@ annotated there stays, and nothing is computed from it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from app.soccer.frames import Box
@@ -31,7 +32,11 @@ def ball_boxes(solution: Solution | None, view: View) -> dict[str, Box]:
     solved = solution.view(view.key) if solution else None
     if solved is not None and solved.ball is not None and has_ball_3d(solution, view):
         boxes |= {"optimized": solved.ball.optimized_box, "exact": solved.ball.exact_box}
-    return {kind: box for kind, box in boxes.items() if box is not None}
+    return {kind: box for kind, box in boxes.items() if box is not None and _is_finite(box)}
+
+
+def _is_finite(box: Box) -> bool:
+    return all(map(math.isfinite, (box.x, box.y, box.width, box.height)))
 
 
 def ball_fit(solution: Solution | None, view: View, everything: bool) -> BallFit | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 from app.soccer.frames import height_above_grass
@@ -83,12 +84,15 @@ def _several_balls(view: View) -> Iterator[Finding]:
 
 
 def _sides_swapped(swap: Swap) -> Finding:
+    # As labelled the rays may meet behind a camera: then there is no error to tell.
+    measured = math.isfinite(swap.error_px)
+    now = f"misses the others by {swap.error_px:.1f} px" if measured else "meets no other"
     return Finding(
         "sides_swapped",
-        f"Labelled for the other side: turned by 180° its ball meets the others within "
-        f"{swap.turned_error_px:.1f} px.",
+        f"Labelled for the other side: as labelled its ball {now}; turned by 180° it meets the "
+        f"others within {swap.turned_error_px:.1f} px.",
         swap.view,
-        number=swap.error_px,
+        number=swap.error_px if measured else None,
         threshold=swap.turned_error_px,
         confidence=swap.confidence,
         fix=Fix("swap_sides", swap.view),

@@ -7,6 +7,7 @@ meets theirs, that of the camera as labelled does not.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -25,7 +26,8 @@ class Swap:
 
     Attributes:
         view: Key of the view.
-        error_px: Larger reprojection error of its best pair as labelled.
+        error_px: Larger reprojection error of its best pair as labelled; infinite where the
+            rays meet behind a camera or the pair cannot be judged.
         turned_error_px: The same once it is turned; below tau.
         confidence: Between 0.5 and 1.
     """
@@ -83,7 +85,9 @@ def _swap(sight: Sight, others: Sequence[Sight], policy: Policy) -> Swap | None:
     if after >= 1:
         return None
     tau = sight.tau_px(policy)
-    return Swap(sight.view, before * tau, after * tau, confidence=before / (before + after))
+    # As labelled, the balls may meet behind a camera: no error at all, and no doubt about it.
+    confidence = before / (before + after) if math.isfinite(before) else 1.0
+    return Swap(sight.view, before * tau, after * tau, confidence)
 
 
 def _turn(sight: Sight) -> Sight:
