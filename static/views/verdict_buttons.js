@@ -6,7 +6,7 @@ import { useLayoutEffect, useRef } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
 import {
-	accept, addNote, answer, askReason, cancelAsking, defer, lastReason, leaveOut, reject, rejectView, REASONS,
+	accept, addNote, answer, askReason, cancelAsking, defer, isBlind, lastReason, leaveOut, reject, rejectView, REASONS,
 } from '../state/verdicts.js';
 import { asking, pinPlace } from '../state/workspace.js';
 import { pinText } from '../lib/pins.js';
@@ -95,6 +95,16 @@ function PinForm() {
 		/>`;
 }
 
+/** What speaks against accepting a group. @param {GroupDocument} group */
+function acceptTitle(group) {
+	const failing = group.solution?.first_failing;
+	const reasons = [
+		group.solution?.passes ? '' : failing ? `a gate fails (${failing.sentence})` : 'a gate fails',
+		isBlind(group) ? 'no view has a picture to look at' : '',
+	].filter(Boolean);
+	return `Accept although ${reasons.join(' and ')}? Say why.`;
+}
+
 /** @param {{group: GroupDocument}} props */
 function Ask({ group }) {
 	if (asking.value === 'reason') return html`<${ReasonList} key="group" ...${GROUP_REASONS} />`;
@@ -103,9 +113,7 @@ function Ask({ group }) {
 	if (asking.value === 'note') return html`<${NoteForm} title="What is wrong with it?" button="Reject" />`;
 	if (asking.value === 'pin') return html`<${PinForm} />`;
 	if (asking.value !== 'override') return null;
-	const failing = group.solution?.first_failing;
-	const title = `Accept although ${failing ? `a gate fails (${failing.sentence})` : 'a gate fails'}? Say why.`;
-	return html`<${NoteForm} title=${title} button="Accept" />`;
+	return html`<${NoteForm} title=${acceptTitle(group)} button="Accept" />`;
 }
 
 /** @param {{group: GroupDocument}} props */

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 
 import { ballOf } from '../geometry/preview.js';
 import { capital, words } from '../lib/format.js';
-import { REASONS } from '../state/verdicts.js';
+import { isBlind, REASONS } from '../state/verdicts.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
 
 /** @import {GroupDocument, SolutionJson, VerdictJson, ViewJson} from '../api/types.js' */
@@ -79,6 +79,7 @@ export function VerdictCard({ group, solution, live }) {
 			<p class="verdict-card__over">${over}</p>
 			<h1>${title}</h1>
 			<p class="verdict-card__text">${text}</p>
+			${isBlind(group) ? html`<p><span class="pill" data-status="no-picture">no picture</span> <span data-grade="warn">No view of this group has a picture to look at.</span></p>` : null}
 			${verdict.state === 'unreviewed' && !verdict.note ? null : html`
 				<p class="verdict-card__verdict">
 					<span class="pill" data-status=${verdict.state}>${verdictText(verdict)}</span>
