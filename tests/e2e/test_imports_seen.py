@@ -60,7 +60,7 @@ class TestImportOfNothing:
         page = open_page("/import")
         bring_in(page, empty, "nothing")
         assert page.locator(".pill").first.inner_text() == "failed"
-        assert colour(page, '.pill[data-state="failed"]', "--reject-ink")
+        assert colour(page, '.pill[data-state="failed"]', "--bad")
         card = page.get_by_role("region", name="Progress")
         expect(card).to_contain_text("nothing could be imported from empty.zip")
         expect(card).to_contain_text("Nothing was imported")
