@@ -167,7 +167,7 @@ def import_(
         imported = import_source(store, dataset, source, settings, progress, dry_run=dry_run)
     print_import(imported.values(), json_)
     if not imported.something:
-        complain(f"nothing could be imported from {path}")
+        complain(*imported.nothing_read())
         raise typer.Exit(1)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from app.finite import json_text
 from app.options import Json, Workers, parse_size, read_settings
 from app.terminal import Progress, complain, print_json, print_values, say, show_progress
 
@@ -308,7 +309,6 @@ def _tidy(stem: str) -> str:
 
 def _write(store: Store, found: StoredEvaluation, out: Path) -> None:
     """Everything of an evaluation into a folder."""
-    import json
 
     from app.errors import InputError
     from app.evaluation.figure_csv import figure_csv, table_csv
@@ -318,7 +318,7 @@ def _write(store: Store, found: StoredEvaluation, out: Path) -> None:
 
     try:
         out.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(evaluation_values(found), indent=2, ensure_ascii=False)
+        text = json_text(evaluation_values(found), indent=2)
         (out / "evaluation.json").write_text(text + "\n", encoding="utf-8")
         for table in tables_of(found):
             (out / f"{table.name}.csv").write_text(table_csv(table), encoding="utf-8")
@@ -331,7 +331,7 @@ def _write(store: Store, found: StoredEvaluation, out: Path) -> None:
             place: int | None = 0
             while place is not None:
                 page = list_frames(store, found.id, FrameQuery(), 500, place)
-                file.writelines(json.dumps(vars(frame)) + "\n" for frame in page.items)
+                file.writelines(json_text(vars(frame), ascii_=True) + "\n" for frame in page.items)
                 place = page.next
     except OSError as error:
         raise InputError(f"{out} cannot hold the evaluation ({error.strerror})") from error

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import logging
+import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from typing import Any
+
+from app.finite import finite, json_text
 
 Progress = Callable[..., None]
 """Called with how many are done and, where it is known, how many there are."""
@@ -66,7 +68,7 @@ def say(line: str) -> None:
 
 def print_json(value: Any) -> None:
     """One JSON document on stdout."""
-    say(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+    say(json_text(value, indent=2))
 
 
 def print_values(values: Mapping[str, Any], as_json: bool) -> None:
@@ -110,13 +112,18 @@ def print_export(values: Mapping[str, Any], as_json: bool) -> None:
 def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, float):
+    if isinstance(value, float) and math.isfinite(value):
         return f"{value:.4g}"
     if isinstance(value, dict):
         return ", ".join(f"{name} {_text(item)}" for name, item in value.items()) or "none"
     if isinstance(value, (list, tuple)):
         return str(len(value))
-    return "none" if value is None else str(value)
+    return "none" if finite(value) is None else str(value)
+
+
+def only_finite(_logger: Any, _method: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
+    """What is logged without numbers that are infinite or NaN."""
+    return {name: finite(value) for name, value in event.items()}
 
 
 def log_to_stderr() -> None:
@@ -126,6 +133,7 @@ def log_to_stderr() -> None:
     structlog.configure(
         processors=[
             structlog.contextvars.merge_contextvars,
+            only_finite,
             structlog.processors.add_log_level,
             structlog.processors.TimeStamper(fmt="iso", utc=True),
             structlog.processors.format_exc_info,

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import NotFoundError
+from app.finite import json_text
 from app.review.export import ExportReport
 from app.store.clock import now
 
@@ -64,7 +65,7 @@ class ExportFolder:
             missing_images=list(report.missing_images),
             bytes=self.content(name).stat().st_size,
         )
-        _write_atomically(self._record(name), json.dumps(asdict(entry)).encode())
+        _write_atomically(self._record(name), json_text(asdict(entry), ascii_=True).encode())
         return entry
 
     def find(self, name: str) -> ExportEntry | None:

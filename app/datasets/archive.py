@@ -10,7 +10,7 @@ import zipfile
 import zlib
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Protocol
 from urllib.parse import unquote
@@ -18,6 +18,7 @@ from urllib.parse import unquote
 from app.config import Settings
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, UnsafePathError
+from app.nested_zip import open_nested
 
 _DRIVE = re.compile(r"[A-Za-z]:")
 _RATIO_FLOOR = 1024 * 1024
@@ -244,15 +245,48 @@ class ZipTree:
         DatasetFormatError: Not a complete zip file, or beyond the limits.
     """
 
-    def __init__(self, path: Path, report: Report, limits: Limits):
+    def __init__(
+        self, path: Path, report: Report, limits: Limits, archive: zipfile.ZipFile | None = None
+    ):
         self.path = path
         self._limits = limits
-        self._archive = _open_zip(path)
+        self._archive = _open_zip(path) if archive is None else archive
+        self._count = self._total = 0
         try:
             self._members = self._checked(report)
         except DatasetFormatError:
             self._archive.close()
             raise
+
+    def nested(self, name: str, report: Report) -> ZipTree:
+        """The members of a zip file that is itself a member, read in place.
+
+        What the zip files inside hold counts toward the limits of the one around them. A zip
+        file inside one of them is a file like any other, and is not opened.
+
+        Raises:
+            DatasetFormatError: It is damaged, or beyond the limits.
+        """
+        shown = self.shown(name)
+        member = self._members.get(name)
+        if member is None:
+            raise DatasetFormatError(shown, None, None, "is not in the zip file")
+        grown = max(member.file_size, 1) / max(member.compress_size, 1)
+        limits = replace(
+            self._limits,
+            members=self._limits.members - self._count,
+            total_bytes=self._limits.total_bytes - self._total + member.file_size,
+            ratio=max(int(self._limits.ratio / max(grown, 1.0)), 1),
+        )
+        try:
+            archive = open_nested(self._archive, self.path, member)
+        except (*_BROKEN, ValueError, UnicodeError) as error:
+            problem = f"cannot be opened inside the zip file ({error})."
+            raise DatasetFormatError(shown, None, None, problem) from error
+        inner = ZipTree(Path(shown), report, limits, archive)
+        self._count += inner._count
+        self._total += inner._total - member.file_size
+        return inner
 
     def names(self) -> list[str]:
         """Every member that is a safe plain file, sorted."""
@@ -312,6 +346,7 @@ class ZipTree:
         if total > limits.total_bytes:
             problem = f"unpacks to {total:,} bytes; at most {limits.total_bytes:,} are read"
             raise DatasetFormatError(shown, None, None, problem)
+        self._count, self._total = len(members), total
 
     def _problem(self, member: zipfile.ZipInfo, folded: Counter[str]) -> str | None:
         kind = stat.S_IFMT(member.external_attr >> 16)

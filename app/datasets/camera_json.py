@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -17,6 +16,7 @@ from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree, re
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, GeometryError
+from app.finite import json_text
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
@@ -244,7 +244,7 @@ def _several(value: Any) -> dict[str, Any] | None:
 
 def camera_text(camera: Camera) -> str:
     """The text of one camera file."""
-    return json.dumps(camera_to_json(camera), indent=1, allow_nan=False) + "\n"
+    return json_text(camera_to_json(camera), indent=1, ascii_=True) + "\n"
 
 
 def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:

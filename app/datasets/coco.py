@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,6 +12,7 @@ from app.datasets.camera_json import camera_to_json
 from app.datasets.export_record import ExportRecord, chosen_box
 from app.datasets.frame_names import likely_suffix, match_frame
 from app.datasets.view_state import head_to_json, view_to_json
+from app.finite import json_text
 from app.soccer.frames import Box
 from app.soccer.group import View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit
@@ -50,9 +50,10 @@ def write_coco(
         info: What stands under ``info``.
 
     Returns:
-        Counts: ``groups``, ``images``, ``annotations``.
+        Counts: ``groups``, ``images``, ``annotations`` (boxes), ``balls`` (views in which the 3D
+        ball holds).
     """
-    counts = {"groups": 0, "images": 0, "annotations": 0}
+    counts = {"groups": 0, "images": 0, "annotations": 0, "balls": 0}
     folder = root / "annotations"
     folder.mkdir()
     with ExitStack() as stack:
@@ -65,6 +66,7 @@ def write_coco(
                     path = folder / f"{PREFIX}{split}.json"
                     files[split] = stack.enter_context(_Instances(path, info or {}))
                 counts["images"] += 1
+                counts["balls"] += record.has_ball_3d(view)
                 files[split].add_image(_image(record, view, counts["images"], everything))
                 annotation = _annotation(record, view, counts, everything, boxes)
                 if annotation is not None:
@@ -113,7 +115,7 @@ class _Instances:
 
 
 def _text(value: Mapping[str, Any]) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    return json_text(value)
 
 
 def frame_name(record: ExportRecord, view: View) -> str:

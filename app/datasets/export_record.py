@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from app.geometry.camera import Camera
+from app.soccer.ball_boxes import BOX_KINDS, ball_boxes, ball_fit, has_ball_3d
 from app.soccer.frames import Box
 from app.soccer.group import Group, View
 from app.soccer.solution import BallFit, Solution, ViewSolution
 
-BOX_KINDS = ("optimized", "annotated", "exact")
+__all__ = ["BOX_KINDS", "ExportRecord", "chosen_box"]
+
 _NOT_CALIBRATED = ("calibratable", "jac")
 
 
@@ -60,15 +63,17 @@ class ExportRecord:
 
     def ball_fit(self, view: View, everything: bool) -> BallFit | None:
         """The 3D ball in one view; in views of no valid pair only when everything is asked."""
-        solved = self.view_solution(view)
-        if solved is None or self.solution is None or self.solution.ball is None:
-            return None
-        return solved.ball if solved.included or everything else None
+        return ball_fit(self.solution, view, everything)
+
+    def has_ball_3d(self, view: View) -> bool:
+        """Whether the 3D ball holds in one view; every format's count of balls counts these."""
+        return has_ball_3d(self.solution, view)
 
     @property
     def point(self) -> tuple[float, float, float] | None:
-        """The 3D ball, pitch frame, metres, z down."""
-        return self.solution.ball.point if self.solution and self.solution.ball else None
+        """The 3D ball, pitch frame, metres, z down; None where it is not a finite place."""
+        ball = self.solution.ball if self.solution else None
+        return ball.point if ball is not None and all(map(math.isfinite, ball.point)) else None
 
     @property
     def verdict_text(self) -> str:
@@ -77,10 +82,6 @@ class ExportRecord:
 
 
 def chosen_box(record: ExportRecord, view: View, kind: str) -> Box | None:
-    """The ball's box of one of ``BOX_KINDS``; the annotated one where that does not exist."""
-    annotated = view.ball.box if view.ball else None
-    fit = record.ball_fit(view, everything=True)
-    if fit is None or kind == "annotated":
-        return annotated
-    box = fit.exact_box if kind == "exact" else fit.optimized_box
-    return box if box is not None else annotated
+    """The ball's box of one of ``BOX_KINDS``; the annotated one where the view has none of it."""
+    boxes = ball_boxes(record.solution, view)
+    return boxes.get(kind) or boxes.get("annotated")

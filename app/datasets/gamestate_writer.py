@@ -13,6 +13,7 @@ from app.datasets.archive import resolve_inside
 from app.datasets.gamestate import BALL_ID, LABELS, METADATA, PITCH_ID
 from app.datasets.per_view import view_stem
 from app.datasets.sn_calibration import lines_to_json
+from app.finite import json_text
 from app.soccer.annotation import BallAnnotation
 from app.soccer.group import Group, View
 from app.soccer.pitch import MARKINGS
@@ -64,12 +65,12 @@ def write_gamestate(root: Path, groups: Iterable[Group]) -> dict[str, int]:
         groups: Groups; one run of a match is in memory at a time.
 
     Returns:
-        Counts: ``groups``, ``images``, ``balls``.
+        Counts: ``groups``, ``images``, ``annotated_balls``.
 
     Raises:
         UnsafePathError: A key would leave ``root``.
     """
-    counts = {"groups": 0, "images": 0, "balls": 0}
+    counts = {"groups": 0, "images": 0, "annotated_balls": 0}
     written: set[Path] = set()
     for match, run in groupby(groups, key=lambda group: group.match):
         name = match or "sequence"
@@ -83,7 +84,7 @@ def write_gamestate(root: Path, groups: Iterable[Group]) -> dict[str, int]:
             for view in group.views:
                 _add(file, group, view, counts)
         path.parent.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(file.value(), ensure_ascii=False, allow_nan=False)
+        text = json_text(file.value())
         path.write_text(text + "\n", encoding="utf-8")
         written.add(path)
     return counts
@@ -101,7 +102,7 @@ def _add(file: _File, group: Group, view: View, counts: dict[str, int]) -> None:
         own = {"id": f"{identity}{number:03d}", "image_id": identity}
         file.annotations.append(own | annotation)
     counts["images"] += 1
-    counts["balls"] += sum(ball.center is not None for ball in view.balls)
+    counts["annotated_balls"] += sum(ball.center is not None for ball in view.balls)
 
 
 def _image(kept: Mapping[str, Any], view: View, number: int, group: Group) -> dict[str, Any]:

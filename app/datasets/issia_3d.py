@@ -14,6 +14,7 @@ from app.datasets.issia import CALIBRATION
 from app.datasets.issia_3d_reader import TABLE
 from app.datasets.spill import Spill, open_spill
 from app.errors import InputError
+from app.finite import json_text
 from app.geometry.camera import Camera
 from app.soccer.group import Group, View
 from app.soccer.solution import BallFit
@@ -44,12 +45,13 @@ def write_issia_3d(
     once there is a 3D point. ``everything`` adds the column ``verdict``.
 
     Returns:
-        Counts: ``groups`` (rows) and ``balls`` (rows with a 3D ball).
+        Counts: ``groups`` (rows), ``points`` (rows with a 3D ball) and ``balls`` (views in which
+        it holds, as in every format).
 
     Raises:
         InputError: A group is not from ISSIA.
     """
-    counts = {"groups": 0, "balls": 0}
+    counts = {"groups": 0, "points": 0, "balls": 0}
     cameras: dict[int, Camera] = {}
     with open_spill() as spill:
         for record in records:
@@ -58,9 +60,10 @@ def write_issia_3d(
             if annotating:
                 verdict = (record.verdict_text,) if everything else ()
                 cells = [cell(value) for value in (*_row(record, annotating), *verdict)]
-                spill.add((frame_number(record.group), 0, "", 0), json.dumps(cells))
+                spill.add((frame_number(record.group), 0, "", 0), json_text(cells))
                 counts["groups"] += 1
-                counts["balls"] += record.point is not None
+                counts["points"] += record.point is not None
+                counts["balls"] += sum(map(record.has_ball_3d, annotating.values()))
         _write_table(root / TABLE, spill, everything)
     _write_calibration(root, cameras)
     return counts
@@ -122,7 +125,12 @@ def _collect_cameras(record: ExportRecord, cameras: dict[int, Camera]) -> None:
 
 
 def _row(record: ExportRecord, annotating: dict[int, View]) -> Iterator[Value]:
-    fits = {camera: record.ball_fit(view, True) for camera, view in annotating.items()}
+    # The published layout: a number for every camera that annotates, in a valid pair or not.
+    solved = {camera: record.view_solution(view) for camera, view in annotating.items()}
+    fits = {
+        camera: item.ball if item is not None and record.point is not None else None
+        for camera, item in solved.items()
+    }
     yield frame_number(record.group)
     for camera in CAMERAS:
         yield from _center(annotating.get(camera))
@@ -147,5 +155,5 @@ def _of(fit: BallFit | None, name: str) -> float | None:
 
 def _write_calibration(root: Path, cameras: dict[int, Camera]) -> None:
     value = {f"cam{number}": camera_to_json(cameras[number]) for number in sorted(cameras)}
-    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
+    text = json_text(value, indent=1, ascii_=True) + "\n"
     (root / CALIBRATION).write_text(text, encoding="utf-8")

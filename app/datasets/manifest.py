@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from app.finite import json_text
 
 MANIFEST = "manifest.json"
 SOFTWARE = "touchline"
@@ -87,9 +88,7 @@ def write_manifest(root: Path, manifest: Manifest) -> Path:
         **manifest.stamp,
     }
     path = root / MANIFEST
-    path.write_text(
-        json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
-    )
+    path.write_text(json_text(value, indent=1) + "\n", encoding="utf-8")
     return path
 
 

@@ -1,9 +1,12 @@
-"""The frames of one SoccerNet match: members of Frames-v3.zip or loose files, read in place."""
+"""The frames of one SoccerNet match: members of Frames-v3.zip or loose files, read in place.
+
+Frames-v3.zip may itself be a member of the zip that was uploaded.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 
 from app.datasets.archive import FileTree, Limits, ZipTree
 from app.datasets.report import Report
@@ -31,22 +34,29 @@ class MatchFrames:
     ):
         self._tree, self._match = tree, match
         self._loose = {name for name in names if _is_image(name)}
-        self._archive: Path | None = None
         self._members: set[str] = set()
-        # Names of a folder lead to files inside it; those of a zip cannot be opened in place.
-        if ARCHIVE in names and tree.path.is_dir():
-            self._open(tree.path / match / ARCHIVE, report, limits)
+        if ARCHIVE in names:
+            self._open(report, limits)
 
-    def _open(self, path: Path, report: Report, limits: Limits) -> None:
+    def _open(self, report: Report, limits: Limits) -> None:
+        tree, name = self._tree, self._match + ARCHIVE
         try:
-            archive = ZipTree(path, report, limits)
+            if isinstance(tree, ZipTree):
+                archive = tree.nested(name, report)
+            else:
+                archive = ZipTree(tree.path / name, report, limits)
         except DatasetFormatError as error:
             problem = f"{error.problem} Its match is imported without these frames."
             report.note(error.path, error.record, error.field, problem)
             return
-        self._archive = path
         self._members = {name for name in archive.names() if _is_image(name)}
         archive.close()
+
+    def _member(self, name: str) -> Media:
+        """Where a member of the archive is."""
+        if isinstance(self._tree, ZipTree):
+            return Media(str(self._tree.path), f"{self._match}{ARCHIVE}/{name}")
+        return Media(str(self._tree.path / self._match / ARCHIVE), name)
 
     @property
     def some(self) -> bool:
@@ -57,7 +67,7 @@ class MatchFrames:
         """Where the frame of an image name (``7_1.png``) lies, or None."""
         for folder in FOLDERS:
             if folder + image in self._members:
-                return Media(str(self._archive), folder + image)
+                return self._member(folder + image)
         for folder in FOLDERS:
             if folder + image in self._loose:
                 name = self._match + folder + image

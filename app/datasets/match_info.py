@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from types import TracebackType
@@ -13,6 +12,7 @@ from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.datasets.soccernet_record import IMAGE
 from app.errors import DatasetFormatError, UnsafePathError
+from app.finite import json_text
 from app.soccer.group import Group, View
 
 FILE = "match_info.json"
@@ -102,6 +102,6 @@ class MatchInfoWriter:
     def add(self, image: str, record: Mapping[str, Any]) -> None:
         """One image; its name is relative to the export."""
         head = ",\n" if self._count else "{\n"
-        text = json.dumps(dict(record), ensure_ascii=False, allow_nan=False)
-        self._file.write(f"{head} {json.dumps(image, ensure_ascii=False)}: {text}")
+        text = json_text(dict(record))
+        self._file.write(f"{head} {json_text(image)}: {text}")
         self._count += 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +13,8 @@ from app.datasets.export_record import ExportRecord, chosen_box
 from app.datasets.manifest import software_version
 from app.datasets.view_state import extras_to_json, view_to_json
 from app.errors import InputError
+from app.finite import finite
+from app.finite import json_text as finite_text
 from app.geometry.camera import Camera
 from app.soccer.frames import Box
 from app.soccer.group import View
@@ -79,13 +80,13 @@ def write_parquet(
         provenance: Values of the columns of ``PROVENANCE``.
 
     Returns:
-        Counts: ``groups``, ``views``, ``balls`` (views with a 3D ball).
+        Counts: ``groups``, ``views``, ``boxes`` and ``balls`` (views in which the 3D ball holds).
 
     Raises:
         InputError: pyarrow is not installed.
     """
     pyarrow, parquet = pyarrow_modules()
-    counts = {"groups": 0, "views": 0, "balls": 0}
+    counts = {"groups": 0, "views": 0, "boxes": 0, "balls": 0}
     schema = pyarrow.schema([(name, _type(pyarrow, kind)) for name, kind, _ in COLUMNS])
     waiting: list[dict[str, Any]] = []
     with parquet.ParquetWriter(root / TABLE, schema, compression="zstd") as writer:
@@ -93,9 +94,10 @@ def write_parquet(
             counts["groups"] += 1
             for position, view in enumerate(record.group.views):
                 row = Row(record, view, position, boxes, everything, provenance or {})
-                waiting.append({name: get(row) for name, _, get in COLUMNS})
+                waiting.append(finite({name: get(row) for name, _, get in COLUMNS}))
                 counts["views"] += 1
-                counts["balls"] += row.fit is not None
+                counts["boxes"] += _chosen(row) is not None
+                counts["balls"] += record.has_ball_3d(view)
             if len(waiting) >= ROWS:
                 writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
                 waiting.clear()
@@ -123,7 +125,7 @@ def _type(pyarrow: Any, kind: str) -> Any:
 
 def json_text(value: Any) -> str | None:
     """A value as JSON text; None stays None."""
-    return None if value is None else json.dumps(value, ensure_ascii=False, allow_nan=False)
+    return None if value is None else finite_text(value)
 
 
 def _camera(get: Callable[[Camera], Any]) -> Getter:

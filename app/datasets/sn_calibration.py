@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
@@ -16,6 +15,7 @@ from app.datasets.exact import exact_inverse
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, UnknownMarkingError
+from app.finite import json_text
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Media
@@ -227,7 +227,7 @@ def line_file_text(
     pixels: bool = False,
 ) -> str:
     """The text of one line file."""
-    return json.dumps(lines_to_json(lines, size, others, pixels=pixels), allow_nan=False) + "\n"
+    return json_text(lines_to_json(lines, size, others, pixels=pixels), ascii_=True) + "\n"
 
 
 def write_line_files(root: Path, files: Iterable[LineFile]) -> list[Path]:

@@ -32,6 +32,7 @@ from app.datasets.soccernet_record import (
     record_to_json,
 )
 from app.errors import DatasetFormatError, InputError, UnsafePathError
+from app.finite import json_text
 from app.soccer.group import Group, Station, View
 
 LABELS = "Labels-v3.json"
@@ -351,7 +352,7 @@ class LabelsWriter:
             labels = _joined(json.loads(path.read_text(encoding="utf-8")), labels)
         path.parent.mkdir(parents=True, exist_ok=True)
         # Without indentation: with it, writing would take ten times as long.
-        text = json.dumps(labels, ensure_ascii=False, allow_nan=False)
+        text = json_text(labels)
         path.write_text(text + "\n", encoding="utf-8")
         self.written[path] = None
 

@@ -21,6 +21,7 @@ from app.datasets.soccernet_v3 import (
     labels_to_json,
     split_key,
 )
+from app.finite import finite
 from app.soccer.frames import Box
 from app.soccer.group import Group, View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit
@@ -69,7 +70,7 @@ def write_soccernet_v3d(
         boxes: Ball box of Labels-v3D.json, one of ``BOX_KINDS``.
 
     Returns:
-        Counts: ``groups``, ``views``, ``balls`` (rows with a 3D ball).
+        Counts: ``groups``, ``views``, ``balls`` (views in which the 3D ball holds).
 
     Raises:
         InputError: A group is not from SoccerNet.
@@ -107,7 +108,7 @@ def _add_rows(
         verdict = (record.verdict_text,) if everything else ()
         table.add((*_row(record, view, fit), *verdict))
         counts["views"] += 1
-        counts["balls"] += fit is not None
+        counts["balls"] += record.has_ball_3d(view)
         if record.split(view) in lists:
             lists[record.split(view)].write(f"{match}/{Path(view.key).stem}\n")
 
@@ -122,7 +123,7 @@ def _row(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Valu
     yield from (action, replay is None, None if replay is None else float(replay))
     yield from (view.size.width, view.size.height, view.ball is not None)
     yield box_text(box) if box else None
-    yield repr(camera_to_json(camera)) if camera else None
+    yield repr(finite(camera_to_json(camera))) if camera else None
     yield from _jac(record, view) or (None,) * len(JAC_NAMES)
     yield f"[array({plain_list(record.point)})]" if fit and record.point else None
     yield from (fit.error_px, fit.optimized_error_m) if fit else (None, None)

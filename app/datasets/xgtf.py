@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import groupby
@@ -16,6 +15,7 @@ from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons
 from app.datasets.issia_3d import frame_number, view_camera
 from app.datasets.sn_calibration import line_file_text
 from app.datasets.spill import Key, Spill, open_spill
+from app.finite import json_text
 from app.soccer.group import Group, Station, View
 
 _BALL, _NOTE, _PERSON = 0, 1, 2
@@ -58,12 +58,12 @@ def write_issia(
         spare: People of frames that no group's view holds.
 
     Returns:
-        Counts: ``groups``, ``balls``, ``persons``, ``cameras`` (files).
+        Counts: ``groups``, ``annotated_balls``, ``persons``, ``cameras`` (files).
 
     Raises:
         InputError: A group is not from ISSIA.
     """
-    counts = {"groups": 0, "balls": 0, "persons": 0, "cameras": 0}
+    counts = {"groups": 0, "annotated_balls": 0, "persons": 0, "cameras": 0}
     stations: dict[int, Station] = {}
     with open_spill() as spill:
         for group in groups:
@@ -89,7 +89,7 @@ def _add_balls(spill: Spill, camera: int, frame: int, view: View, counts: dict[s
         if ball.center is not None:
             x, y = map(_number, ball.center)
             spill.add((camera, _BALL, "", frame), f"<data:point {_span(frame)} x={x} y={y}/>")
-            counts["balls"] += 1
+            counts["annotated_balls"] += 1
     notes = view.extras.metadata.get("ball")
     for name, value in (notes if isinstance(notes, dict) else {}).items():
         body = f"<data:svalue {_span(frame)} value={_quoted(value)}/>"
@@ -174,7 +174,7 @@ def _write_stations(root: Path, stations: Mapping[int, Station]) -> None:
         if station.given is not None
     }
     if given:
-        text = json.dumps(given, indent=1, allow_nan=False) + "\n"
+        text = json_text(given, indent=1, ascii_=True) + "\n"
         (root / CALIBRATION).write_text(text, encoding="utf-8")
     for number, station in sorted(stations.items()):
         if station.lines:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
@@ -41,9 +42,11 @@ def write_yolo(
         boxes: One of ``BOX_KINDS``.
 
     Returns:
-        Counts: ``groups``, ``labels`` (files), ``balls``, ``images``, ``images_missing``.
+        Counts: ``groups``, ``labels`` (files), ``boxes`` (files with one), ``balls`` (views in
+        which the 3D ball holds), ``images``, ``images_missing``.
     """
-    counts = {"groups": 0, "labels": 0, "balls": 0, "images": 0, "images_missing": 0}
+    names = ("groups", "labels", "boxes", "balls", "images", "images_missing")
+    counts = dict.fromkeys(names, 0)
     with ExitStack() as stack:
         lists = {name: stack.enter_context(_open(root / f"{name}.txt")) for name in LISTS}
         used: set[str] = set()
@@ -85,7 +88,8 @@ def _add(
     cells: tuple[Any, ...] = (image, present, group.key, view.key, split)
     table.add((*cells, view.size.width, view.size.height, record.verdict_text))
     counts["labels"] += 1
-    counts["balls"] += line is not None
+    counts["boxes"] += line is not None
+    counts["balls"] += record.has_ball_3d(view)
     counts["images" if present else "images_missing"] += 1
     return image
 
@@ -99,7 +103,7 @@ def label_line(box: Box, size: ImageSize) -> str | None:
     """
     left, right = max(box.x, 0.0), min(box.x + box.width, float(size.width))
     top, bottom = max(box.y, 0.0), min(box.y + box.height, float(size.height))
-    if right <= left or bottom <= top:
+    if not all(map(math.isfinite, (left, right, top, bottom))) or right <= left or bottom <= top:
         return None
     numbers = (
         (left + right) / 2 / size.width,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections import Counter
@@ -20,6 +19,7 @@ from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile, read_line_files
 from app.errors import DatasetFormatError, InputError
+from app.finite import json_text
 from app.geometry.camera import Camera
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
@@ -309,4 +309,4 @@ def _nothing(source: Path, report: Report, what: str) -> InputError:
 
 
 def _text(value: Any) -> str:
-    return json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    return json_text(value, indent=1) + "\n"

@@ -7,7 +7,6 @@ leaves whole verdicts, and given again it does the rest. ``bulk_undo`` takes it 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -16,6 +15,7 @@ from sqlalchemy import ColumnElement, insert, select, update
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError
+from app.finite import json_text
 from app.review.idempotency import Request, is_repeated, remember
 from app.review.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdict import Verdict, check_verdict
@@ -36,9 +36,9 @@ from app.store.view_models import VerdictBatchModel
 CHUNK = 500
 """Groups a transaction: a few hundredths of a second."""
 SAMPLE = 5
-UNSOLVED, NEEDS_NOTE = "unsolved", "needs_note"
-"""Why a group is left alone: its gates are not known, or it fails one and nobody says why it
-shall be accepted all the same."""
+UNSOLVED, NEEDS_NOTE, NO_PICTURE = "unsolved", "needs_note", "no_picture"
+"""Why a group is left alone: its gates are not known, or it fails one, or no view of it has a
+picture, and nobody says why it shall be accepted all the same."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def give_verdicts(
     """Give a verdict to all groups of a query, as each of them is when its turn comes.
 
     Accepting a group that fails a gate overrides the policy, as it does for one group alone:
-    without a note such groups are refused and counted.
+    without a note such groups are refused and counted, and so are groups without any picture.
 
     Args:
         store: The database.
@@ -224,6 +224,7 @@ def queue_rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[A
         "solved",
         "passes",
         "gate",
+        "pictures",
     )
     columns = [getattr(QueueModel, name) for name in names]
     statement = select(*columns).where(*where).order_by(QueueModel.number)
@@ -232,7 +233,7 @@ def queue_rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[A
 
 def sort_out(rows: Sequence[Any], verdict: Verdict) -> SortedOut:
     """The groups that a verdict changes, and how many it is refused for, and why."""
-    change, refused = [], {UNSOLVED: 0, NEEDS_NOTE: 0}
+    change, refused = [], {UNSOLVED: 0, NEEDS_NOTE: 0, NO_PICTURE: 0}
     for row in rows:
         if _has(row, verdict):
             continue
@@ -240,6 +241,8 @@ def sort_out(rows: Sequence[Any], verdict: Verdict) -> SortedOut:
             refused[UNSOLVED] += 1
         elif verdict.state == "accepted" and not row.passes and verdict.note is None:
             refused[NEEDS_NOTE] += 1
+        elif verdict.state == "accepted" and not row.pictures and verdict.note is None:
+            refused[NO_PICTURE] += 1
         else:
             change.append(row)
     reasons = (Refusal(reason, count) for reason, count in refused.items() if count)
@@ -297,7 +300,7 @@ class BatchRun:
         session.execute(update(VerdictBatchModel).where(mine).values(log_id=log_id))
 
     def _save_batch(self, session: Session, at: str) -> None:
-        values: dict[str, Any] = {"changed": self.changed, "spans": json.dumps(self._spans)}
+        values: dict[str, Any] = {"changed": self.changed, "spans": json_text(self._spans)}
         if self.batch is not None:
             mine = VerdictBatchModel.id == self.batch
             session.execute(update(VerdictBatchModel).where(mine).values(values))

@@ -44,6 +44,8 @@ def camera_sigma(calibration: Calibration) -> CameraSigma | None:
     camera, covariance = calibration.camera, calibration.covariance
     if camera is None or covariance is None:
         return None
+    if not all(map(math.isfinite, covariance)):
+        return None
     spread = np.array(covariance).reshape(PARAMETERS, PARAMETERS)
     sigma = np.sqrt(np.maximum(np.diag(spread), 0.0))
     focal = camera.focal_length[0]

@@ -8,7 +8,6 @@ are not carried: they lie elsewhere on each machine.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from sqlalchemy.orm import Session
 
 from app.datasets.manifest import Manifest, write_manifest
 from app.datasets.output import output_tree
+from app.finite import json_text
 from app.review.datasets import Dataset, read_dataset
 from app.review.licence import licence_text
 from app.review.lineage import Lineage, Lineages, station_lineage
@@ -82,7 +82,7 @@ def carry_out(
             "dataset": found.name,
             "policy": policy_to_json(found.policy),
         }
-        (root / HEAD).write_text(json.dumps(head, indent=1) + "\n", encoding="utf-8")
+        (root / HEAD).write_text(json_text(head, indent=1, ascii_=True) + "\n", encoding="utf-8")
         write_manifest(root, _manifest(session, found, counts))
     return counts
 

@@ -15,10 +15,10 @@ from app.review.datasets import Dataset
 from app.review.membership import RULES, read_candidates, require_solved
 from app.review.state import read_states
 from app.review.versions import BATCH, FrozenGroup, Version, read_rows, thaw
-from app.soccer.frames import Box
-from app.soccer.group import Group, View
+from app.soccer.ball_boxes import ball_boxes, has_ball_3d
+from app.soccer.group import Group
 from app.soccer.policy import Policy
-from app.soccer.solution import SOLVER_VERSION, Solution, ViewSolution
+from app.soccer.solution import SOLVER_VERSION, Solution
 from app.store.codecs import Json, policy_to_json
 from app.store.digest import digest
 from app.store.models import GroupModel, ViewModel
@@ -117,7 +117,7 @@ def group_frames(
     """
     for view in group.views:
         solved = solution.view(view.key)
-        inside = solved is not None and solved.included and solution.ball is not None
+        inside = has_ball_3d(solution, view)
         yield Frame(
             id=view_ids[view.key],
             group_id=group_id,
@@ -126,7 +126,7 @@ def group_frames(
             match=group.match,
             size=view.size,
             split=(splits or {}).get(view.key, group.split),
-            boxes=_boxes(view, solved if inside else None),
+            boxes=ball_boxes(solution, view),
             absent=view.ball is None and any(ball.out_of_view for ball in view.balls),
             camera=solved.calibration.camera if solved else None,
             point=solution.ball.point if solution.ball and inside else None,
@@ -136,13 +136,6 @@ def group_frames(
             station=view.station.key,
             predicted_by=view.ball.predicted_by if view.ball else "",
         )
-
-
-def _boxes(view: View, solved: ViewSolution | None) -> dict[str, Box]:
-    boxes = {"annotated": view.ball.box if view.ball else None}
-    if solved is not None and solved.ball is not None:
-        boxes |= {"optimized": solved.ball.optimized_box, "exact": solved.ball.exact_box}
-    return {kind: box for kind, box in boxes.items() if box is not None}
 
 
 def _frozen_frames(

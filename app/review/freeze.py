@@ -244,7 +244,9 @@ class _Run:
         for view in solved["views"]:
             side = (splits or {}).get(view["view"], split) or NO_SPLIT
             self._views[side] = self._views.get(side, 0) + 1
-            self._balls[side] = self._balls.get(side, 0) + bool(view["included"])
+            # As ``soccer.ball_boxes.has_ball_3d``: what every format counts as a ball.
+            ball = solved["ball"] is not None and view["included"]
+            self._balls[side] = self._balls.get(side, 0) + bool(ball)
         frames = frames_of(group, _facts(group))
         return {
             "split": split,

@@ -11,7 +11,7 @@ from app.config import Settings
 from app.errors import InputError
 from app.review.datasets import find_dataset, get_dataset, require_name
 from app.review.import_folders import resolve_folder
-from app.review.jobs import Jobs, Progress, Work
+from app.review.jobs import FailedWithReportError, Jobs, Progress, Work
 from app.review.solve_job import request_solve
 from app.review.sources import FORMATS, Imported, Source, import_source
 from app.soccer.frames import ImageSize
@@ -103,7 +103,7 @@ def resume_imports(jobs: Jobs, store: Store, settings: Settings) -> None:
 def import_work(
     jobs: Jobs, store: Store, settings: Settings, request: ImportRequest, actor: str
 ) -> Work:
-    """The work itself; its result is the report."""
+    """The work itself; its result is the report, also where it fails because it read nothing."""
 
     def work(progress: Progress) -> Json:
         source = source_of(settings, request)
@@ -121,6 +121,9 @@ def import_work(
             actor=actor,
             dry_run=request.dry_run,
         )
+        if not imported.something:
+            problem, hint = imported.nothing_read()
+            raise FailedWithReportError(problem, hint, _result(imported, request))
         if not request.dry_run and imported.result.new + imported.result.changed:
             _solve(jobs, store, request.dataset, actor)
         return _result(imported, request)

@@ -41,6 +41,7 @@ class IngestReport:
     Attributes:
         changed: Groups, and static cameras that many groups share.
         findings: Edits that a changed source met.
+        without_picture: Groups of which no view has a picture.
         missing: Groups that this source brought before and does not bring any more; they stay.
         problems: What to tell about single groups, or about the missing ones.
     """
@@ -50,6 +51,7 @@ class IngestReport:
     unchanged: int = 0
     findings: int = 0
     missing: int = 0
+    without_picture: int = 0
     problems: list[str] = field(default_factory=list)
 
 
@@ -171,6 +173,7 @@ def _sound(groups: Iterable[Group], seen: set[str], report: IngestReport) -> Ite
             report.problems.append(f"group {group.key} has two views of one name")
         else:
             seen.add(group.key)
+            report.without_picture += all(view.media is None for view in group.views)
             yield replace(group, views=tuple(map(_absolute, group.views)))
 
 

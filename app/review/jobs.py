@@ -56,6 +56,20 @@ Pool = Callable[[], AbstractContextManager[Executor]]
 """Makes an executor for the length of one large job, so that requests keep their processor."""
 
 
+class FailedWithReportError(ReviewError):
+    """A job that failed, and what it has to tell all the same.
+
+    Args:
+        message: One sentence that says what is wrong.
+        hint: What to do about it.
+        result: The job's result.
+    """
+
+    def __init__(self, message: str, hint: str | None, result: Json):
+        super().__init__(message, hint=hint)
+        self.result = result
+
+
 class JobCancelled(Exception):  # noqa: N818
     """The job shall end here: a person cancelled it, or the server stops."""
 
@@ -343,6 +357,8 @@ class Jobs:
             if not run.progress.cancelled.is_set():
                 return None
             return {"state": CANCELLED, "sentence": "Cancelled."}
+        except FailedWithReportError as error:
+            return {**_failure(error.message, error.hint), "result": error.result}
         except ReviewError as error:
             return _failure(error.message, error.hint, error.pointer)
         except Exception:

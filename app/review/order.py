@@ -11,6 +11,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Label, and_, case, func, or_
 
 from app.errors import InputError
+from app.finite import json_text
 from app.review.query import SORTS, TEXT_SORTS, Query
 from app.store.models import QueueModel
 
@@ -79,7 +80,7 @@ class Order:
     def encode(self, row: Any) -> str:
         """The cursor that continues after a row."""
         values = [getattr(row, key.name) for key in self.keys]
-        text = json.dumps([self.name, *values], separators=(",", ":"))
+        text = json_text([self.name, *values], ascii_=True, compact=True)
         return base64.urlsafe_b64encode(text.encode()).decode().rstrip("=")
 
     def decode(self, cursor: str) -> list[Any]:

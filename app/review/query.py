@@ -13,7 +13,6 @@ interpreted.
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Callable, Iterator
@@ -24,6 +23,7 @@ from sqlalchemy import ColumnElement, and_, case, func, not_, or_, select
 from sqlalchemy.orm import InstrumentedAttribute
 
 from app.errors import InputError
+from app.finite import json_text
 from app.soccer.solution import FINDING_KINDS, GATES
 from app.store.models import QueueModel
 
@@ -208,7 +208,7 @@ def _condition(term: _Term) -> ColumnElement[bool]:
 def _listed_groups(term: _Term) -> ColumnElement[bool]:
     ids = [_id(term, text) for text in term.value.split(",")]
     # One parameter, however many there are: a statement takes a limited number of them.
-    listed = func.json_each(json.dumps(ids)).table_valued("value")
+    listed = func.json_each(json_text(ids)).table_valued("value")
     return QueueModel.group_id.in_(select(listed.c.value))
 
 
@@ -281,6 +281,14 @@ def _gate(term: _Term, value: str) -> ColumnElement[bool]:
     return QueueModel.gate == _choice(term, value, GATES)
 
 
+def _pictures(term: _Term, value: str) -> ColumnElement[bool]:
+    """Whether views have a picture: ``none`` of them, ``any``, or ``all``."""
+    choice = _choice(term, value, ("none", "any", "all"))
+    if choice == "all":
+        return QueueModel.pictures >= QueueModel.views
+    return QueueModel.pictures == 0 if choice == "none" else QueueModel.pictures > 0
+
+
 def _view(_term: _Term, value: str) -> ColumnElement[bool]:
     """A view's key (``cam3``, ``7_1.png``), or how many views there are."""
     if value.isascii() and value.isdigit():
@@ -312,6 +320,7 @@ _TESTS: dict[str, Callable[[_Term, str], ColumnElement[bool]]] = {
     "finding": _finding,
     "gate": _gate,
     "view": _view,
+    "pictures": _pictures,
     "match": _match,
     "label": _text,
     "": _text,

@@ -43,6 +43,7 @@ class GroupRow:
     split: str
     changed: str
     views: int
+    pictures: int
     main_view: int | None
     status: str
     stale: bool

@@ -13,6 +13,7 @@ from app.datasets.camera_json import read_cameras
 from app.datasets.coco_reader import read_coco
 from app.datasets.format_names import ImportFormat
 from app.datasets.gamestate import read_gamestate
+from app.datasets.guess_format import guess_format
 from app.datasets.issia import DEFAULT_SIZE as ISSIA_SIZE
 from app.datasets.issia import IssiaFolder, IssiaOptions, open_issia
 from app.datasets.issia_3d_reader import open_issia_3d
@@ -89,16 +90,44 @@ class Imported:
         """Whether anything of the files is in the dataset now."""
         return self.result.new + self.result.changed + self.result.unchanged > 0
 
+    @property
+    def complete(self) -> bool:
+        """Whether nothing was left out and no picture is missing."""
+        report = self.report
+        missing = self.result.without_picture or report.counts["views without frame"]
+        return self.something and not (report.problems or report.dropped or missing)
+
+    def nothing_read(self) -> tuple[str, str]:
+        """Why nothing could be imported, naming the file, and what to do about it."""
+        source, problems = self.source, self.report.problems
+        name = source.shown(str(source.path))
+        sentence = f"nothing could be imported from {name} as {source.format}"
+        if problems:
+            first = source.shown(problems[0].message)
+            sentence += f". The first of {len(problems)} problems: " if problems[1:] else ": "
+            sentence += first
+        guess = guess_format(source.path)
+        if guess is not None and guess != source.format:
+            return sentence, f"It looks like {guess}: choose that format and import it again."
+        if self.report.read:
+            return sentence, "Every record was left out; the report names each with its reason."
+        return sentence, (
+            f"Check that it is the right file or folder, and that it holds what {source.format} "
+            "asks for (docs/formats.md)."
+        )
+
     def values(self) -> dict[str, Any]:
         """Everything that there is to tell, as plain values."""
         shown = self.source.shown
         return {
+            "outcome": "complete" if self.complete else "partial" if self.something else "nothing",
             "read": self.report.read,
             "imported": self.report.imported,
             "new": self.result.new,
             "changed": self.result.changed,
             "unchanged": self.result.unchanged,
             "missing": self.result.missing,
+            "without_picture": self.result.without_picture,
             "findings": self.result.findings,
             "counts": dict(self.report.counts),
             "skipped": [

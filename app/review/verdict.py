@@ -49,7 +49,7 @@ def set_verdict(
     """Save a person's verdict on a group as it is; the newest of all people's counts.
 
     Accepting a group that fails a gate overrides the policy: it needs a note, which goes into
-    the export.
+    the export. So does accepting a group without any picture: nobody can have looked at it.
 
     Raises:
         InputError: Unknown state or reason, or a note is missing.
@@ -60,6 +60,7 @@ def set_verdict(
     # Accepting weighs the gates, so they must be known.
     seen = solved(store, group_id, solver=solver) if state == "accepted" else load(store, group_id)
     override = _override(seen, verdict)
+    _require_seen(seen, verdict)
     with store.write() as session:
         if not is_repeated(session, request):
             require_unchanged(session, group_id, if_match, f"group {seen.key}")
@@ -103,6 +104,18 @@ def _override(state: GroupState, verdict: Verdict) -> str | None:
             pointer="/note",
         )
     return gate.name if gate is not None else "unknown"
+
+
+def _require_seen(state: GroupState, verdict: Verdict) -> None:
+    """Refuse a bare acceptance of a group that nobody can have looked at."""
+    seen = any(view.media is not None for view in state.group.views)
+    if verdict.state == "accepted" and verdict.note is None and not seen:
+        raise InputError(
+            "this group has no picture in any view, so nobody can have looked at it; accepting "
+            "it needs a note that says what it was judged by",
+            hint="Import it again with its frames, or say in the note why it is right.",
+            pointer="/note",
+        )
 
 
 def _save(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.sample.scene import SceneTruth
+from app.soccer.ball_boxes import ball_boxes
 from app.soccer.frames import Box
 from app.soccer.group import Group
 from app.soccer.solution import Solution
@@ -79,12 +80,9 @@ def size_error_percent(box: Box, careful: Box) -> float:
 def _boxes(group: Group, solution: Solution, truth: SceneTruth) -> Iterable[tuple[Box, Box, Box]]:
     """Annotated, optimised and true box of every view that has them."""
     for view in group.views:
-        solved, true = solution.view(view.key), truth.view(view.key)
-        if view.ball is None or view.ball.box is None or true is None:
-            continue
-        if solved is None or solved.ball is None or solved.ball.optimized_box is None:
-            continue
-        yield view.ball.box, solved.ball.optimized_box, true.ball_box
+        boxes, true = ball_boxes(solution, view), truth.view(view.key)
+        if true is not None and "annotated" in boxes and "optimized" in boxes:
+            yield boxes["annotated"], boxes["optimized"], true.ball_box
 
 
 def _row(name: str, pairs: list[tuple[Box, Box]]) -> BoxRow:

@@ -5,7 +5,6 @@ One object ``{"seed", "groups": {key: {"ball", "views": {view: {...}}, "faults":
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
@@ -15,6 +14,7 @@ from app.datasets.camera_json import camera_from_json, camera_to_json
 from app.datasets.fields import whole
 from app.datasets.json_text import read_json
 from app.errors import DatasetFormatError
+from app.finite import json_text
 from app.sample.scene import PRACTICE_KINDS, PlantedFault, SceneTruth, ViewTruth
 from app.soccer.frames import Box
 
@@ -32,7 +32,7 @@ class TruthWriter:
     def write(self, entries: Iterable[tuple[str, str]]) -> None:
         """Add groups: their keys and what ``truth_to_json`` made of each, as text."""
         for key, text in entries:
-            self._stream.write(f"{self._separator}{json.dumps(key)}: {text}")
+            self._stream.write(f"{self._separator}{json_text(key, ascii_=True)}: {text}")
             self._separator = ",\n"
 
     def close(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
@@ -19,6 +18,7 @@ import cv2
 from app.datasets.match_frames import ARCHIVE
 from app.datasets.soccernet_v3 import write_soccernet_v3
 from app.errors import InputError
+from app.finite import json_text
 from app.sample.fixture import group_counts, make_fixture
 from app.sample.render import render
 from app.sample.scenes import make_match
@@ -133,7 +133,7 @@ def _label_match(job: _Job) -> _Labelled:
     scenes = make_match(job.match, job.groups, job.seed, job.faults)
     write_soccernet_v3(job.out, [scene.group for scene in scenes])
     truths = [
-        (scene.truth.key, json.dumps(truth_to_json(scene.truth), separators=(",", ":")))
+        (scene.truth.key, json_text(truth_to_json(scene.truth), ascii_=True, compact=True))
         for scene in scenes
     ]
     return _Labelled(

@@ -11,6 +11,7 @@ from sqlalchemy import delete, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
+from app.finite import json_text
 from app.store.clock import now
 from app.store.job_models import AnswerModel
 
@@ -53,7 +54,7 @@ def keep_answer(session: Session, key: str, actor: str, answer: Answer) -> None:
         "actor": actor,
         "request_digest": answer.request_digest,
         "status": answer.status,
-        "headers": json.dumps(answer.headers),
+        "headers": json_text(answer.headers, ascii_=True),
         "body": zlib.compress(answer.body, _FAST),
         "at": now(),
     }

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import threading
 import zipfile
+import zlib
 from collections import OrderedDict
+from collections.abc import Callable
 from pathlib import Path
 
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
+from app.nested_zip import nested_name, open_nested
 
 MAX_OPEN = 16
 
-_Key = tuple[str, int, int]
-"""Path, time of change and size: a file that was replaced is another archive."""
+_Key = tuple[str, int, int, str]
+"""Path, time of change and size: a file that was replaced is another archive. The name of the zip
+inside it last, or empty."""
 
 
 class Archives:
-    """Members of zip archives by path; safe to use from many threads."""
+    """Members of zip archives by path; safe to use from many threads.
+
+    A member may lie in a zip that is itself a member: ``<match>/Frames-v3.zip/7.png``.
+    """
 
     def __init__(self, most: int = MAX_OPEN):
         self._most = most
@@ -31,10 +38,10 @@ class Archives:
             TooLargeError: The member is larger than ``limit`` bytes, whatever it declares.
             ImageError: The archive or the member is damaged.
         """
-        archive = self._get(path)
+        archive, name = self._find(path, member)
         try:
             # ZipFile locks its own file; a closed one stays readable for a member under way.
-            with archive.open(member) as file:
+            with archive.open(name) as file:
                 data = file.read(limit + 1)
         except KeyError as error:
             raise NotFoundError(f"{path.name} has no member {member}") from error
@@ -48,15 +55,17 @@ class Archives:
 
     def facts(self, path: Path, member: str) -> tuple[int, int]:
         """Size and CRC-32 of a member, as the archive's directory says."""
+        archive, name = self._find(path, member)
         try:
-            info = self._get(path).getinfo(member)
+            info = archive.getinfo(name)
         except KeyError as error:
             raise NotFoundError(f"{path.name} has no member {member}") from error
         return info.file_size, info.CRC
 
     def has(self, path: Path, member: str) -> bool:
         """Whether the archive's directory lists a member of that name."""
-        return member in self._get(path).NameToInfo
+        archive, name = self._find(path, member)
+        return name in archive.NameToInfo
 
     def close(self) -> None:
         """Close all archives."""
@@ -64,20 +73,45 @@ class Archives:
             while self._open:
                 self._open.popitem()[1].close()
 
-    def _get(self, path: Path) -> zipfile.ZipFile:
+    def _find(self, path: Path, member: str) -> tuple[zipfile.ZipFile, str]:
+        """The open archive that a member lies in, and its name there."""
         key = _key(path)
+        archive = self._get(key, lambda: _open(path))
+        if member in archive.NameToInfo or (nested := nested_name(archive, member)) is None:
+            return archive, member
+        outer, inner = nested
+        info = archive.getinfo(outer)
+        return self._get((*key[:3], outer), lambda: _open_inside(path, info)), inner
+
+    def _get(self, key: _Key, open_it: Callable[[], zipfile.ZipFile]) -> zipfile.ZipFile:
         with self._lock:
             if key not in self._open:
-                try:
-                    self._open[key] = zipfile.ZipFile(path)
-                except zipfile.BadZipFile as error:
-                    raise ImageError(f"{path.name} is no complete zip archive") from error
-                except OSError as error:
-                    raise StorageError(f"{path.name} cannot be read") from error
+                self._open[key] = open_it()
             self._open.move_to_end(key)
             while len(self._open) > self._most:
                 self._open.popitem(last=False)[1].close()
             return self._open[key]
+
+
+def _open(path: Path) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(path)
+    except zipfile.BadZipFile as error:
+        raise ImageError(f"{path.name} is no complete zip archive") from error
+    except OSError as error:
+        raise StorageError(f"{path.name} cannot be read") from error
+
+
+def _open_inside(path: Path, info: zipfile.ZipInfo) -> zipfile.ZipFile:
+    shown = f"{path.name}/{info.filename}"
+    try:
+        # Opened anew: one that is kept open may be closed for others' sake meanwhile.
+        with zipfile.ZipFile(path) as archive:
+            return open_nested(archive, path, info)
+    except OSError as error:
+        raise StorageError(f"{shown} cannot be read") from error
+    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, RuntimeError) as error:
+        raise ImageError(f"{shown} cannot be read: {error}") from error
 
 
 def _key(path: Path) -> _Key:
@@ -85,4 +119,4 @@ def _key(path: Path) -> _Key:
         status = path.stat()
     except OSError as error:
         raise NotFoundError(f"the file {path.name} is not where it was imported from") from error
-    return str(path), status.st_mtime_ns, status.st_size
+    return str(path), status.st_mtime_ns, status.st_size, ""

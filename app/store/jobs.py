@@ -9,6 +9,7 @@ from typing import Any
 from sqlalchemy import delete, insert, select, update
 from sqlalchemy.orm import Session
 
+from app.finite import finite
 from app.store.clock import now
 from app.store.codecs import Json, canonical, parse
 from app.store.group_rows import next_id
@@ -139,7 +140,7 @@ def trim_jobs(session: Session, kind: str, keep: int) -> None:
 
 
 def _text(value: Json) -> str | None:
-    return None if value is None else canonical(value)
+    return None if value is None else canonical(finite(value))
 
 
 def _job(row: Any) -> Job:

@@ -9,7 +9,7 @@ from sqlalchemy import Connection, Engine, inspect, text
 from app.config import Settings
 from app.errors import StorageError
 
-KNOWN_REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0007")
+KNOWN_REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007")
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]
 """The revision that this version works with."""

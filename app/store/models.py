@@ -247,7 +247,8 @@ class QueueModel(Base):
     """One row a group, for lists: everything that can be filtered or sorted, in plain columns.
 
     ``findings`` and ``view_keys`` are lists between commas: ``,low_parallax,bad_point,``.
-    ``value`` is the smallest relative distance to a gate's threshold.
+    ``value`` is the smallest relative distance to a gate's threshold; ``pictures`` counts the
+    views that have one.
     """
 
     __tablename__ = "queue"
@@ -266,6 +267,7 @@ class QueueModel(Base):
     changed: Mapped[str]
     views: Mapped[int]
     view_keys: Mapped[str]
+    pictures: Mapped[int] = mapped_column(server_default=text("0"))
     main_view: Mapped[int | None]
     status: Mapped[str]
     stale: Mapped[bool]

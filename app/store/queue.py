@@ -148,6 +148,7 @@ def _said(head: Any, views: Sequence[Any]) -> dict[str, Any]:
         **{name: getattr(head, name) for name in names},
         "group_id": head.id,
         "views": len(views),
+        "pictures": sum(view.media_path is not None for view in views),
         "view_keys": _list([view.key for view in views]),
         "main_view": main,
     }

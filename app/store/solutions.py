@@ -13,6 +13,7 @@ from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError
+from app.finite import json_text
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
 from app.store import value_codec
@@ -120,7 +121,7 @@ def _row(key: SolutionKey, encoded: EncodedSolution) -> dict[str, object]:
         "inputs_hash": key.inputs_hash,
         "policy_hash": key.policy_hash,
         "solver_version": key.solver_version,
-        "calibrations": json.dumps(encoded.calibration_keys),
+        "calibrations": json_text(encoded.calibration_keys, ascii_=True),
         "summary": encoded.summary,
         "body": encoded.body,
     }

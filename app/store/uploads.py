@@ -19,6 +19,7 @@ from pathlib import Path
 
 from app.config import Settings
 from app.errors import InputError, NotFoundError, TooLargeError
+from app.finite import json_text
 from app.store.clock import now
 
 _ID = re.compile(r"[0-9a-f]{32}")
@@ -190,7 +191,7 @@ def require_size(settings: Settings, size: int) -> None:
 def _write_record(folder: Path, upload: Upload) -> None:
     temporary = folder / f"{_RECORD}.new"
     with temporary.open("wb") as file:
-        file.write(json.dumps(asdict(upload)).encode())
+        file.write(json_text(asdict(upload), ascii_=True).encode())
         file.flush()
         os.fsync(file.fileno())
     temporary.replace(folder / _RECORD)

@@ -11,6 +11,7 @@ import { idempotencyKey, queryText, request, upload } from './client.js';
 
 /**
  * @typedef {object} ImportReport
+ * @property {'complete' | 'partial' | 'nothing'} [outcome]
  * @property {number} read
  * @property {number} imported
  * @property {number} new
@@ -18,6 +19,7 @@ import { idempotencyKey, queryText, request, upload } from './client.js';
  * @property {number} unchanged
  * @property {{file: string, record: string | null, field: string | null, problem: string}[]} skipped
  * @property {number} findings
+ * @property {number} [without_picture] groups of which no view has a picture
  * @property {{[name: string]: number}} [counts]
  * @property {number} [more_skipped]
  * @property {any[]} [remarks]

@@ -259,6 +259,7 @@
  * @property {number | null} size_ratio
  * @property {number | null} margin
  * @property {number} views
+ * @property {number} pictures views that have one
  * @property {string} split
  * @property {string | null} reviewer
  * @property {boolean} fixed

@@ -34,7 +34,7 @@ function drawReprojected(context, { picture, viewport }) {
 
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
 function drawBoxes(context, { picture, viewport }) {
-	// Outside every valid pair no 3D ball stands behind a box.
+	// Only a view in a valid pair helped to find the 3D ball, so only it has a box made from it.
 	const optimised = picture.solved?.included ? picture.ball?.optimized_box : null;
 	if (optimised) {
 		strokeBox(context, viewport, optimised, {

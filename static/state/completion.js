@@ -27,14 +27,14 @@ const VALUES = /** @type {{[field: string]: string[]}} */ ({
 	reason: ['bad_field_lines', 'sides_confused', 'not_same_instant', 'ball_not_visible', 'bad_calibration', 'duplicate_view', 'other'],
 	sort: SORTS.flatMap((name) => [name, `${name}-desc`]),
 	stale: ['yes', 'no'], solved: ['yes', 'no'], passes: ['yes', 'no'], fixed: ['yes', 'no'],
-	split: [], match: [], reviewer: [], view: [], label: [], id: [],
+	pictures: ['none', 'any', 'all'], split: [], match: [], reviewer: [], view: [], label: [], id: [],
 });
 const HINTS = /** @type {{[field: string]: string}} */ ({
 	status: 'verdict', finding: 'what was noticed', gate: 'first failing gate', reason: 'why rejected',
 	sort: 'order of the rows', stale: 'changed after its verdict', solved: 'has numbers', passes: 'every gate',
 	fixed: 'edited before it was accepted', split: 'train or test', match: 'part of the match’s name',
 	reviewer: 'who decided', view: 'key of a view, or how many', label: 'part of the label',
-	id: 'groups one by one: id:12,15,19',
+	pictures: 'whether views have a picture', id: 'groups one by one: id:12,15,19',
 });
 const MOST = 14;
 

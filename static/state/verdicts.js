@@ -21,7 +21,12 @@ const MAX_NOTE = 2000;
 /** The reason last used, for `X X`. */
 export const lastReason = signal(/** @type {string | null} */ (null));
 
-/** Accept and go on; a group that fails a gate needs a note that says why. */
+/** Whether nobody can have looked at a group: no view of it has a picture. @param {import('../api/types.js').GroupDocument} group */
+export function isBlind(group) {
+	return group.views.every(({ image }) => image === null);
+}
+
+/** Accept and go on; a group that fails a gate, or that has no picture, needs a note that says why. */
 export function accept() {
 	const group = document.value;
 	if (!group) return;
@@ -29,7 +34,7 @@ export function accept() {
 		announce('This group is not solved yet and cannot be accepted.');
 		return;
 	}
-	if (!group.solution.passes || doubt(group.solution)) asking.value = 'override';
+	if (!group.solution.passes || isBlind(group) || doubt(group.solution)) asking.value = 'override';
 	else decide('accepted', null, null);
 }
 

@@ -26,7 +26,11 @@ const STATES = [
 ];
 
 /** Why a group is left alone. */
-const REFUSALS = /** @type {{[reason: string]: string}} */ ({ unsolved: 'nobody has solved them yet', needs_note: 'they fail a gate, and accepting that needs a note' });
+const REFUSALS = /** @type {{[reason: string]: string}} */ ({
+	unsolved: 'nobody has solved them yet',
+	needs_note: 'they fail a gate, and accepting that needs a note',
+	no_picture: 'no view of them has a picture, and accepting that needs a note',
+});
 
 /** @param {{preview: BulkPreview, q: string}} props */
 function Outcome({ preview, q }) {
@@ -50,7 +54,7 @@ function Outcome({ preview, q }) {
 function Fields({ ask, change }) {
 	const value = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.target).value;
 	const notes = /** @type {{[state: string]: string}} */ ({
-		accepted: 'Note, needed to accept groups that fail a gate', rejected: 'Note', deferred: 'Note', unreviewed: 'Note',
+		accepted: 'Note, needed to accept groups that fail a gate or have no picture', rejected: 'Note', deferred: 'Note', unreviewed: 'Note',
 	});
 	return html`
 		<fieldset class="choice choice--row">

@@ -12,7 +12,7 @@ import { IMPORT_FORMATS, optionValue } from '../state/import_formats.js';
 import { follow, isOver } from '../state/jobs.js';
 import { pageAddress } from './dataset_menu.js';
 import { ImportReport } from './import_report.js';
-import { JobProgress } from './job_progress.js';
+import { JobProgress, toneOf } from './job_progress.js';
 import { PageFrame } from './page_frame.js';
 import { SourceChoice, UploadField } from './source_choice.js';
 
@@ -76,10 +76,10 @@ function FormatChoice({ format, choose }) {
 function Outcome({ job, dry, dataset }) {
 	const done = job.state === 'done';
 	return html`
-		<section class="card form" aria-label="Progress">
+		<section class="card form" aria-label="Progress" data-tone=${isOver(job) ? toneOf(job) : undefined}>
 			<${JobProgress} job=${job} />
 			${job.problem?.hint ? html`<p>${job.problem.hint}</p>` : null}
-			${done && job.result ? html`<${ImportReport} report=${job.result} dry=${dry} />` : null}
+			${isOver(job) && job.result ? html`<${ImportReport} report=${job.result} dry=${dry} dataset=${dataset} />` : null}
 			${done && !dry ? html`<p class="buttons"><a class="button button--primary" href=${pageAddress(dataset, 'queue')}>Open the queue</a><a class="button" href=${pageAddress(dataset, 'yield')}>See the yield</a></p>` : null}
 		</section>
 	`;

@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 
 import { count, plural, words } from '../lib/format.js';
+import { queueAddress } from '../state/navigation.js';
 
 /** @import {ImportReport as Report} from '../api/imports.js' */
 
@@ -25,17 +26,41 @@ function Skipped({ report }) {
 	`;
 }
 
-/** @param {{report: Report, dry: boolean}} props */
-export function ImportReport({ report, dry }) {
+/** What is said over the numbers, by what came of the import. @param {string | undefined} outcome @param {boolean} dry */
+function heading(outcome, dry) {
+	if (outcome === 'nothing') return dry ? 'Nothing could be read: an import would bring nothing' : 'Nothing was imported';
+	if (outcome === 'partial') return dry ? 'An import would bring a part; nothing is saved yet' : 'Imported in part: something is missing';
+	return dry ? 'This is what an import would do; nothing is saved yet' : 'Imported';
+}
+
+/** Groups that nobody can look at, and the way to them. @param {{report: Report, dry: boolean, dataset: string}} props */
+function WithoutPicture({ report, dry, dataset }) {
+	const groups = report.without_picture ?? 0;
+	if (!groups) return null;
+	const which = `${plural(groups, 'group')} ${groups === 1 ? 'has' : 'have'} no picture in any view`;
+	return html`
+		<p data-grade="warn">
+			${dry ? which : html`<a href=${queueAddress(dataset, 'pictures:none')}>${which}</a>`}.
+			Nobody can look at them, so accepting one needs a note. Are the frames (for SoccerNet, Frames-v3.zip) beside the labels?
+		</p>
+	`;
+}
+
+/** @param {{report: Report, dry: boolean, dataset: string}} props */
+export function ImportReport({ report, dry, dataset }) {
+	const { outcome } = report;
 	const numbers = [
 		['read', report.read], ['new', report.new], ['changed', report.changed], ['unchanged', report.unchanged], ['findings', report.findings],
+		['left out', report.skipped.length + (report.more_skipped ?? 0)], ['without picture', report.without_picture],
 	];
 	const counts = Object.entries(report.counts ?? {});
+	const grade = outcome === 'nothing' ? 'bad' : outcome === 'partial' ? 'warn' : 'ok';
 	return html`
 		<section class="import__report" aria-label=${dry ? 'What would happen' : 'What happened'}>
-			<h3>${dry ? 'This is what an import would do; nothing is saved yet' : 'Imported'}</h3>
+			<h3 data-grade=${grade}>${heading(outcome, dry)}</h3>
 			<dl class="number-list">${numbers.map(([name, n]) => html`<div key=${name}><dt>${name}</dt><dd>${count(Number(n ?? 0))}</dd></div>`)}</dl>
 			${counts.length ? html`<p class="note">${counts.map(([name, n]) => `${count(n)} ${words(name)}`).join(' · ')}</p>` : null}
+			<${WithoutPicture} report=${report} dry=${dry} dataset=${dataset} />
 			${(report.remarks ?? []).map((remark) => html`<p key=${String(remark)} class="note">${String(remark)}</p>`)}
 			<${Skipped} report=${report} />
 		</section>

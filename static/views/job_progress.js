@@ -19,6 +19,15 @@ export function jobText(job) {
 	return job.total ? `${count(job.done)} of ${count(job.total)}` : '';
 }
 
+/**
+ * How a job stands, for its colour: an import that left something out is done in part.
+ *
+ * @param {JobJson} job @returns {string}
+ */
+export function toneOf(job) {
+	return job.state === 'done' && job.result?.outcome === 'partial' ? 'partial' : job.state;
+}
+
 /** @param {{job: JobJson}} props */
 export function Meter({ job }) {
 	const share = shareOf(job);
@@ -44,7 +53,7 @@ export function JobProgress({ job, cancellable = true }) {
 	return html`
 		<div class="job" role="status">
 			<div class="job__line">
-				<span class="pill" data-state=${job.state}>${job.state}</span>
+				<span class="pill" data-state=${toneOf(job)}>${toneOf(job) === 'partial' ? 'done in part' : job.state}</span>
 				<strong>${job.title}</strong>
 				<span class="job__sentence">${jobText(job)}</span>
 				${cancellable && !isOver(job) ? html`<button class="button button--small" type="button" onClick=${cancel}>Cancel<span class="hidden-text"> ${job.title}</span></button>` : null}

@@ -7,9 +7,10 @@ import { useEffect, useState } from 'preact/hooks';
 import { getJobs } from '../api/jobs.js';
 import { connected, listen } from '../api/events.js';
 import { ApiError } from '../api/problem.js';
+import { plural } from '../lib/format.js';
 import { isOver } from '../state/jobs.js';
 import { pageAddress } from './dataset_menu.js';
-import { JobProgress } from './job_progress.js';
+import { JobProgress, toneOf } from './job_progress.js';
 import { Loading, PageFrame, Trouble } from './page_frame.js';
 import { When } from './when.js';
 
@@ -56,6 +57,17 @@ function useJobs() {
 	return { jobs, next, error, retry: first, more: () => read(next).then(setNext) };
 }
 
+/** What an import did not bring, in numbers. @param {JobJson} job */
+function partOf(job) {
+	if (toneOf(job) !== 'partial') return null;
+	const { new: fresh = 0, changed = 0, unchanged = 0, skipped = [], more_skipped: more = 0, without_picture: blind = 0 } = job.result;
+	const left = skipped.length + more;
+	const parts = [
+		plural(fresh + changed + unchanged, 'group'), left ? `${plural(left, 'record')} left out` : '', blind ? `${plural(blind, 'group')} without any picture` : '',
+	].filter(Boolean);
+	return html`<p data-grade="warn">${parts.join(' · ')}</p>`;
+}
+
 /** @param {{job: JobJson}} props */
 function JobCard({ job }) {
 	return html`
@@ -63,6 +75,7 @@ function JobCard({ job }) {
 			<section class="card" aria-label=${`Job ${job.id}: ${job.title}`}>
 				<${JobProgress} job=${job} />
 				<p class="note">${job.kind}${job.dataset ? html` · <a class="link" href=${pageAddress(job.dataset, 'queue')}>${job.dataset}</a>` : null}${` · ${job.actor} · begun `}<${When} at=${job.started ?? job.created} />${job.ended ? html`${' · ended '}<${When} at=${job.ended} />` : null}</p>
+				${partOf(job)}
 				${job.problem?.hint ? html`<p>${job.problem.hint}</p>` : null}
 			</section>
 		</li>

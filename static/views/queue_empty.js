@@ -44,8 +44,9 @@ export function QueueEmpty({ q }) {
 		return html`
 			<section class="card empty">
 				<h2>No dataset yet</h2>
-				<p>Make the sample dataset, or import your own, then load this page again:</p>
-				<pre>touchline sample OUT && touchline import soccernet-v3 OUT --dataset sample && touchline solve --dataset sample</pre>
+				<p>Import your own files here, or start the server with the sample dataset:</p>
+				<pre>touchline serve --sample</pre>
+				<p><a class="button button--primary" href="/import">Import a dataset</a></p>
 			</section>
 		`;
 	}
@@ -53,7 +54,8 @@ export function QueueEmpty({ q }) {
 		return html`
 			<section class="card empty">
 				<h2>There is no dataset “${param('dataset')}”</h2>
-				<p><a class="button" href="/groups">Open the first dataset</a></p>
+				<p>Perhaps it was deleted, or its import brought nothing: the list of jobs tells. Choose another one, or import its files.</p>
+				<p class="buttons"><a class="button button--primary" href="/datasets">All datasets</a><a class="button" href=${`/import?dataset=${encodeURIComponent(param('dataset'))}`}>Import</a><a class="button" href="/jobs">Jobs</a></p>
 			</section>
 		`;
 	}
@@ -61,7 +63,7 @@ export function QueueEmpty({ q }) {
 		<section class="card empty">
 			<h2>${q ? 'No group matches this query' : 'This dataset has no groups'}</h2>
 			${q ? html`<p>Take a word away, or start again.</p><p><a class="button" href=${queueAddress(name, '')}>Show all groups</a></p>`
-				: html`<p>Import groups into it with <code>touchline import</code>.</p>`}
+				: html`<p>Nothing was imported into it yet.</p><p><a class="button button--primary" href=${`/import?dataset=${encodeURIComponent(name)}`}>Import</a></p>`}
 		</section>
 	`;
 }

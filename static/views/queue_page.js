@@ -34,14 +34,18 @@ function QueueHeader({ field }) {
 	const one = dataset.value;
 	const { total, loaded } = queue.value;
 	const error = failure.value ?? queue.value.error;
+	// Which dataset is meant is known before its rows are: one that is not there has none to wait for.
+	const gone = datasets.value !== null && !one;
+	const state = error ? (error.status === 400 ? 'Query not understood' : 'No answer')
+		: gone ? 'No such dataset' : loaded && one ? `${count(total)} of ${count(one.groups)} match` : 'Loading…';
 	return html`
 		<${Header} current="queue">
 			<div class="header__middle">
 				<${QueryBox} field=${field} invalid=${queue.value.error?.status === 400} onQuery=${setQuery} />
 			</div>
-			<span class="save" data-state=${error ? 'failed' : 'saved'} role="status">
+			<span class="save" data-state=${error || gone ? 'failed' : 'saved'} role="status">
 				<span class="save__dot" aria-hidden="true"></span>
-				${error ? (error.status === 400 ? 'Query not understood' : 'No answer') : loaded && one ? `${count(total)} of ${count(one.groups)} match` : 'Loading…'}
+				${state}
 			</span>
 			<${ExportButton} />
 		<//>

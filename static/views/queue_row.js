@@ -63,7 +63,7 @@ function Cells({ row, index, q, active, ticked }) {
 	return html`
 		<${Tick} row=${row} index=${index} active=${active} ticked=${ticked} />
 		<div role="gridcell" class="queue-cell">
-			<span class="thumbnail">${row.thumbnail ? html`<img src=${row.thumbnail} alt="" loading="lazy" decoding="async" width="104" height="58" />` : 'no frame'}</span>
+			<span class="thumbnail">${row.thumbnail ? html`<img src=${row.thumbnail} alt="" loading="lazy" decoding="async" width="104" height="58" />` : row.pictures ? 'no frame' : ''}${row.pictures ? null : html`<span class="pill" data-status="no-picture">no picture</span>`}</span>
 		</div>
 		<div role="gridcell" class="queue-cell queue-cell--two">
 			<a href=${reviewAddress(row.id, q)} tabindex=${active ? 0 : -1}>${row.number}</a>

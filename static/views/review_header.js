@@ -14,6 +14,7 @@ import { standing } from '../state/walk.js';
 import { changedElsewhere } from '../state/live.js';
 import { lasting } from '../state/outbox.js';
 import { isAway, isSending, savedAt, waiting, wake, wasRefused } from '../state/sending.js';
+import { isBlind } from '../state/verdicts.js';
 import { Header } from './header.js';
 
 /** @import {Standing} from '../state/walk.js' */
@@ -113,7 +114,7 @@ export function ReviewHeader() {
 				<${HeaderButton} label="Previous group" keys="D" run=${goPrevious} path="M10 3 5 8l5 5"
 					reason=${at && !at.previous.length ? 'This is the first group of the queue' : null} />
 				<span class="header__where">
-					<strong title=${group?.key ?? ''}>${group?.label ?? ''}</strong> <${Place} />
+					<strong title=${group?.key ?? ''}>${group?.label ?? ''}</strong> ${group && isBlind(group) ? html`<span class="pill" data-status="no-picture">no picture</span> ` : null}<${Place} />
 				</span>
 				<${HeaderButton} label="Next group" keys="F" run=${goNext} path="m6 3 5 5-5 5"
 					reason=${at && !at.next.length ? 'This is the last group of the queue' : null} />

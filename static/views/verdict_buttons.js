@@ -8,7 +8,7 @@ import { useKeys } from '../lib/hooks.js';
 import { doubt, suggestedReason } from '../state/advice.js';
 import { REASONS } from '../state/reasons.js';
 import {
-	accept, addNote, answer, askReason, cancelAsking, defer, lastReason, reject, rejectView, rejectViewBecause,
+	accept, addNote, answer, askReason, cancelAsking, defer, isBlind, lastReason, reject, rejectView, rejectViewBecause,
 } from '../state/verdicts.js';
 import { asking, pinPlace } from '../state/workspace.js';
 import { pinText } from '../lib/pins.js';
@@ -100,6 +100,17 @@ function PinForm() {
 		/>`;
 }
 
+/** What speaks against accepting a group. @param {GroupDocument} group */
+function acceptTitle(group) {
+	const failing = group.solution?.first_failing;
+	const reasons = [
+		group.solution?.passes ? '' : failing ? `a gate fails (${failing.sentence})` : 'a gate fails',
+		isBlind(group) ? 'no view has a picture to look at' : '',
+		doubt(group.solution)?.replace(/\.$/, '') ?? '',
+	].filter(Boolean);
+	return `Accept although ${reasons.join(' and ')}? Say why.`;
+}
+
 /** @param {{group: GroupDocument}} props */
 function Ask({ group }) {
 	if (asking.value === 'reason') return html`<${ReasonList} key="group" ...${GROUP_REASONS} suggested=${suggestedReason(group.solution)} />`;
@@ -109,10 +120,7 @@ function Ask({ group }) {
 	if (asking.value === 'pin') return html`<${PinForm} />`;
 	if (asking.value === 'swap') return html`<${SwapAsk} group=${group} />`;
 	if (asking.value !== 'override') return null;
-	const failing = group.solution?.first_failing;
-	const although = failing ? `a gate fails (${failing.sentence})` : (doubt(group.solution) ?? 'a gate fails');
-	const title = `Accept although ${although.replace(/\.$/, '')}? Say why.`;
-	return html`<${NoteForm} title=${title} button="Accept" />`;
+	return html`<${NoteForm} title=${acceptTitle(group)} button="Accept" />`;
 }
 
 /** @param {{group: GroupDocument}} props */

@@ -8,6 +8,7 @@ import { capital, words } from '../lib/format.js';
 import { findingTitle } from '../state/advice.js';
 import { mend } from '../state/mends.js';
 import { REASONS } from '../state/reasons.js';
+import { isBlind } from '../state/verdicts.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
 import { MendBox } from './mend_box.js';
 
@@ -98,6 +99,7 @@ export function VerdictCard({ group, solution, live }) {
 			<h1>${title}</h1>
 			<p class="verdict-card__text">${text}</p>
 			<${MendBox} solution=${solution} />
+			${isBlind(group) ? html`<p><span class="pill" data-status="no-picture">no picture</span> <span data-grade="warn">No view of this group has a picture to look at.</span></p>` : null}
 			${verdict.state === 'unreviewed' && !verdict.note ? null : html`
 				<p class="verdict-card__verdict">
 					<span class="pill" data-status=${verdict.state}>${verdictText(verdict)}</span>

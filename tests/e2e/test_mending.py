@@ -254,10 +254,7 @@ class TestUndrawnLine:
         def length(fit: Document) -> float:
             points = fit["polyline"]
             return float(
-                sum(
-                    ((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2) ** 0.5
-                    for a, b in pairwise(points)
-                )
+                sum(((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2) ** 0.5 for a, b in pairwise(points))
             )
 
         drawn = [fit for fit in fits if fit["marking"] in view["lines"]]

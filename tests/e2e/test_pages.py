@@ -289,10 +289,11 @@ def bring_in(page: Page, labels: Path) -> None:
 
 
 def accept_all(page: Page) -> None:
-    """Accept what passes, in one go."""
+    """Accept what passes, in one go; a note says why, for the labels came without pictures."""
     page.goto("/groups?dataset=passing through")
     page.wait_for_selector(".queue-row a")
     page.keyboard.press("b")
+    page.locator("#bulk-note").fill("seen in the video")
     page.locator("dialog").get_by_role("button", name="Accept").click()
     expect(page.locator(".bar")).to_contain_text("groups accepted", timeout=MINUTE)
 

@@ -45,7 +45,7 @@ class BulkVerdict(BaseModel):
 
 
 class RefusalDocument(BaseModel):
-    """Groups that are left alone: `unsolved`, or `needs_note` (they fail a gate)."""
+    """Groups that are left alone: `unsolved`, `needs_note` (they fail a gate), `no_picture`."""
 
     reason: str
     groups: int

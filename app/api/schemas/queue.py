@@ -57,6 +57,7 @@ class GroupRow(BaseModel):
     x_m: float | None
     y_m: float | None
     views: int
+    pictures: int = Field(description="Views that have a picture; 0: nothing to look at.")
     findings: list[str]
     reviewer: str | None
     reason: str | None

@@ -35,7 +35,7 @@ class TestWriteCoco:
             solved(soccer_group("9.png", split="")),
         ]
         counts = write_coco(tmp_path, records)
-        assert counts == {"groups": 3, "images": 6, "annotations": 6}
+        assert counts == {"groups": 3, "images": 6, "annotations": 6, "balls": 6}
         names = ("train", "test", "unassigned")
         assert sorted(path.name for path in (tmp_path / "annotations").iterdir()) == sorted(
             f"instances_{name}.json" for name in names

@@ -142,7 +142,7 @@ class TestWriteGamestate:
     ) -> None:
         groups = read(labels, "SNGS-060")
         counts = write_gamestate(tmp_path / "out", groups)
-        assert counts == {"groups": 2, "images": 2, "balls": 2}
+        assert counts == {"groups": 2, "images": 2, "annotated_balls": 2}
         path = tmp_path / "out/SNGS-060/Labels-GameState.json"
         written = json.loads(path.read_text())
         assert list(read_gamestate(tmp_path / "out", report)) == groups

@@ -47,7 +47,7 @@ class TestWriteIssia3d:
             "err_cam3": "0.75", "err_cam4": "0.75", "cam_list": "[3, 4]", "opt_d_cam3": "10.5",
             "opt_d_cam4": "10.5", "opt_e_cam3": "0.125", "opt_e_cam4": "0.125",
         }  # fmt: skip
-        assert counts == {"groups": 1, "balls": 1}
+        assert counts == {"groups": 1, "points": 1, "balls": 2}
 
     def test_every_annotating_camera_has_values_once_there_is_a_point(
         self, tmp_path: Path, solved: Solved, issia_group: Make
@@ -63,7 +63,7 @@ class TestWriteIssia3d:
         (row,) = _rows(tmp_path)
         assert (row["num_cameras"], row["cam_list"], row["ball_3D"]) == ("1", "[5]", "")
         assert not any(row[f"{name}_cam5"] for name in ("err", "opt_d", "opt_e"))
-        assert counts == {"groups": 1, "balls": 0}
+        assert counts == {"groups": 1, "points": 0, "balls": 0}
 
     def test_rows_come_by_number_of_the_frame(
         self, tmp_path: Path, solved: Solved, issia_group: Make

@@ -1,11 +1,12 @@
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from app.datasets.archive import DEFAULT_LIMITS, open_tree
+from app.datasets.archive import DEFAULT_LIMITS, Limits, open_tree
 from app.datasets.match_frames import MatchFrames
 from app.datasets.report import Report
 from app.soccer.group import Media
@@ -58,3 +59,81 @@ class TestMatchFrames:
         assert tree is not None
         frames = MatchFrames(tree, "m/", ["frames/7.png"], report, DEFAULT_LIMITS)
         assert frames.find("7.png") == Media(str(path), "m/frames/7.png")
+
+
+class TestFramesOfAZippedTree:
+    @pytest.mark.parametrize("compression", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+    def test_the_archive_inside_the_zip_is_read_in_place(
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report, compression: int
+    ) -> None:
+        path = _nested(tmp_path, make_zip, {"v3_frames/7.png": b"x"}, compression)
+        frames = _zipped(path, report)
+        place = "m/Frames-v3.zip/v3_frames/7.png"
+        assert frames.find("7.png") == Media(str(path), place)
+        assert frames.find("8.png") is None
+        assert report.problems == []
+
+    def test_a_damaged_archive_inside_is_one_problem(
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report
+    ) -> None:
+        path = make_zip({"m/Frames-v3.zip": b"PK nothing", "m/8.png": b"x"})
+        frames = _zipped(path, report)
+        assert frames.find("8.png") == Media(str(path), "m/8.png")
+        (problem,) = report.problems
+        assert problem.path == f"{path}/m/Frames-v3.zip"
+        assert "without these frames" in problem.problem
+
+    @pytest.mark.parametrize(
+        ("limits", "said"),
+        [
+            (Limits(members=3), "members"),
+            (Limits(total_bytes=2_000_000), "unpacks to"),
+            (Limits(ratio=1), "grows more"),
+        ],
+    )
+    def test_what_is_inside_counts_toward_the_limits_of_the_whole(
+        self,
+        tmp_path: Path,
+        make_zip: Callable[..., Path],
+        report: Report,
+        limits: Limits,
+        said: str,
+    ) -> None:
+        inside = {f"{n}.png": bytes(1_500_000) for n in range(3)}
+        path = _nested(tmp_path, make_zip, inside, zipfile.ZIP_STORED)
+        frames = _zipped(path, report, limits)
+        assert frames.find("1.png") is None
+        assert said in report.problems[0].problem
+
+    def test_unsafe_members_inside_are_left_out(
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report
+    ) -> None:
+        path = _nested(tmp_path, make_zip, {"../7.png": b"x", "8.png": b"x"}, zipfile.ZIP_STORED)
+        frames = _zipped(path, report)
+        assert frames.find("8.png") is not None
+        assert [item.record for item in report.problems] == ["../7.png"]
+
+    def test_an_archive_inside_the_archive_is_not_opened(
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report
+    ) -> None:
+        deep = make_zip({"7.png": b"x"}, tmp_path / "deep.zip").read_bytes()
+        path = _nested(tmp_path, make_zip, {"Frames-v3.zip": deep}, zipfile.ZIP_STORED)
+        assert not _zipped(path, report).some
+
+
+def _nested(
+    tmp_path: Path, make_zip: Callable[..., Path], inside: dict[str, bytes], compression: int
+) -> Path:
+    """A zip of a tree whose match ``m`` has its frames in a zip of its own."""
+    inner = make_zip(inside, tmp_path / "inner.zip")
+    path = tmp_path / "upload.zip"
+    with zipfile.ZipFile(path, "w", compression) as target:
+        target.write(inner, "m/Frames-v3.zip")
+    return path
+
+
+def _zipped(path: Path, report: Report, limits: Limits = DEFAULT_LIMITS) -> MatchFrames:
+    tree = open_tree(path, report, limits)
+    assert tree is not None
+    inside = [name.removeprefix("m/") for name in tree.names()]
+    return MatchFrames(tree, "m/", inside, report, limits)

@@ -28,7 +28,7 @@ class TestWriteParquet:
     ) -> None:
         provenance = {"dataset": "demo", "policy": "paper", "policy_hash": "abc"}
         counts = write_parquet(tmp_path, [solved(soccer_group())], provenance=provenance)
-        assert counts == {"groups": 1, "views": 2, "balls": 2}
+        assert counts == {"groups": 1, "views": 2, "boxes": 2, "balls": 2}
         first, second = rows(tmp_path)
         assert (first["group"], second["view"]) == (f"{match}/7.png", "7_1.png")
         assert first["position_meters"] == camera.position.tolist()

@@ -40,7 +40,7 @@ class TestWriteIssia:
         groups = [issia_group(-2, cameras=(6,)), replace(group, views=views)]
         spare = [FramePersons(7, "cam2", (person("3", -4.0),))]
         counts = write_issia(tmp_path, reversed(groups), spare)
-        assert counts == {"groups": 2, "balls": 3, "persons": 5, "cameras": 4}
+        assert counts == {"groups": 2, "annotated_balls": 3, "persons": 5, "cameras": 4}
         folder = open_issia(tmp_path, IssiaOptions(), report)
         again = {found.key: found for found in folder.groups()}
         for written in groups:

@@ -44,7 +44,7 @@ class TestWriteYolo:
         ]
         counts = write_yolo(tmp_path, records)
         assert counts == {
-            "groups": 3, "labels": 6, "balls": 6, "images": 0, "images_missing": 6,
+            "groups": 3, "labels": 6, "boxes": 6, "balls": 6, "images": 0, "images_missing": 6,
         }  # fmt: skip
         data = yaml.safe_load((tmp_path / "data.yaml").read_text())
         assert (data["names"], data["nc"]) == ({0: "ball"}, 1)
@@ -81,7 +81,7 @@ class TestWriteYolo:
     ) -> None:
         group = soccer_group(replays=0)
         group = replace(group, views=(replace(group.views[0], balls=()),))
-        assert write_yolo(tmp_path, [solved(group, ball=False)])["balls"] == 0
+        assert write_yolo(tmp_path, [solved(group, ball=False)])["boxes"] == 0
         (label,) = tmp_path.rglob("labels/train/*.txt")
         assert label.read_text() == ""
 

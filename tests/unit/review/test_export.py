@@ -227,7 +227,7 @@ class TestExport:
             everything=True,
             progress=lambda done, total: calls.append((done, total)),
         )
-        assert report.counts == {"groups": 2, "balls": 2}
+        assert report.counts == {"groups": 2, "points": 2, "balls": 6}
         assert calls == [(1, 2), (2, 2)]
         assert (tmp_path / "out/issia_calibration.json").is_file()
 

@@ -1,4 +1,4 @@
-"""Migration 0005 on a database that holds groups, solutions and verdicts."""
+"""Migrations 0005 and 0006 on a database that holds groups, solutions and verdicts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sqlalchemy.exc import IntegrityError
 
 from app.review.submit import load
 from app.review.verdict import set_verdict
-from app.store.migrate import SCHEMA_REVISION, migrate, schema_revision
+from app.store.migrate import KNOWN_REVISIONS, migrate, schema_revision
 from app.store.queue import refresh_queue
 from app.store.session import Store, make_engine
 
@@ -24,7 +24,7 @@ def as_before(store: Store) -> None:
     with store.write() as session:
         session.execute(text("DROP TABLE version_check"))
         session.execute(text("ALTER TABLE view DROP COLUMN left_out"))
-        for name in PLACES:
+        for name in (*PLACES, "pictures"):
             session.execute(text(f"ALTER TABLE queue DROP COLUMN {name}"))
         for trigger in ("solution_refuses_update", "verdict_refuses_delete"):
             session.execute(text(f"DROP TRIGGER {trigger}"))
@@ -53,7 +53,7 @@ def read(store: Store, statement: str) -> list[Any]:
         return list(session.execute(text(statement)).all())
 
 
-QUEUE = f"SELECT group_id, {', '.join(PLACES)} FROM queue ORDER BY group_id"
+QUEUE = f"SELECT group_id, {', '.join(PLACES)}, pictures, views FROM queue ORDER BY group_id"
 SUMMARIES = "SELECT id, summary FROM solution ORDER BY id"
 
 
@@ -76,10 +76,12 @@ class TestUpgrade:
         assert (queue[0].x_m, queue[0].y_m) == pytest.approx((5.0, 2.0), abs=0.1)
         assert (queue[0].box_px, queue[2].box_px) == (14.0, 14.0)
         assert queue[1].box_px == pytest.approx(5.0, abs=2.0)
+        # Static cameras come without frames here.
+        assert [(row.pictures, row.views) for row in queue] == [(2, 2), (0, 3), (2, 2), (2, 2)]
         assert queue[2].x_m is None and queue[3].box_px is None
         as_before(filled)
         migrate(filled.settings)
-        assert schema_revision(make_engine(filled.settings)) == SCHEMA_REVISION
+        assert schema_revision(make_engine(filled.settings)) == KNOWN_REVISIONS[-1]
         assert read(filled, QUEUE) == queue
         again = read(filled, SUMMARIES)
         assert [json.loads(row.summary) for row in again] == [

@@ -48,7 +48,9 @@ class TestReadTimeline:
 
     def test_a_query_and_a_match_narrow_it(self, filmed: Store) -> None:
         state = load(filmed, 2)
-        set_verdict(filmed, 2, "accepted", if_match=state.etag, actor="ann")
+        # These frames have no pictures, so the note says what was looked at.
+        note = "seen on video"
+        set_verdict(filmed, 2, "accepted", note=note, if_match=state.etag, actor="ann")
         assert read_timeline(filmed, 1, "status:accepted").id == [2]
         assert read_timeline(filmed, 1, "", "issia").id == read_timeline(filmed, 1).id
         assert read_timeline(filmed, 1, "", "issi").id == []

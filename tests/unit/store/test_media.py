@@ -55,6 +55,63 @@ def archive(tmp_path: Path) -> Path:
     return path
 
 
+def nested(tmp_path: Path, archive: Path, compression: int) -> Path:
+    """An upload that holds the archive as a member."""
+    path = tmp_path / "upload.zip"
+    with zipfile.ZipFile(path, "w", compression) as target:
+        target.write(archive, "league/Frames-v3.zip")
+    return path
+
+
+class TestFrameOfAZipInsideAZip:
+    @pytest.mark.parametrize("compression", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+    def test_it_is_read_where_it_lies(self, tmp_path, archive, settings, compression) -> None:
+        upload = nested(tmp_path, archive, compression)
+        media = Media(str(upload), "league/Frames-v3.zip/v3_frames/7.png")
+        assert read_frame(media, None, False, settings) == PNG
+        assert read_frame(media, 40, True, settings) == read_frame(media, 40, True, settings)
+        assert media_facts(media) == {"bytes": len(PNG), "crc32": zlib.crc32(PNG)}
+
+    def test_real_bytes_are_counted(self, tmp_path, archive) -> None:
+        upload = nested(tmp_path, archive, zipfile.ZIP_STORED)
+        member = "league/Frames-v3.zip/v3_frames/7.png"
+        with pytest.raises(TooLargeError):
+            Archives().read(upload, member, len(PNG) - 1)
+        assert Archives().read(upload, member, len(PNG)) == PNG
+
+    def test_a_third_level_is_not_opened(self, tmp_path, archive) -> None:
+        inner = nested(tmp_path, archive, zipfile.ZIP_STORED)
+        outer = tmp_path / "outer.zip"
+        with zipfile.ZipFile(outer, "w") as target:
+            target.write(inner, "inner.zip")
+        with pytest.raises(NotFoundError):
+            Archives().read(outer, "inner.zip/league/Frames-v3.zip/v3_frames/7.png", 10**6)
+
+    def test_many_threads_read_one_archive_while_others_push_it_out(
+        self, tmp_path, archive
+    ) -> None:
+        upload = nested(tmp_path, archive, zipfile.ZIP_DEFLATED)
+        archives, got = Archives(most=1), []
+
+        def read() -> None:
+            for _ in range(20):
+                name = "league/Frames-v3.zip/v3_frames/7.png"
+                got.append(archives.read(upload, name, 10**6) == PNG)
+
+        threads = [threading.Thread(target=read) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert got == [True] * 80
+
+    def test_a_damaged_one_is_named(self, tmp_path, archive) -> None:
+        archive.write_bytes(archive.read_bytes()[:-30])
+        upload = nested(tmp_path, archive, zipfile.ZIP_STORED)
+        with pytest.raises(ImageError, match=r"upload\.zip/league/Frames-v3\.zip"):
+            Archives().read(upload, "league/Frames-v3.zip/7.png", 10**6)
+
+
 class TestReadFrame:
     def test_a_file_comes_as_it_is(self, file, settings) -> None:
         data = read_frame(Media(str(file)), None, False, settings)

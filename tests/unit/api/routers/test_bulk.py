@@ -17,7 +17,8 @@ def statuses(api) -> set[str]:
 
 class TestPostVerdicts:
     def test_a_dry_run_tells_and_the_run_does_what_it_told(self, api) -> None:
-        body = {"q": "passes:yes", "state": "accepted"}
+        # These groups have no pictures, so accepting them needs a note.
+        body = {"q": "passes:yes", "state": "accepted", "note": "seen on video"}
         plan = api.post(VERDICTS, params={"dry_run": True}, json=body).json()
         assert (plan["dry_run"], plan["matches"], plan["would_change"]) == (True, 3, 3)
         assert (len(plan["sample"]), plan["batch"], plan["changed"]) == (3, None, 0)
@@ -39,7 +40,8 @@ class TestPostVerdicts:
             },
         )
         done = api.post(VERDICTS, json={"state": "accepted"}).json()
-        assert (done["changed"], done["refused"]) == (2, [{"reason": "needs_note", "groups": 1}])
+        reasons = [{"reason": "needs_note", "groups": 1}, {"reason": "no_picture", "groups": 2}]
+        assert (done["changed"], done["refused"]) == (0, reasons)
         again = api.post(VERDICTS, json={"state": "accepted", "note": "seen in the video"}).json()
         assert again["changed"] == 3
         verdict = api.get("/api/v1/groups/1").json()["verdict"]

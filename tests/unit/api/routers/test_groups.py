@@ -189,7 +189,7 @@ class TestVerdict:
 
     def test_can_be_changed_and_taken_back(self, api, document) -> None:
         for verdict in (
-            {"state": "accepted"},
+            {"state": "accepted", "note": "no pictures; seen on video"},
             {"state": "deferred"},
             {"state": "rejected", "reason": "other", "note": "no match"},
             {"state": "unreviewed"},

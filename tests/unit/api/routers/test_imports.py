@@ -7,6 +7,8 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
 from app.datasets.soccernet_v3 import write_soccernet_v3
@@ -157,3 +159,71 @@ class TestListImportFolders:
 
     def test_without_allowed_folders_the_list_is_empty(self, api) -> None:
         assert api.get(f"{API}/folders").json()["items"] == []
+
+
+class TestNestedFrames:
+    @pytest.mark.parametrize("compression", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+    def test_an_uploaded_tree_serves_the_pictures_of_its_inner_zip(
+        self, app, api, tree, group: Group, compression: int
+    ) -> None:
+        picture = cv2.imencode(".png", np.full((72, 128, 3), 90, np.uint8))[1].tobytes()
+        frames = io.BytesIO()
+        with zipfile.ZipFile(frames, "w") as inner:
+            for view in group.views:
+                inner.writestr(view.key, picture)
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w", compression) as archive:
+            for path in tree.rglob("Labels-v3.json"):
+                place = path.relative_to(tree)
+                archive.write(path, place)
+                archive.writestr(str(place.parent / "Frames-v3.zip"), frames.getvalue())
+        job = uploaded(app, api, packed.getvalue())
+        assert (job.state, job.result["outcome"]) == ("done", "complete")
+        assert (job.result["without_picture"], job.result["skipped"]) == (0, [])
+        (row,) = api.get("/api/v1/groups", params={"dataset": "fresh"}).json()["items"]
+        assert row["pictures"] == 2
+        for view in api.get(f"/api/v1/groups/{row['id']}").json()["views"]:
+            answer = api.get(view["image"])
+            assert (answer.status_code, answer.content) == (200, picture)
+        assert api.get(row["thumbnail"]).headers["content-type"] == "image/jpeg"
+
+
+class TestOutcome:
+    def test_labels_alone_are_an_import_in_part(self, app, api, tree) -> None:
+        job = finished(app, api.post(API, json=body()))
+        assert (job.state, job.result["outcome"]) == ("done", "partial")
+        assert job.result["without_picture"] == 1
+
+    def test_an_import_that_reads_nothing_has_failed_and_says_why(self, app, api, tree) -> None:
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w") as archive:
+            archive.writestr("readme.txt", "nothing")
+        job = uploaded(app, api, packed.getvalue())
+        assert job.state == "failed"
+        assert "nothing could be imported from m.zip as soccernet-v3" in job.problem["detail"]
+        assert "Labels-v3.json" in job.problem["detail"]
+        assert "docs/formats.md" in job.problem["hint"]
+        assert (job.result["outcome"], job.result["read"]) == ("nothing", 0)
+        assert "fresh" not in api.get("/api/v1/datasets").text
+
+    def test_another_format_that_it_looks_like_is_named(self, app, api, tree) -> None:
+        job = finished(app, api.post(API, json=body(format="coco")))
+        assert (job.state, "soccernet-v3" in job.problem["hint"]) == ("failed", True)
+        assert str(tree) not in str((job.problem, job.result))
+
+    def test_a_dry_run_that_reads_nothing_fails_alike(self, app, api, tree) -> None:
+        job = finished(app, api.post(API, json=body(format="coco", dry_run=True)))
+        assert job.state == "failed"
+
+    def test_doing_it_again_is_no_failure(self, app, api, tree) -> None:
+        finished(app, api.post(API, json=body()))
+        again = finished(app, api.post(API, json=body()))
+        assert (again.state, again.result["unchanged"]) == ("done", 1)
+
+
+def uploaded(app: Any, api: Any, content: bytes) -> Any:
+    """The job that imports a file that is uploaded first."""
+    headers = {"Content-Type": "application/octet-stream"}
+    params = {"name": "m.zip"}
+    sent = api.post("/api/v1/uploads", params=params, content=content, headers=headers).json()
+    return finished(app, api.post(API, json=body(source={"upload": sent["id"]})))

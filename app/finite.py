@@ -1,0 +1,55 @@
+"""The one way in which numbers leave: finite, or not at all.
+
+JSON, CSV and logs have no infinity and no NaN that every reader understands. A number that is
+neither known nor finite leaves as null, as an empty cell, as nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+
+def finite(value: Any) -> Any:
+    """A value of dicts, lists and plain values in which no number is infinite or NaN.
+
+    Example:
+        >>> finite({"error": float("inf"), "at": (1.0, float("nan"))})
+        {'error': None, 'at': [1.0, None]}
+    """
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: finite(item) for key, item in value.items()}
+    return [finite(item) for item in value] if isinstance(value, (list, tuple)) else value
+
+
+def json_text(
+    value: Any,
+    *,
+    indent: int | None = None,
+    ascii_: bool = False,
+    compact: bool = False,
+) -> str:
+    """The JSON text of a value; a number that is not finite is null.
+
+    Args:
+        value: Dicts, lists and plain values.
+        indent: Spaces a level, for people; None: one line.
+        ascii_: Whether letters beyond ASCII are escaped.
+        compact: Without spaces.
+    """
+    separators = (",", ":") if compact else None
+
+    def text(plain: Any) -> str:
+        return json.dumps(
+            plain, indent=indent, ensure_ascii=ascii_, separators=separators, allow_nan=False
+        )
+
+    try:
+        return text(value)
+    except ValueError:
+        # Rare, so that what is finite costs nothing.
+        return text(finite(value))

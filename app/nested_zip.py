@@ -1,0 +1,131 @@
+"""A zip file inside a zip file, read in place: one level, never deeper.
+
+``<match>/Frames-v3.zip/7.png`` names the member ``7.png`` of the zip that is itself the member
+``<match>/Frames-v3.zip``. A zip that was stored as it is (the usual way, it is compressed
+already) is read where it lies; one that was compressed once more is unpacked for as long as it
+is open, into a file without a name that is gone with the process.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import struct
+import tempfile
+import zipfile
+from pathlib import Path
+
+MAX_UNPACKED = 4 * 1024**3
+"""Bytes of a compressed zip that are unpacked to reach its members."""
+
+_CHUNK = 1024 * 1024
+_HEADER = struct.Struct("<4s5H3I2H")
+"""Local header of a member: name and extra field follow it, then the data."""
+_SIGNATURE = b"PK\x03\x04"
+_ENCRYPTED = 0x1
+
+
+def nested_name(archive: zipfile.ZipFile, name: str) -> tuple[str, str] | None:
+    """The member that is a zip, and the name inside it; None where ``name`` is not of this kind.
+
+    A member of exactly this name goes before.
+    """
+    parts = name.split("/")
+    for count in range(1, len(parts)):
+        outer = "/".join(parts[:count])
+        if outer.lower().endswith(".zip") and outer in archive.NameToInfo:
+            return outer, "/".join(parts[count:])
+    return None
+
+
+def open_nested(
+    archive: zipfile.ZipFile, path: Path, member: zipfile.ZipInfo, limit: int = MAX_UNPACKED
+) -> zipfile.ZipFile:
+    """Open a zip that is a member of another.
+
+    Args:
+        archive: The outer zip, open.
+        path: Its file.
+        member: The inner zip.
+        limit: Bytes to unpack at most, where it is compressed; real ones are counted.
+
+    Raises:
+        zipfile.BadZipFile: It is damaged, encrypted, no zip, or larger than the limit.
+        OSError: It cannot be read, or there is no room to unpack it.
+    """
+    if member.flag_bits & _ENCRYPTED:
+        raise zipfile.BadZipFile("is encrypted")
+    if member.compress_type == zipfile.ZIP_STORED:
+        return zipfile.ZipFile(_stored(path, member))
+    with tempfile.TemporaryFile() as file:
+        total = 0
+        with archive.open(member) as packed:
+            while chunk := packed.read(_CHUNK):
+                total += len(chunk)
+                if total > limit:
+                    raise zipfile.BadZipFile(f"unpacks to more than {limit:,} bytes")
+                file.write(chunk)
+        file.flush()
+        return zipfile.ZipFile(_Window(os.dup(file.fileno()), 0, total))
+
+
+def _stored(path: Path, member: zipfile.ZipInfo) -> _Window:
+    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    window = _Window(handle, member.header_offset, _HEADER.size)
+    header = window.read(_HEADER.size)
+    if len(header) < _HEADER.size or not header.startswith(_SIGNATURE):
+        raise zipfile.BadZipFile("has no header where the zip file's list of members says")
+    *_, name, extra = _HEADER.unpack(header)
+    start = member.header_offset + _HEADER.size + name + extra
+    return window.moved(start, member.file_size)
+
+
+class _Window(io.RawIOBase):
+    """A part of a file as a file; reading it moves nobody else's place in it.
+
+    It closes its handle when nobody holds it any more: a member may be under way while its
+    archive is closed.
+    """
+
+    def __init__(self, handle: int, start: int, size: int):
+        super().__init__()
+        self._handle, self._start, self._size, self._at = handle, start, size, 0
+
+    def moved(self, start: int, size: int) -> _Window:
+        """The same file, another part of it."""
+        self._start, self._size, self._at = start, size, 0
+        return self
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def seekable(self) -> bool:
+        """It is."""
+        return True
+
+    def tell(self) -> int:
+        """Where the next read begins."""
+        return self._at
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Go to a place."""
+        place = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size}[whence]
+        if place < 0:
+            raise ValueError("a place before the beginning")
+        self._at = place
+        return place
+
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
+        """Fill a buffer as far as the part goes."""
+        count = max(min(len(buffer), self._size - self._at), 0)
+        data = os.pread(self._handle, count, self._start + self._at)
+        buffer[: len(data)] = data
+        self._at += len(data)
+        return len(data)
+
+    def close(self) -> None:
+        """Release the handle."""
+        if not self.closed:
+            os.close(self._handle)
+        super().close()

@@ -1,0 +1,138 @@
+"""What an import brought is seen: nothing, a part, or groups that nobody can look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.test_access import serious_in_both
+
+MINUTE = 60_000
+OpenPage = Callable[..., Page]
+
+
+def colour(page: Page, selector: str, token: str) -> bool:
+    """Whether the text of an element has the colour of a token."""
+    same: bool = page.locator(selector).first.evaluate(
+        """(element, token) => {
+            const probe = document.createElement('span');
+            probe.style.color = `var(${token})`;
+            element.append(probe);
+            const same = getComputedStyle(element).color === getComputedStyle(probe).color;
+            probe.remove();
+            return same;
+        }""",
+        token,
+    )
+    return same
+
+
+def bring_in(page: Page, file: Path, dataset: str) -> None:
+    page.get_by_label("Dataset", exact=True).fill(dataset)
+    page.set_input_files("#import-file", file)
+    expect(page.get_by_text("is uploaded")).to_be_visible()
+    page.get_by_role("button", name="Import", exact=True).click()
+    expect(page.get_by_role("region", name="What happened")).to_be_visible(timeout=MINUTE)
+
+
+@pytest.fixture
+def blind(home: Path, tmp_path: Path) -> Path:
+    """A zip with the labels of one match, without frames, and one file that cannot be read."""
+    found = sorted(home.parent.rglob("Labels-v3.json"))[0]
+    target = tmp_path / "blind.zip"
+    with ZipFile(target, "w") as archive:
+        archive.write(found, "/".join(found.parts[-4:]))
+        archive.writestr("broken/Labels-v3.json", "{")
+    return target
+
+
+class TestImportOfNothing:
+    def test_has_failed_in_red_and_leads_nowhere_false(
+        self, open_page: OpenPage, tmp_path: Path
+    ) -> None:
+        empty = tmp_path / "empty.zip"
+        with ZipFile(empty, "w") as archive:
+            archive.writestr("readme.txt", "nothing")
+        page = open_page("/import")
+        bring_in(page, empty, "nothing")
+        assert page.locator(".pill").first.inner_text() == "failed"
+        assert colour(page, '.pill[data-state="failed"]', "--bad")
+        card = page.get_by_role("region", name="Progress")
+        expect(card).to_contain_text("nothing could be imported from empty.zip")
+        expect(card).to_contain_text("Nothing was imported")
+        expect(page.get_by_role("link", name="Open the queue")).to_have_count(0)
+        assert serious_in_both(page) == []
+
+    def test_a_queue_of_no_dataset_says_so_and_leads_on(self, open_page: OpenPage) -> None:
+        page = open_page("/groups?dataset=nothing")
+        expect(page.locator(".empty h2")).to_have_text("There is no dataset “nothing”")
+        expect(page.locator(".save")).to_contain_text("No such dataset")
+        expect(page.locator("body")).not_to_contain_text("Loading")
+        expect(page.get_by_role("main").get_by_role("link", name="Import")).to_have_attribute(
+            "href", "/import?dataset=nothing"
+        )
+        page.get_by_role("link", name="All datasets").click()
+        expect(page.get_by_role("region", name="sample")).to_be_visible()
+
+
+class TestGroupsWithoutAPicture:
+    def test_are_marked_and_accepted_only_with_a_note(
+        self, open_page: OpenPage, blind: Path
+    ) -> None:
+        page = open_page("/import")
+        bring_in(page, blind, "blind")
+        # Done in part, in orange, with counts.
+        assert page.locator(".pill").first.inner_text() == "done in part"
+        assert colour(page, '.pill[data-state="partial"]', "--warn")
+        report = page.get_by_role("region", name="What happened")
+        expect(report).to_contain_text("1 record is left out")
+        assert serious_in_both(page) == []
+        page.goto("/jobs")
+        expect(page.locator('[data-grade="warn"]').first).to_contain_text("without any picture")
+        expect(page.locator(".meter")).to_have_count(0, timeout=MINUTE)
+        # The queue marks them, and finds them.
+        page.goto("/groups?dataset=blind&q=pictures:none+passes:yes")
+        mark = page.locator('.queue-row .pill[data-status="no-picture"]').first
+        expect(mark).to_have_text("no picture")
+        assert colour(page, '.queue-row .pill[data-status="no-picture"]', "--warn")
+        assert serious_in_both(page) == []
+        page.locator(".queue-row a").first.click()
+        # A asks for a reason instead of accepting.
+        page.wait_for_url("**/review/**")
+        expect(page.locator('.header .pill[data-status="no-picture"]')).to_be_visible()
+        expect(page.locator(".verdict-card")).to_contain_text("has a picture to look at")
+        address = page.url
+        page.keyboard.press("a")
+        field = page.locator("#verdict-note")
+        expect(field).to_be_focused()
+        expect(page.locator(".ask")).to_contain_text("no view has a picture to look at")
+        assert page.url == address
+        assert serious_in_both(page) == []
+        group = int(address.split("/review/")[1].split("?")[0])
+        assert (
+            page.request.get(f"/api/v1/groups/{group}").json()["verdict"]["state"] == "unreviewed"
+        )
+        field.fill("seen in the video")
+        page.keyboard.press("Enter")
+        page.wait_for_function("address => location.href !== address", arg=address)
+        expect(page.locator(".save")).not_to_contain_text("Saving")
+        verdict = page.request.get(f"/api/v1/groups/{group}").json()["verdict"]
+        assert (verdict["state"], verdict["note"]) == ("accepted", "seen in the video")
+        remove(page, "blind")
+
+
+def remove(page: Page, name: str) -> None:
+    """Leave the server as the other tests expect it."""
+    found = page.request.get("/api/v1/datasets").json()["items"]
+    (identity,) = (one["id"] for one in found if one["name"] == name)
+    origin = page.evaluate("location.origin")
+    answer = page.request.delete(
+        f"/api/v1/datasets/{identity}",
+        data={"confirm": name},
+        headers={"Origin": origin, "Content-Type": "application/json"},
+    )
+    assert answer.ok, answer.text()
