@@ -10,7 +10,7 @@ import { leftOutText } from '../state/reasons.js';
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
 const FAILED = /** @type {Record<string, string>} */ ({
-	calibratable: 'no camera', jac: 'lines do not fit', ball: 'no ball', reprojection: '', baseline: 'same place',
+	calibratable: 'no camera', jac: '', ball: 'no ball', reprojection: '', baseline: 'same place',
 });
 
 /** JaC at 0.5 %, or null when it was not measured. @param {ViewSolutionJson | null} solved */

@@ -77,7 +77,7 @@ class TestBall:
         after = patch(api, document, "/ball", body).json()
         assert after["views"][0]["balls"] == [
             {"box": [600.25, 300.5, 12.0, 13.0], "point": None, "occluded": True}
-            | {"out_of_view": False, "source": "person", "predicted_by": None}
+            | {"out_of_view": False, "source": "person", "predicted_by": None, "inferred": False}
         ]
 
     def test_a_point_is_a_ball_too(self, api, document) -> None:
@@ -88,7 +88,7 @@ class TestBall:
         after = patch(api, document, "/ball", {"box": None, "out_of_view": True}).json()
         assert after["views"][0]["balls"] == [
             {"box": None, "point": None, "occluded": False, "out_of_view": True}
-            | {"source": "person", "predicted_by": None}
+            | {"source": "person", "predicted_by": None, "inferred": False}
         ]
 
     @pytest.mark.parametrize(
