@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
 import { cancelJob } from '../api/jobs.js';
-import { count } from '../lib/format.js';
+import { capital, count } from '../lib/format.js';
 import { sentenceOf } from '../lib/resource.js';
 import { isOver, shareOf } from '../state/jobs.js';
 
@@ -13,7 +13,7 @@ import { isOver, shareOf } from '../state/jobs.js';
 
 /** @param {JobJson} job @returns {string} */
 export function jobText(job) {
-	if (job.state === 'failed') return job.problem?.detail ?? 'It failed.';
+	if (job.state === 'failed') return capital(job.problem?.detail ?? 'It failed.');
 	if (job.state === 'done') return '';
 	if (job.sentence) return job.sentence;
 	return job.total ? `${count(job.done)} of ${count(job.total)}` : '';

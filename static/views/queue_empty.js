@@ -54,7 +54,7 @@ export function QueueEmpty({ q }) {
 		return html`
 			<section class="card empty">
 				<h2>There is no dataset “${param('dataset')}”</h2>
-				<p>Perhaps it was deleted, or its import brought nothing: the list of jobs tells. Choose another one, or import its files.</p>
+				<p>It may have been deleted, or its import may have brought nothing; the list of jobs says which. Open another dataset, or import the files again.</p>
 				<p class="buttons"><a class="button button--primary" href="/datasets">All datasets</a><a class="button" href=${`/import?dataset=${encodeURIComponent(param('dataset'))}`}>Import</a><a class="button" href="/jobs">Jobs</a></p>
 			</section>
 		`;

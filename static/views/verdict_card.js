@@ -94,7 +94,7 @@ export function VerdictCard({ group, solution, live }) {
 	const { tone, over, title, text } = headline(group, solution, mend.value);
 	const { verdict } = group;
 	return html`
-		<section class="card verdict-card" data-tone=${tone} data-live=${live} aria-label="Result">
+		<section class="card verdict-card" data-tone=${tone === 'ok' && isBlind(group) ? 'warn' : tone} data-live=${live} aria-label="Result">
 			<p class="verdict-card__over">${over}</p>
 			<h1>${title}</h1>
 			<p class="verdict-card__text">${text}</p>

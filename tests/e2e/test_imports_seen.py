@@ -62,7 +62,7 @@ class TestImportOfNothing:
         assert page.locator(".pill").first.inner_text() == "failed"
         assert colour(page, '.pill[data-state="failed"]', "--bad")
         card = page.get_by_role("region", name="Progress")
-        expect(card).to_contain_text("nothing could be imported from empty.zip")
+        expect(card).to_contain_text("Nothing could be imported from empty.zip")
         expect(card).to_contain_text("Nothing was imported")
         expect(page.get_by_role("link", name="Open the queue")).to_have_count(0)
         assert serious_in_both(page) == []
