@@ -37,7 +37,7 @@ WORDS = {
         hint="Compare the names: click a red line to read which marking it is said to be. Is that "
         "the line that you see?",
         fault="In view {view} the line called “{marking}” is really “{true_marking}”.",
-        best="Take the fix that the card offers (it gives the line its right name), then press A.",
+        best="Press Enter: it gives the line its right name, as the card says. Then press A.",
     ),
     "swapped_sides": LessonWords(
         question="Each view fits its own lines. Do they show the ball at the same place of the "
@@ -45,22 +45,22 @@ WORDS = {
         hint="Look at the small pitch below: on which side does each camera stand, and which goal "
         "do the views show? Replays are sometimes labelled from the other end.",
         fault="In view {view} left and right are exchanged in every label.",
-        best="Take the fix that swaps the sides of view {view} (or press M there), then A.",
+        best="Press Enter: it swaps left and right in view {view}. Then press A.",
     ),
     "bad_point": LessonWords(
         question="One click of an annotator went astray. Find it.",
         hint="Follow the whiskers: they lead from the line to each annotated point, and one is "
         "much longer than the others.",
         fault="In view {view} a point of “{marking}” lies {amount:.0f} px beside its line.",
-        best="Take the fix that moves or drops the point (or drag it onto the paint), then press "
-        "A.",
+        best="Press Enter to do what the card offers, Shift Enter for another way (or drag the "
+        "point onto the paint). Then press A.",
     ),
     "missing_ball": LessonWords(
         question="The views are calibrated, and still there is no 3D ball. What is missing?",
         hint="Look at the small ball pictures below: does every view have a ball? Where the rays "
         "of the other views cross the picture is where to search.",
         fault="Nobody marked the ball in view {view}, although it can be seen.",
-        best="Press N in view {view}, choose the ball and click it in the picture, then press A.",
+        best="Press Enter, click the ball on the dotted line in view {view}, then press A.",
     ),
     "undrawn_line": LessonWords(
         question="This group fails because of its field lines, but no annotated line looks wrong. "
@@ -68,15 +68,15 @@ WORDS = {
         hint="Look for white paint that carries a thin dotted line and no points: it can be seen, "
         "and nobody annotated it. Such lines count as missed.",
         fault="In view {view} nobody annotated {markings}, although they can be seen.",
-        best="Draw the missing lines: press N, type the name, click two points on the paint; then "
-        "press A.",
+        best="Press Enter: it leads to the line with its name chosen. Click two points on the "
+        "paint and press Escape. When the card says that the group passes, press A.",
     ),
     "not_synchronous": LessonWords(
         question="Every view is calibrated and has a ball, and yet they do not meet in one point. "
         "Look at the players.",
         hint="Compare how the players stand around the ball in each view. Is it the same moment?",
         fault="View {view} shows another moment: the ball had moved {amount:.1f} m.",
-        best="No edit can mend that. Press X and choose “Not the same instant”; where two other "
+        best="No edit can mend that. Press X, then Enter for “Not the same instant”; where two other "
         "views agree you may leave view {view} out with Shift X instead, and accept the rest.",
     ),
     "tiny_baseline": LessonWords(
@@ -85,7 +85,7 @@ WORDS = {
         "from one place say nothing about depth.",
         fault="Both cameras stand at one place: view {view} is only {amount:.1f} m beside the "
         "main camera.",
-        best="No edit can mend that. Press X and choose “Duplicate view”.",
+        best="No edit can mend that. Press X, then Enter for “Duplicate view”.",
     ),
 }
 """By the kind of the lesson."""

@@ -1,10 +1,11 @@
 // @ts-check
 /** Lines that the camera sees and nobody has drawn: ghosts that stand out on grass and on white paint. */
 
+import { piecesOf } from '../geometry/polyline.js';
 import { toScreen } from '../geometry/viewport.js';
 import { colours } from '../lib/colours.js';
 import { shortMarking } from '../lib/format.js';
-import { label, strokeLine, widthOf } from './pen.js';
+import { label, strokeLines, widthOf } from './pen.js';
 
 /** @import {Scene} from './scene.js' */
 
@@ -20,8 +21,9 @@ export function drawUndrawn(context, { picture, viewport, meant }) {
 		if (points.length > 0 || polyline.length < 2) continue;
 		const named = meant?.action === 'draw_marking' && meant.marking === marking;
 		// White on black is seen on everything; the gaps let the paint through.
-		strokeLine(context, viewport, polyline, { colour: colours.value.ink, width: named ? 5 : 3.5, dash: [2, 7], halo: false });
-		strokeLine(context, viewport, polyline, {
+		const pieces = piecesOf(polyline, picture.view);
+		strokeLines(context, viewport, pieces, { colour: colours.value.ink, width: named ? 5 : 3.5, dash: [2, 7], halo: false });
+		strokeLines(context, viewport, pieces, {
 			colour: named ? colours.value.selected : colours.value.point, width: named ? 2.5 : 1.5, dash: [2, 7], halo: false,
 		});
 		if (named) point(context, marking, polyline.map((at) => toScreen(viewport, at)));

@@ -85,7 +85,7 @@ export function PanelTools({ picture, sizes }) {
 					title=${equalViews.value ? 'Main camera large (Shift+L)' : 'All views equally large (Shift+L)'}
 					path=${equalViews.value ? PATHS.main : PATHS.equal} onClick=${() => { equalViews.value = !equalViews.value; }} />` : null}
 			<${Tool} label=${filled.value ? 'Show whole images' : 'Fill the panels with the images'}
-				title=${filled.value ? 'Images are cropped to fill their panels; show them whole (I)' : 'Crop the images so that they fill their panels (I)'}
+				title=${filled.value ? 'Images are cropped to fill their panels; show them whole (Shift+Z)' : 'Crop the images so that they fill their panels (Shift+Z)'}
 				path=${PATHS.crop} pressed=${filled.value} onClick=${toggleFilled} />
 			<${Tool} label=${alone ? 'Show all views' : `Show only view ${letter}`} title=${alone ? 'Show all views' : 'Show only this view'}
 				path=${alone ? PATHS.smaller : PATHS.larger} onClick=${() => toggleMaximised(letter)} />

@@ -207,7 +207,7 @@ const VIEW = [
 		hold: { start: () => { loupe.value = true; }, end: () => { loupe.value = false; } },
 	},
 	{ keys: ['0'], label: 'Leave the zoom of every view', group: 'View', run: fitAll },
-	{ keys: ['i'], label: 'Crop the images to fill their panels, or show them whole', group: 'View', run: fillPanels },
+	{ keys: ['Shift+z'], label: 'Crop the images to fill their panels, or show them whole', group: 'View', run: fillPanels },
 	{
 		keys: ['h'], label: 'Hide or show everything drawn; held: peek below', group: 'View',
 		run: flipOverlays, hold: { start: flipOverlays, end: flipOverlays },

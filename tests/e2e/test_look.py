@@ -140,7 +140,7 @@ class TestArrangement:
         page.reload()
         page.wait_for_selector('.image-panel__stage[data-ready="true"] canvas')
         expect(page.get_by_role("button", name="Show whole images").first).to_be_visible()
-        page.keyboard.press("i")
+        page.keyboard.press("Shift+Z")
         expect(page.get_by_role("button", name="Fill the panels").first).to_be_visible()
 
     def test_the_wheel_over_a_black_bar_keeps_the_picture(self, open_page: OpenPage) -> None:
