@@ -16,6 +16,8 @@ import {
 
 /** @typedef {{view: ViewJson, camera: Camera, center: ImagePoint, tau: number, dropped: string | null}} Seen */
 
+const NO_BOX = { optimized_diameter_px: null, optimized_box: null, exact_box: null, size_ratio: null };
+
 /**
  * The ball of a view: null when there is none, or several to pick from.
  *
@@ -66,7 +68,9 @@ export function previewBall(group, solution) {
 		},
 		views: solution.views.map((view) => {
 			const one = seen.find((candidate) => candidate.view.key === view.view);
-			const ball = one && point ? fitBall(one, point, group.policy.ball_diameter_m) : null;
+			const fit = one && point ? fitBall(one, point, group.policy.ball_diameter_m) : null;
+			// Outside every valid pair a view has its errors alone: no box stands for a ball that it does not confirm.
+			const ball = fit && !included.has(view.view) ? { ...fit, ...NO_BOX } : fit;
 			return { ...view, included: included.has(view.view), ball, expected: point ? expectBall(view, point, group.policy.ball_diameter_m) : null };
 		}),
 	};

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field
@@ -180,8 +181,16 @@ class BallFitDocument(BaseModel):
     )
 
     @staticmethod
-    def of(fit: BallFit) -> BallFitDocument:
-        """The document of a fit."""
+    def of(fit: BallFit, *, included: bool) -> BallFitDocument:
+        """The document of a fit; a view outside every valid pair has its errors alone."""
+        if not included:
+            fit = replace(
+                fit,
+                optimized_diameter_px=None,
+                optimized_box=None,
+                exact_box=None,
+                size_ratio=None,
+            )
         return BallFitDocument.model_construct(
             reprojected=_xy(fit.reprojected),
             error_px=fit.error_px,
@@ -233,7 +242,9 @@ class ViewSolutionDocument(BaseModel):
             included=view.included,
             failed=view.failed,
             calibration=CalibrationDocument.of(view.calibration),
-            ball=None if view.ball is None else BallFitDocument.of(view.ball),
+            ball=None
+            if view.ball is None
+            else BallFitDocument.of(view.ball, included=view.included),
             expected=None if view.expected is None else ExpectedBallDocument.of(view.expected),
         )
 

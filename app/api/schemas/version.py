@@ -79,7 +79,7 @@ class FreezePlanDocument(BaseModel):
         return FreezePlanDocument.model_validate(vars(plan))
 
 
-class DifferenceDocument(BaseModel):
+class FrozenDifferenceDocument(BaseModel):
     """Something that did not come out as it was frozen; `group` null: the version itself."""
 
     group: str | None
@@ -100,7 +100,7 @@ class VerificationDocument(BaseModel):
     groups: int | None = Field(description="Groups of the version; null where it failed.")
     equal: int | None = Field(description="Groups that came out as they were frozen.")
     different: int | None = Field(description="Values that did not.")
-    differences: list[DifferenceDocument] = Field(description="The first of them.")
+    differences: list[FrozenDifferenceDocument] = Field(description="The first of them.")
 
     @staticmethod
     def of(found: Verification) -> VerificationDocument:
@@ -118,7 +118,7 @@ class VerificationDocument(BaseModel):
             equal=report.get("equal"),
             different=report.get("different"),
             differences=[
-                DifferenceDocument.model_validate(item)
+                FrozenDifferenceDocument.model_validate(item)
                 for item in report.get("differences", ())[:SHOWN_DIFFERENCES]
             ],
         )
