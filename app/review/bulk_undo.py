@@ -11,6 +11,7 @@ from sqlalchemy import select, update
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError, NotFoundError
+from app.finite import json_text
 from app.review.bulk import save_verdicts
 from app.store.clock import now
 from app.store.group_rows import next_id
@@ -51,7 +52,7 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
     kept = batch.changed - restored
     with store.write() as session:
         at = now()
-        values = {"undone": at, "undone_by": actor, "undo_spans": json.dumps(spans)}
+        values = {"undone": at, "undone_by": actor, "undo_spans": json_text(spans)}
         session.execute(
             update(VerdictBatchModel).where(VerdictBatchModel.id == batch_id).values(values)
         )

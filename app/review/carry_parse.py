@@ -167,7 +167,7 @@ def _group(value: Json, shared: Mapping[str, Station]) -> Group:
     group = logged_group({**value, "views": [{**view, "media": None} for view in views]}, shared)
     keys = [_text(view.key) for view in group.views]
     if not keys or len(set(keys)) < len(keys):
-        raise InputError("has no view, or two of one name")
+        raise InputError("has no views, or two views of the same name")
     for text in (group.key, group.match, group.split, group.label):
         _text(text, empty=text is not group.key)
     if not (0 < group.pitch.length < 1000 and 0 < group.pitch.width < 1000):
@@ -176,7 +176,7 @@ def _group(value: Json, shared: Mapping[str, Station]) -> Group:
         _list(said["balls"], MAX_BALLS)
         _extras(said["extras"])
         if view.included not in (True, False):
-            raise InputError("says something else than yes or no of a view")
+            raise InputError("has another value where true or false is expected for a view")
         if view.left_out is not None:
             _check_left_out(view)
         if not view.station.shared:
@@ -187,7 +187,7 @@ def _group(value: Json, shared: Mapping[str, Station]) -> Group:
 def _check_left_out(view: View) -> None:
     why = view.left_out
     if view.included or why is None or left_out(_text(why.reason), why.note) != why:
-        raise InputError("has a view with a reason for leaving it out that is none")
+        raise InputError("has a view that was left out for a reason that Touchline does not know")
 
 
 def _station(value: Json) -> Station:
@@ -200,10 +200,10 @@ def _checked(station: Station) -> Station:
         if not isinstance(side, int) or isinstance(side, bool) or not 1 <= side <= MAX_SIDE:
             raise InputError(f"has an image side of {side}")
     if station.calibration not in CALIBRATIONS or station.flipped not in (True, False):
-        raise InputError("has an unknown calibration, or is flipped in an unknown way")
+        raise InputError("has a calibration or a flip that Touchline does not know")
     for marking, points in station.lines.items():
         if canonical_marking(marking) != marking or len(points) > MAX_POINTS:
-            raise InputError(f"has a marking {marking} that is none, or with too many points")
+            raise InputError(f"has {marking}, which is not a pitch marking or has too many points")
     return station
 
 
@@ -215,7 +215,7 @@ def _verdict(value: Json) -> Mapping[str, Any]:
         if values[name] is not None:
             _text(values[name], most=MAX_NOTE)
     if values["state"] not in STATES or values["fixed"] not in (True, False):
-        raise InputError("has a verdict that is none")
+        raise InputError("has a verdict that Touchline does not know")
     if (values["state"] == "rejected") != (values["reason"] in REASONS):
         raise InputError("has a rejection without a reason, or a reason without a rejection")
     return values
@@ -247,17 +247,17 @@ def _states(value: Json) -> tuple[str, ...]:
 
 def _mapping(value: Json) -> dict[str, Json]:
     if not isinstance(value, dict):
-        raise InputError("has something else in the place of an object")
+        raise InputError("has another value where an object is expected")
     return value
 
 
 def _list(value: Json, most: int) -> list[Json]:
     if not isinstance(value, list) or len(value) > most:
-        raise InputError(f"has something else in the place of a list of at most {most}")
+        raise InputError(f"has another value where a list is expected, of at most {most}")
     return value
 
 
 def _text(value: Json, *, empty: bool = False, most: int = MAX_TEXT) -> str:
     if not isinstance(value, str) or len(value) > most or not (value or empty):
-        raise InputError("has something else in the place of a text")
+        raise InputError("has another value where a text is expected")
     return value

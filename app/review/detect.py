@@ -167,7 +167,7 @@ def _problem(row: Any, problem: str) -> dict[str, Any]:
 
 def _nothing_seen(rows: list[Any], problems: list[dict[str, Any]]) -> InputError:
     if not rows:
-        return InputError("no view fits, so there is nothing to look at")
+        return InputError("no view has a camera that fits, so there is nothing to triangulate")
     return InputError(
         f"none of the {len(rows)} frames could be read: {problems[0]['problem']}",
         hint="Import the dataset with its frames.",

@@ -229,7 +229,10 @@ def _checked_points(marking: str, points: tuple[ImagePoint, ...]) -> tuple[Image
     for index, point in enumerate(points):
         if not all(math.isfinite(value) and abs(value) <= MAX_COORDINATE for value in point):
             pointer = f"/lines/{marking.replace('~', '~0').replace('/', '~1')}/{index}"
-            raise InputError(f"point {index + 1} of {marking} is nowhere", pointer=pointer)
+            raise InputError(
+                f"point {index + 1} of {marking} is not a number of pixels that a picture can have",
+                pointer=pointer,
+            )
     return points
 
 
@@ -242,6 +245,9 @@ def _check_ball(ball: BallAnnotation) -> None:
     if ball.box is not None:
         numbers += [ball.box.x, ball.box.y, ball.box.width, ball.box.height]
         if not (ball.box.width > 0 and ball.box.height > 0):
-            raise InputError("a ball's box must be wider and higher than nothing", pointer="/box")
+            raise InputError("a ball's box needs a width and a height above zero", pointer="/box")
     if not all(math.isfinite(value) and abs(value) <= MAX_COORDINATE for value in numbers):
-        raise InputError("the ball is nowhere", pointer="/box" if ball.box else "/point")
+        raise InputError(
+            "the place of the ball is not a number of pixels that a picture can have",
+            pointer="/box" if ball.box else "/point",
+        )

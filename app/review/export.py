@@ -138,7 +138,9 @@ def _carry(
 ) -> ExportReport:
     """Everything that was said about a dataset, for another installation of Touchline."""
     if version is not None:
-        raise InputError("touchline carries a dataset as it is; a version goes out in the others")
+        raise InputError(
+            "the format touchline carries the whole dataset; choose another format to export a frozen version"
+        )
     return ExportReport(out, CARRY, carry_out(store, dataset, out, progress))
 
 
@@ -148,7 +150,9 @@ def _source(
     found = read_dataset(session, dataset)
     if version is not None:
         if everything:
-            raise InputError("a version has the groups that it has; all is for the dataset itself")
+            raise InputError(
+                "a frozen version always exports exactly its own groups; leave out all, or export the dataset itself"
+            )
         frozen = find_version(store, found.id, version)
         return VersionSource(session, frozen)
     source = LiveSource(session, found, everything)

@@ -11,7 +11,7 @@ class LessonWords:
 
     Attributes:
         question: What to look for, without giving the answer away.
-        hint: Where to look, for who is stuck.
+        hint: Where to look, for somebody who is stuck.
         fault: What was wrong, said once the group is judged.
         best: What to do about it, and with which keys.
     """

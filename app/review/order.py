@@ -93,7 +93,10 @@ class Order:
             raise InputError("the cursor is damaged", pointer="/cursor") from error
         sound = all(map(_is_key, values))
         if name != self.name or len(values) != len(self._keys) or not sound:
-            raise InputError("the cursor belongs to another query", pointer="/cursor")
+            raise InputError(
+                "this cursor came from another query; ask for the first page of this one",
+                pointer="/cursor",
+            )
         return list(values)
 
 

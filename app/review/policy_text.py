@@ -39,7 +39,7 @@ def policy_from_yaml(text: str) -> Policy:
     except RecursionError as error:
         raise InputError("this is not a policy in YAML: it is nested too deep") from error
     if not isinstance(value, dict):
-        raise InputError("a policy in YAML is a list of `name: value` lines")
+        raise InputError("a policy in YAML consists of lines `name: value`")
     name = value.pop("name", CUSTOM)
     return policy_with(PAPER, value, name=name)
 

@@ -89,7 +89,7 @@ Solutions = Callable[[Session, Sequence[SolutionKey]], Mapping[int, Solution]]
 
 
 def unsolved(_session: Session, _keys: Sequence[SolutionKey]) -> Mapping[int, Solution]:
-    """No solutions, for who asks what was said alone; such a state's ETag says so."""
+    """No solutions: for callers who only need what people said. The ETag of such a state says so."""
     return {}
 
 

@@ -6,7 +6,6 @@ ordinary sample does not know them.
 
 from __future__ import annotations
 
-import json
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ import cv2
 
 from app.datasets.match_frames import ARCHIVE
 from app.datasets.soccernet_v3 import write_soccernet_v3
+from app.finite import json_text
 from app.sample.faults import FaultPlan
 from app.sample.render import render
 from app.sample.scene import Scene
@@ -96,7 +96,7 @@ def write_practice(out: Path, progress: Progress | None = None) -> None:
     with temporary.open("w", encoding="utf-8") as stream:
         writer = TruthWriter(stream, SEED)
         writer.write(
-            (scene.truth.key, json.dumps(truth_to_json(scene.truth), separators=(",", ":")))
+            (scene.truth.key, json_text(truth_to_json(scene.truth), compact=True))
             for scene in scenes
         )
         writer.close()

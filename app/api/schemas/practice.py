@@ -27,7 +27,7 @@ class LessonDocument(BaseModel):
     total: int
     title: str
     question: str = Field(description="What to look for; does not give the answer away.")
-    hint: str = Field(description="Where to look, for who is stuck.")
+    hint: str = Field(description="Where to look, for somebody who is stuck.")
     verdict: str
     state: LessonState = Field(
         description="`mended`: edited rightly and not judged yet. Weighed against what the "

@@ -84,6 +84,7 @@ class TestIngest:
     def test_an_import_that_yields_no_group_makes_no_dataset(self, store) -> None:
         assert vars(again(store)) == {
             "new": 0, "changed": 0, "unchanged": 0, "findings": 0, "missing": 0, "problems": [],
+            "without_picture": 0,
         }  # fmt: skip
         with pytest.raises(NotFoundError):
             get_dataset(store, "demo")

@@ -27,6 +27,6 @@ class TestDecode:
         "key", [float("inf"), float("-inf"), float("nan"), 1e300, 2**64, None, [1], {"a": 1}]
     )
     def test_no_key_is_beyond_what_a_row_can_have(self, order: Order, key: object) -> None:
-        with pytest.raises(InputError, match="belongs to another query") as caught:
+        with pytest.raises(InputError, match="came from another query") as caught:
             order.decode(cursor("jac", 0, key, 3))
         assert caught.value.pointer == "/cursor"

@@ -1,0 +1,42 @@
+import assert from 'node:assert/strict';
+import { describe, it } from 'node:test';
+
+import { errorOf, gradeOfView } from '../../static/views/view_state.js';
+
+const box = { box: [10, 10, 8, 8], point: null, out_of_view: false, occluded: false };
+
+function picture({ view = {}, solved = {}, apart = null } = {}) {
+	return {
+		apart, ball: { error_px: 3200 },
+		view: { key: 'a', width: 1280, height: 720, included: true, left_out: null, balls: [box], ...view },
+		solved: {
+			view: 'a', included: true, failed: null, ball: { error_px: 3200 }, ...solved,
+			calibration: { camera: {}, source: 'given', jac: null, ...solved.calibration },
+		},
+	};
+}
+
+describe('gradeOfView', () => {
+	it('does not call a given camera well whose ball no other view confirms', () => {
+		assert.equal(gradeOfView(picture({ solved: { included: false } })).grade, 'bad');
+		assert.equal(gradeOfView(picture({ apart: 3200 })).grade, 'bad');
+		assert.equal(gradeOfView(picture()).grade, 'ok');
+	});
+
+	it('says that a ball was placed and does not count', () => {
+		const placed = picture({ view: { balls: [{ ...box, inferred: true }] }, solved: { included: false } });
+		assert.deepEqual(gradeOfView(placed), { grade: 'warn', sentence: 'ball placed, not counted' });
+	});
+
+	it('tells a view without a camera from one without a ball', () => {
+		assert.equal(gradeOfView(picture({ solved: { calibration: { camera: null, source: 'lines', jac: null } } })).sentence, 'no camera');
+		assert.equal(gradeOfView(picture({ view: { balls: [] } })).sentence, 'no ball');
+	});
+});
+
+describe('errorOf', () => {
+	it('is one error: in the best pair where the view agrees with no other, else to the 3D ball', () => {
+		assert.equal(errorOf(picture({ apart: 27 })).px, 27);
+		assert.equal(errorOf(picture()).px, 3200);
+	});
+});
