@@ -164,7 +164,7 @@ class TestRoundTrip:
         assert entries(there) == before
 
     def test_a_version_is_not_carried(self, store, busy, tmp_path) -> None:
-        with pytest.raises(InputError, match="carries a dataset as it is"):
+        with pytest.raises(InputError, match="carries the whole dataset"):
             export(store, "demo", "touchline", tmp_path / "x", version="v1")
 
 

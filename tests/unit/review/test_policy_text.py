@@ -101,9 +101,9 @@ class TestPolicyFromYaml:
     @pytest.mark.parametrize(
         ("text", "words"),
         [
-            ("", "list of"),
-            ("- 1", "list of"),
-            ("5", "list of"),
+            ("", "consists of lines"),
+            ("- 1", "consists of lines"),
+            ("5", "consists of lines"),
             ("a: [", "line 1"),
             ("tau_percent: 1\ntau_percent: 2", "line 2.*twice"),
             ("a: &x 1\nb: *x", "line 2: references"),
