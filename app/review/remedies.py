@@ -164,8 +164,14 @@ def _of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Idea]
 
 def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]:
     """Draw what the camera sees and nobody has drawn: all of it, the longest first."""
+    # What stands there under a wrong name is relabelled, not drawn again.
+    named = {suspect.suggested for suspect in solved.calibration.suspects}
     undrawn = sorted(
-        (fit for fit in solved.calibration.markings if fit.outcome == "fp" and _is_undrawn(fit)),
+        (
+            fit
+            for fit in solved.calibration.markings
+            if fit.outcome == "fp" and _is_undrawn(fit) and fit.marking not in named
+        ),
         key=polyline_length,
         reverse=True,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -17,6 +17,8 @@ BAD_POINT_GAMMA = 2.0
 GOOD_POINT_GAMMA = 1.0
 """... while all others of the marking lie within this."""
 GAMMA_PERCENT = 0.5
+MIN_POINTS = {True: 2, False: 3}
+"""Of a marking in which one point is called bad: more where the solver left the marking out."""
 UNANNOTATED_PERCENT = 5.0
 """A marking that nobody annotated is worth a word when it is seen over this length, in per cent
 of the diagonal."""
@@ -32,15 +34,21 @@ def calibration_findings(
         size: Annotated size.
         view: Key of the view, for findings of a group.
     """
-    yield from _wrong_labels(calibration, view)
-    yield from _bad_points(calibration, size, view)
+    slips = _slips(calibration, size)
+    yield from _wrong_labels(calibration, slips, view)
+    yield from _bad_points(slips, size, view)
     yield from _not_annotated(calibration, size, view)
     yield from _under_constrained(calibration, view)
     yield from _implausible_camera(calibration, view)
 
 
-def _wrong_labels(calibration: Calibration, view: str | None) -> Iterator[Finding]:
+def _wrong_labels(
+    calibration: Calibration, slips: Mapping[str, tuple[int, float]], view: str | None
+) -> Iterator[Finding]:
     for suspect in calibration.suspects:
+        if suspect.suggested is None and suspect.marking in slips:
+            # It fits where it is said to lie, but for one point.
+            continue
         if suspect.suggested is None:
             sentence = (
                 f"“{suspect.marking}” contradicts all other lines and fits no other marking. Drop "
@@ -65,26 +73,40 @@ def _wrong_labels(calibration: Calibration, view: str | None) -> Iterator[Findin
         )
 
 
-def _bad_points(calibration: Calibration, size: ImageSize, view: str | None) -> Iterator[Finding]:
-    """A single point off its line while all others of the line fit: a slip of the hand."""
+def _slips(calibration: Calibration, size: ImageSize) -> dict[str, tuple[int, float]]:
+    """Single points off their line while all others of the line fit: a slip of the hand.
+
+    Returns:
+        By marking: index of the point, and how far off it is, pixels. Markings that fit under
+        another name are none of these.
+    """
     gamma = GAMMA_PERCENT / 100 * size.diagonal
+    relabelled = {item.marking for item in calibration.suspects if item.suggested is not None}
+    found = {}
     for fit in calibration.markings:
-        if not fit.used or len(fit.distances_px) < 2:
+        if fit.marking in relabelled or len(fit.distances_px) < MIN_POINTS[fit.used]:
             continue
         index = int(np.argmax(fit.distances_px))
         others = [apart for at, apart in enumerate(fit.distances_px) if at != index]
         worst = fit.distances_px[index]
-        if worst <= BAD_POINT_GAMMA * gamma or max(others) > GOOD_POINT_GAMMA * gamma:
-            continue
+        if worst > BAD_POINT_GAMMA * gamma and max(others) <= GOOD_POINT_GAMMA * gamma:
+            found[fit.marking] = (index, worst)
+    return found
+
+
+def _bad_points(
+    slips: Mapping[str, tuple[int, float]], size: ImageSize, view: str | None
+) -> Iterator[Finding]:
+    for marking, (index, worst) in slips.items():
         yield Finding(
             "bad_point",
-            f"Point {index + 1} of “{fit.marking}” lies {worst:.1f} px off the line on which all "
-            "its other points lie. Drop it, or move it onto the paint.",
+            f"Point {index + 1} of “{marking}” lies {worst:.1f} px off the line on which its other "
+            "points lie. Drop it, or move it onto the paint.",
             view,
-            fit.marking,
+            marking,
             number=worst,
-            threshold=BAD_POINT_GAMMA * gamma,
-            fix=Fix("drop_point", view, fit.marking, index=index),
+            threshold=BAD_POINT_GAMMA * GAMMA_PERCENT / 100 * size.diagonal,
+            fix=Fix("drop_point", view, marking, index=index),
         )
 
 

@@ -104,7 +104,7 @@ def _jac(views: Sequence[JudgedView], short: bool, policy: Policy) -> Gate:
         return Gate("jac", True, None, policy.min_jac, None, sentence)
     shown = fallen if blamed else [item for item in measured if item[1].failed is None] or measured
     jac, view = min(shown, key=lambda item: item[0])
-    sentence = f"{'worst ' if len(shown) > 1 else ''}{jac:.2f} · {view.letter}"
+    sentence = f"{'worst ' if len(shown) > 1 else ''}{_beside(jac, policy.min_jac)} · {view.letter}"
     if fallen and not blamed:
         sentence += f"; {_letters([view for _, view in fallen])} below, not used"
     key = view.key if blamed else None
@@ -113,6 +113,13 @@ def _jac(views: Sequence[JudgedView], short: bool, policy: Policy) -> Gate:
 
 _FALLEN_AT = {"calibratable": "no camera", "jac": "lines do not fit"}
 """Why a view does not count."""
+
+
+def _beside(value: float, limit: float) -> str:
+    """A value in as many digits as it takes to tell it from its limit; the limit itself is said."""
+    if value == limit:
+        return f"exactly {value:.2f}"
+    return f"{value:.2f}" if f"{value:.2f}" != f"{limit:.2f}" else f"{value:.4f}"
 
 
 def _two_views(
@@ -163,7 +170,14 @@ def _baseline(left: Sequence[JudgedView], pairs: Sequence[Pair], policy: Policy)
         return _unjudged("baseline", policy.min_baseline_m)
     widest = max(apart)
     passed = widest >= policy.min_baseline_m
-    return _gate("baseline", passed, widest, policy.min_baseline_m, f"{widest:.1f} m")
+    letters = "–".join(view.letter for view in left if view.has_ball) if len(left) > 1 else ""
+    return _gate(
+        "baseline",
+        passed,
+        widest,
+        policy.min_baseline_m,
+        f"{widest:.1f} m" if passed else f"{letters} {widest:.1f} m apart",
+    )
 
 
 def _reprojection(left: Sequence[JudgedView], pairs: Sequence[Pair]) -> Gate:

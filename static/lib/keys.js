@@ -136,7 +136,7 @@ function isSliding(event) {
 /** @param {KeyboardEvent} event */
 function dispatch(event) {
 	if (event.defaultPrevented || event.isComposing) return;
-	if (document.querySelector('dialog[open], [popover]:popover-open') || isPress(event) || isSliding(event)) return;
+	if (document.querySelector('dialog[open], [popover]:popover-open:not([role="tooltip"])') || isPress(event) || isSliding(event)) return;
 	const chord = chordOf(event);
 	if (!lettersOn.value && isLetter(chord)) return;
 	const typing = isTyping(event.target);

@@ -88,20 +88,35 @@ function drawChosenBox(context, viewport, box) {
 	}
 }
 
-/** How far up the line its letter stands, CSS pixels: at the end on the grass it would cover low balls. */
-const LETTER_AWAY = 46;
+const DOTS = [2, 6];
+/** How far beside its line a letter stands, CSS pixels. */
+const BESIDE = 12;
+
+/**
+ * Where the letter of a ray stands: beside the end at which the line comes into sight, far from where the ball is likely to be.
+ *
+ * @param {{x: number, y: number}[]} line CSS pixels, from the other camera to the grass
+ * @param {{width: number, height: number}} seen part of the panel
+ */
+export function letterPlace(line, { width, height }) {
+	const inside = line.filter(({ x, y }) => x >= 0 && y >= 0 && x <= width && y <= height);
+	const [first, last] = [inside[0], inside.at(-1)];
+	if (!first || !last) return null;
+	// A ball on the grass is at the end: the letter goes to the other one.
+	return { x: first.x + BESIDE, y: Math.min(height - BESIDE, Math.max(BESIDE, first.y + (first.y < last.y ? BESIDE : -BESIDE))) };
+}
 
 /** The rays of the other views' balls, from the grass to 30 m above it. */
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
 export function drawEpipolars(context, { picture, viewport }) {
 	for (const { letter, points } of picture.epipolars) {
-		strokeLine(context, viewport, points, { colour: viewColour(letter), width: 1.75, dash: [2, 4] });
-		const [above, last] = points.slice(-2).map((point) => toScreen(viewport, point));
-		if (!last) continue;
-		const length = Math.hypot(above.x - last.x, above.y - last.y) || 1;
-		const share = LETTER_AWAY / length;
-		label(context, letter, {
-			x: last.x + (above.x - last.x) * share + 6, y: last.y + (above.y - last.y) * share,
-		}, viewColour(letter));
+		// Dots on dots: a dark line below them would look like one of the field's.
+		strokeLine(context, viewport, points, { colour: colours.value.ink, width: 3.5, dash: DOTS, halo: false });
+		strokeLine(context, viewport, points, { colour: viewColour(letter), width: 2, dash: DOTS, halo: false });
+		const at = letterPlace(points.map((point) => toScreen(viewport, point)), {
+			width: Math.min(widthOf(context), viewport.left + picture.view.width * viewport.scale),
+			height: viewport.top + picture.view.height * viewport.scale,
+		});
+		if (at) label(context, letter, at, viewColour(letter));
 	}
 }

@@ -27,6 +27,7 @@ import { pinsOf } from '../lib/pins.js';
  * @property {BallFitJson | null} ball the 3D ball seen in this view
  * @property {number | null} apart when the view agrees with no other: its error in the best pair, px
  * @property {number} gamma pixels
+ * @property {number} tau largest error of a ball that two views agree on, pixels
  * @property {MarkingResiduals[]} markings
  * @property {ImagePoint[]} outline of the 3D ball
  * @property {Epipolar[]} epipolars rays of the other views' balls
@@ -70,6 +71,7 @@ export function picturesOf(group, solution, saved) {
 			ball: solved?.ball ?? null,
 			apart: apartOf(view.key, solution),
 			gamma,
+			tau: (group.policy.tau_percent / 100) * diagonal(view),
 			markings: residualsOf(view.lines, solved?.calibration.markings ?? [], gamma, live),
 			outline: camera && point ? ballOutline(camera, point, group.policy.ball_diameter_m) : [],
 			epipolars: camera ? epipolarsInto(group, view, cameras) : [],

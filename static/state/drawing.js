@@ -1,14 +1,16 @@
 // @ts-check
 /** Drawing what is missing: a ball, a marking, a point more. Every click is saved at once. */
 
+import { previewBall } from '../geometry/preview.js';
 import { toImage } from '../geometry/viewport.js';
 import { addPoint, markingAt } from './line_edits.js';
 import { expectedDiameter, newBall } from './ball_edits.js';
+import { applyEdit } from './edits.js';
 import { group, solution, submit } from './group.js';
 import { announce } from './notice.js';
 import { drawing, focused, pointerPlace, selected } from './workspace.js';
 
-/** @import {PointJson, ViewJson} from '../api/types.js' */
+/** @import {GroupDocument, PointJson, ViewJson} from '../api/types.js' */
 /** @import {ScreenPoint, Viewport} from '../geometry/viewport.js' */
 
 /** CSS pixels within which a line is meant. */
@@ -72,12 +74,21 @@ export function drawAt(view, at) {
 	const present = drawing.value;
 	if (!present || present.view !== view.key || !group.value || !within(view, at)) return;
 	if (present.what === 'ball') {
-		submit(newBall(view, at, expectedDiameter(group.value, solution.value, view)));
+		submit(sized(view, at));
 		selected.value = { kind: 'ball', view: view.key };
 		drawing.value = null;
 	} else if (present.what === 'line') {
 		putPoint(view, present.marking, at);
 	}
+}
+
+/** A new ball, as large as a ball looks at the distance at which the other views see it. @param {ViewJson} view @param {PointJson} at */
+function sized(view, at) {
+	const shown = /** @type {GroupDocument} */ (group.value);
+	const edit = newBall(view, at, expectedDiameter(shown, solution.value, view));
+	const then = solution.value && previewBall(applyEdit(shown, edit), solution.value).views.find((one) => one.view === view.key);
+	const diameter = then?.included ? then.ball?.optimized_diameter_px : null;
+	return diameter ? newBall(view, at, diameter) : edit;
 }
 
 /** Draw at the pointer, else in the middle of what the view shows. */

@@ -122,7 +122,8 @@ export function describe(group, edit) {
 	if (edit.kind === 'include') return `View ${letter} ${edit.included ? 'included' : leftOutText(leftOutBy(edit))}`;
 	if (edit.kind === 'ball' && edit.prediction) return `Ball of ${letter} accepted from ${edit.ball?.predicted_by}`;
 	if (edit.kind === 'ball') return `Ball of ${letter} changed`;
-	const markings = Object.keys(edit.lines);
+	const drawn = Object.keys(edit.lines).filter((marking) => edit.lines[marking]);
+	const markings = drawn.length ? drawn : Object.keys(edit.lines);
 	return `${markings.length > FEW ? `${markings.length} markings` : markings.join(', ')} of ${letter} changed`;
 }
 

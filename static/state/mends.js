@@ -8,7 +8,8 @@ import { findingTitle } from './advice.js';
 import { editOfFix } from './edits.js';
 import { document, group, solution } from './group.js';
 import { remedies } from './insight.js';
-import { focused } from './workspace.js';
+import { fitPanel, returnLent } from './viewports.js';
+import { focused, maximised } from './workspace.js';
 
 /** @import {FindingJson, FixJson, GroupDocument, SolutionJson, ViewJson} from '../api/types.js' */
 /** @import {Remedy} from './insight.js' */
@@ -32,7 +33,7 @@ function labelOf({ action, to, index }) {
 	return {
 		swap_sides: 'Swap left and right', move_point: 'Move the point', drop_point: 'Drop the point', drop_marking: 'Drop the line',
 		draw_marking: 'Draw it', look_ball: 'Show the place', include_view: 'Use it again', exclude_view: 'Leave it out',
-		place_ball: 'Place it there', draw_ball: 'Draw it',
+		place_ball: 'Place it there', draw_ball: 'Draw it', resize_ball: 'Fit the box',
 	}[action] ?? action;
 }
 
@@ -45,6 +46,7 @@ function fixOf(action, view, more = {}) {
 function fixesOf(shown, finding) {
 	const view = shown.views.find(({ key }) => key === finding.view);
 	if (finding.kind === 'visible_not_annotated') return [fixOf('draw_marking', finding.view, { marking: finding.marking })];
+	if (finding.kind === 'ball_size') return [fixOf('resize_ball', finding.view)];
 	if (!finding.fix) return [];
 	if (finding.fix.action !== 'pick_ball' || !view || ballOf(view)) return [finding.fix];
 	return view.balls.flatMap((ball, index) => (ball.out_of_view || !finding.fix ? [] : [{ ...finding.fix, index }]));
@@ -63,15 +65,15 @@ function inPicture({ width, height }, [x, y]) {
 
 /** @param {GroupDocument} shown @param {SolutionJson} solved @returns {Mend[]} */
 function missingBalls(shown, solved) {
-	const short = solved.first_failing?.gate === 'ball';
 	return blindViews(shown, solved).flatMap((view) => {
 		const place = solved.views.find((one) => one.view === view.key)?.expected?.place;
-		if (!short && !(place && inPicture(view, place))) return [];
+		// Where there is no 3D ball yet, another view's ball may bring it.
+		if (solved.ball ? !(place && inPicture(view, place)) : solved.passes) return [];
 		const fix = place ? fixOf('place_ball', view.key, { point: place }) : fixOf('draw_ball', view.key);
 		return [{
 			fix, title: `No ball is drawn in ${view.letter}`, label: labelOf(fix), passes: false,
 			sentence: place ? 'A green cross marks where the other views see it. If it is not visible there, press O.'
-				: 'The dotted line is the ray of the other view: the ball lies on it. If it is not visible, press O.',
+				: 'The dotted line is the ray of another view: the ball lies on it. If it is not visible, press O.',
 		}];
 	});
 }
@@ -107,7 +109,7 @@ export function mendsOf(shown, solved, helping) {
 }
 
 /** Actions that lead a person to the place and leave the drawing to them. */
-const GUIDED = new Set(['draw_marking', 'look_ball', 'draw_ball', 'place_ball']);
+const GUIDED = new Set(['draw_marking', 'look_ball', 'draw_ball', 'place_ball', 'resize_ball']);
 
 /** Everything that would mend the group on screen. */
 export const mends = computed(() => {
@@ -139,8 +141,12 @@ export function startMends() {
 	});
 }
 
-/** Keys speak about the view that the card speaks about. */
+/** Keys speak about the view that the card speaks about, and it is seen whole, whatever was looked at before. */
 function focusMeant() {
+	returnLent();
 	const meant = group.value?.views.find(({ key }) => key === mend.value?.fix.view);
-	if (meant) focused.value = meant.letter;
+	if (!meant) return;
+	focused.value = meant.letter;
+	fitPanel(meant.letter);
+	if (maximised.value !== meant.letter) maximised.value = null;
 }

@@ -75,7 +75,21 @@ export function panPanel(letter, image, panel, dx, dy, center) {
 	if (next.left !== present.left || next.top !== present.top) put(letter, next, panel);
 }
 
-/** @param {string} letter @param {Size} panel @param {ImagePoint} point @param {number} scale */
+/**
+ * Show a place of this group; unlike a person's own zoom it does not stay for the next one.
+ *
+ * @param {string} letter @param {Size} panel @param {ImagePoint} point @param {number} scale
+ */
 export function zoomTo(letter, panel, point, scale) {
 	put(letter, centeredOn(point, panel, scale), panel);
+	lent.add(letter);
+}
+
+/** Panels whose zoom belongs to one place of one group. @type {Set<string>} */
+const lent = new Set();
+
+/** Show those panels again as they were shown before. */
+export function returnLent() {
+	for (const letter of lent) fitPanel(letter);
+	lent.clear();
 }

@@ -14,7 +14,7 @@ import { carryOut } from './mend_actions.js';
 /** @param {{group: GroupDocument, finding: FindingJson}} props */
 function Finding({ group, finding }) {
 	const view = group.views.find((candidate) => candidate.key === finding.view);
-	const sure = finding.confidence === null ? '' : `, ${Math.round(finding.confidence * 100)} %`;
+	const sure = finding.confidence === null ? '' : ` (${Math.round(finding.confidence * 100)} % sure)`;
 	const title = findingTitle(group, finding);
 	const offered = mends.value.filter((mend) => mend.sentence === finding.sentence && mend.fix.view === finding.view);
 	return html`

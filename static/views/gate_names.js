@@ -11,7 +11,7 @@ export const GATE_TITLES = /** @type {Record<string, string>} */ ({
 	jac: 'Field lines do not fit',
 	two_views: 'Fewer than two views are left',
 	ball: 'The ball is drawn in fewer than two views',
-	baseline: 'The cameras stand in one place',
+	baseline: 'The cameras stand too close together',
 	reprojection: 'The views do not agree on one ball',
 	parallax: 'The rays are nearly parallel',
 	sigma: 'The position is too uncertain',

@@ -1,7 +1,9 @@
 // @ts-check
 /** Carrying out what mends a group: the edit itself, or leading the person to the place where to draw. */
 
+import { squareBox } from '../geometry/ball.js';
 import { framePoints } from '../geometry/frame_points.js';
+import { ballCenter, ballOf } from '../geometry/preview.js';
 import { raysInto } from '../overlays/scene.js';
 import { placeBall } from '../state/ball_edits.js';
 import { startBall, startMarking } from '../state/drawing.js';
@@ -29,10 +31,14 @@ function panelOf(letter) {
 
 /** Bring some points of a view into sight. @param {ViewJson} view @param {ImagePoint[]} points @param {number} most */
 export function showPlace(view, points, most = BALL_SCALE) {
-	const panel = panelOf(view.letter);
-	if (!panel || points.length === 0) return;
-	const { center, scale } = framePoints(points, panel, most);
-	zoomTo(view.letter, panel, center, scale);
+	if (points.length === 0) return;
+	// A view that was not on screen is there with the next frame.
+	requestAnimationFrame(() => {
+		const panel = panelOf(view.letter);
+		if (!panel) return;
+		const { center, scale } = framePoints(points, panel, most);
+		zoomTo(view.letter, panel, center, scale);
+	});
 }
 
 /** Put the ball where the other views see it. @param {ViewJson} view @returns {boolean} whether that is known */
@@ -54,6 +60,15 @@ function drawMissing(view, marking) {
 	showPlace(view, (fit?.polyline ?? []).map(([x, y]) => ({ x, y })), LINE_SCALE);
 }
 
+/** Give the box of a ball the size that it has at its distance. @param {ViewJson} view */
+function fitBox(view) {
+	const ball = ballOf(view);
+	const diameter = solution.value?.views.find((one) => one.view === view.key)?.ball?.optimized_diameter_px;
+	const center = ball && ballCenter(ball);
+	if (!ball?.box || !center || !diameter) return;
+	submit({ kind: 'ball', view: view.key, ball: { ...ball, box: squareBox(center, diameter) } });
+}
+
 /** @param {Mend} wanted */
 export function carryOut({ fix }) {
 	const shown = group.value;
@@ -66,6 +81,7 @@ export function carryOut({ fix }) {
 		showPlace(view, raysInto(shown, solution.value, view).filter(({ x, y }) => x >= 0 && y >= 0 && x < view.width && y < view.height));
 	}
 	else if (fix.action === 'draw_marking' && fix.marking) drawMissing(view, fix.marking);
+	else if (fix.action === 'resize_ball') fitBox(view);
 	else if (fix.action === 'look_ball' && fix.point) {
 		showPlace(view, [{ x: fix.point[0], y: fix.point[1] }]);
 		selected.value = { kind: 'ball', view: view.key };

@@ -157,6 +157,12 @@ function showGates() {
 	say('Details of the gates', gatesOpen.value);
 }
 
+/** Every view, none of them zoomed. */
+function showAll() {
+	maximised.value = null;
+	fitAll();
+}
+
 function flipOverlays() {
 	overlaysHidden.value = !overlaysHidden.value;
 	say('Overlays', !overlaysHidden.value);
@@ -206,7 +212,7 @@ const VIEW = [
 		run: zoomToBall,
 		hold: { start: () => { loupe.value = true; }, end: () => { loupe.value = false; } },
 	},
-	{ keys: ['0'], label: 'Leave the zoom of every view', group: 'View', run: fitAll },
+	{ keys: ['0'], label: 'Leave the zoom, and show all views', group: 'View', run: showAll },
 	{ keys: ['Shift+z'], label: 'Crop the images to fill their panels, or show them whole', group: 'View', run: fillPanels },
 	{
 		keys: ['h'], label: 'Hide or show everything drawn; held: peek below', group: 'View',

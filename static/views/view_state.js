@@ -19,7 +19,8 @@ export function jacOf(solved) {
 }
 
 /** @param {ViewPicture} picture @returns {{grade: Grade, sentence: string}} */
-export function gradeOfView({ view, solved, apart }) {
+export function gradeOfView(picture) {
+	const { view, solved, apart, tau } = picture;
 	if (!view.included) return { grade: 'unseen', sentence: leftOutText(view.left_out) };
 	if (!solved) return { grade: 'unseen', sentence: 'not solved' };
 	if (!solved.calibration.camera) return { grade: 'bad', sentence: 'no camera' };
@@ -28,7 +29,10 @@ export function gradeOfView({ view, solved, apart }) {
 	if (!view.balls.length) return { grade: 'warn', sentence: 'no ball' };
 	if (view.balls.some(({ inferred }) => inferred)) return { grade: 'warn', sentence: 'ball placed, not counted' };
 	// A ball that no other view confirms is not well, wherever the camera comes from.
-	if (apart !== null || (solved.ball && !solved.included)) return { grade: 'bad', sentence: given };
+	const error = errorOf(picture).px;
+	if (error !== null && error >= tau) return { grade: 'bad', sentence: given };
+	// What is wrong is not to be seen in this view.
+	if (apart !== null || (solved.ball && !solved.included)) return { grade: 'warn', sentence: 'not counted' };
 	return { grade: 'ok', sentence: given };
 }
 

@@ -5,12 +5,12 @@ import { errorOf, gradeOfView } from '../../static/views/view_state.js';
 
 const box = { box: [10, 10, 8, 8], point: null, out_of_view: false, occluded: false };
 
-function picture({ view = {}, solved = {}, apart = null } = {}) {
+function picture({ view = {}, solved = {}, apart = null, error = 3200 } = {}) {
 	return {
-		apart, ball: { error_px: 3200 },
+		apart, tau: 14, ball: { error_px: error },
 		view: { key: 'a', width: 1280, height: 720, included: true, left_out: null, balls: [box], ...view },
 		solved: {
-			view: 'a', included: true, failed: null, ball: { error_px: 3200 }, ...solved,
+			view: 'a', included: true, failed: null, ball: { error_px: error }, ...solved,
 			calibration: { camera: {}, source: 'given', jac: null, ...solved.calibration },
 		},
 	};
@@ -20,7 +20,12 @@ describe('gradeOfView', () => {
 	it('does not call a given camera well whose ball no other view confirms', () => {
 		assert.equal(gradeOfView(picture({ solved: { included: false } })).grade, 'bad');
 		assert.equal(gradeOfView(picture({ apart: 3200 })).grade, 'bad');
-		assert.equal(gradeOfView(picture()).grade, 'ok');
+		assert.equal(gradeOfView(picture({ error: 2 })).grade, 'ok');
+	});
+
+	it('puts no red cross before a view whose own numbers are good', () => {
+		const blameless = picture({ apart: 0.4, error: 0.4, solved: { included: false } });
+		assert.deepEqual(gradeOfView(blameless), { grade: 'warn', sentence: 'not counted' });
 	});
 
 	it('says that a ball was placed and does not count', () => {

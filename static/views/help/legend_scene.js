@@ -22,7 +22,7 @@ export function sceneOf(picture, scene = {}, balls = []) {
 	));
 	return {
 		picture: {
-			view, solved: null, ball: null, apart: null, gamma: GAMMA, markings: [], outline: [], epipolars: [], pins: [], ...picture,
+			view, solved: null, ball: null, apart: null, gamma: GAMMA, tau: 2 * GAMMA, markings: [], outline: [], epipolars: [], pins: [], ...picture,
 		},
 		viewport: { scale: 1, left: 0, top: 0 },
 		selected: null, hidden: false, projections: true, boxes: true, gain: 1, rays: true, ...scene,

@@ -71,11 +71,19 @@ class TestApply:
         [
             (SetLines("7.png", {"Midle line": HERE}), UnknownMarkingError, "Midle line"),
             (SetLines("9.png", {}), NotFoundError, "no view 9.png"),
-            (SetLines("7.png", {"Middle line": (ImagePoint(math.nan, 1),)}), InputError, "number of pixels"),
+            (
+                SetLines("7.png", {"Middle line": (ImagePoint(math.nan, 1),)}),
+                InputError,
+                "number of pixels",
+            ),
             (SetLines("7.png", {"Middle line": HERE * 501}), InputError, "1000 points"),
             (SetBall("7.png", BallAnnotation()), InputError, "box or a point"),
             (SetBall("7.png", BallAnnotation(box=Box(1, 2, 0, 3))), InputError, "above zero"),
-            (SetBall("7.png", BallAnnotation(point=ImagePoint(1e9, 0))), InputError, "number of pixels"),
+            (
+                SetBall("7.png", BallAnnotation(point=ImagePoint(1e9, 0))),
+                InputError,
+                "number of pixels",
+            ),
             (
                 SetBall("7.png", BallAnnotation(box=Box(1, 2, 3, 4), point=ImagePoint(1, 2))),
                 InputError,

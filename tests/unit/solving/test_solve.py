@@ -148,7 +148,10 @@ class TestGates:
     def test_a_picture_that_is_there_twice_has_no_baseline(self, make, other):
         found = solve(group(make("7.png", MAIN, BALL), make("7_1.png", MAIN, other)), PAPER)
         assert found.first_failing.name == "baseline"
-        assert (found.first_failing.value, found.first_failing.sentence) == (0.0, "0.0 m")
+        assert (found.first_failing.value, found.first_failing.sentence) == (
+            0.0,
+            "A–B 0.0 m apart",
+        )
 
     def test_views_of_different_instants_do_not_meet(self):
         views = given_view("a", MAIN, BALL), given_view("b", OPPOSITE, (36.0, 2.0, -0.11))
