@@ -97,7 +97,7 @@ def _slips(calibration: Calibration, size: ImageSize) -> dict[str, tuple[int, fl
 def _bad_points(
     slips: Mapping[str, tuple[int, float]], size: ImageSize, view: str | None
 ) -> Iterator[Finding]:
-    for marking, (index, worst) in slips.items():
+    for marking, (index, worst) in sorted(slips.items(), key=lambda slip: -slip[1][1]):
         yield Finding(
             "bad_point",
             f"Point {index + 1} of “{marking}” lies {worst:.1f} px off the line on which its other "

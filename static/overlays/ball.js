@@ -92,6 +92,11 @@ const DOTS = [2, 6];
 /** How far beside its line a letter stands, CSS pixels. */
 const BESIDE = 12;
 
+/** Of a line that runs miles out of the picture browsers draw no dots. @param {{x: number, y: number}} at @param {number} width */
+function isNear({ x, y }, width) {
+	return Math.abs(x) < 3 * width && Math.abs(y) < 3 * width;
+}
+
 /**
  * Where the letter of a ray stands: beside the end at which the line comes into sight, far from where the ball is likely to be.
  *
@@ -110,10 +115,11 @@ export function letterPlace(line, { width, height }) {
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
 export function drawEpipolars(context, { picture, viewport }) {
 	for (const { letter, points } of picture.epipolars) {
+		const near = points.filter((point) => isNear(toScreen(viewport, point), widthOf(context)));
 		// Dots on dots: a dark line below them would look like one of the field's.
-		strokeLine(context, viewport, points, { colour: colours.value.ink, width: 3.5, dash: DOTS, halo: false });
-		strokeLine(context, viewport, points, { colour: viewColour(letter), width: 2, dash: DOTS, halo: false });
-		const at = letterPlace(points.map((point) => toScreen(viewport, point)), {
+		strokeLine(context, viewport, near, { colour: colours.value.ink, width: 3.5, dash: DOTS, halo: false });
+		strokeLine(context, viewport, near, { colour: viewColour(letter), width: 2, dash: DOTS, halo: false });
+		const at = letterPlace(near.map((point) => toScreen(viewport, point)), {
 			width: Math.min(widthOf(context), viewport.left + picture.view.width * viewport.scale),
 			height: viewport.top + picture.view.height * viewport.scale,
 		});

@@ -10,7 +10,7 @@ from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import ImagePoint
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.soccer.solution import Finding, Fix
+from app.soccer.solution import Finding, Fix, Suspect
 from app.solving.solve import solve
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, group, view
 
@@ -114,6 +114,17 @@ class TestFindRemedies:
         assert all(marking in best.sentence for marking in missing)
         assert "visible over" in best.sentence
         assert edit_of_fix(bad, best.fix) is None
+
+    def test_a_line_that_is_there_under_a_wrong_name_is_not_to_be_drawn_again(self):
+        bad, policy, missing = self.undrawn()
+        solution = solve(bad, policy)
+        seen = solution.view("b")
+        suspects = tuple(Suspect("Middle line", name, 0.9, 50.0) for name in missing)
+        doubted = replace(seen, calibration=replace(seen.calibration, suspects=suspects))
+        views = tuple(doubted if one is seen else one for one in solution.views)
+        remedies = find_remedies(bad, policy, replace(solution, views=views))
+        sentences = " ".join(remedy.sentence for remedy in remedies)
+        assert not any(f"{marking} (visible" in sentences for marking in missing)
 
     def test_a_view_that_was_left_out_can_be_used_again(self):
         good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))

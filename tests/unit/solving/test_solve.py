@@ -7,6 +7,8 @@ from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.pitch import twin_marking
 from app.soccer.policy import PAPER, STRICT
+from app.soccer.solution import Calibration, MarkingFit, Suspect
+from app.solving.calibration_findings import calibration_findings
 from app.solving.solve import solve, view_letter
 from tests.unit.solving.conftest import (
     BALL_M,
@@ -320,6 +322,13 @@ class TestExpectedBall:
         assert alone.first_failing.name == "ball"
 
 
+def left_out(marking, distances):
+    """A calibration that left a marking out, whose points lie so far from where it should be."""
+    fit = MarkingFit(marking, "fp", distances, used=False)
+    suspect = Suspect(marking, None, 0.5, max(distances))
+    return Calibration("lines", MAIN, markings=(fit,), suspects=(suspect,))
+
+
 class TestCalibrationFindings:
     def test_one_point_off_its_line_is_a_bad_point(self, clean):
         station = clean.views[0].station
@@ -331,6 +340,16 @@ class TestCalibrationFindings:
         assert [(item.kind, item.marking, item.fix.index) for item in found] == [
             ("bad_point", "Big rect. right main", 2)
         ]
+
+    def test_one_slipped_point_is_no_wrong_label_even_where_the_marking_was_left_out(self, clean):
+        found = calibration_findings(left_out("Side line top", (0.4, 0.3, 48.5, 0.2)), SIZE)
+        assert [(item.kind, item.fix.action, item.fix.index) for item in found] == [
+            ("bad_point", "drop_point", 2)
+        ]
+
+    def test_a_marking_that_is_off_with_all_its_points_contradicts_the_others(self, clean):
+        found = calibration_findings(left_out("Side line top", (30.0, 33.0, 48.5, 29.0)), SIZE)
+        assert [(item.kind, item.fix.action) for item in found] == [("wrong_label", "drop_marking")]
 
     def test_a_marking_in_sight_that_nobody_annotated_is_said(self, clean):
         station = clean.views[0].station
