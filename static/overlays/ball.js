@@ -88,7 +88,7 @@ function drawChosenBox(context, viewport, box) {
 	}
 }
 
-const DOTS = [2, 6];
+const DOTS = [3, 5];
 /** How far beside its line a letter stands, CSS pixels. */
 const BESIDE = 12;
 
@@ -117,8 +117,8 @@ export function drawEpipolars(context, { picture, viewport }) {
 	for (const { letter, points } of picture.epipolars) {
 		const near = points.filter((point) => isNear(toScreen(viewport, point), widthOf(context)));
 		// Dots on dots: a dark line below them would look like one of the field's.
-		strokeLine(context, viewport, near, { colour: colours.value.ink, width: 3.5, dash: DOTS, halo: false });
-		strokeLine(context, viewport, near, { colour: viewColour(letter), width: 2, dash: DOTS, halo: false });
+		strokeLine(context, viewport, near, { colour: colours.value.ink, width: 4.5, dash: DOTS, halo: false });
+		strokeLine(context, viewport, near, { colour: viewColour(letter), width: 2.5, dash: DOTS, halo: false });
 		const at = letterPlace(near.map((point) => toScreen(viewport, point)), {
 			width: Math.min(widthOf(context), viewport.left + picture.view.width * viewport.scale),
 			height: viewport.top + picture.view.height * viewport.scale,
