@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from zipfile import ZipFile
 
+import httpx
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -40,14 +41,20 @@ def bring_in(page: Page, file: Path, dataset: str) -> None:
 
 
 @pytest.fixture
-def blind(home: Path, tmp_path: Path) -> Path:
+def blind(home: Path, tmp_path: Path, server: str) -> Iterator[Path]:
     """A zip with the labels of one match, without frames, and one file that cannot be read."""
     found = sorted(home.parent.rglob("Labels-v3.json"))[0]
     target = tmp_path / "blind.zip"
     with ZipFile(target, "w") as archive:
         archive.write(found, "/".join(found.parts[-4:]))
         archive.writestr("broken/Labels-v3.json", "{")
-    return target
+    yield target
+    # Other tests share the server, and know one dataset.
+    api = f"{server}/api/v1/datasets"
+    for item in httpx.get(api).json()["items"]:
+        if item["name"] == "blind":
+            gone = httpx.request("DELETE", f"{api}/{item['id']}", json={"confirm": "blind"})
+            assert gone.is_success, gone.text
 
 
 class TestImportOfNothing:

@@ -66,7 +66,7 @@ class TestMargins:
         expect(page.get_by_label("Order")).to_have_attribute("title", re.compile("whose margin"))
         column = page.get_by_role("columnheader", name="margin")
         expect(column.locator("small")).to_have_text("by value")
-        expect(column).to_have_attribute("title", re.compile("in per cent of the threshold"))
+        expect(column.locator("button")).to_have_attribute("data-term", "column:margin")
 
 
 class TestLogarithmicHistograms:

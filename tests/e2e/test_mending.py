@@ -225,7 +225,7 @@ class TestMissingBall:
         x, y, width, height = one.document()["views"][1]["balls"][0]["box"]
         one.change(1, "/ball", None)
         screen = one.open()
-        expect(one.card).to_contain_text("ray of the other view")
+        expect(one.card).to_contain_text("ray of another view")
         screen.press("Enter", "0")
         view = one.document()["views"][1]
         one.page.mouse.click(*screen.place(view, x + width / 2, y + height / 2))
