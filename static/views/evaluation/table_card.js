@@ -31,7 +31,7 @@ function Row({ row, open }) {
 	`;
 }
 
-const ARROWS = /** @type {{[better: string]: string}} */ ({ higher: '\u00a0↑', lower: '\u00a0↓' });
+const ARROWS = /** @type {{[better: string]: string}} */ ({ higher: ' ↑', lower: ' ↓' });
 
 /** @param {{evaluation: number, table: TableJson, open: (query: FrameQuery, title: string) => void}} props */
 export function TableCard({ evaluation, table, open }) {
@@ -42,7 +42,7 @@ export function TableCard({ evaluation, table, open }) {
 			<div class="table__scroll" tabindex="0" role="region" aria-label=${table.title}>
 				<table class="table">
 					<thead><tr><td></td>${table.columns.map((column) => html`
-						<th key=${column.name} data-numeric="true" title=${column.better ? `${column.better} is better` : undefined}>${column.label}${column.unit ? `,\u00a0${column.unit}` : ''}${ARROWS[column.better] ?? ''}</th>`)}<th data-numeric="true">from</th></tr></thead>
+						<th key=${column.name} data-numeric="true" title=${column.better ? `${column.better} is better` : undefined}>${column.label}${column.unit ? `, ${column.unit}` : ''}${ARROWS[column.better] ?? ''}</th>`)}<th data-numeric="true">from</th></tr></thead>
 					<tbody>${table.rows.map((row) => html`<${Row} key=${row.name} row=${row} open=${open} />`)}</tbody>
 				</table>
 			</div>
