@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -172,25 +171,18 @@ def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Ide
             for fit in solved.calibration.markings
             if fit.outcome == "fp" and _is_undrawn(fit) and fit.marking not in named
         ),
-        key=polyline_length,
+        key=lambda fit: fit.length_px,
         reverse=True,
     )
     if not undrawn:
         return
     letter = chr(ord("A") + group.views.index(view))
-    names = [
-        f"{fit.marking} (visible over {max(polyline_length(fit), 1):.0f} px)" for fit in undrawn
-    ]
+    names = [f"{fit.marking} (visible over {max(fit.length_px, 1):.0f} px)" for fit in undrawn]
     verb = "were" if len(names) > 1 else "was"
     sentence = f"{' and '.join(names)} {verb} drawn in {letter}"
     drawn = {fit.marking: fit.polyline[:: len(fit.polyline) // _CLICKS + 1] for fit in undrawn}
     fix = Fix("draw_marking", view.key, undrawn[0].marking)
     yield _Idea(_RANKS[fix.action], sentence, fix, trial=SetLines(view.key, drawn))
-
-
-def polyline_length(fit: MarkingFit) -> float:
-    """Length of a projected marking, pixels."""
-    return sum(math.dist(a, b) for a, b in pairwise(fit.polyline))
 
 
 def _is_undrawn(fit: MarkingFit) -> bool:

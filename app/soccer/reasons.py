@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 from app.errors import InputError
 
-REASONS = (
+Reason = Literal[
     "bad_field_lines",
     "sides_confused",
     "not_same_instant",
@@ -14,8 +15,9 @@ REASONS = (
     "bad_calibration",
     "duplicate_view",
     "other",
-)
+]
 """``other`` needs a note."""
+REASONS: tuple[str, ...] = get_args(Reason)
 MAX_NOTE = 2000
 """Characters."""
 

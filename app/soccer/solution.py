@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from app.geometry.camera import Camera
 from app.soccer.frames import Box, ImagePoint
@@ -70,6 +71,11 @@ class MarkingFit:
     def largest_px(self) -> float | None:
         """Largest distance of an annotated point, pixels; None without one."""
         return max(self.distances_px, default=None)
+
+    @property
+    def length_px(self) -> float:
+        """Length of the projected marking, pixels; 0 when it is not visible."""
+        return sum(math.dist(a, b) for a, b in pairwise(self.polyline))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from app.soccer.frames import ImageSize, height_above_grass
-from app.soccer.solution import Calibration, Finding, Fix, MarkingFit
+from app.soccer.solution import Calibration, Finding, Fix
 from app.solving.calibrate import MAX_POSITION_SIGMA_M
 
 MAX_CAMERA_HEIGHT_M = 100.0
@@ -120,7 +120,7 @@ def _not_annotated(
     for fit in calibration.markings:
         if fit.outcome != "fp" or fit.distances_px or fit.marking in mislabelled:
             continue
-        length = _length(fit)
+        length = fit.length_px
         if length > shortest:
             yield Finding(
                 "visible_not_annotated",
@@ -185,9 +185,3 @@ def _implausible_camera(calibration: Calibration, view: str | None) -> Iterator[
             "lines."
         )
         yield Finding("implausible_camera", sentence, view, number=number, threshold=threshold)
-
-
-def _length(fit: MarkingFit) -> float:
-    """Length of a projected marking, pixels."""
-    points = np.array(fit.polyline, dtype=np.float64).reshape(-1, 2)
-    return float(np.hypot(*np.diff(points, axis=0).T).sum()) if len(points) > 1 else 0.0

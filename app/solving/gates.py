@@ -170,7 +170,7 @@ def _baseline(left: Sequence[JudgedView], pairs: Sequence[Pair], policy: Policy)
         return _unjudged("baseline", policy.min_baseline_m)
     widest = max(apart)
     passed = widest >= policy.min_baseline_m
-    letters = "–".join(view.letter for view in left if view.has_ball) if len(left) > 1 else ""
+    letters = "–".join(view.letter for view in left if view.has_ball)
     return _gate(
         "baseline",
         passed,

@@ -8,10 +8,10 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.group import State
-from app.api.schemas.verdict import Reason
 from app.review.bulk import Batch, BatchReport, BulkPlan, Refusal
 from app.review.bulk_redo import RedoReport
 from app.review.query import MAX_LISTED_LENGTH
+from app.soccer.reasons import Reason
 
 
 class BulkVerdict(BaseModel):

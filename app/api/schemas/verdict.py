@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.group import State
-
-Reason = Literal[
-    "bad_field_lines",
-    "sides_confused",
-    "not_same_instant",
-    "ball_not_visible",
-    "bad_calibration",
-    "duplicate_view",
-    "other",
-]
+from app.soccer.reasons import Reason
 
 
 class VerdictEdit(BaseModel):

@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from app.api.schemas.group import image_address
-from app.api.schemas.verdict import Reason
-from app.soccer.reasons import MAX_NOTE
+from app.soccer.reasons import MAX_NOTE, Reason
 
 
 class ViewEdit(BaseModel):
