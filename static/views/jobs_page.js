@@ -19,9 +19,18 @@ import { When } from './when.js';
 const PAGE = 50;
 const ASK = 1500;
 
-/** What the newest knowledge of each job is, the newest job first. @param {JobJson[]} jobs @param {JobJson[]} more */
+/**
+ * What the newest knowledge of each job is, the newest job first. A job that is over stays so: a
+ * list that was asked for before its end may arrive after the news of it.
+ *
+ * @param {JobJson[]} jobs @param {JobJson[]} more
+ */
 function merged(jobs, more) {
-	const byId = new Map([...jobs, ...more].map((job) => [job.id, job]));
+	const byId = new Map(jobs.map((job) => [job.id, job]));
+	for (const job of more) {
+		const before = byId.get(job.id);
+		if (!before || isOver(job) || !isOver(before)) byId.set(job.id, job);
+	}
 	return [...byId.values()].sort((a, b) => b.id - a.id);
 }
 
@@ -48,9 +57,12 @@ function useJobs() {
 		first();
 		return listen('job', (/** @type {JobJson} */ job) => setJobs((before) => merged(before ?? [], [job])), () => { read(null); });
 	}, []);
-	// Where the server cannot tell, ask.
+	// Where the server cannot tell, ask; once it can, ask for what it told before anybody listened.
 	useEffect(() => {
-		if (connected.value) return undefined;
+		if (connected.value) {
+			read(null);
+			return undefined;
+		}
 		const timer = setInterval(() => { if (!document.hidden) read(null); }, ASK);
 		return () => clearInterval(timer);
 	}, [connected.value]);

@@ -1,0 +1,44 @@
+"""The page of jobs says how they stand now."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from playwright.sync_api import Page, Route, expect
+
+OpenPage = Callable[..., Page]
+
+RUNNING: dict[str, Any] = {
+    "id": 4_711,
+    "kind": "solve",
+    "title": "Solve sample",
+    "dataset": "sample",
+    "state": "running",
+    "done": 3,
+    "total": 9,
+    "sentence": "3 of 9 groups solved",
+    "result": None,
+    "problem": None,
+    "created": "2030-01-01T00:00:00Z",
+    "started": "2030-01-01T00:00:00Z",
+    "ended": None,
+    "actor": "local",
+}
+
+
+class TestNews:
+    def test_a_job_that_ended_before_anybody_listened_is_over(self, open_page: OpenPage) -> None:
+        """The list was read, the job ended, and only then the page began to hear of jobs."""
+        page = open_page(None)
+        answers = [RUNNING, {**RUNNING, "state": "done", "done": 9, "ended": RUNNING["started"]}]
+
+        def answer(route: Route) -> None:
+            job = answers.pop(0) if len(answers) > 1 else answers[0]
+            route.fulfill(json={"items": [job], "next": None})
+
+        page.route("**/api/v1/jobs?*", answer)
+        page.goto("/jobs")
+        card = page.get_by_role("region", name="Solve sample")
+        expect(card.locator(".pill")).to_have_text("done")
+        expect(card.locator(".meter")).to_have_count(0)
