@@ -109,7 +109,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None =
     for router in ROUTERS:
         app.include_router(router.router, prefix=PREFIX)
     describe(app)
-    _add_middleware(app, services, site)
+    _add_middleware(app, settings, site)
     return app
 
 
@@ -121,10 +121,9 @@ def software_version() -> str:
         return "0"
 
 
-def _add_middleware(app: FastAPI, services: Services, site: Site) -> None:
+def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
     """The first one added is the innermost."""
-    settings = services.settings
-    app.add_middleware(FirstAnswers, store=services.store, actor=LOCAL_USER)
+    app.add_middleware(FirstAnswers, actor=LOCAL_USER)
     app.add_middleware(OneRange)
     app.add_middleware(HeadAsGet)
     app.add_middleware(

@@ -42,12 +42,11 @@ class FirstAnswers:
 
     Args:
         app: What answers for the first time.
-        store: Where answers are kept.
         actor: Whose keys they are.
     """
 
-    def __init__(self, app: ASGIApp, store: Store, actor: str):
-        self.app, self._store, self._actor = app, store, actor
+    def __init__(self, app: ASGIApp, actor: str):
+        self.app, self._actor = app, actor
         self._under_way: dict[str, asyncio.Event] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -81,7 +80,7 @@ class FirstAnswers:
 
     async def _answer(self, key: str, request: _Request, send: Send) -> None:
         try:
-            known = await run_sync(self._find, key)
+            known = await run_sync(self._find, request.store, key)
         except StorageError as error:
             await _refuse(error, request.scope, request.receive, send)
             return
@@ -97,17 +96,18 @@ class FirstAnswers:
         await self.app(request.scope, request.receive, recorded.send)
         if recorded.is_kept:
             try:
-                await run_sync(self._keep, key, recorded.answer(request.digest()))
+                answer = recorded.answer(request.digest())
+                await run_sync(self._keep, request.store, key, answer)
             except StorageError as error:
                 # It is sent already; a repetition is answered with the state as it is then.
                 log.warning("an answer could not be kept", error=str(error))
 
-    def _find(self, key: str) -> Answer | None:
-        with self._store.read() as session:
+    def _find(self, store: Store, key: str) -> Answer | None:
+        with store.read() as session:
             return find_answer(session, key, self._actor)
 
-    def _keep(self, key: str, answer: Answer) -> None:
-        with self._store.write() as session:
+    def _keep(self, store: Store, key: str, answer: Answer) -> None:
+        with store.write() as session:
             keep_answer(session, key, self._actor, answer)
 
 
@@ -141,6 +141,12 @@ class _Request:
         self._sum = hashlib.sha256()
         self._body: list[bytes] = []
         self._ended = self._replayed = False
+
+    @property
+    def store(self) -> Store:
+        """Where the application keeps its answers."""
+        store: Store = self.scope["app"].state.services.store
+        return store
 
     async def read(self) -> None:
         """Read the rest of the body; one that is not streamed can be received once more."""

@@ -14,6 +14,7 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp
 
 from app.api.application import create_app
+from app.api.deps import Services
 from app.config import Settings
 from app.geometry.camera import Camera
 from app.review.ingest import ingest
@@ -46,7 +47,12 @@ def client_of() -> Callable[[ASGIApp], TestClient]:
 @pytest.fixture
 def static_folder(tmp_path: Path) -> Path:
     """A browser application of a few files."""
-    folder = tmp_path / "static"
+    (tmp_path / "secret.js").write_text("secret")
+    return write_static(tmp_path / "static")
+
+
+def write_static(folder: Path) -> Path:
+    """A browser application of a few files."""
     (folder / "node_modules" / "preact").mkdir(parents=True)
     (folder / "index.html").write_bytes(INDEX)
     (folder / "main.js").write_text("export const one = 1;\n")
@@ -55,7 +61,6 @@ def static_folder(tmp_path: Path) -> Path:
     (folder / "node_modules" / "preact" / "a.mjs").write_text("export {};\n")
     (folder / "node_modules" / "preact" / "demo.html").write_text("<script>1</script>")
     (folder / "node_modules" / "preact" / "x.svg").write_text("<svg/>")
-    (tmp_path / "secret.js").write_text("secret")
     return folder
 
 
@@ -139,13 +144,23 @@ def prepared_home(
     return home
 
 
+@pytest.fixture(scope="session")
+def only_app(prepared_home: Path, tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
+    """The whole application, put together once; each test gives it services of its own."""
+    folder = tmp_path_factory.mktemp("application")
+    shutil.copytree(prepared_home, folder / "home")
+    app = create_app(Settings(home=folder / "home"), static=write_static(folder / "static"))
+    app.state.services.close()
+    return app
+
+
 @pytest.fixture
-def app(prepared_home: Path, static_folder: Path, tmp_path: Path) -> Iterator[FastAPI]:
+def app(only_app: FastAPI, prepared_home: Path, tmp_path: Path) -> Iterator[FastAPI]:
     """The whole application over a home of its own."""
     shutil.copytree(prepared_home, tmp_path / "home")
-    app = create_app(Settings(home=tmp_path / "home"), static=static_folder)
-    yield app
-    app.state.services.close()
+    only_app.state.services = Services.open(Settings(home=tmp_path / "home"))
+    yield only_app
+    only_app.state.services.close()
 
 
 @pytest.fixture

@@ -193,7 +193,7 @@ class TestStreamed:
             await send({"type": "http.response.start", "status": 201, "headers": []})
             await send({"type": "http.response.body", "body": str(len(parts)).encode()})
 
-        middleware = FirstAnswers(upload, app.state.services.store, "local")
+        middleware = FirstAnswers(upload, "local")
 
         async def call(chunks: list[bytes]) -> list[dict[str, Any]]:
             sent: list[dict[str, Any]] = []
@@ -207,7 +207,13 @@ class TestStreamed:
                 sent.append(message)
 
             headers = [(b"idempotency-key", b"u"), (b"content-type", b"application/octet-stream")]
-            scope = {"type": "http", "method": "POST", "path": "/u", "query_string": b""}
+            scope = {
+                "type": "http",
+                "app": app,
+                "method": "POST",
+                "path": "/u",
+                "query_string": b"",
+            }
             await middleware({**scope, "headers": headers}, receive, send)
             return sent
 
