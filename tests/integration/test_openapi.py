@@ -147,7 +147,8 @@ class Attack:
         if isinstance(case.query, dict):
             case.query.pop("q", None)
             case.query.pop("group", None)
-        case.headers["If-Match"] = self.etag(case)
+        if case.method != "GET":
+            case.headers["If-Match"] = self.etag(case)
         case.headers.pop("Idempotency-Key", None)
         if case.operation.path.endswith("/imports"):
             source = {"upload": self.upload()}

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
+import pickle
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pysqlite3.dbapi2 as sqlite
 import pytest
+from sqlalchemy import select
 
 from app.config import Settings
 from app.geometry.camera import Camera
@@ -22,6 +27,7 @@ from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import MARKINGS, Pitch
+from app.store.models import DatasetModel
 from app.store.session import Store
 
 SIZE = ImageSize(1280, 720)
@@ -56,6 +62,7 @@ def seen(camera: Camera, point: tuple[float, float, float]) -> ImagePoint:
     return ImagePoint(float(x), float(y))
 
 
+@cache
 def drawn(camera: Camera) -> dict[str, list[ImagePoint]]:
     """Every marking that a camera sees, a few points each."""
     lines: dict[str, list[ImagePoint]] = {}
@@ -150,26 +157,83 @@ def store(only_store: Store, empty: Path) -> Store:
     return only_store
 
 
+@pytest.fixture
+def there(empty: Path, tmp_path: Path) -> Iterator[Store]:
+    """Another installation, empty."""
+    home = tmp_path / "there"
+    home.mkdir()
+    _copy(empty, home / "touchline.db")
+    other = Store.open(Settings(home=home))
+    yield other
+    other.close()
+
+
 def _copy(source: Path, target: Path) -> None:
     with closing(sqlite.connect(str(source))) as one, closing(sqlite.connect(str(target))) as two:
         one.backup(two)
+
+
+Once = Callable[[object, Callable[[], Any]], Any]
+
+
+@pytest.fixture(scope="session")
+def filled_before(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Any]]:
+    """Databases that tests have filled, each with what its filling returned."""
+    return {}
+
+
+@pytest.fixture
+def once(
+    store: Store,
+    filled_before: dict[str, tuple[Path, Any]],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Once:
+    """Fills the empty database: ``once(name, fill)``; from the second time on it is copied.
+
+    The name is anything that tells one content from all others.
+    """
+    database = store.settings.home / "touchline.db"
+
+    def run(name: object, make: Callable[[], Any]) -> Any:
+        if not _is_empty(store):
+            return make()
+        key = hashlib.sha256(pickle.dumps(name)).hexdigest()
+        if key not in filled_before:
+            result = make()
+            kept = tmp_path_factory.mktemp("filled") / "touchline.db"
+            _copy(database, kept)
+            filled_before[key] = (kept, result)
+        else:
+            _copy(filled_before[key][0], database)
+        return filled_before[key][1]
+
+    return run
+
+
+def _is_empty(store: Store) -> bool:
+    with store.read() as session:
+        return session.scalar(select(DatasetModel.id).limit(1)) is None
 
 
 Fill = Callable[..., list[int]]
 
 
 @pytest.fixture
-def fill(store: Store) -> Fill:
+def fill(store: Store, once: Once) -> Fill:
     """Ingests groups into the dataset "demo", solves them, and returns all ids in order."""
 
     def run(*groups: Group, solved: bool = True) -> list[int]:
-        ingest(store, "demo", groups, source="test", actor="ann")
-        if solved:
-            solve_dataset(store, "demo")
-        page = list_groups(store, get_dataset(store, "demo").id, limit=500)
-        return [row.id for row in page.items]
+        return list(once((groups, solved), lambda: _ingested(store, groups, solved)))
 
     return run
+
+
+def _ingested(store: Store, groups: tuple[Group, ...], solved: bool) -> list[int]:
+    ingest(store, "demo", groups, source="test", actor="ann")
+    if solved:
+        solve_dataset(store, "demo")
+    page = list_groups(store, get_dataset(store, "demo").id, limit=500)
+    return [row.id for row in page.items]
 
 
 @pytest.fixture

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from app.config import Settings
 from app.datasets.archive import DEFAULT_LIMITS
 from app.datasets.report import Report
 from app.errors import InputError
@@ -34,14 +33,6 @@ from app.store.models import LogModel
 from app.store.session import Store
 
 BALL, OTHER = (BallAnnotation(box=Box(500.0 + n, 300.0, 14.0, 14.0)) for n in (0, 9))
-
-
-@pytest.fixture
-def there(tmp_path: Path):
-    """Another installation, empty."""
-    other = Store.open(Settings(home=tmp_path / "there"))
-    yield other
-    other.close()
 
 
 @pytest.fixture
@@ -95,25 +86,29 @@ def ball_of(store: Store, group_id: int, view: str):
 
 
 @pytest.fixture
-def busy(store, fill, make_group, make_static, opposite):
+def busy(store, once, fill, make_group, make_static, opposite):
     """Edits, verdicts, a camera of its own, a static camera's lines, spare frames, a policy."""
-    ids = fill(make_group(7), make_group(8), make_group(9, shift=80.0), make_static(10))
-    edit(store, ids[0], SetBall("7.png", BALL))
-    edit(store, ids[0], SetLines("7_1.png", {"Middle line": None}))
-    edit(store, ids[1], IncludeView("8_1.png", False))
-    undo(store, ids[1], if_match=load(store, ids[1]).etag, actor="ben")
-    judge(store, ids[0], "deferred", actor="ben")
-    judge(store, ids[1], "accepted")
-    judge(store, ids[2], "accepted", note="seen on video")
-    station = load_station(store, load(store, ids[3]).station_ids["cam2"])
-    lines = SetStationLines({"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))})
-    submit_station(store, station.id, lines, if_match=station.etag, actor="ann")
-    ingest_cameras(store, "demo", {"8_1": opposite}, source="cameras", actor="ann")
-    spare = [SpareFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
-    ingest_spare(store, "demo", spare, source="spare", actor="ann")
-    set_policy(store, "demo", replace(STRICT, min_jac=0.5))
-    solve_dataset(store, "demo")
-    return ids
+
+    def make():
+        ids = fill(make_group(7), make_group(8), make_group(9, shift=80.0), make_static(10))
+        edit(store, ids[0], SetBall("7.png", BALL))
+        edit(store, ids[0], SetLines("7_1.png", {"Middle line": None}))
+        edit(store, ids[1], IncludeView("8_1.png", False))
+        undo(store, ids[1], if_match=load(store, ids[1]).etag, actor="ben")
+        judge(store, ids[0], "deferred", actor="ben")
+        judge(store, ids[1], "accepted")
+        judge(store, ids[2], "accepted", note="seen on video")
+        station = load_station(store, load(store, ids[3]).station_ids["cam2"])
+        lines = SetStationLines({"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))})
+        submit_station(store, station.id, lines, if_match=station.etag, actor="ann")
+        ingest_cameras(store, "demo", {"8_1": opposite}, source="cameras", actor="ann")
+        spare = [SpareFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
+        ingest_spare(store, "demo", spare, source="spare", actor="ann")
+        set_policy(store, "demo", replace(STRICT, min_jac=0.5))
+        solve_dataset(store, "demo")
+        return ids
+
+    return once("busy", make)
 
 
 class TestRoundTrip:

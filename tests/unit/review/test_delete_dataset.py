@@ -30,22 +30,28 @@ from app.store.tables import Base
 
 
 @pytest.fixture
-def two(store: Store, fill, make_group, make_static) -> Store:
+def two(store: Store, once, fill, make_group, make_static) -> Store:
     """The dataset "demo", to which much was done, and "other" with the same frames."""
-    ids = fill(make_group(7), make_group(8), make_static(10))
-    state = load(store, ids[0])
-    ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-    submit(store, ids[0], SetBall("7.png", ball), if_match=state.etag, actor="ann")
-    other_lines = replace(make_static(10).views[0].station, lines={})
-    changed = make_static(10)
-    changed = changed.with_view(replace(changed.views[0], station=other_lines))
-    ingest(store, "demo", [replace(make_group(7), label="new"), changed], source="b", actor="ann")
-    spare = [SpareFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
-    ingest_spare(store, "demo", spare, source="spare", actor="ann")
-    give_verdicts(store, 1, "", "deferred", actor="ben")
-    save_view(store, 1, "All", "", actor="ben")
-    ingest(store, "other", [make_group(7), make_group(9)], source="test", actor="ann")
-    solve_dataset(store, "other")
+
+    def make() -> None:
+        ids = fill(make_group(7), make_group(8), make_static(10))
+        state = load(store, ids[0])
+        ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
+        submit(store, ids[0], SetBall("7.png", ball), if_match=state.etag, actor="ann")
+        other_lines = replace(make_static(10).views[0].station, lines={})
+        changed = make_static(10)
+        changed = changed.with_view(replace(changed.views[0], station=other_lines))
+        ingest(
+            store, "demo", [replace(make_group(7), label="new"), changed], source="b", actor="ann"
+        )
+        spare = [SpareFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
+        ingest_spare(store, "demo", spare, source="spare", actor="ann")
+        give_verdicts(store, 1, "", "deferred", actor="ben")
+        save_view(store, 1, "All", "", actor="ben")
+        ingest(store, "other", [make_group(7), make_group(9)], source="test", actor="ann")
+        solve_dataset(store, "other")
+
+    once("demo and other", make)
     return store
 
 

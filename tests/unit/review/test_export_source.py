@@ -94,8 +94,8 @@ class TestVersionSource:
         test = (tmp_path / "out" / "SNv3D-test.txt").read_text().splitlines()
         assert [line.rpartition("/")[2] for line in test] == ["7_1"]
 
-    def test_a_version_has_the_groups_that_it_has(self, store, version, tmp_path) -> None:
-        with pytest.raises(InputError, match="has the groups that it has"):
+    def test_a_version_exports_exactly_its_own_groups(self, store, version, tmp_path) -> None:
+        with pytest.raises(InputError, match="always exports exactly its own groups"):
             export(store, "demo", "cameras", tmp_path / "x", version="v1", everything=True)
         with pytest.raises(NotFoundError, match='no version "v9"'):
             export(store, "demo", "cameras", tmp_path / "x", version="v9")

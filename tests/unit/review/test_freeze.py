@@ -1,12 +1,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from sqlalchemy import delete, func, select, text
 
-from app.config import Settings
 from app.errors import ConflictError, InputError
 from app.review.datasets import set_policy
 from app.review.edit import SetBall
@@ -24,7 +22,6 @@ from app.soccer.frames import Box
 from app.soccer.group import Media
 from app.soccer.policy import STRICT
 from app.store.models import LogModel, SolutionModel
-from app.store.session import Store
 from app.store.version_models import FrozenModel, VersionGroupModel, VersionModel
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
@@ -45,25 +42,29 @@ def rows_of(store, version):
 
 
 @pytest.fixture
-def judged(store, fill, make_group):
+def judged(store, once, fill, make_group):
     """Accepted, rejected, accepted against a gate, failing, unreviewed."""
-    ids = fill(
-        make_group(7),
-        make_group(8),
-        make_group(9, shift=80.0),
-        make_group(10, shift=80.0),
-        make_group(11),
-    )
-    judge(store, ids[0], "accepted")
-    judge(store, ids[1], "rejected", "bad_calibration", "look at the box")
-    judge(store, ids[2], "accepted", note="seen on video")
-    return ids
+
+    def make():
+        ids = fill(
+            make_group(7),
+            make_group(8),
+            make_group(9, shift=80.0),
+            make_group(10, shift=80.0),
+            make_group(11),
+        )
+        judge(store, ids[0], "accepted")
+        judge(store, ids[1], "rejected", "bad_calibration", "look at the box")
+        judge(store, ids[2], "accepted", note="seen on video")
+        return ids
+
+    return once("judged", make)
 
 
 @pytest.fixture
-def elsewhere(tmp_path: Path, make_group):
+def elsewhere(there, make_group):
     """Another home with the same content: another order, name, people, folder and history."""
-    store = Store.open(Settings(home=tmp_path / "elsewhere"))
+    store = there
     groups = [make_group(11), make_group(9, shift=80.0), make_group(8), make_group(7)]
     groups = [moved(group) for group in [make_group(10, shift=80.0), *groups]]
     ingest(store, "other", groups, source="somewhere", actor="zoe")
@@ -73,8 +74,7 @@ def elsewhere(tmp_path: Path, make_group):
     judge(store, ids["8.png"], "rejected", "bad_calibration", "look at the box", actor="zoe")
     judge(store, ids["7.png"], "deferred", actor="zoe")
     judge(store, ids["7.png"], "accepted", actor="yan")
-    yield store
-    store.close()
+    return store
 
 
 def moved(group):

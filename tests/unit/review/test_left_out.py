@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from contextlib import closing
 from dataclasses import replace
 
 import pytest
 
-from app.config import Settings
 from app.datasets.archive import DEFAULT_LIMITS
 from app.datasets.report import Report
 from app.errors import InputError
@@ -30,7 +28,6 @@ from app.soccer.group import Group, Station, View
 from app.soccer.reasons import LeftOut
 from app.store.digest import group_inputs_hash, source_hash
 from app.store.frozen import freeze_said
-from app.store.session import Store
 from tests.unit.review.conftest import OPPOSITE, SIZE, drawn, seen
 
 WHY = LeftOut("not_same_instant", "the foot is off the ball")
@@ -195,18 +192,10 @@ class TestFixed:
 
 
 class TestCarried:
-    def test_another_installation_learns_why(self, store, state, tmp_path) -> None:
+    def test_another_installation_learns_why(self, store, there, state, tmp_path) -> None:
         change(store, LEAVE)
         export(store, "demo", "touchline", tmp_path / "carried.zip")
-        with closing(Store.open(Settings(home=tmp_path / "there"))) as there:
-            report = Report()
-            carry_in(
-                there,
-                "demo",
-                tmp_path / "carried.zip",
-                report,
-                DEFAULT_LIMITS,
-                source="here",
-                actor="zoe",
-            )
-            assert (why(there), report.problems) == (WHY, [])
+        report = Report()
+        carried = tmp_path / "carried.zip"
+        carry_in(there, "demo", carried, report, DEFAULT_LIMITS, source="here", actor="zoe")
+        assert (why(there), report.problems) == (WHY, [])

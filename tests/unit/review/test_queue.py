@@ -71,6 +71,12 @@ def queue_rows(count: int, seed: int = 5) -> list[dict[str, object]]:
     ]
 
 
+@pytest.fixture
+def dataset(store: Store, once) -> int:
+    """Id of a dataset of rows made up."""
+    return once("rows made up", lambda: fill_queue(store, COUNT))
+
+
 def fill_queue(store: Store, count: int) -> int:
     """A dataset of rows made up; returns its id."""
     dataset = create_dataset(store, "big").id
@@ -121,8 +127,7 @@ SORTED = [f"sort:{name}{end}" for name in SORTS for end in ("", "-desc")]
 
 class TestListGroups:
     @pytest.mark.parametrize("query", SORTED)
-    def test_pages_hold_each_group_once_and_in_order(self, store, query: str) -> None:
-        dataset = fill_queue(store, COUNT)
+    def test_pages_hold_each_group_once_and_in_order(self, store, dataset, query: str) -> None:
         whole = walk(store, dataset, query, 500)
         assert sorted(whole) == list(range(1, COUNT + 1))
         assert walk(store, dataset, query, 7) == whole
@@ -133,8 +138,7 @@ class TestListGroups:
         ]
 
     @pytest.mark.parametrize("query", SORTED)
-    def test_numbers_that_are_missing_come_last(self, store, query: str) -> None:
-        dataset = fill_queue(store, COUNT)
+    def test_numbers_that_are_missing_come_last(self, store, dataset, query: str) -> None:
         name = query[5:].removesuffix("-desc")
         rows = list_groups(store, dataset, query, 500).items
         values = [sorted_by(row, name) for row in rows]
@@ -180,15 +184,13 @@ class TestListGroups:
             ("size_ratio>1 error<2", lambda row: row.size_ratio == 1.1 and row.error_px == 1.0),
         ],
     )
-    def test_filters(self, store, query: str, holds) -> None:
-        dataset = fill_queue(store, COUNT)
+    def test_filters(self, store, dataset, query: str, holds) -> None:
         rows = list_groups(store, dataset, "", 500).items
         page = list_groups(store, dataset, query, 500)
         assert [row.id for row in page.items] == [row.id for row in rows if holds(row)]
         assert page.total == len(page.items)
 
-    def test_a_cursor_belongs_to_its_query(self, store) -> None:
-        dataset = fill_queue(store, COUNT)
+    def test_a_cursor_belongs_to_its_query(self, store, dataset) -> None:
         cursor = list_groups(store, dataset, "sort:jac", 5).next
         for bad in (cursor + "x!", "", "W10", "bnVsbA", "eyJhIjoxfQ"):
             with pytest.raises(InputError) as caught:
@@ -216,8 +218,9 @@ class TestListGroups:
 
 class TestPositions:
     @pytest.mark.parametrize("query", [*SORTED, "sort:jac status:unreviewed", "jac>2"])
-    def test_every_position_has_what_stands_there_in_the_whole_list(self, store, query) -> None:
-        dataset = fill_queue(store, COUNT)
+    def test_every_position_has_what_stands_there_in_the_whole_list(
+        self, store, dataset, query
+    ) -> None:
         whole = list_groups(store, dataset, query, 500)
         for start in (0, 1, 50, 58, 59, 60, 61, 100, COUNT - 7, COUNT - 1, COUNT, 10**15):
             page = list_groups(store, dataset, query, 7, start=start)
@@ -227,23 +230,20 @@ class TestPositions:
             assert list(found.ids) == [row.id for row in page.items]
             assert found.total == whole.total
 
-    def test_a_page_of_a_position_has_a_cursor_that_goes_on(self, store) -> None:
-        dataset = fill_queue(store, COUNT)
+    def test_a_page_of_a_position_has_a_cursor_that_goes_on(self, store, dataset) -> None:
         ids = walk(store, dataset, "sort:sigma", 500)
         page = list_groups(store, dataset, "sort:sigma", 10, start=80)
         after = list_groups(store, dataset, "sort:sigma", 10, page.next)
         assert [row.id for row in after.items] == ids[90:100]
         assert list_groups(store, dataset, "sort:sigma", 10, start=COUNT - 10).next is None
 
-    def test_a_cursor_or_a_position_but_not_both(self, store) -> None:
-        dataset = fill_queue(store, COUNT)
+    def test_a_cursor_or_a_position_but_not_both(self, store, dataset) -> None:
         cursor = list_groups(store, dataset, "", 5).next
         with pytest.raises(InputError, match="not both") as caught:
             list_groups(store, dataset, "", 5, cursor, 5)
         assert caught.value.pointer == "/from"
 
-    def test_all_ids_come_at_once(self, store) -> None:
-        dataset = fill_queue(store, COUNT)
+    def test_all_ids_come_at_once(self, store, dataset) -> None:
         found = list_ids(store, dataset, "sort:sigma-desc")
         assert list(found.ids) == walk(store, dataset, "sort:sigma-desc", 500)
 
@@ -262,8 +262,7 @@ class TestPositions:
 
 class TestNeighbours:
     @pytest.mark.parametrize("query", ["", "sort:jac", "sort:sigma-desc status:unreviewed"])
-    def test_agree_with_the_list(self, store, query: str) -> None:
-        dataset = fill_queue(store, COUNT)
+    def test_agree_with_the_list(self, store, dataset, query: str) -> None:
         ids = walk(store, dataset, query, 500)
         for place in (0, 3, len(ids) // 2, len(ids) - 1):
             found = neighbours(store, ids[place], query)
@@ -285,8 +284,7 @@ class TestNeighbours:
 
 
 class TestSummary:
-    def test_counts_and_histograms_are_of_what_matches(self, store) -> None:
-        dataset = fill_queue(store, COUNT)
+    def test_counts_and_histograms_are_of_what_matches(self, store, dataset) -> None:
         rows = list_groups(store, dataset, "split:train", 500).items
         found = summary(store, dataset, "split:train")
         assert found.groups == found.solved == len(rows)
@@ -297,8 +295,7 @@ class TestSummary:
         assert jac.counts[15] == sum(row.min_jac == 0.75 for row in rows)
         assert sum(jac.counts) == sum(row.min_jac is not None for row in rows)
 
-    def test_what_lies_beyond_counts_in_the_end_bins(self, store) -> None:
-        dataset = fill_queue(store, COUNT)
+    def test_what_lies_beyond_counts_in_the_end_bins(self, store, dataset) -> None:
         found = summary(store, dataset).histograms["sigma"]
         rows = list_groups(store, dataset, "sigma>=100", 500).items
         assert found.counts[-1] == len(rows) > 0

@@ -26,22 +26,26 @@ def frozen(store, name, **options):
 
 
 @pytest.fixture
-def two(store, fill, make_group):
+def two(store, once, fill, make_group):
     """Two versions: a group moved, one rejected, one accepted, one new, one as it was."""
-    ids = fill(*(make_group(number) for number in (6, 7, 8, 9)))
-    for number in ids[:3]:
-        judge(store, number, "accepted")
-    first = frozen(store, "v1")
-    state = load(store, ids[1])
-    box = state.group.view("7.png").ball.box
-    ball = BallAnnotation(box=Box(box.x + 0.5, box.y, box.width, box.height))
-    submit(store, ids[1], SetBall("7.png", ball), if_match=state.etag, actor="ben")
-    judge(store, ids[1], "accepted")
-    judge(store, ids[2], "rejected", "sides_confused")
-    judge(store, ids[3], "accepted")
-    ids = fill(*(make_group(number) for number in (6, 7, 8, 9, 10)))
-    judge(store, ids[4], "accepted")
-    return first, frozen(store, "v2", split=Split("camera", test_cameras=("9.png",)))
+
+    def make():
+        ids = fill(*(make_group(number) for number in (6, 7, 8, 9)))
+        for number in ids[:3]:
+            judge(store, number, "accepted")
+        first = frozen(store, "v1")
+        state = load(store, ids[1])
+        box = state.group.view("7.png").ball.box
+        ball = BallAnnotation(box=Box(box.x + 0.5, box.y, box.width, box.height))
+        submit(store, ids[1], SetBall("7.png", ball), if_match=state.etag, actor="ben")
+        judge(store, ids[1], "accepted")
+        judge(store, ids[2], "rejected", "sides_confused")
+        judge(store, ids[3], "accepted")
+        ids = fill(*(make_group(number) for number in (6, 7, 8, 9, 10)))
+        judge(store, ids[4], "accepted")
+        return first, frozen(store, "v2", split=Split("camera", test_cameras=("9.png",)))
+
+    return once("two versions", make)
 
 
 class TestDiffVersions:
