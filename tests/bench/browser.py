@@ -6,15 +6,9 @@ queue. Every figure is a percentile over many turns; the limits are printed besi
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shutil
-import socket
-import subprocess
-import sys
 import tempfile
-import time
-import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -25,10 +19,12 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from tests.bench.table import print_table
 from tests.e2e.install_chromium import find_chromium
+from tests.e2e.service import run_touchline, serving
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLE_GROUPS = 40
 LARGE_GROUPS = int(os.environ.get("TOUCHLINE_BENCH_GROUPS", "12764"))
+LARGE_SECONDS = 3600
 TURNS = 25
 DRAG_STEPS = 90
 MEMORY_GROUPS = 500
@@ -50,7 +46,7 @@ def bench_browser() -> None:
             executable_path=chromium,
             args=["--enable-precise-memory-info", "--js-flags=--expose-gc"],
         )
-        with _serving(home) as address:
+        with serving(home) as address:
             rows += _review(browser, address)
             rows += _queue(browser, address)
         browser.close()
@@ -61,26 +57,23 @@ def bench_browser() -> None:
     )
 
 
-def _touchline(home: Path, *arguments: str) -> None:
-    command = [sys.executable, "-c", "from app.cli import main; main()", *arguments]
-    subprocess.run(command, cwd=ROOT, env=_environment(home), check=True, capture_output=True)
-
-
-def _environment(home: Path, port: int = 0) -> dict[str, str]:
-    return {**os.environ, "TOUCHLINE_HOME": str(home), "TOUCHLINE_PORT": str(port)}
-
-
 def _make_home(home: Path) -> None:
     """The sample, and the large dataset: the sample's groups again and again without frames."""
-    _touchline(home, "migrate")
-    tree = home / "tree"
-    _touchline(home, "sample", "--groups", str(SAMPLE_GROUPS), str(tree))
-    _touchline(home, "import", "soccernet-v3", str(tree), "--dataset", "sample")
-    _touchline(home, "solve", "--dataset", "sample")
-    many = home / "many"
+    tree, many = home / "tree", home / "many"
+    run_touchline(
+        home,
+        "migrate",
+        f"sample --groups {SAMPLE_GROUPS} {tree}",
+        f"import soccernet-v3 {tree} --dataset sample",
+        "solve --dataset sample",
+    )
     _multiply(tree, many)
-    _touchline(home, "import", "soccernet-v3", str(many), "--dataset", "large")
-    _touchline(home, "solve", "--dataset", "large")
+    run_touchline(
+        home,
+        f"import soccernet-v3 {many} --dataset large",
+        "solve --dataset large",
+        seconds=LARGE_SECONDS,
+    )
 
 
 def _multiply(tree: Path, many: Path) -> None:
@@ -93,36 +86,6 @@ def _multiply(tree: Path, many: Path) -> None:
             target = many / match.parent.relative_to(tree) / f"{match.name} {copy:03d}"
             target.mkdir(parents=True)
             shutil.copy(path, target / path.name)
-
-
-@contextlib.contextmanager
-def _serving(home: Path) -> Iterator[str]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = int(probe.getsockname()[1])
-    address = f"http://127.0.0.1:{port}"
-    process = subprocess.Popen(
-        [sys.executable, "-c", "from app.cli import main; main()", "serve"],
-        cwd=ROOT,
-        env=_environment(home, port),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        _wait_for(address)
-        yield address
-    finally:
-        process.terminate()
-        process.wait(timeout=20)
-
-
-def _wait_for(address: str) -> None:
-    deadline = time.monotonic() + 120
-    while time.monotonic() < deadline:
-        with contextlib.suppress(OSError), urllib.request.urlopen(f"{address}/readyz", timeout=2):
-            return
-        time.sleep(0.1)
-    raise TimeoutError("the server did not start")
 
 
 def _open(browser: Browser, address: str) -> Page:

@@ -2,37 +2,30 @@
 
 from __future__ import annotations
 
-import os
-import socket
-import subprocess
-import sys
-import time
-import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from shutil import copytree
 
 import pytest
-from playwright.sync_api import (
-    Browser,
-    BrowserContext,
-    ConsoleMessage,
-    Page,
-    expect,
-    sync_playwright,
-)
+from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
 from tests.e2e.film import write_film
 from tests.e2e.install_chromium import ADVICE, find_chromium
 from tests.e2e.screen import Screen, passing
 from tests.e2e.season import fill_season
+from tests.e2e.service import ROOT, run_touchline, serving
+from tests.e2e.windows import TIMEOUT_MS, Windows
 
-ROOT = Path(__file__).resolve().parents[2]
 GROUPS = 14
-SIZE = {"width": 1440, "height": 900}
-START_SECONDS = 60.0
-SOFTWARE_GRAPHICS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+CONTEXTS = 4
+"""3D contexts that the browser keeps at a time."""
+SOFTWARE_GRAPHICS = [
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    f"--max-active-webgl-contexts={CONTEXTS}",
+]
 
 
 def _chromium() -> str:
@@ -42,45 +35,42 @@ def _chromium() -> str:
     return found
 
 
-def _touchline(*arguments: str, home: Path) -> None:
-    command = [sys.executable, "-c", "from app.cli import main; main()", *arguments]
-    done = subprocess.run(
-        command, cwd=ROOT, env=_environment(home), capture_output=True, text=True, timeout=300
-    )
-    assert done.returncode == 0, f"touchline {' '.join(arguments)}: {done.stderr}"
-
-
-def _environment(home: Path, port: int = 0) -> dict[str, str]:
-    return {**os.environ, "TOUCHLINE_HOME": str(home), "TOUCHLINE_PORT": str(port)}
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.fixture(scope="session")
-def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A home with the solved sample dataset."""
+def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with the solved sample dataset, to be copied; nobody serves or changes it."""
     if not (ROOT / "static" / "node_modules" / "preact").is_dir():
         pytest.fail(
             "The browser's libraries are not installed: run 'npm ci' in static/ (make setup).",
             pytrace=False,
         )
-    folder = tmp_path_factory.mktemp("home")
-    sample = tmp_path_factory.mktemp("sample")
-    _touchline("migrate", home=folder)
-    _touchline("sample", "--groups", str(GROUPS), str(sample / "tree"), home=folder)
-    _touchline("import", "soccernet-v3", str(sample / "tree"), "--dataset", "sample", home=folder)
-    _touchline("solve", "--dataset", "sample", "--workers", "1", home=folder)
-    return folder
+    folder = tmp_path_factory.mktemp("pristine")
+    home, tree = folder / "home", folder / "tree"
+    run_touchline(
+        home,
+        "migrate",
+        f"sample --groups {GROUPS} {tree}",
+        f"import soccernet-v3 {tree} --dataset sample",
+        "solve --dataset sample --workers 1",
+    )
+    return home
+
+
+@pytest.fixture(scope="session")
+def labels_file(pristine: Path) -> Path:
+    """The labels of the sample's first match, in SoccerNet-v3 layout."""
+    return sorted((pristine.parent / "tree").rglob("Labels-v3.json"))[0]
+
+
+@pytest.fixture(scope="session")
+def home(pristine: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with the solved sample dataset."""
+    return Path(copytree(pristine, tmp_path_factory.mktemp("shared") / "home"))
 
 
 @pytest.fixture(scope="session")
 def server(home: Path) -> Iterator[str]:
     """Address of a server over the home."""
-    with _serving(home) as address:
+    with serving(home) as address:
         yield address
 
 
@@ -89,10 +79,13 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Address of a server over a home of its own: a short film by six static cameras."""
     home = tmp_path_factory.mktemp("film-home")
     folder = write_film(tmp_path_factory.mktemp("film"))
-    _touchline("migrate", home=home)
-    _touchline("import", "issia", str(folder), "--dataset", "film", home=home)
-    _touchline("solve", "--dataset", "film", "--workers", "1", home=home)
-    with _serving(home) as address:
+    run_touchline(
+        home,
+        "migrate",
+        f"import issia {folder} --dataset film",
+        "solve --dataset film --workers 1",
+    )
+    with serving(home) as address:
         yield address
 
 
@@ -101,47 +94,15 @@ def season(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Address of a server over a home of its own: two thousand groups."""
     home = tmp_path_factory.mktemp("season-home")
     fill_season(home)
-    with _serving(home) as address:
+    with serving(home) as address:
         yield address
-
-
-@contextmanager
-def _serving(home: Path) -> Iterator[str]:
-    port = _free_port()
-    address = f"http://127.0.0.1:{port}"
-    with (home / "server.log").open("wb") as log:
-        process = subprocess.Popen(
-            [sys.executable, "-c", "from app.cli import main; main()", "serve"],
-            cwd=ROOT,
-            env=_environment(home, port),
-            stdout=log,
-            stderr=log,
-        )
-        try:
-            _wait_for(address, process, home / "server.log")
-            yield address
-        finally:
-            process.terminate()
-            process.wait(timeout=20)
-
-
-def _wait_for(address: str, process: subprocess.Popen[bytes], log: Path) -> None:
-    deadline = time.monotonic() + START_SECONDS
-    while time.monotonic() < deadline:
-        assert process.poll() is None, log.read_text()
-        try:
-            with urllib.request.urlopen(f"{address}/healthz", timeout=2):
-                return
-        except OSError:
-            time.sleep(0.1)
-    pytest.fail(f"the server did not start: {log.read_text()}")
 
 
 @pytest.fixture(scope="module")
 def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
     """Chromium, for one module: while Playwright runs, no other test can run an event loop."""
     # On a busy machine five seconds are little.
-    expect.set_options(timeout=20_000)
+    expect.set_options(timeout=TIMEOUT_MS)
     with sync_playwright() as playwright:
         # Where there is no graphics card the 3D view is drawn by the processor, which costs time.
         drawn = request.module.__name__.endswith("scene3d")
@@ -188,23 +149,24 @@ def console() -> Iterator[Console]:
 OpenPage = Callable[..., Page]
 
 
+@pytest.fixture(scope="module")
+def windows(browser: Browser) -> Windows:
+    """Windows of the browser, which know nothing of earlier tests."""
+    return Windows(browser)
+
+
 @pytest.fixture
-def open_page(browser: Browser, server: str, console: Console) -> Iterator[OpenPage]:
+def open_page(windows: Windows, server: str, console: Console) -> Iterator[OpenPage]:
     """A function that opens a fresh window: ``open_page("/groups", scheme=...)``; None: blank."""
-    contexts: list[BrowserContext] = []
 
     def open_one(
-        path: str | None, *, scheme: str = "dark", size: dict[str, int] | None = None
+        path: str | None,
+        *,
+        scheme: str = "dark",
+        size: dict[str, int] | None = None,
+        address: str = server,
     ) -> Page:
-        context = browser.new_context(
-            base_url=server,
-            viewport=size or SIZE,  # type: ignore[arg-type]
-            color_scheme=scheme,  # type: ignore[arg-type]
-            accept_downloads=True,
-        )
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(20_000)
+        page = windows.take(address, scheme, size)
         page.on("console", console.hear)
         page.on("pageerror", lambda error: console.messages.append(f"error: {error}"))
         if path is not None:
@@ -212,8 +174,7 @@ def open_page(browser: Browser, server: str, console: Console) -> Iterator[OpenP
         return page
 
     yield open_one
-    for context in contexts:
-        context.close()
+    windows.give_back()
 
 
 @pytest.fixture

@@ -13,8 +13,9 @@ from typing import Any
 
 from playwright.sync_api import Page, sync_playwright
 
-from tests.e2e.conftest import ROOT, _chromium, _serving, _touchline
+from tests.e2e.install_chromium import find_chromium
 from tests.e2e.screen import Screen, rows
+from tests.e2e.service import ROOT, run_touchline, serving
 
 OUT = ROOT / "docs" / "images"
 GROUPS = 24
@@ -81,11 +82,9 @@ def main() -> None:
     """Make a home, serve it, take the pictures."""
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder) / "home"
-        _touchline("migrate", home=home)
-        _touchline("sample", "--dataset", "sample", "--groups", str(GROUPS), home=home)
-        _touchline("practice", home=home)
-        with _serving(home) as address, sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=_chromium())
+        run_touchline(home, "migrate", f"sample --dataset sample --groups {GROUPS}", "practice")
+        with serving(home) as address, sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=find_chromium())
             context = browser.new_context(
                 base_url=address,
                 viewport=SIZE,  # type: ignore[arg-type]

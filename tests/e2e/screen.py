@@ -7,6 +7,7 @@ from typing import Any
 from playwright.sync_api import Page, Request, expect
 
 Document = dict[str, Any]
+TWO_FRAMES = "() => new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))"
 
 
 class Screen:
@@ -66,6 +67,8 @@ class Screen:
 
     def saved(self) -> None:
         """Wait until the last write was answered."""
+        # What a key has done is drawn with the next frame; until then the page says what was.
+        self.page.evaluate(TWO_FRAMES)
         # The first edit of a server may have to wait for its compiled solver.
         patient = expect(self.page.locator('.save[data-unsaved="0"]'))
         patient.to_contain_text("Saved", timeout=60_000)

@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from app.sample.practice import LESSONS, Lesson, make_practice
 from app.sample.scene import Scene
-from tests.e2e.conftest import Console, _serving, _touchline
+from tests.e2e.conftest import OpenPage
 from tests.e2e.screen import Screen
+from tests.e2e.service import run_touchline, serving
 from tests.e2e.test_access import serious, serious_in_both
 
-OpenPage = Callable[..., Page]
 Json = dict[str, Any]
 TOKENS = Path(__file__).resolve().parents[2] / "static" / "css" / "tokens.css"
 STRUCTURE = frozenset({"canvas-halo", "canvas-chalk", "canvas-chalk-soft"})
@@ -176,22 +176,17 @@ class TestTerms:
 def practice(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Address of a server over a home of its own, with the practice groups."""
     home = tmp_path_factory.mktemp("practice-home")
-    _touchline("migrate", home=home)
-    _touchline("practice", home=home)
-    with _serving(home) as address:
+    run_touchline(home, "migrate", "practice")
+    with serving(home) as address:
         yield address
 
 
 @pytest.fixture
-def lessons(browser: Browser, practice: str, console: Console) -> Iterator[tuple[Page, list[Json]]]:
+def lessons(open_page: OpenPage, practice: str) -> tuple[Page, list[Json]]:
     """A window and the lessons, all of them open again."""
-    context = browser.new_context(base_url=practice, viewport={"width": 1440, "height": 900})
-    page = context.new_page()
-    page.set_default_timeout(20_000)
-    page.on("console", console.hear)
+    page = open_page(None, address=practice)
     found: list[Json] = page.request.get("/api/v1/practice").json()["lessons"]
-    yield page, found
-    context.close()
+    return page, found
 
 
 class TestPractice:

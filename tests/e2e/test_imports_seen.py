@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from zipfile import ZipFile
 
-import httpx
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.e2e.service import delete_dataset
 from tests.e2e.test_access import serious_in_both
 
 MINUTE = 60_000
@@ -41,20 +41,14 @@ def bring_in(page: Page, file: Path, dataset: str) -> None:
 
 
 @pytest.fixture
-def blind(home: Path, tmp_path: Path, server: str) -> Iterator[Path]:
+def blind(labels_file: Path, tmp_path: Path, server: str) -> Iterator[Path]:
     """A zip with the labels of one match, without frames, and one file that cannot be read."""
-    found = sorted(home.parent.rglob("Labels-v3.json"))[0]
     target = tmp_path / "blind.zip"
     with ZipFile(target, "w") as archive:
-        archive.write(found, "/".join(found.parts[-4:]))
+        archive.write(labels_file, "/".join(labels_file.parts[-4:]))
         archive.writestr("broken/Labels-v3.json", "{")
     yield target
-    # Other tests share the server, and know one dataset.
-    api = f"{server}/api/v1/datasets"
-    for item in httpx.get(api).json()["items"]:
-        if item["name"] == "blind":
-            gone = httpx.request("DELETE", f"{api}/{item['id']}", json={"confirm": "blind"})
-            assert gone.is_success, gone.text
+    delete_dataset(server, "blind")
 
 
 class TestImportOfNothing:
@@ -129,17 +123,3 @@ class TestGroupsWithoutAPicture:
         expect(page.locator(".save")).not_to_contain_text("Saving")
         verdict = page.request.get(f"/api/v1/groups/{group}").json()["verdict"]
         assert (verdict["state"], verdict["note"]) == ("accepted", "seen in the video")
-        remove(page, "blind")
-
-
-def remove(page: Page, name: str) -> None:
-    """Leave the server as the other tests expect it."""
-    found = page.request.get("/api/v1/datasets").json()["items"]
-    (identity,) = (one["id"] for one in found if one["name"] == name)
-    origin = page.evaluate("location.origin")
-    answer = page.request.delete(
-        f"/api/v1/datasets/{identity}",
-        data={"confirm": name},
-        headers={"Origin": origin, "Content-Type": "application/json"},
-    )
-    assert answer.ok, answer.text()

@@ -3,38 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
+from shutil import copytree
 
 import cv2
 import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.conftest import OpenPage, _serving, _touchline
+from tests.e2e.conftest import OpenPage
 from tests.e2e.film import write_film
 from tests.e2e.screen import Screen, withdraw_verdict
+from tests.e2e.service import run_touchline, serving
 
 MINUTE = 60_000
-GROUPS = 6
 FRAME = 110
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A server of its own: a small sample, and a film whose first camera has frames on disk."""
-    home = tmp_path_factory.mktemp("left-out-home")
-    sample = tmp_path_factory.mktemp("left-out-sample") / "tree"
+def server(pristine: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A server of its own: the sample, and a film whose first camera has frames on disk."""
+    home = Path(copytree(pristine, tmp_path_factory.mktemp("left-out") / "home"))
     film = write_film(tmp_path_factory.mktemp("left-out-film"))
     frames = film / "cam1"
     frames.mkdir()
     for number in (FRAME - 1, FRAME, FRAME + 1):
         picture = np.full((1080, 1920, 3), (number - FRAME + 2) * 60, np.uint8)
         cv2.imwrite(str(frames / f"{number:06d}.jpg"), picture)
-    _touchline("migrate", home=home)
-    _touchline("sample", "--groups", str(GROUPS), str(sample), home=home)
-    _touchline("import", "soccernet-v3", str(sample), "--dataset", "sample", home=home)
-    _touchline("import", "issia", str(film), "--dataset", "film", home=home)
-    _touchline("solve", "--dataset", "sample", "--workers", "1", home=home)
-    with _serving(home) as address:
+    run_touchline(home, f"import issia {film} --dataset film")
+    with serving(home) as address:
         yield address
 
 

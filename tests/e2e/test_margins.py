@@ -7,12 +7,11 @@ from collections.abc import Callable, Iterator
 from shutil import rmtree
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
-from tests.e2e.conftest import _serving as serving
-from tests.e2e.conftest import _touchline as run_touchline
 from tests.e2e.film import write_film
 from tests.e2e.screen import Screen, rows
+from tests.e2e.service import run_touchline, serving
 from tests.e2e.test_queue_walk import SMALL, collisions
 
 OpenPage = Callable[..., Page]
@@ -120,18 +119,25 @@ class TestAt1100:
 
 
 @pytest.fixture(scope="module")
-def given(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    """A page of a server with a dataset whose cameras came with it, without any field line."""
+def unmeasured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Address of a server with a dataset whose cameras came with it, without any field line."""
     home = tmp_path_factory.mktemp("given-home")
     folder = write_film(tmp_path_factory.mktemp("given"))
     rmtree(folder / "lines")
-    run_touchline("migrate", home=home)
-    run_touchline("import", "issia", str(folder), "--dataset", "given", home=home)
-    run_touchline("solve", "--dataset", "given", "--workers", "1", home=home)
+    run_touchline(
+        home,
+        "migrate",
+        f"import issia {folder} --dataset given",
+        "solve --dataset given --workers 1",
+    )
     with serving(home) as address:
-        context = browser.new_context(base_url=address, viewport={"width": 1100, "height": 700})
-        yield context.new_page()
-        context.close()
+        yield address
+
+
+@pytest.fixture
+def given(open_page: OpenPage, unmeasured: str) -> Page:
+    """A page of that server."""
+    return open_page(None, size=SMALL, address=unmeasured)
 
 
 class TestUnmeasuredJac:

@@ -10,6 +10,7 @@ from zipfile import ZipFile
 import pytest
 from playwright.sync_api import Page, Route, expect
 
+from tests.e2e.service import delete_dataset
 from tests.e2e.test_access import (
     BEYOND_ITS_FRAME,
     NESTED_SCROLLERS,
@@ -219,21 +220,20 @@ class TestStatistics:
 
 
 @pytest.fixture
-def labels(home: Path, tmp_path: Path) -> Path:
+def labels(labels_file: Path, tmp_path: Path, server: str) -> Iterator[Path]:
     """A zip with the labels of one match of the sample, without frames."""
-    found = sorted(home.parent.rglob("Labels-v3.json"))[0]
     target = tmp_path / "match.zip"
     with ZipFile(target, "w") as archive:
-        archive.write(found, "/".join(found.parts[-4:]))
-    return target
+        archive.write(labels_file, "/".join(labels_file.parts[-4:]))
+    yield target
+    delete_dataset(server, "passing through")
 
 
 @pytest.fixture
-def predictions(home: Path, tmp_path: Path) -> Path:
+def predictions(labels_file: Path, tmp_path: Path) -> Path:
     """COCO results: every ball of that match, a little too large."""
-    found = sorted(home.parent.rglob("Labels-v3.json"))[0]
-    labels = json.loads(found.read_text())
-    rows = list(_boxes(labels, "/".join(found.parts[-4:-1])))
+    labels = json.loads(labels_file.read_text())
+    rows = list(_boxes(labels, "/".join(labels_file.parts[-4:-1])))
     target = tmp_path / "detector.json"
     target.write_text(json.dumps(rows))
     return target

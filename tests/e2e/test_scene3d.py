@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.e2e.conftest import CONTEXTS
 from tests.e2e.screen import Screen, passing
 from tests.e2e.test_access import serious
 
 OpenPage = Callable[..., Page]
-MORE_THAN_CHROMIUM_KEEPS = 18
-"""Times the view is opened: sixteen contexts that nobody gave back make Chromium complain."""
+MORE_THAN_CHROMIUM_KEEPS = CONTEXTS + 2
+"""Times the view is opened: more contexts that nobody gave back make Chromium complain."""
 
 LABELS = """() => [...document.querySelectorAll('.scene3d__camera')].map((label) => {
   const { x, y, width, height } = label.getBoundingClientRect();

@@ -1,0 +1,88 @@
+"""Windows of a browser, each as new to the page as if nobody had been there.
+
+What a window has loaded from the server stays with the browser from test to test; what the page
+kept for itself (storage, databases, cookies) does not.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+from playwright.sync_api import Browser, BrowserContext, CDPSession, Error, Page
+
+SIZE = {"width": 1440, "height": 900}
+TIMEOUT_MS = 20_000
+NOTHING_ON_ITS_WAY = """() => {
+  const save = document.querySelector('.save[data-unsaved]');
+  return !save || save.dataset.unsaved === '0' || ['away', 'failed'].includes(save.dataset.state);
+}"""
+KEPT_BY_PAGES = "cookies,indexeddb,local_storage,service_workers,cache_storage"
+
+
+def _let_write(page: Page) -> None:
+    """Wait for what the page is about to save: the next test must not meet it on its way."""
+    with suppress(Error):
+        page.wait_for_function(NOTHING_ON_ITS_WAY, timeout=TIMEOUT_MS)
+
+
+@dataclass
+class _Window:
+    """One profile of the browser, and a blank page through which it is cleaned."""
+
+    address: str
+    context: BrowserContext
+    blank: Page
+    cleaner: CDPSession
+
+    @classmethod
+    def new(cls, browser: Browser, address: str) -> _Window:
+        context = browser.new_context(base_url=address, accept_downloads=True)
+        blank = context.new_page()
+        return cls(address, context, blank, context.new_cdp_session(blank))
+
+    def clean(self) -> None:
+        origins = {self.address}
+        self.context.set_offline(False)
+        self.context.unroute_all()
+        for page in self.context.pages:
+            if page is not self.blank:
+                _let_write(page)
+                origins.add("{0.scheme}://{0.netloc}".format(urlsplit(page.url)))
+                page.close()
+        for origin in origins:
+            self.cleaner.send(
+                "Storage.clearDataForOrigin", {"origin": origin, "storageTypes": KEPT_BY_PAGES}
+            )
+
+
+class Windows:
+    """Windows of one browser: taken by a test, given back cleaned."""
+
+    def __init__(self, browser: Browser):
+        self.browser = browser
+        self._free: defaultdict[str, list[_Window]] = defaultdict(list)
+        self._taken: list[_Window] = []
+
+    def take(
+        self, address: str, scheme: str = "dark", size: Mapping[str, int] | None = None
+    ) -> Page:
+        """A blank page in a window of its own, whose relative addresses start at ``address``."""
+        free = self._free[address]
+        window = free.pop() if free else _Window.new(self.browser, address)
+        self._taken.append(window)
+        page = window.context.new_page()
+        page.set_viewport_size(size or SIZE)  # type: ignore[arg-type]
+        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        page.set_default_timeout(TIMEOUT_MS)
+        return page
+
+    def give_back(self) -> None:
+        """Clean and keep every window that was taken."""
+        while self._taken:
+            window = self._taken.pop()
+            window.clean()
+            self._free[window.address].append(window)
