@@ -18,6 +18,7 @@
       StorageError          the disk or the database refuses
       OverloadedError       more work waits than is taken
     ShapeError(ValueError)  our own mistake, outside the tree
+    JobCancelled            no error at all: somebody wants the work to end
 
 Only ``api/errors.py`` knows which HTTP status belongs to which branch, and only ``cli.py`` which
 exit code.
@@ -144,6 +145,10 @@ class StorageError(ReviewError):
 
 class OverloadedError(ReviewError):
     """As much waits as may wait; later it can be taken."""
+
+
+class JobCancelled(Exception):  # noqa: N818
+    """The job shall end here: a person cancelled it, or the server stops."""
 
 
 class ShapeError(ValueError):

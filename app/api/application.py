@@ -45,7 +45,7 @@ from app.api.security.headers import SecurityHeaders
 from app.api.security.origin import KnownHosts, SameOrigin
 from app.api.security.requests import HeadAsGet, OneRange
 from app.config import Settings
-from app.review.jobs import Pool
+from app.review.jobs.jobs import Pool
 
 PREFIX = "/api/v1"
 ROUTERS = (

@@ -11,17 +11,17 @@ from fastapi import Depends, Header, Path, Query, Request
 
 from app.api.errors import PreconditionRequiredError
 from app.api.events import Events
-from app.api.export_folder import ExportFolder
-from app.api.export_job import resume_exports
 from app.config import Settings
 from app.errors import InputError
-from app.review.evaluation_jobs import resume_evaluations
-from app.review.import_jobs import resume_imports
-from app.review.jobs import Jobs, Pool
-from app.review.practice import resume_practice
-from app.review.solve_job import resume_solving, solve_leftovers
-from app.review.version_jobs import resume_versions
-from app.review.yield_store import YieldStore
+from app.review.exporting.folder import ExportFolder
+from app.review.jobs.evaluations import resume_evaluations
+from app.review.jobs.exports import resume_exports
+from app.review.jobs.imports import resume_imports
+from app.review.jobs.jobs import Jobs, Pool
+from app.review.jobs.solve import resume_solving, solve_leftovers
+from app.review.jobs.versions import resume_versions
+from app.review.practice.practice import resume_practice
+from app.review.yields.store import YieldStore
 from app.solving.warm import warm_up
 from app.store.session import Store
 

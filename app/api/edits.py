@@ -5,8 +5,8 @@ from __future__ import annotations
 from app.api.schemas.annotation import points_of
 from app.api.schemas.preview import PreviewRequest, ViewPreview
 from app.errors import InputError
-from app.review.edit import Edit, IncludeView, SetBall, SetLines
-from app.review.state import GroupState
+from app.review.editing.edit import Edit, IncludeView, SetBall, SetLines
+from app.review.editing.state import GroupState
 
 
 def preview_edits(state: GroupState, request: PreviewRequest) -> list[Edit]:

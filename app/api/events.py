@@ -18,14 +18,14 @@ from fastapi.sse import ServerSentEvent
 from app.api.schemas.event import DatasetEvent, GroupEvent
 from app.api.schemas.job import JobDocument
 from app.errors import OverloadedError, StorageError
-from app.review.changes import (
+from app.review.jobs.jobs import Jobs
+from app.review.queue.changes import (
     Change,
     newest_entry,
     newest_solution,
     read_changes,
     read_solved,
 )
-from app.review.jobs import Jobs
 from app.store.jobs import OPEN, Job
 from app.store.session import Store
 

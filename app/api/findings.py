@@ -8,8 +8,8 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, func, select
 
-from app.review.datasets import get_dataset
-from app.review.state import GroupState, read_states
+from app.review.datasets.dataset import get_dataset
+from app.review.editing.state import GroupState, read_states
 from app.soccer.solution import Finding
 from app.store.models import QueueModel
 from app.store.session import Store

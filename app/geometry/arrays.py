@@ -1,4 +1,4 @@
-"""The array type of this floor and the check of its shapes."""
+"""The types of arrays, and the check of their shapes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import numpy.typing as npt
 from app.errors import ShapeError
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 
 def require_shape(array: FloatArray, shape: tuple[int | None, ...], name: str) -> FloatArray:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from app.config import Settings
-from app.review.ingest import ingest
-from app.review.recompute import solve_dataset
+from app.review.editing.recompute import solve_dataset
+from app.review.importing.ingest import ingest
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.store.session import Store

@@ -14,15 +14,15 @@ from app.cli import app as cli
 from app.config import Settings
 from app.errors import InputError
 from app.evaluation.overlap import iou
-from app.review.accept import AcceptRequest, accept
-from app.review.detect import DetectRequest, detect
-from app.review.edit import SetBall
-from app.review.evaluations import EvaluationRequest, run_evaluation, tables_of
-from app.review.onnx_model import OnnxModel
-from app.review.predictions import view_predictions
-from app.review.recompute import solve_dataset
-from app.review.sources import Source, import_source
-from app.review.submit import load, submit
+from app.review.editing.edit import SetBall
+from app.review.editing.recompute import solve_dataset
+from app.review.editing.submit import load, submit
+from app.review.evaluating.accept import AcceptRequest, accept
+from app.review.evaluating.detect import DetectRequest, detect
+from app.review.evaluating.evaluation import EvaluationRequest, run_evaluation, tables_of
+from app.review.evaluating.onnx_model import OnnxModel
+from app.review.evaluating.predictions import view_predictions
+from app.review.importing.sources import Source, import_source
 from app.sample.truth import read_truth
 from app.sample.write import write_sample
 from app.soccer.frames import Box, ImageSize
@@ -178,8 +178,8 @@ def found_at_least(frames: int) -> int:
 
 
 def _states(store: Store):
-    from app.review.datasets import get_dataset
-    from app.review.queue import list_groups
+    from app.review.datasets.dataset import get_dataset
+    from app.review.queue.listing import list_groups
 
     page = list_groups(store, get_dataset(store, "drawn").id, limit=500)
     return [load(store, row.id) for row in page.items]

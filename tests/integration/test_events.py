@@ -14,7 +14,7 @@ import httpx
 import pytest
 
 from app.config import Settings
-from app.review.datasets import create_dataset
+from app.review.datasets.dataset import create_dataset
 from app.store.session import Store
 from tests.integration.conftest import COMMAND, environment
 

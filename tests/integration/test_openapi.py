@@ -23,18 +23,18 @@ from schemathesis.config import (
 )
 
 from app.api.application import create_app
-from app.api.export_job import request_export
 from app.config import Settings
 from app.datasets.report import Report
 from app.datasets.soccernet_v3 import read_soccernet_v3
-from app.review.evaluations import EvaluationRequest, run_evaluation
-from app.review.freeze import FreezeRequest, freeze
-from app.review.ingest import ingest
-from app.review.policies import read_policy
-from app.review.predictions import PredictionFiles, add_predictions
-from app.review.recompute import solve_dataset
-from app.review.stations import load_station
-from app.review.submit import load
+from app.review.editing.recompute import solve_dataset
+from app.review.editing.stations import load_station
+from app.review.editing.submit import load
+from app.review.evaluating.evaluation import EvaluationRequest, run_evaluation
+from app.review.evaluating.predictions import PredictionFiles, add_predictions
+from app.review.importing.ingest import ingest
+from app.review.jobs.exports import request_export
+from app.review.policies.policy import read_policy
+from app.review.versions.freeze import FreezeRequest, freeze
 from app.store.session import Store
 from app.store.uploads import UploadWriter
 

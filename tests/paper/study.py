@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from app.evaluation.evaluate import Evaluation, Inputs, Options, evaluate
 from app.evaluation.frame import Detection, Frame
-from app.review.datasets import get_dataset
-from app.review.evaluation_frames import Truth, live_truth
-from app.review.ingest import ingest
-from app.review.recompute import solve_dataset
+from app.review.datasets.dataset import get_dataset
+from app.review.editing.recompute import solve_dataset
+from app.review.evaluating.frames import Truth, live_truth
+from app.review.importing.ingest import ingest
 from app.sample.scene import Scene
 from app.sample.scenes import make_scenes
 from app.soccer.frames import Box

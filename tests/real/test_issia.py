@@ -12,10 +12,10 @@ import pytest
 from app.config import Settings
 from app.datasets.issia import IssiaOptions, read_issia
 from app.datasets.report import Report
-from app.review.datasets import create_dataset
-from app.review.export import export
-from app.review.ingest import ingest
-from app.review.recompute import solve_dataset
+from app.review.datasets.dataset import create_dataset
+from app.review.editing.recompute import solve_dataset
+from app.review.exporting.export import export
+from app.review.importing.ingest import ingest
 from app.soccer.policy import PAPER
 from app.soccer.solution import Solution
 from app.solving.solve import solve

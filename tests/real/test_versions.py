@@ -16,15 +16,15 @@ from app.config import Settings
 from app.datasets.archive import DEFAULT_LIMITS
 from app.datasets.issia import IssiaOptions, read_issia
 from app.datasets.report import Report
-from app.review.carry_in import carry_in
-from app.review.export import export
-from app.review.freeze import FreezeRequest, freeze
-from app.review.ingest import ingest
-from app.review.recompute import solve_dataset
-from app.review.split import Split
-from app.review.submit import load
-from app.review.verdict import set_verdict
-from app.review.verify import verify
+from app.review.editing.recompute import solve_dataset
+from app.review.editing.submit import load
+from app.review.exporting.export import export
+from app.review.importing.carry_in import carry_in
+from app.review.importing.ingest import ingest
+from app.review.verdicts.verdict import set_verdict
+from app.review.versions.freeze import FreezeRequest, freeze
+from app.review.versions.verify import verify
+from app.soccer.split import Split
 from app.store.models import GroupModel
 from app.store.session import Store
 

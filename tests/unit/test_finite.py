@@ -24,6 +24,7 @@ import app
 import app.api.schemas as schemas
 from app.api.findings import GroupFindings
 from app.api.schemas.solution import SolutionDocument
+from app.commands.terminal import only_finite, print_json, print_values
 from app.datasets.export_record import ExportRecord
 from app.datasets.manifest import Manifest, write_manifest
 from app.datasets.parquet import pyarrow_modules
@@ -31,11 +32,10 @@ from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.figure_csv import figure_csv
 from app.finite import finite, json_text
 from app.geometry.camera import Camera
-from app.review.export_formats import FORMATS, WriteOptions, write_format
+from app.review.exporting.formats import FORMATS, WriteOptions, write_format
 from app.soccer.solution import BestBall, Finding, Fix, Gate, MarkingFit, Solution, Suspect
 from app.store.jobs import _text as job_text
 from app.store.value_codec import dumps, from_json, to_json
-from app.terminal import only_finite, print_json, print_values
 from tests.unit.datasets.conftest import camera, issia_group, soccer_group, solved  # noqa: F401
 
 BAD = (math.inf, -math.inf, math.nan)

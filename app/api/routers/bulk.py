@@ -16,8 +16,8 @@ from app.api.schemas.bulk import (
     RedoDocument,
     UndoDocument,
 )
-from app.review import bulk, bulk_redo, bulk_undo
-from app.review.datasets import dataset_id
+from app.review.datasets.dataset import dataset_id
+from app.review.verdicts import bulk, bulk_redo, bulk_undo
 
 router = APIRouter(tags=["verdicts"])
 

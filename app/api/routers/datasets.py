@@ -15,10 +15,10 @@ from app.api.schemas.dataset import (
     DeletedDocument,
     SummaryDocument,
 )
-from app.review import datasets as review
-from app.review import delete_dataset as deletion
-from app.review.delete_dataset import read_contents
-from app.review.progress import summary
+from app.review.datasets import dataset as review
+from app.review.datasets import delete as deletion
+from app.review.datasets.delete import read_contents
+from app.review.queue.progress import summary
 
 router = APIRouter(prefix="/datasets", tags=["datasets"])
 

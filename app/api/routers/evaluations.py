@@ -28,8 +28,8 @@ from app.evaluation.figure_csv import figure_csv, table_csv
 from app.evaluation.figure_png import figure_png
 from app.evaluation.result import NUMBERS
 from app.evaluation.table import TABLES
-from app.review import evaluations as review
-from app.review.evaluation_jobs import request_evaluation
+from app.review.evaluating import evaluation as review
+from app.review.jobs.evaluations import request_evaluation
 
 router = APIRouter(tags=["evaluations"])
 

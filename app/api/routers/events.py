@@ -12,7 +12,7 @@ from app.api.deps import AppServices, Services, get_services
 from app.api.events import Feed, hello
 from app.api.problem import Responses, responses
 from app.api.security.requests import is_head
-from app.review.datasets import get_dataset
+from app.review.datasets.dataset import get_dataset
 
 router = APIRouter(prefix="/events", tags=["events"])
 

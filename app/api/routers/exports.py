@@ -10,7 +10,6 @@ from fastapi import APIRouter, Depends, Path, Response
 from starlette.responses import FileResponse
 
 from app.api.deps import Actor, AppServices, IdempotencyKey, Services
-from app.api.export_job import KIND, request_export
 from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import Responses, responses
 from app.api.routers.jobs import Cursor, DatasetFilter, Limit, parse_cursor
@@ -21,7 +20,8 @@ from app.api.schemas.export import (
     ExportRequest,
 )
 from app.errors import ConflictError, NotFoundError
-from app.review.datasets import get_dataset
+from app.review.datasets.dataset import get_dataset
+from app.review.jobs.exports import KIND, request_export
 
 router = APIRouter(prefix="/exports", tags=["exports"])
 

@@ -11,7 +11,7 @@ from app.api.findings import count_groups, read_findings
 from app.api.problem import responses
 from app.api.schemas.queue import FindingList, FindingRow
 from app.errors import InputError
-from app.review.datasets import get_dataset
+from app.review.datasets.dataset import get_dataset
 from app.soccer.solution import FINDING_KINDS
 
 router = APIRouter(prefix="/findings", tags=["findings"])

@@ -34,10 +34,11 @@ from app.api.schemas.queue import (
 from app.api.schemas.solution import SolutionDocument
 from app.api.schemas.verdict import VerdictEdit
 from app.errors import InputError, NotFoundError
-from app.review import queue, submit
-from app.review.datasets import get_dataset
-from app.review.state import GroupState
-from app.review.verdict import set_verdict
+from app.review.datasets.dataset import get_dataset
+from app.review.editing import submit
+from app.review.editing.state import GroupState
+from app.review.queue import listing as queue
+from app.review.verdicts.verdict import set_verdict
 from app.store.session import Store
 
 router = APIRouter(prefix="/groups", tags=["groups"])

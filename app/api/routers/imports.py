@@ -11,8 +11,8 @@ from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import responses
 from app.api.schemas.imports import FolderDocument, ImportBody
 from app.api.schemas.job import JobDocument
-from app.review.import_folders import list_folder
-from app.review.import_jobs import request_import
+from app.review.importing.folders import list_folder
+from app.review.jobs.imports import request_import
 
 router = APIRouter(prefix="/imports", tags=["imports"])
 

@@ -9,9 +9,9 @@ from app.api.lookup import find_view
 from app.api.problem import responses
 from app.api.routers.groups import with_solution
 from app.api.schemas.insight import InfluenceDocument, Influences, Remedies, RemedyDocument
-from app.review import submit
-from app.review.influence import influences
-from app.review.remedies import find_remedies
+from app.review.editing import submit
+from app.review.editing.influence import influences
+from app.review.editing.remedies import find_remedies
 
 router = APIRouter(tags=["insight"])
 

@@ -10,7 +10,7 @@ from app.api.deps import AppServices, Id
 from app.api.problem import responses
 from app.api.schemas.job import JobDocument, JobKind, JobPage, JobState
 from app.errors import InputError
-from app.review.datasets import get_dataset
+from app.review.datasets.dataset import get_dataset
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 

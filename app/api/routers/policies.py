@@ -17,11 +17,11 @@ from app.api.schemas.policy import (
     ShippedPolicyDocument,
 )
 from app.errors import InputError
-from app.review.datasets import get_dataset
-from app.review.policies import change_policy, read_policy
-from app.review.policy_fields import FIELDS
-from app.review.policy_text import CUSTOM, policy_from_yaml, policy_with
-from app.review.solve_job import request_solve
+from app.review.datasets.dataset import get_dataset
+from app.review.jobs.solve import request_solve
+from app.review.policies.fields import FIELDS
+from app.review.policies.policy import change_policy, read_policy
+from app.review.policies.text import CUSTOM, policy_from_yaml, policy_with
 from app.soccer.policy import POLICIES, Policy
 
 router = APIRouter(tags=["policies"])

@@ -9,8 +9,8 @@ from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import responses
 from app.api.schemas.job import JobDocument
 from app.api.schemas.practice import LessonDocument, PracticeBody, PracticeDocument
-from app.review.practice import read_lesson, read_practice, request_practice
-from app.review.submit import load
+from app.review.editing.submit import load
+from app.review.practice.practice import read_lesson, read_practice, request_practice
 
 router = APIRouter(tags=["practice"])
 

@@ -26,10 +26,10 @@ from app.api.schemas.prediction import (
     size_of,
 )
 from app.config import Settings
-from app.review import predictions as review
-from app.review.accept import accept, accept_box, plan_accept
-from app.review.evaluation_jobs import request_accept
-from app.review.predictions_of_group import group_predictions
+from app.review.evaluating import predictions as review
+from app.review.evaluating.accept import accept, accept_box, plan_accept
+from app.review.evaluating.group_predictions import group_predictions
+from app.review.jobs.evaluations import request_accept
 from app.store.uploads import upload_path
 
 router = APIRouter(tags=["predictions"])

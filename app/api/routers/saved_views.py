@@ -13,8 +13,9 @@ from app.api.schemas.saved_view import (
     SavedViewDocument,
     SavedViewList,
 )
-from app.review import reviewers, saved_views
-from app.review.datasets import dataset_id
+from app.review.datasets.dataset import dataset_id
+from app.review.queue import saved_views
+from app.review.verdicts import reviewers
 
 router = APIRouter(tags=["queue"])
 

@@ -25,17 +25,17 @@ from app.api.schemas.group import GroupDocument
 from app.api.schemas.station import StationDetail
 from app.api.schemas.view import StationEdit
 from app.errors import NotFoundError
-from app.review.datasets import get_dataset
-from app.review.edit import SetStationCalibration, SetStationLines
-from app.review.solve_job import request_solve
-from app.review.stations import (
+from app.review.datasets.dataset import get_dataset
+from app.review.editing.edit import SetStationCalibration, SetStationLines
+from app.review.editing.stations import (
     StationState,
     load_station,
     redo_station,
     submit_station,
     undo_station,
 )
-from app.review.submit import solved
+from app.review.editing.submit import solved
+from app.review.jobs.solve import request_solve
 
 router = APIRouter(prefix="/stations", tags=["stations"])
 

@@ -7,8 +7,8 @@ from fastapi import APIRouter
 from app.api.deps import AppStore, DatasetPath, QueryText
 from app.api.problem import responses
 from app.api.schemas.statistics import StatisticsDocument
-from app.review.datasets import dataset_id
-from app.review.statistics import statistics
+from app.review.datasets.dataset import dataset_id
+from app.review.queue.statistics import statistics
 
 router = APIRouter(prefix="/datasets/{dataset}/statistics", tags=["datasets"])
 

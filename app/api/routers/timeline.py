@@ -9,8 +9,8 @@ from fastapi import APIRouter, Query
 from app.api.deps import AppStore, DatasetPath, QueryText
 from app.api.problem import responses
 from app.api.schemas.timeline import TimelineDocument
-from app.review.datasets import dataset_id
-from app.review.timeline import read_timeline
+from app.review.datasets.dataset import dataset_id
+from app.review.queue.timeline import read_timeline
 
 router = APIRouter(prefix="/datasets/{dataset}/timeline", tags=["datasets"])
 

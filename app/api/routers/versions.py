@@ -19,10 +19,11 @@ from app.api.schemas.version import (
     VersionManifest,
     VersionRequest,
 )
-from app.review import version_jobs, versions
-from app.review.freeze import plan_freeze
-from app.review.version_diff import changelog, diff_versions
-from app.review.version_manifest import version_manifest
+from app.review.jobs import versions as version_jobs
+from app.review.versions import version as versions
+from app.review.versions.diff import changelog, diff_versions
+from app.review.versions.freeze import plan_freeze
+from app.review.versions.manifest import version_manifest
 
 router = APIRouter(tags=["versions"])
 

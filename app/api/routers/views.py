@@ -26,8 +26,8 @@ from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.review.edit import Edit, IncludeView, SetBall, SetCalibrationSource, SetLines
-from app.review.submit import submit
+from app.review.editing.edit import Edit, IncludeView, SetBall, SetCalibrationSource, SetLines
+from app.review.editing.submit import submit
 from app.soccer.group import Media
 from app.store.media import content_type, read_frame
 from app.store.neighbours import FARTHEST, neighbours

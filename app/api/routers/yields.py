@@ -7,8 +7,8 @@ from fastapi import APIRouter
 from app.api.deps import AppServices, DatasetPath
 from app.api.problem import responses
 from app.api.schemas.yields import WhatIf, YieldDocument
-from app.review.datasets import dataset_id
-from app.review.yields import get_yield
+from app.review.datasets.dataset import dataset_id
+from app.review.yields.funnel import get_yield
 
 router = APIRouter(prefix="/datasets/{dataset}/yield", tags=["yield"])
 

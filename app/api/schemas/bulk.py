@@ -8,9 +8,9 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.group import State
-from app.review.bulk import Batch, BatchReport, BulkPlan, Refusal
-from app.review.bulk_redo import RedoReport
-from app.review.query import MAX_LISTED_LENGTH
+from app.review.queue.query import MAX_LISTED_LENGTH
+from app.review.verdicts.bulk import Batch, BatchReport, BulkPlan, Refusal
+from app.review.verdicts.bulk_redo import RedoReport
 from app.soccer.reasons import Reason
 
 

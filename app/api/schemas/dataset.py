@@ -8,8 +8,8 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.policy import PolicyDocument
-from app.review.datasets import Dataset
-from app.review.progress import Summary
+from app.review.datasets.dataset import Dataset
+from app.review.queue.progress import Summary
 
 
 class DatasetDocument(BaseModel):

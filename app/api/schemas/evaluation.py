@@ -11,7 +11,7 @@ from app.evaluation.comparison import Difference, FrameDifference
 from app.evaluation.figure import Figure
 from app.evaluation.result import FrameResult
 from app.evaluation.table import Cell, Table
-from app.review.evaluations import (
+from app.review.evaluating.evaluation import (
     Comparison,
     EvaluationRequest,
     FramePage,

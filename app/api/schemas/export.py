@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.api.export_folder import ExportEntry
 from app.api.schemas.job import JobDocument
 from app.datasets.format_names import ExportFormat
+from app.review.exporting.folder import ExportEntry
 from app.store.jobs import DONE, Job
 
 Boxes = Literal["optimized", "annotated", "exact"]

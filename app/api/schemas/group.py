@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from app.api.schemas.annotation import Ball, LineDocuments, lines_document
 from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.solution import SolutionDocument
-from app.review.state import GroupState, VerdictState
+from app.review.editing.state import GroupState, VerdictState
 from app.soccer.group import Group, View
 from app.store.neighbours import counts_time
 

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from app.datasets.format_names import ImportFormat
-from app.review.import_folders import FolderListing
-from app.review.import_jobs import ImportRequest
+from app.review.importing.folders import FolderListing
+from app.review.jobs.imports import ImportRequest
 
 Camera = Annotated[int, Field(ge=0, le=999)]
 Offset = Annotated[int, Field(ge=-999_999, le=999_999)]

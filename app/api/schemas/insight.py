@@ -5,8 +5,8 @@ from __future__ import annotations
 from pydantic import BaseModel, Field
 
 from app.api.schemas.solution import XY, FixDocument
-from app.review.influence import Influence
-from app.review.remedies import Remedy
+from app.review.editing.influence import Influence
+from app.review.editing.remedies import Remedy
 from app.soccer.solution import GAMMAS_PERCENT
 
 Jac = dict[str, float]

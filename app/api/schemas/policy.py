@@ -7,8 +7,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.review.policies import PolicyState
-from app.review.policy_text import MAX_CHARACTERS, policy_to_yaml, policy_values
+from app.review.policies.policy import PolicyState
+from app.review.policies.text import MAX_CHARACTERS, policy_to_yaml, policy_values
 from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy
 
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel, Field
 
-from app.review.practice import Practice, PracticeLesson
+from app.review.practice.practice import Practice, PracticeLesson
 
 LessonState = Literal["open", "mended", "right", "almost", "wrong"]
 

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, model_validator
 
-from app.review.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
-from app.review.predictions_of_group import GroupPredictions
+from app.review.evaluating.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
+from app.review.evaluating.group_predictions import GroupPredictions
 from app.soccer.frames import ImageSize
 from app.store.predictions import PredictedBox, PredictionSet
 

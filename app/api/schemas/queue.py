@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field
 
 from app.api.schemas.group import State, image_address
 from app.api.schemas.solution import FailingGate, FixDocument
-from app.review.queue import GroupRow as QueueRow
+from app.review.queue.listing import GroupRow as QueueRow
 from app.store.log import LogEntry
 
 THUMBNAIL_WIDTH = 208

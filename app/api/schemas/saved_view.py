@@ -7,8 +7,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.review.reviewers import Reviewer
-from app.review.saved_views import MAX_NAME, SavedView
+from app.review.queue.saved_views import MAX_NAME, SavedView
+from app.review.verdicts.reviewers import Reviewer
 
 
 class NewSavedView(BaseModel):

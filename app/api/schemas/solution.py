@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, Field
 
 from app.datasets.camera_json import camera_to_json
-from app.review.camera_sigma import CameraSigma, camera_sigma
+from app.soccer.camera_sigma import CameraSigma, camera_sigma
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 from app.soccer.solution import (
     GAMMAS_PERCENT,

@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 
 from app.api.schemas.annotation import LineDocuments, lines_document
 from app.api.schemas.group import DatasetName
-from app.review.stations import StationState
+from app.review.editing.stations import StationState
 
 
 class StationDetail(BaseModel):

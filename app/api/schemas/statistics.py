@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, Field
 
-from app.review.statistics import Histogram, Share, Statistics
+from app.review.queue.statistics import Histogram, Share, Statistics
 
 
 class SplitSeries(BaseModel):

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field
 
-from app.review.timeline import Timeline
+from app.review.queue.timeline import Timeline
 
 Place = Annotated[list[float], Field(min_length=3, max_length=3)]
 """x, y, z. No tuple: in lists the checkers of OpenAPI documents stumble over them."""

@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt
 
 from app.api.schemas.policy import PolicyDocument
-from app.review.freeze import MAX_LICENCE, MAX_NOTE, FreezePlan, FreezeRequest
-from app.review.split import TEST_CAMERAS, Split
-from app.review.verification import Verification
-from app.review.version_diff import VersionDiff
-from app.review.versions import Version
+from app.review.versions.diff import VersionDiff
+from app.review.versions.freeze import MAX_LICENCE, MAX_NOTE, FreezePlan, FreezeRequest
+from app.review.versions.verification import Verification
+from app.review.versions.version import Version
+from app.soccer.split import TEST_CAMERAS, Split
 
 Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 SHOWN_DIFFERENCES = 40

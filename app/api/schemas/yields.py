@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.policy import PolicyDocument
-from app.review.yields import THRESHOLDS, UNSOLVED, Yield
+from app.review.yields.funnel import THRESHOLDS, UNSOLVED, Yield
 
 Number = Annotated[float, Field(ge=-1e6, le=1e6)]
 

@@ -17,8 +17,8 @@ from app.api.application import create_app
 from app.api.deps import Services
 from app.config import Settings
 from app.geometry.camera import Camera
-from app.review.ingest import ingest
-from app.review.recompute import solve_dataset
+from app.review.editing.recompute import solve_dataset
+from app.review.importing.ingest import ingest
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, Station, View

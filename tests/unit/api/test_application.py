@@ -11,8 +11,8 @@ from structlog.testing import capture_logs
 from app.api.application import create_app
 from app.config import Settings
 from app.errors import StorageError
-from app.review.datasets import get_dataset
-from app.review.ingest import ingest
+from app.review.datasets.dataset import get_dataset
+from app.review.importing.ingest import ingest
 from app.store.session import Store
 
 API = "/api/v1"

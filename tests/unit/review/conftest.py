@@ -17,12 +17,12 @@ from sqlalchemy import select
 
 from app.config import Settings
 from app.geometry.camera import Camera
-from app.review.datasets import get_dataset
-from app.review.ingest import ingest
-from app.review.queue import list_groups
-from app.review.recompute import solve_dataset
-from app.review.state import GroupState
-from app.review.submit import load
+from app.review.datasets.dataset import get_dataset
+from app.review.editing.recompute import solve_dataset
+from app.review.editing.state import GroupState
+from app.review.editing.submit import load
+from app.review.importing.ingest import ingest
+from app.review.queue.listing import list_groups
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, Station, View

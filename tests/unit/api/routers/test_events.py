@@ -16,10 +16,10 @@ from fastapi import FastAPI
 
 from app.api import events as module
 from app.api.server import Server, listen
-from app.review.datasets import set_policy
-from app.review.edit import IncludeView
-from app.review.submit import load, submit
-from app.review.verdict import set_verdict
+from app.review.datasets.dataset import set_policy
+from app.review.editing.edit import IncludeView
+from app.review.editing.submit import load, submit
+from app.review.verdicts.verdict import set_verdict
 from app.soccer.policy import STRICT
 
 SECONDS = 20
@@ -146,7 +146,7 @@ class TestListen:
         with opened(address, dataset="broadcast") as stream:
             set_policy(services.store, "broadcast", STRICT, actor="bob")
             assert stream.next()[0] == "dataset"
-            from app.review.recompute import solve_dataset
+            from app.review.editing.recompute import solve_dataset
 
             solve_dataset(services.store, "broadcast")
             told = {stream.until(lambda name, _: name == "group")["group"] for _ in range(3)}

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from app.api.routers import exports as module
-from app.review.jobs import Jobs
+from app.review.jobs.jobs import Jobs
 
 SECONDS = 30
 API = "/api/v1/exports"
@@ -152,7 +152,7 @@ class TestRestart:
     ) -> None:
         # The first server still believes that it is to write it.
         monkeypatch.setattr(module, "PATIENCE", 0.1)
-        from app.api.export_job import resume_exports
+        from app.review.jobs.exports import resume_exports
 
         services = app.state.services
         services.jobs._closing.set()

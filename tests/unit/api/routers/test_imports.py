@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from app.datasets.soccernet_v3 import write_soccernet_v3
-from app.review.datasets import get_dataset
-from app.review.import_jobs import resume_imports
+from app.review.datasets.dataset import get_dataset
+from app.review.jobs.imports import resume_imports
 from app.soccer.group import Group
 from app.store.jobs import NewJob, insert_job, update_job
 from app.store.log import read_log

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from app.review.jobs import Progress
+from app.review.jobs.jobs import Progress
 
 SECONDS = 20
 API = "/api/v1/jobs"

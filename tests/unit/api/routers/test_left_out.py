@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 import pytest
 
-from app.review.freeze import FreezeRequest, freeze
-from app.review.ingest import ingest
+from app.review.importing.ingest import ingest
+from app.review.versions.freeze import FreezeRequest, freeze
 from app.soccer.group import Group, Media
 from app.store.neighbours import FARTHEST
 

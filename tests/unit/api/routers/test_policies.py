@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from app.review.policy_text import policy_to_yaml
+from app.review.policies.text import policy_to_yaml
 from app.soccer.policy import PAPER, STRICT
 
 SECONDS = 30

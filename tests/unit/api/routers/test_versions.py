@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from app.api.deps import Services
-from app.review.freeze import FreezeRequest, freeze
-from app.review.jobs import Jobs
-from app.review.version_jobs import request_freeze, resume_versions
+from app.review.jobs.jobs import Jobs
+from app.review.jobs.versions import request_freeze, resume_versions
+from app.review.versions.freeze import FreezeRequest, freeze
 
 API = "/api/v1"
 

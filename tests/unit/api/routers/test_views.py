@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from app.api.routers.views import MAX_WIDTH, MIN_WIDTH, clamp_width
-from app.review.ingest import ingest
+from app.review.importing.ingest import ingest
 from app.soccer.group import Media
 
 API = "/api/v1"

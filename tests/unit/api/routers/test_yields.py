@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from app.api.schemas.yields import LABELS, WhatIf
-from app.review.yields import UNSOLVED
+from app.review.yields.funnel import UNSOLVED
 from app.soccer.policy import THRESHOLDS
 from app.soccer.solution import GATES
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from app.api.schemas.prediction import AcceptOutcome, ViewPrediction
-from app.review.accept import Accepted, AcceptPlan
+from app.review.evaluating.accept import Accepted, AcceptPlan
 from app.store.predictions import PredictedBox, PredictionSet
 
 SET = PredictionSet(

@@ -1,0 +1,86 @@
+"""Commands on line files: calibrate, score, pitch; they need no dataset."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.commands.opened import process_pool
+from app.commands.options import Json, Size, Workers, parse_size, read_settings
+from app.commands.terminal import print_values, show_progress
+
+commands = typer.Typer()
+
+
+class Labels(StrEnum):
+    """Whether calibration doubts the names of markings."""
+
+    CHECKED = "checked"
+    GIVEN = "given"
+
+
+@commands.command()
+def calibrate(
+    source: Annotated[Path, typer.Argument(metavar="IN", exists=True)],
+    out: Annotated[Path, typer.Argument(metavar="OUT")],
+    size: Size = "960x540",
+    labels: Annotated[Labels, typer.Option(help="checked leaves out wrong labels.")] = (
+        Labels.CHECKED
+    ),
+    leave_one_out: Annotated[
+        bool, typer.Option("--leave-one-out", help="Drop each marking in turn, too.")
+    ] = False,
+    workers: Workers = None,
+    json_: Json = False,
+) -> None:
+    """Calibrate line files (folder or zip) to camera files; needs no dataset."""
+    from app.review.datasets.batch import calibrate_files
+
+    pool = process_pool(workers or read_settings().workers)
+    with pool as executor, show_progress("Calibrating") as progress:
+        result = calibrate_files(
+            source,
+            out,
+            size=parse_size(size),
+            labels=labels.value,
+            with_leave_one_out=leave_one_out,
+            executor=executor,
+            progress=progress,
+        )
+    print_values(result, json_)
+
+
+@commands.command()
+def score(
+    lines: Annotated[Path, typer.Argument(metavar="LINES", exists=True)],
+    cameras: Annotated[Path, typer.Argument(metavar="CAMERAS", exists=True)],
+    size: Size = "960x540",
+    without: Annotated[
+        Path | None,
+        typer.Option(exists=True, dir_okay=False, help="findings.json: leave those markings out."),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Measure camera files against line files: JaC, completeness, errors."""
+    from app.review.datasets.batch import score_files
+
+    with show_progress("Scoring") as progress:
+        result = score_files(
+            lines, cameras, size=parse_size(size), without=without, progress=progress
+        )
+    print_values(result, json_)
+
+
+@commands.command()
+def pitch(
+    source: Annotated[Path, typer.Argument(metavar="IN", exists=True)],
+    size: Size = "960x540",
+    json_: Json = False,
+) -> None:
+    """Estimate the size of a pitch from line files of one match."""
+    from app.review.datasets.batch import estimate_pitch_of_files
+
+    print_values(estimate_pitch_of_files(source, size=parse_size(size)), json_)

@@ -1,0 +1,103 @@
+"""Options: from what was typed, or set in the environment, to values; wrong ones are wrong usage."""
+
+from __future__ import annotations
+
+import os
+import re
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from app.config import Settings
+    from app.review.importing.sources import Source
+    from app.soccer.frames import ImageSize
+
+Dataset = Annotated[str, typer.Option("--dataset", help="Name of the dataset.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout.")]
+Size = Annotated[str, typer.Option("--size", metavar="WxH", help="Size of the annotated images.")]
+Workers = Annotated[
+    int | None, typer.Option("--workers", min=1, help="Processes; default: all cores.")
+]
+
+
+def read_settings(**given: object) -> Settings:
+    """Settings from the environment and, stronger, from the command line."""
+    from pydantic import ValidationError
+
+    from app.config import Settings
+
+    values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    try:
+        return Settings(**values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = "_".join(str(part) for part in first["loc"]).upper()
+        raise typer.BadParameter(f"{first['msg']} (TOUCHLINE_{name})") from None
+
+
+def require_local(settings: Settings) -> None:
+    """Refuse an address that other machines reach, unless the operator named the hosts."""
+    from app.api.server import is_local
+
+    if not is_local(settings.host) and "TOUCHLINE_ALLOWED_HOSTS" not in os.environ:
+        raise typer.BadParameter(
+            f"{settings.host} can be reached by other machines, and this version has no accounts: "
+            "everybody who reaches it may change everything. Use 127.0.0.1, or set "
+            "TOUCHLINE_ALLOWED_HOSTS to the names that it shall answer to."
+        )
+
+
+def typed_source(
+    format_: str,
+    path: Path,
+    *,
+    lines: Path | None,
+    calibration: str,
+    frame_offset: str,
+    flip: str,
+    size: str | None,
+) -> Source:
+    """What an import reads, from the texts of a command line."""
+    from app.review.importing.sources import Source
+
+    return Source(
+        format_,
+        path.resolve(),
+        size=None if size is None else parse_size(size),
+        lines=None if lines is None else lines.resolve(),
+        calibration=calibration,
+        frame_offset=parse_frame_offset(frame_offset),
+        flipped=parse_cameras(flip),
+    )
+
+
+def parse_size(text: str) -> ImageSize:
+    """``960x540``."""
+    from app.soccer.frames import ImageSize
+
+    match = re.fullmatch(r"([1-9]\d{0,4})[xX]([1-9]\d{0,4})", text)
+    if match is None:
+        raise typer.BadParameter(f'"{text}" is not a size; write it as 960x540')
+    return ImageSize(int(match[1]), int(match[2]))
+
+
+def parse_cameras(text: str) -> frozenset[int]:
+    """``2,6``."""
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    if not all(part.isascii() and part.isdigit() for part in parts):
+        raise typer.BadParameter(f'"{text}" is not a list of cameras; write it as 2,6')
+    return frozenset(int(part) for part in parts)
+
+
+def parse_frame_offset(text: str) -> int | dict[int, int]:
+    """``8``, or ``1=8,2=9`` by camera."""
+    if re.fullmatch(r"-?\d{1,6}", text):
+        return int(text)
+    pairs = [re.fullmatch(r"(\d{1,3})=(-?\d{1,6})", part.strip()) for part in text.split(",")]
+    found = [(int(pair[1]), int(pair[2])) for pair in pairs if pair]
+    if len(found) < len(pairs):
+        raise typer.BadParameter(f'"{text}" is not an offset; write 8, or 1=8,2=9 by camera')
+    return dict(found)

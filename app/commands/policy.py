@@ -1,0 +1,103 @@
+"""Commands on policies: show the one that judges a dataset, and set another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.commands.opened import opened_store
+from app.commands.options import Dataset, Json
+from app.commands.terminal import print_json, print_values, say
+
+if TYPE_CHECKING:
+    from app.soccer.policy import Policy
+
+commands = typer.Typer(help="The thresholds that judge a dataset.", no_args_is_help=True)
+
+
+@commands.command()
+def show(
+    dataset: Dataset,
+    file: Annotated[
+        Path | None, typer.Argument(metavar="[FILE]", help="Write it there, not to stdout.")
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Print the policy of a dataset as YAML, ready for `policy set`."""
+    from app.review.policies.policy import read_policy
+    from app.review.policies.text import policy_to_yaml, policy_values
+
+    with opened_store() as store:
+        state = read_policy(store, dataset)
+    text = policy_to_yaml(state.policy)
+    if file is not None:
+        _write(file, text)
+    if json_:
+        history = [
+            {"version": item.version, "name": item.policy.name, "hash": item.policy.hash}
+            | {"at": item.at, "actor": item.actor}
+            for item in state.history
+        ]
+        values = {"values": policy_values(state.policy), "history": history}
+        print_json({**_head(dataset, state.policy), "version": state.version, **values})
+    elif file is None:
+        say(text.rstrip("\n"))
+
+
+@commands.command("set")
+def set_(
+    policy: Annotated[str, typer.Argument(metavar="POLICY", help="paper, strict, or a YAML file.")],
+    dataset: Dataset,
+    json_: Json = False,
+) -> None:
+    """Judge a dataset by another policy; `solve` computes what that leaves out of date."""
+    from app.review.editing.recompute import stale_groups
+    from app.review.policies.policy import change_policy
+
+    chosen = read_policy_option(policy)
+    with opened_store() as store:
+        state = change_policy(store, dataset, chosen, if_match=None, actor="local")
+        stale = len(stale_groups(store, state.dataset_id))
+    values = {**_head(state.dataset, state.policy), "version": state.version, "to_solve": stale}
+    print_values(values, json_)
+
+
+def read_policy_option(text: str) -> Policy:
+    """The policy that an option names: a shipped one by its name, or a YAML file.
+
+    Raises:
+        typer.BadParameter: It is neither.
+        InputError: The file holds no policy.
+    """
+    from app.errors import InputError
+    from app.review.policies.text import MAX_CHARACTERS, policy_from_yaml
+    from app.soccer.policy import POLICIES
+
+    if text in POLICIES:
+        return POLICIES[text]
+    path = Path(text)
+    if not path.is_file():
+        names = ", ".join(POLICIES)
+        raise typer.BadParameter(f'"{text}" is no policy ({names}) and no YAML file')
+    try:
+        with path.open(encoding="utf-8") as file:
+            return policy_from_yaml(file.read(MAX_CHARACTERS + 1))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read as text") from error
+    except InputError as error:
+        raise InputError(f"{path}: {error.message}", hint=error.hint) from error
+
+
+def _head(dataset: str, policy: Policy) -> dict[str, str]:
+    return {"dataset": dataset, "name": policy.name, "hash": policy.hash}
+
+
+def _write(path: Path, text: str) -> None:
+    from app.errors import StorageError
+
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise StorageError(f"{path} cannot be written ({error.strerror})") from error

@@ -1,0 +1,58 @@
+"""Commands on what is computed: solve, and the findings of it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from app.commands.opened import executor_of, opened_store
+from app.commands.options import Dataset, Json, Workers, read_settings
+from app.commands.policy import read_policy_option
+from app.commands.terminal import print_json, print_values, say, show_progress
+
+commands = typer.Typer()
+
+
+@commands.command()
+def solve(
+    dataset: Dataset,
+    policy: Annotated[
+        str | None,
+        typer.Option(
+            metavar="paper|strict|FILE.yaml", help="Judge the dataset by this policy from now on."
+        ),
+    ] = None,
+    workers: Workers = None,
+    json_: Json = False,
+) -> None:
+    """Compute what is missing or out of date; can be interrupted at any time."""
+    from app.review.editing.recompute import solve_dataset
+    from app.review.policies.policy import change_policy
+
+    chosen = None if policy is None else read_policy_option(policy)
+    settings = read_settings()
+    with (
+        opened_store(settings) as store,
+        executor_of(workers or settings.workers) as executor,
+        show_progress("Solving") as progress,
+    ):
+        if chosen is not None:
+            change_policy(store, dataset, chosen, if_match=None, actor="local")
+        report = solve_dataset(store, dataset, executor, progress)
+    print_values(vars(report), json_)
+
+
+@commands.command()
+def findings(dataset: Dataset, json_: Json = False) -> None:
+    """List what a person should look at."""
+    from app.api.findings import finding_values
+
+    with opened_store() as store:
+        values = list(finding_values(store, dataset))
+    if json_:
+        print_json(values)
+        return
+    for value in values:
+        place = " ".join(value[key] for key in ("group", "view") if value.get(key))
+        say(f"{value['kind']:20} {place}: {value['sentence']}")

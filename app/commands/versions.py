@@ -1,0 +1,178 @@
+"""Commands on frozen versions: freeze, versions, diff, verify."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.commands.opened import executor_of, opened_store
+from app.commands.options import Dataset, Json, Workers, parse_cameras, read_settings
+from app.commands.terminal import complain, print_json, print_values, say, show_progress
+
+if TYPE_CHECKING:
+    from app.review.versions.version import Version
+    from app.soccer.split import Split
+
+commands = typer.Typer()
+
+VersionName = Annotated[str, typer.Argument(help="Name, id or hash of a version.")]
+SHOWN = 20
+"""Lines of each kind that a table shows."""
+
+
+class SplitKind(StrEnum):
+    """How a version is split into train and test."""
+
+    GIVEN = "given"
+    MATCH = "match"
+    CAMERA = "camera"
+
+
+class Groups(StrEnum):
+    """Which groups enter a version."""
+
+    ACCEPTED = "accepted"
+    PASSING = "passing"
+
+
+@commands.command()
+def freeze(
+    dataset: Dataset,
+    name: Annotated[
+        str | None, typer.Argument(help="Of the version; default: the next vN.")
+    ] = None,
+    named: Annotated[str | None, typer.Option("--name", help="The same.")] = None,
+    note: Annotated[str, typer.Option(help="What a reader should know.")] = "",
+    licence: Annotated[str, typer.Option(help="Licence text; default: that of the sources.")] = "",
+    licence_file: Annotated[
+        Path | None, typer.Option(exists=True, dir_okay=False, help="A file with that text.")
+    ] = None,
+    groups: Annotated[
+        Groups, typer.Option(help="accepted by people, or whatever is passing and not rejected.")
+    ] = Groups.ACCEPTED,
+    split: Annotated[SplitKind, typer.Option(help="Of train and test.")] = SplitKind.GIVEN,
+    seed: Annotated[int, typer.Option(min=0, help="Of a split by match.")] = 0,
+    test_share: Annotated[float, typer.Option(help="Of the matches, in a split by match.")] = 0.2,
+    test_cameras: Annotated[str, typer.Option(metavar="1,2", help="In a split by camera.")] = "1,2",
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Count, and save nothing.")] = False,
+    json_: Json = False,
+) -> None:
+    """Freeze a dataset as it is now into a version that never changes."""
+    cameras = tuple(f"cam{number}" for number in sorted(parse_cameras(test_cameras)))
+    from app.review.versions.freeze import FreezeRequest, plan_freeze
+    from app.review.versions.freeze import freeze as run_freeze
+    from app.review.versions.version import next_name
+    from app.soccer.split import Split
+
+    chosen = Split(split.value, seed, test_share, cameras)
+    text = licence if licence_file is None else licence_file.read_text(encoding="utf-8")
+    with opened_store() as store, show_progress("Freezing") as progress:
+        title = name or named or next_name(store, dataset)
+        request = FreezeRequest(title, note, text, chosen, groups.value)
+        if dry_run:
+            print_values(vars(plan_freeze(store, dataset, request)), json_)
+            return
+        version = run_freeze(store, dataset, request, actor="local", progress=progress)
+    print_values(version_values(version), json_)
+
+
+@commands.command()
+def versions(dataset: Dataset, json_: Json = False) -> None:
+    """List the frozen versions of a dataset, newest first."""
+    from app.review.versions.version import list_versions
+
+    with opened_store() as store:
+        found = list_versions(store, dataset)
+    if json_:
+        print_json([version_values(item) for item in found])
+        return
+    for item in found:
+        groups = f"{item.counts['groups']:6} groups"
+        say(f"{item.name:16} {item.hash[:16]}  {item.created[:19]}  {groups}  {item.note}")
+
+
+@commands.command()
+def diff(older: VersionName, newer: VersionName, dataset: Dataset, json_: Json = False) -> None:
+    """Tell what changed from one version to another."""
+    from app.review.versions.diff import changelog_lines, diff_versions
+    from app.review.versions.version import find_version
+
+    with opened_store() as store:
+        ids = [find_version(store, dataset, name).id for name in (older, newer)]
+        found = diff_versions(store, *ids)
+    if json_:
+        print_json(found.values())
+        return
+    for line in changelog_lines(found):
+        say(line)
+    for sign, passages in (("+", found.added), ("-", found.dropped)):
+        _say_some([f"{sign} {item.group}: {item.why}" for item in passages])
+    _say_some([f"~ {item.group}: {', '.join(item.what)}" for item in found.changed])
+    _say_some([f"> {item.group}: {item.metres:.3g} m" for item in found.moved])
+
+
+@commands.command()
+def verify(
+    dataset: Dataset,
+    version: Annotated[
+        str | None, typer.Argument(help="Name, id or hash of a version; default: the newest.")
+    ] = None,
+    workers: Workers = None,
+    json_: Json = False,
+) -> None:
+    """Compute a version from scratch and compare it bit for bit; exit code 1 where it differs."""
+    from app.errors import NotFoundError
+    from app.review.versions.verify import verify_and_keep
+    from app.review.versions.version import find_version, list_versions
+
+    settings = read_settings()
+    with (
+        opened_store() as store,
+        executor_of(workers or settings.workers) as executor,
+        show_progress("Verifying") as progress,
+    ):
+        known = list_versions(store, dataset)
+        if not known:
+            raise NotFoundError(f'"{dataset}" has no version yet', hint="Freeze one first.")
+        chosen = known[0] if version is None else find_version(store, dataset, version)
+        report = verify_and_keep(store, chosen.id, executor, progress, actor="local")
+    print_values(report.values(), json_)
+    if not report.ok:
+        if not json_:
+            _say_some([f"  {_difference(item)}" for item in report.differences])
+        complain(report.sentence)
+        raise typer.Exit(1)
+
+
+def version_values(version: Version) -> dict[str, Any]:
+    """A version as plain values."""
+    split: Split = version.split
+    return {
+        "id": version.id,
+        "dataset": version.dataset,
+        "name": version.name,
+        "hash": version.hash,
+        "created": version.created,
+        "note": version.note,
+        "groups": version.groups,
+        "counts": dict(version.counts),
+        "split": split.values(),
+        "policy": version.policy.name,
+        "policy_hash": version.policy.hash,
+        "solver_version": version.solver_version,
+        "software_version": version.software_version,
+    }
+
+
+def _difference(item: Any) -> str:
+    return f"{item.group or 'version'}, {item.place}: {item.frozen} frozen, {item.now} now"
+
+
+def _say_some(lines: list[str]) -> None:
+    for line in lines[:SHOWN]:
+        say(line)
+    if len(lines) > SHOWN:
+        say(f"  and {len(lines) - SHOWN} more; --json names them all")

@@ -1,0 +1,82 @@
+"""Edits to JSON and back, for the log: explicit, because what is logged must stay readable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from app.review.editing.edit import (
+    Edit,
+    IncludeView,
+    LineChanges,
+    SetBall,
+    SetBalls,
+    SetCalibrationSource,
+    SetLines,
+    SetStationCalibration,
+    SetStationLines,
+    StationEdit,
+)
+from app.soccer.frames import ImagePoint
+from app.store.codecs import Json, ball_from_json, ball_to_json
+
+
+def edit_to_json(edit: Edit | StationEdit) -> Json:
+    """An edit with its name under ``edit``."""
+    match edit:
+        case SetLines(view, lines):
+            return {"edit": "set_lines", "view": view, "lines": _lines_to_json(lines)}
+        case SetBalls(view, balls):
+            return {"edit": "set_balls", "view": view, "balls": [*map(ball_to_json, balls)]}
+        case SetBall(view, ball):
+            one = [] if ball is None else [ball_to_json(ball)]
+            return {"edit": "set_balls", "view": view, "balls": one}
+        case IncludeView(view, included, reason, note):
+            why = {} if reason is None else {"reason": reason, "note": note}
+            return {"edit": "include_view", "view": view, "included": included, **why}
+        case SetCalibrationSource(view, calibration):
+            return {"edit": "set_calibration", "view": view, "calibration": calibration}
+        case SetStationLines(lines):
+            return {"edit": "set_station_lines", "lines": _lines_to_json(lines)}
+        case SetStationCalibration(calibration):
+            return {"edit": "set_station_calibration", "calibration": calibration}
+    raise TypeError(f"no codec for {type(edit).__name__}")
+
+
+def edit_from_json(value: Mapping[str, Any]) -> Edit:
+    """Back from ``edit_to_json``, for edits of a group."""
+    match value["edit"]:
+        case "set_lines":
+            return SetLines(value["view"], _lines_from_json(value["lines"]))
+        case "set_balls":
+            return SetBalls(value["view"], tuple(map(ball_from_json, value["balls"])))
+        case "include_view":
+            why = value.get("reason"), value.get("note")
+            return IncludeView(value["view"], value["included"], *why)
+        case "set_calibration":
+            return SetCalibrationSource(value["view"], value["calibration"])
+    raise ValueError(f"the log holds an unknown edit: {value['edit']}")
+
+
+def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
+    """Back from ``edit_to_json``, for edits of a station."""
+    match value["edit"]:
+        case "set_station_lines":
+            return SetStationLines(_lines_from_json(value["lines"]))
+        case "set_station_calibration":
+            return SetStationCalibration(value["calibration"])
+    raise ValueError(f"the log holds an unknown edit: {value['edit']}")
+
+
+def _lines_to_json(lines: LineChanges) -> Json:
+    return {
+        marking: None if points is None else [[float(x), float(y)] for x, y in points]
+        for marking, points in lines.items()
+    }
+
+
+def _lines_from_json(value: Mapping[str, Any]) -> LineChanges:
+    return {
+        marking: None if points is None else tuple(ImagePoint(x, y) for x, y in points)
+        for marking, points in value.items()
+    }

@@ -1,0 +1,207 @@
+"""Recompute: the work to do is what the data lacks, groups without a solution.
+
+Killed anywhere it loses nothing but the chunks in hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+
+from sqlalchemy import and_, select
+from sqlalchemy.orm import Session
+
+from app.review.datasets.dataset import Dataset, get_dataset, read_dataset
+from app.review.datasets.fan_out import fan_out
+from app.review.editing.known import calibration_keys
+from app.review.editing.solver import Solver
+from app.soccer.group import Group, Station
+from app.soccer.pitch import Pitch
+from app.soccer.policy import Policy
+from app.soccer.solution import SOLVER_VERSION, Calibration
+from app.solving.calibrate import calibrate_station, calibration_key
+from app.solving.solve import solve
+from app.store.codecs import group_from_json, group_to_json, pack, unpack
+from app.store.groups import read_groups, read_stations
+from app.store.models import DatasetModel, GroupModel, SolutionModel, StationModel, ViewModel
+from app.store.queue import refresh_queue
+from app.store.session import Store
+from app.store.solutions import (
+    EncodedSolution,
+    SolutionKey,
+    decode_calibration,
+    encode_calibration,
+    encode_solution,
+    insert_calibrations,
+    insert_solutions,
+    read_calibration_bodies,
+)
+
+CHUNK = 40
+"""Groups a task: a second of work, or a few when lines must be calibrated."""
+
+Progress = Callable[[int, int], None]
+"""Called with the number of groups done and the number that were to do."""
+
+
+@dataclass
+class SolveReport:
+    """What was done; ``failed`` are groups whose solving itself broke, with the reason."""
+
+    total: int = 0
+    solved: int = 0
+    passed: int = 0
+    failed: list[tuple[str, str]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Task:
+    """A chunk of groups on its way to a worker: plain bytes, so that it travels anywhere."""
+
+    groups: tuple[tuple[SolutionKey, bytes], ...]
+    policy: Policy
+    calibrations: Mapping[str, bytes]
+    solver: Solver
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a worker sends back for one group: a solution, or the reason why there is none."""
+
+    key: SolutionKey
+    group: str
+    passes: bool = False
+    solution: EncodedSolution | None = None
+    problem: str = ""
+
+
+def stale_groups(store: Store, dataset: str | int) -> list[int]:
+    """Ids of groups without a solution for their present state, policy and solver, in order."""
+    with store.read() as session:
+        return _stale(session, read_dataset(session, dataset).id)
+
+
+def solve_dataset(
+    store: Store,
+    dataset: str | int,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    *,
+    solver: Solver = solve,
+) -> SolveReport:
+    """Solve what is stale in a dataset.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        executor: Where chunks are solved; None: here, one after the other.
+        progress: Called after each chunk; an error that it raises ends the run, and nothing
+            that was saved before is lost.
+        solver: Only tests put another one in; a function of a module, so that it travels.
+    """
+    found, ids = get_dataset(store, dataset), stale_groups(store, dataset)
+    report = SolveReport(total=len(ids))
+    if progress is not None:
+        progress(0, report.total)
+    _calibrate_shared(store, found)
+    chunks = (ids[start : start + CHUNK] for start in range(0, len(ids), CHUNK))
+    tasks = (_task(store, found, chunk, solver) for chunk in chunks)
+    for results in fan_out(solve_task, tasks, executor):
+        _save(store, results, report)
+        if progress is not None:
+            progress(report.solved + len(report.failed), report.total)
+    return report
+
+
+def solve_task(task: Task) -> list[Result]:
+    """Solve the groups of a task; runs in a worker."""
+    known = {key: decode_calibration(body) for key, body in task.calibrations.items()}
+    return [
+        _solve_one(key, group_from_json(unpack(body)), task, known) for key, body in task.groups
+    ]
+
+
+def _solve_one(key: SolutionKey, group: Group, task: Task, known: dict[str, Calibration]) -> Result:
+    try:
+        solution = task.solver(group, task.policy, known)
+        encoded = encode_solution(group, solution, known)
+    except Exception as error:
+        # One broken group must not stop the others; it stays stale and is reported by name.
+        return Result(key, group.key, problem=f"{type(error).__name__}: {error}")
+    return Result(key, group.key, solution.passes, encoded)
+
+
+def _save(store: Store, results: Sequence[Result], report: SolveReport) -> None:
+    solutions = [(item.key, item.solution) for item in results if item.solution is not None]
+    with store.write() as session:
+        insert_solutions(session, solutions)
+        refresh_queue(session, [key.group_id for key, _ in solutions])
+    report.solved += len(solutions)
+    report.passed += sum(item.passes for item in results)
+    report.failed += [(item.group, item.problem) for item in results if item.solution is None]
+
+
+def _task(store: Store, dataset: Dataset, ids: Sequence[int], solver: Solver) -> Task:
+    with store.read() as session:
+        policy = read_dataset(session, dataset.id).policy
+        stored = read_groups(session, ids, extras=False).values()
+        keys = calibration_keys((item.group for item in stored), policy)
+        known = read_calibration_bodies(session, keys)
+    groups = tuple(
+        (SolutionKey(item.id, item.inputs_hash, policy.hash), pack(group_to_json(item.group)))
+        for item in stored
+    )
+    return Task(groups, policy, known, solver)
+
+
+def _stale(session: Session, dataset_id: int) -> list[int]:
+    statement = (
+        select(GroupModel.id)
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .outerjoin(
+            SolutionModel,
+            and_(
+                SolutionModel.group_id == GroupModel.id,
+                SolutionModel.inputs_hash == GroupModel.inputs_hash,
+                SolutionModel.policy_hash == DatasetModel.policy_hash,
+                SolutionModel.solver_version == SOLVER_VERSION,
+            ),
+        )
+        .where(GroupModel.dataset_id == dataset_id, SolutionModel.id.is_(None))
+        .order_by(GroupModel.number)
+    )
+    return list(session.scalars(statement))
+
+
+def _calibrate_shared(store: Store, dataset: Dataset) -> None:
+    """Calibrate each static camera once, before the chunks that all need it are sent out."""
+    policy = dataset.policy
+    with store.read() as session:
+        cameras = {
+            calibration_key(station, pitch, policy.calibration): (station, pitch)
+            for station, pitch in _shared(session, dataset.id)
+        }
+        known = read_calibration_bodies(session, cameras)
+    bodies = {
+        key: encode_calibration(calibrate_station(station, pitch, policy.calibration))
+        for key, (station, pitch) in cameras.items()
+        if key not in known
+    }
+    if bodies:
+        with store.write() as session:
+            insert_calibrations(session, bodies)
+
+
+def _shared(session: Session, dataset_id: int) -> Iterable[tuple[Station, Pitch]]:
+    """Static cameras with each size of pitch that their groups have."""
+    statement = (
+        select(StationModel.id, GroupModel.pitch_length, GroupModel.pitch_width)
+        .join(ViewModel, ViewModel.station_id == StationModel.id)
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
+        .where(StationModel.dataset_id == dataset_id, StationModel.shared)
+        .distinct()
+    )
+    places = session.execute(statement).all()
+    stations = read_stations(session, {row.id for row in places})
+    return [(stations[row.id].station, Pitch(row.pitch_length, row.pitch_width)) for row in places]

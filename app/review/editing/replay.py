@@ -1,0 +1,329 @@
+"""Replay: the ledger once more from the log alone, and the tables once more from that."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from sqlalchemy import delete, insert, text
+from sqlalchemy.orm import Session
+
+from app.review.editing.codec import edit_from_json, station_edit_from_json
+from app.review.editing.ledger import (
+    GroupRecord,
+    Ledger,
+    StationRecord,
+    ViewRecord,
+    without_station,
+)
+from app.review.editing.upstream import KIND
+from app.soccer.group import Group, Station
+from app.soccer.pitch import Pitch
+from app.store.codecs import (
+    camera_from_json,
+    extras_from_json,
+    extras_to_json,
+    pack,
+    policy_from_json,
+    station_from_json,
+    view_from_json,
+)
+from app.store.digest import station_digest, view_digest
+from app.store.group_rows import head_values, station_values, view_values
+from app.store.log import LogEntry, read_log, verify_chain
+from app.store.models import (
+    GroupModel,
+    ImportFindingModel,
+    QueueModel,
+    SpareFrameModel,
+    StationModel,
+    ViewModel,
+)
+from app.store.queue import refresh_queue
+from app.store.session import Store
+
+
+def replay(session: Session) -> Ledger:
+    """The ledger that follows from the log, whose chain is verified first.
+
+    Raises:
+        StorageError: The log is not what was written.
+    """
+    verify_chain(session)
+    ledger, numbers = Ledger(), Counter[int]()
+    for entry in read_log(session):
+        assert entry.kind != "import" or entry.dataset_id is not None
+        if entry.kind == "import" and entry.group_id not in ledger.groups:
+            numbers[entry.dataset_id or 0] += 1
+        apply_entry(ledger, entry, numbers[entry.dataset_id or 0])
+    return ledger
+
+
+def apply_entry(ledger: Ledger, entry: LogEntry, number: int = 0) -> None:
+    """Bring one entry of the log into the ledger; ``number`` is that of a group that is new."""
+    if entry.kind == "import" and entry.group_id not in ledger.groups:
+        _new_group(ledger, entry, number)
+    else:
+        _STEPS[entry.kind](ledger, entry)
+
+
+def rebuild(store: Store) -> int:
+    """Write groups, views, stations and what hangs on them anew from the log.
+
+    Datasets, verdicts, solutions and the log itself stay. Returns the number of groups.
+    """
+    with store.write() as session:
+        ledger = replay(session)
+        # Solutions and verdicts refer to groups, which are gone for a moment.
+        session.execute(text("PRAGMA defer_foreign_keys = ON"))
+        for model in (QueueModel, ImportFindingModel, SpareFrameModel, ViewModel):
+            session.execute(delete(model))
+        session.execute(delete(GroupModel))
+        session.execute(delete(StationModel))
+        for model, rows in _rows(ledger):
+            if rows:
+                session.execute(insert(model), rows)
+        refresh_queue(session, list(ledger.groups))
+    return len(ledger.groups)
+
+
+def _dataset(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.dataset_id is not None
+    policy = policy_from_json(entry.body["policy"])
+    ledger.datasets[entry.dataset_id] = (entry.body["name"], policy)
+
+
+def _policy(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.dataset_id is not None
+    name, _ = ledger.datasets[entry.dataset_id]
+    ledger.datasets[entry.dataset_id] = (name, policy_from_json(entry.body["policy"]))
+
+
+def _station(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.station_id is not None and entry.dataset_id is not None
+    station, base = entry.body["station"], entry.body["base"]
+    _save_station(
+        ledger,
+        entry.dataset_id,
+        entry.station_id,
+        station_from_json(station),
+        station_from_json(station if base is None else base),
+    )
+    _notice(ledger, None, entry.station_id, [[None, entry.body["kept"]]])
+
+
+def _save_station(
+    ledger: Ledger, dataset_id: int, station_id: int, station: Station, base: Station | None
+) -> None:
+    old = ledger.stations.get(station_id)
+    digest = station_digest(base) if base is not None else (old.source_digest if old else "")
+    revision = old.revision + 1 if old else 1
+    ledger.stations[station_id] = StationRecord(dataset_id, station, revision, digest)
+
+
+def _new_group(ledger: Ledger, entry: LogEntry, number: int) -> None:
+    assert entry.group_id is not None and entry.dataset_id is not None
+    ledger.groups[entry.group_id] = GroupRecord(
+        entry.dataset_id, number, 0, "", "", Group("", ()), []
+    )
+    _import(ledger, entry)
+
+
+def _import(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.group_id is not None
+    record, body = ledger.groups[entry.group_id], entry.body
+    base = {view["key"]: view for view in (body["base"] or body["group"])["views"]}
+    gone = {item.station_id for item in record.views}
+    record.views = []
+    for value in body["group"]["views"]:
+        view_id, station_id = body["ids"][value["key"]]
+        gone.discard(station_id)
+        item = _import_view(ledger, record, value, base[value["key"]], station_id)
+        record.views.append(replace(item, id=view_id))
+    for station_id in gone:
+        if not ledger.stations[station_id].station.shared:
+            del ledger.stations[station_id]
+    record.head = _head(body["group"])
+    record.source_hash = body["source_hash"]
+    record.revision, record.changed = record.revision + 1, entry.at
+    _notice(ledger, entry.group_id, None, body.get("kept", []))
+
+
+def _import_view(
+    ledger: Ledger,
+    record: GroupRecord,
+    value: Mapping[str, Any],
+    base: Mapping[str, Any],
+    station_id: int,
+) -> ViewRecord:
+    shared = isinstance(value["station"], str)
+    if not shared:
+        own, source = station_from_json(value["station"]), station_from_json(base["station"])
+        _save_station(ledger, record.dataset_id, station_id, own, source)
+    station = ledger.stations[station_id].station
+    source_digest = view_digest(view_from_json(base, station))
+    return ViewRecord(0, station_id, without_station(view_from_json(value, station)), source_digest)
+
+
+def _head(value: Mapping[str, Any]) -> Group:
+    return Group(
+        key=value["key"],
+        views=(),
+        match=value["match"],
+        pitch=Pitch(*value["pitch"]),
+        split=value["split"],
+        label=value["label"],
+    )
+
+
+def _edit(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.group_id is not None
+    record, group = ledger.groups[entry.group_id], ledger.group(entry.group_id)
+    changed = edit_from_json(entry.body["edit"]).apply(group)
+    for item, before, after in zip(record.views, group.views, changed.views, strict=True):
+        item.view = without_station(after)
+        if after.station != before.station:
+            _save_station(ledger, record.dataset_id, item.station_id, after.station, None)
+    record.revision, record.changed = record.revision + 1, entry.at
+
+
+def _station_edit(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.station_id is not None
+    record = ledger.stations[entry.station_id]
+    station = station_edit_from_json(entry.body["edit"]).apply(record.station)
+    _save_station(ledger, record.dataset_id, entry.station_id, station, None)
+
+
+def _camera(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.station_id is not None
+    record = ledger.stations[entry.station_id]
+    edited = station_digest(record.station) != record.source_digest
+    station = replace(record.station, given=camera_from_json(entry.body["given"]))
+    base = None if edited else station
+    _save_station(ledger, record.dataset_id, entry.station_id, station, base)
+    if entry.group_id is not None:
+        group = ledger.groups[entry.group_id]
+        group.revision, group.changed = group.revision + 1, entry.at
+
+
+def _verdict(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.group_id is not None
+    ledger.verdicts.setdefault(entry.group_id, []).append(dict(entry.body))
+
+
+def _dataset_deleted(ledger: Ledger, entry: LogEntry) -> None:
+    """Everything of the dataset goes; its entries before this one still tell what it was."""
+    gone = entry.dataset_id
+    assert gone is not None
+    del ledger.datasets[gone]
+    groups = {key for key, record in ledger.groups.items() if record.dataset_id == gone}
+    stations = {key for key, record in ledger.stations.items() if record.dataset_id == gone}
+    for key in groups:
+        del ledger.groups[key]
+        ledger.verdicts.pop(key, None)
+    for key in stations:
+        del ledger.stations[key]
+    for place in [place for place in ledger.spare if place[0] == gone]:
+        del ledger.spare[place]
+    ledger.noticed = {
+        item for item in ledger.noticed if item[0] not in groups and item[1] not in stations
+    }
+
+
+def _spare(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.dataset_id is not None
+    for camera, frame, extras in entry.body["frames"]:
+        ledger.spare[entry.dataset_id, camera, frame] = extras_from_json(extras)
+
+
+def _notice(
+    ledger: Ledger, group_id: int | None, station_id: int | None, kept: list[list[str | None]]
+) -> None:
+    """Each import replaces what the ones before it noticed in the same place."""
+    place = (group_id, station_id)
+    ledger.noticed = {item for item in ledger.noticed if item[:2] != place}
+    for view, sentence in kept:
+        if sentence is not None:
+            ledger.noticed.add((*place, view, sentence))
+
+
+def _rows(ledger: Ledger) -> list[tuple[Any, list[dict[str, Any]]]]:
+    """Rows of the tables in an order that their references allow."""
+    stations = [
+        {
+            **station_values(item.station),
+            "id": key,
+            "dataset_id": item.dataset_id,
+            "revision": item.revision,
+            "source_digest": item.source_digest,
+        }
+        for key, item in ledger.stations.items()
+    ]
+    views = [
+        {
+            **view_values(item.view, place),
+            "id": item.id,
+            "group_id": key,
+            "station_id": item.station_id,
+            "source_digest": item.source_digest,
+        }
+        for key, record in ledger.groups.items()
+        for place, item in enumerate(record.views)
+    ]
+    noticed = [
+        {"group_id": group, "station_id": station, "view": view, "kind": KIND, "sentence": said}
+        for group, station, view, said in sorted(ledger.noticed, key=repr)
+    ]
+    spare = [
+        {"dataset_id": key[0], "camera": key[1], "frame": key[2], "extras": _packed(extras)}
+        for key, extras in ledger.spare.items()
+    ]
+    return [
+        (StationModel, stations),
+        (GroupModel, [_group_row(ledger, key) for key in ledger.groups]),
+        (ViewModel, views),
+        (ImportFindingModel, noticed),
+        (SpareFrameModel, spare),
+    ]
+
+
+def _group_row(ledger: Ledger, group_id: int) -> dict[str, Any]:
+    record = ledger.groups[group_id]
+    return {
+        **head_values(ledger.group(group_id)),
+        "id": group_id,
+        "dataset_id": record.dataset_id,
+        "number": record.number,
+        "revision": record.revision,
+        "changed": record.changed,
+        "source_hash": record.source_hash,
+    }
+
+
+def _packed(extras: Any) -> bytes:
+    return pack(extras_to_json(extras))
+
+
+_STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
+    "dataset": _dataset,
+    "dataset_deleted": _dataset_deleted,
+    "policy": _policy,
+    "station": _station,
+    "import": _import,
+    "edit": _edit,
+    "undo": _edit,
+    "redo": _edit,
+    "station_edit": _station_edit,
+    "station_undo": _station_edit,
+    "station_redo": _station_edit,
+    "camera": _camera,
+    "verdict": _verdict,
+    "spare": _spare,
+    # What a batch did stands in the verdicts themselves.
+    "verdict_batch": lambda _ledger, _entry: None,
+    "verdict_batch_undo": lambda _ledger, _entry: None,
+    # Versions have tables of their own, which nothing rebuilds and nothing changes.
+    "freeze": lambda _ledger, _entry: None,
+}

@@ -1,0 +1,125 @@
+"""Shared stations during an import: inserted once, followed once, whatever the number of views."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from sqlalchemy import delete, insert, select
+from sqlalchemy.orm import Session
+
+from app.review.editing.upstream import KIND, FollowedStation, follow_station
+from app.soccer.group import Station
+from app.store.clock import now
+from app.store.codecs import camera_from_json, station_from_json, station_to_json
+from app.store.digest import station_digest
+from app.store.group_rows import NewRows
+from app.store.groups import (
+    StoredStation,
+    groups_of_station,
+    refresh_inputs_hashes,
+    save_station,
+    stored_station,
+)
+from app.store.log import Entry, append, read_log
+from app.store.models import ImportFindingModel, LogModel, StationModel
+from app.store.queue import refresh_queue
+
+
+class SharedStations:
+    """The shared stations of a dataset within one write transaction.
+
+    ``changed`` names those that were there and changed, ``kept`` those with edits that stayed.
+    """
+
+    def __init__(self, session: Session, dataset_id: int, source: str, actor: str):
+        self.changed: list[str] = []
+        self.kept: list[str] = []
+        self.ids: dict[str, int] = {}
+        """By key."""
+        self._session, self._dataset_id = session, dataset_id
+        self._source, self._actor = source, actor
+        self._stored: dict[str, StoredStation] = {}
+        self._seen: dict[str, Station] = {}
+        statement = select(*StationModel.__table__.columns).where(
+            StationModel.dataset_id == dataset_id, StationModel.shared
+        )
+        for row in session.execute(statement):
+            self._stored[row.key] = stored_station(row)
+            self.ids[row.key] = row.id
+
+    def follow(self, stations: Iterable[Station]) -> None:
+        """Insert the shared ones among stations, or bring them up to what they are now."""
+        for station in stations:
+            if not station.shared or self._seen.get(station.key) is station:
+                continue
+            if station.key not in self._seen:
+                self._follow(station)
+            self._seen[station.key] = station
+
+    def _follow(self, incoming: Station) -> None:
+        stored = self._stored.get(incoming.key)
+        if stored is None:
+            self._insert(incoming)
+            return
+        source = None if incoming.lines else self._source_of(stored)
+        followed = follow_station(stored, incoming, source)
+        changed = followed.station != stored.station
+        if changed or station_digest(followed.base) != stored.source_digest:
+            self._save(stored, followed)
+            self.changed.append(incoming.key)
+
+    def _source_of(self, stored: StoredStation) -> Station | None:
+        """A station as its dataset last brought it; under an edit only the log remembers."""
+        if not stored.edited:
+            return stored.station
+        found = said = None
+        for entry in read_log(self._session, LogModel.station_id == stored.id):
+            if entry.kind == "station":
+                said = station_from_json(entry.body["base"] or entry.body["station"])
+            elif entry.kind == "camera" and said is not None:
+                said = replace(said, given=camera_from_json(entry.body["given"]))
+            if said is not None and station_digest(said) == stored.source_digest:
+                found = said
+        return found
+
+    def _insert(self, station: Station) -> None:
+        rows = NewRows(self._session, self._dataset_id)
+        self.ids[station.key] = rows.add_station(station)
+        rows.insert()
+        self._log(self.ids[station.key], FollowedStation(station, station, None), None)
+
+    def _save(self, stored: StoredStation, followed: FollowedStation) -> None:
+        save_station(self._session, stored, followed.station, source=followed.base)
+        self._log(stored.id, followed, self._note(stored.id, followed))
+        groups = groups_of_station(self._session, stored.id)
+        refresh_inputs_hashes(self._session, groups)
+        refresh_queue(self._session, groups)
+
+    def _note(self, station_id: int, followed: FollowedStation) -> str | None:
+        """Save what imports noticed about the station: this one, or earlier ones while it holds."""
+        model = ImportFindingModel
+        where = model.station_id == station_id
+        if followed.kept is not None:
+            sentence: str | None = followed.kept.sentence
+            self.kept.append(followed.station.key)
+        elif station_digest(followed.station) != station_digest(followed.base):
+            sentence = self._session.scalar(select(model.sentence).where(where))
+        else:
+            sentence = None
+        self._session.execute(delete(model).where(where))
+        if sentence is not None:
+            values = {"station_id": station_id, "kind": KIND, "sentence": sentence}
+            self._session.execute(insert(model), [values])
+        return sentence
+
+    def _log(self, station_id: int, followed: FollowedStation, kept: str | None) -> None:
+        same = followed.base == followed.station
+        body = {
+            "source": self._source,
+            "station": station_to_json(followed.station),
+            "base": None if same else station_to_json(followed.base),
+            "kept": kept,
+        }
+        entry = Entry("station", self._actor, now(), body, self._dataset_id, station_id=station_id)
+        append(self._session, [entry])

@@ -1,0 +1,325 @@
+"""Accept: predicted balls become annotations because a person says so.
+
+Each one is an edit of its group through the log, like any other, and its ball says which set it
+came from. Until then no solve has seen it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
+from app.evaluation.prediction_run import box_problem
+from app.review.datasets.dataset import read_dataset
+from app.review.editing.edit import SetBall, need_view
+from app.review.editing.etags import require_unchanged, said_of
+from app.review.editing.state import GroupState
+from app.review.editing.submit import load, submit
+from app.review.evaluating.predictions import read_set
+from app.review.queue.query import parse_query
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box, ImageSize
+from app.soccer.group import View
+from app.store.codecs import ball_from_json, parse
+from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
+from app.store.predictions import PredictedBox, PredictionSet, read_box, read_boxes
+from app.store.session import Store
+
+SHOWN = 20
+"""Views that a dry run shows."""
+TRIES = 3
+"""How often a group is taken up again that somebody else changes meanwhile."""
+REASONS = {
+    "below_score": "the surest prediction is below the score",
+    "annotated": "the view has a ball already",
+    "the_same": "the view has this very ball already",
+    "not_a_ball": "the prediction cannot be a ball in this image",
+}
+
+Progress = Callable[[int, int | None, str], None]
+
+
+@dataclass(frozen=True)
+class AcceptRequest:
+    """Which predictions to accept: the surest of each view.
+
+    Attributes:
+        set_id: The set.
+        query: Groups, as the queue's text has it; None: all of them.
+        views: Ids of views; None: all of them.
+        min_score: Less sure ones stay predictions.
+        replace: Also where somebody annotated another ball; otherwise only where there is none.
+    """
+
+    set_id: int
+    query: str | None = None
+    views: tuple[int, ...] | None = None
+    min_score: float = 0.0
+    replace: bool = False
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """One view whose prediction is to be accepted, or why not (one of ``REASONS``)."""
+
+    view_id: int
+    view: str
+    group_id: int
+    group: str
+    box: PredictedBox
+    why: str | None
+
+
+@dataclass(frozen=True)
+class AcceptPlan:
+    """What an acceptance would do.
+
+    Attributes:
+        changes: Views that get a ball.
+        refused: How many do not, by reason.
+    """
+
+    predictions: PredictionSet
+    changes: tuple[Accepted, ...]
+    refused: dict[str, int]
+
+    @property
+    def groups(self) -> int:
+        """How many groups change."""
+        return len({item.group_id for item in self.changes})
+
+
+@dataclass(frozen=True)
+class AcceptReport:
+    """What an acceptance did; ``refused`` also counts what changed meanwhile."""
+
+    views: int
+    groups: int
+    refused: dict[str, int]
+
+
+def plan_accept(store: Store, dataset: str | int, request: AcceptRequest) -> AcceptPlan:
+    """What ``accept`` would do; saves nothing.
+
+    Raises:
+        NotFoundError: There is no such dataset or set, or a view has no prediction.
+        InputError: The query cannot be understood.
+    """
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        predictions = read_set(session, request.set_id)
+        if predictions.dataset_id != found.id:
+            raise NotFoundError(f"dataset {found.name} has no set of predictions {request.set_id}")
+        boxes = read_boxes(session, request.set_id)
+        rows = [row for row in session.execute(_views(found.id, request)) if row.id in boxes]
+    wanted = set(request.views or ())
+    missing = wanted - {row.id for row in rows}
+    if missing:
+        raise NotFoundError(f"the set has no prediction for view {min(missing)}")
+    judged = [_judge(row, boxes[row.id], predictions.name, request) for row in rows]
+    return AcceptPlan(
+        predictions,
+        tuple(item for item in judged if item.why is None),
+        dict(Counter(item.why for item in judged if item.why is not None)),
+    )
+
+
+def accept(
+    store: Store,
+    dataset: str | int,
+    request: AcceptRequest,
+    *,
+    actor: str,
+    progress: Progress | None = None,
+) -> AcceptReport:
+    """Make an edit of every prediction that a person accepts; done again it changes nothing.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        request: Which ones.
+        actor: Who accepts them.
+        progress: Called with groups done and in all; an error that it raises ends it, and what
+            was accepted before stays.
+
+    Raises:
+        As ``plan_accept``.
+    """
+    plan = plan_accept(store, dataset, request)
+    refused = Counter(plan.refused)
+    views = 0
+    changed: set[int] = set()
+    for number, (group_id, items) in enumerate(_by_group(plan.changes)):
+        if progress is not None:
+            progress(number, plan.groups, "Accepting predictions.")
+        for item in items:
+            why = _accept(store, item, plan.predictions.name, request, actor)
+            if why is None:
+                views += 1
+                changed.add(group_id)
+            else:
+                refused[why] += 1
+    return AcceptReport(views, len(changed), dict(refused))
+
+
+def accept_box(
+    store: Store,
+    view_id: int,
+    prediction_id: int,
+    *,
+    if_match: str,
+    actor: str,
+    replace: bool = False,
+    idempotency_key: str | None = None,
+) -> GroupState:
+    """Make one prediction the ball of its view, however sure it is.
+
+    Args:
+        store: The database.
+        view_id: The view.
+        prediction_id: One of the boxes that were predicted for it.
+        if_match: ETag of the group's state that the person saw.
+        actor: Who accepts it.
+        replace: Also where the view has another ball.
+        idempotency_key: The caller's name for this request; sent again it changes nothing.
+
+    Returns:
+        The group as it is then, solved.
+
+    Raises:
+        NotFoundError: The view has no such prediction.
+        InputError: The prediction cannot be a ball in this image.
+        ConflictError: The view has a ball, and it is not to be replaced.
+        StaleRevisionError: Somebody else changed the group first.
+    """
+    with store.read() as session:
+        view = _view(session, view_id)
+        box = read_box(session, prediction_id)
+        if box is None or box.view_id != view_id:
+            # Whoever saw an older state is told so first.
+            require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
+            raise NotFoundError(f"view {view_id} has no prediction {prediction_id}")
+        if problem := _problem(box, view):
+            require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
+            raise InputError(f"the prediction {problem}")
+        name = read_set(session, box.set_id).name
+    edit = SetBall(view.key, accepted_ball(box, name))
+    if not replace:
+        _require_free(load(store, view.group_id), edit, if_match)
+    return submit(
+        store, view.group_id, edit, if_match=if_match, actor=actor, idempotency_key=idempotency_key
+    )
+
+
+def _view(session: Session, view_id: int) -> Any:
+    statement = (
+        select(ViewModel.key, ViewModel.group_id, StationModel.width, StationModel.height)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(ViewModel.id == view_id)
+    )
+    row = session.execute(statement).one_or_none()
+    if row is None:
+        raise NotFoundError(f"there is no view {view_id}")
+    return row
+
+
+def _require_free(state: GroupState, edit: SetBall, if_match: str) -> None:
+    """Refuse where the person saw a ball; of a state that they did not see ``submit`` judges."""
+    balls = need_view(state.group, edit.view).balls
+    if not balls or balls == (edit.ball,) or said_of(state.etag) != said_of(if_match):
+        return
+    raise ConflictError(
+        f"view {edit.view} has a ball already",
+        hint="Delete that ball first, or ask for replace=true.",
+    )
+
+
+def accepted_ball(box: PredictedBox, name: str) -> BallAnnotation:
+    """The annotation that a prediction becomes."""
+    place = Box(box.x, box.y, box.width, box.height)
+    return BallAnnotation(box=place, predicted_by=name)
+
+
+def _views(dataset_id: int, request: AcceptRequest) -> Any:
+    statement = (
+        select(
+            ViewModel.id,
+            ViewModel.key,
+            ViewModel.balls,
+            GroupModel.id.label("group_id"),
+            GroupModel.key.label("group"),
+            StationModel.width,
+            StationModel.height,
+        )
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .join(QueueModel, QueueModel.group_id == GroupModel.id)
+        .where(GroupModel.dataset_id == dataset_id)
+        .order_by(GroupModel.number, ViewModel.position)
+    )
+    if request.query is not None:
+        statement = statement.where(*parse_query(request.query).conditions)
+    if request.views is not None:
+        statement = statement.where(ViewModel.id.in_(request.views))
+    return statement
+
+
+def _judge(row: Any, boxes: Sequence[PredictedBox], name: str, request: AcceptRequest) -> Accepted:
+    best = max(boxes, key=lambda box: (box.score, -box.id))
+    balls = [ball_from_json(value) for value in parse(row.balls)]
+    why = None
+    if best.score < request.min_score:
+        why = "below_score"
+    elif _problem(best, row) is not None:
+        why = "not_a_ball"
+    elif balls == [accepted_ball(best, name)]:
+        why = "the_same"
+    elif balls and not request.replace:
+        why = "annotated"
+    return Accepted(row.id, row.key, row.group_id, row.group, best, why)
+
+
+def _problem(box: PredictedBox, view: Any) -> str | None:
+    """Why a box cannot be a ball in its view."""
+    place = Box(box.x, box.y, box.width, box.height)
+    return box_problem(place, ImageSize(view.width, view.height))
+
+
+def _by_group(items: Sequence[Accepted]) -> Iterator[tuple[int, list[Accepted]]]:
+    groups: dict[int, list[Accepted]] = {}
+    for item in items:
+        groups.setdefault(item.group_id, []).append(item)
+    yield from groups.items()
+
+
+def _accept(
+    store: Store, item: Accepted, name: str, request: AcceptRequest, actor: str
+) -> str | None:
+    """Submit one edit; why not, where the view is no longer as planned or the edit impossible."""
+    edit = SetBall(item.view, accepted_ball(item.box, name))
+    for _ in range(TRIES):
+        try:
+            state = load(store, item.group_id)
+        except NotFoundError:
+            break
+        if not _still_fits(state, item, request):
+            break
+        try:
+            submit(store, item.group_id, edit, if_match=state.etag, actor=actor)
+        except StaleRevisionError:
+            continue
+        except InputError:
+            return "not_a_ball"
+        return None
+    return "changed_meanwhile"
+
+
+def _still_fits(state: GroupState, item: Accepted, request: AcceptRequest) -> bool:
+    view: View | None = state.group.view(item.view)
+    return view is not None and (request.replace or not view.balls)

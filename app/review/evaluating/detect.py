@@ -1,0 +1,174 @@
+"""Detect: a detector looks at every frame of a dataset; what it finds stays a prediction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from sqlalchemy import select
+
+from app.config import Settings
+from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
+from app.evaluation.frame import Detection
+from app.review.datasets.dataset import read_dataset
+from app.review.evaluating.onnx_model import OnnxModel
+from app.review.evaluating.predictions import (
+    LISTED,
+    check_name,
+    frame_names,
+    require_free,
+    save_predictions,
+)
+from app.review.queue.query import parse_query
+from app.soccer.frames import Box
+from app.soccer.group import Media
+from app.store.media import read_frame
+from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
+from app.store.predictions import PredictionSet
+from app.store.session import Store
+
+MIN_SCORE = 0.05
+MOST = 20
+"""Detections of a frame that are kept."""
+
+Progress = Callable[[int, int | None, str], None]
+
+
+@dataclass(frozen=True)
+class DetectRequest:
+    """What a detector shall look at.
+
+    Attributes:
+        name: Of the set of predictions that comes of it.
+        query: Groups, as the queue's text has it; empty: all.
+        missing: Only views that have no ball yet.
+        min_score: Less sure detections are not kept.
+    """
+
+    name: str
+    query: str = ""
+    missing: bool = False
+    min_score: float = MIN_SCORE
+
+
+def detect(
+    store: Store,
+    dataset: str | int,
+    model: OnnxModel,
+    request: DetectRequest,
+    *,
+    actor: str,
+    progress: Progress | None = None,
+) -> PredictionSet:
+    """Run a detector over frames; the set appears whole, when all of them were looked at.
+
+    Frames that cannot be read are named in the set's report and count as not looked at.
+
+    Raises:
+        InputError: The name or the query is impossible, the model does not run, or no frame
+            could be read.
+        ConflictError: There is a set of that name.
+    """
+    check_name(request.name)
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        require_free(session, found.id, request.name)
+        rows = list(session.execute(_views(found.id, request)))
+    detections: dict[int, list[Detection]] = {}
+    problems: list[dict[str, Any]] = []
+    for number, row in enumerate(rows):
+        if progress is not None:
+            progress(number, len(rows), f"Looking for balls with {model.path.name}.")
+        try:
+            picture = _picture(row, store.settings)
+        except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
+            problems.append(_problem(row, error.message))
+            continue
+        detections[row.id] = _in_annotated(row, picture, model, request)
+    if not detections:
+        raise _nothing_seen(rows, problems)
+    return save_predictions(
+        store,
+        found.id,
+        request.name,
+        {view: boxes for view, boxes in detections.items() if boxes},
+        {},
+        names=frame_names(store, found.id),
+        format="detect",
+        source=model.path.name,
+        report={
+            "model": model.digest,
+            "read": sum(map(len, detections.values())),
+            "looked_at": len(detections),
+            "min_score": request.min_score,
+            "problems": problems[:LISTED],
+            "more_problems": max(len(problems) - LISTED, 0),
+        },
+        actor=actor,
+    )
+
+
+def _views(dataset_id: int, request: DetectRequest) -> Any:
+    statement = (
+        select(
+            ViewModel.id,
+            ViewModel.key,
+            ViewModel.media_path,
+            ViewModel.media_member,
+            ViewModel.media_frame,
+            GroupModel.key.label("group"),
+            StationModel.width,
+            StationModel.height,
+            StationModel.flipped,
+        )
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
+        .join(QueueModel, QueueModel.group_id == GroupModel.id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(GroupModel.dataset_id == dataset_id, *parse_query(request.query).conditions)
+        .order_by(GroupModel.number, ViewModel.position)
+    )
+    return statement.where(ViewModel.balls == "[]") if request.missing else statement
+
+
+def _picture(row: Any, settings: Settings) -> Any:
+    if row.media_path is None:
+        raise NotFoundError("this view has no frame that could be read")
+    media = Media(row.media_path, row.media_member, row.media_frame)
+    data = read_frame(media, None, row.flipped, settings)
+    picture = cv2.imdecode(
+        np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    )
+    if picture is None:
+        raise ImageError("the frame is damaged")
+    return picture
+
+
+def _in_annotated(
+    row: Any, picture: Any, model: OnnxModel, request: DetectRequest
+) -> list[Detection]:
+    """Detections in pixels of the annotated size, which need not be the frame's own."""
+    height, width = picture.shape[:2]
+    x, y = row.width / width, row.height / height
+    return [
+        Detection(
+            Box(item.box.x * x, item.box.y * y, item.box.width * x, item.box.height * y),
+            item.score,
+        )
+        for item in model.detect(picture, min_score=request.min_score, most=MOST)
+    ]
+
+
+def _problem(row: Any, problem: str) -> dict[str, Any]:
+    return {"file": row.group, "record": row.key, "field": None, "problem": problem}
+
+
+def _nothing_seen(rows: list[Any], problems: list[dict[str, Any]]) -> InputError:
+    if not rows:
+        return InputError("no view has a camera that fits, so there is nothing to triangulate")
+    return InputError(
+        f"none of the {len(rows)} frames could be read: {problems[0]['problem']}",
+        hint="Import the dataset with its frames.",
+    )

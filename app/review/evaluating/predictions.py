@@ -1,0 +1,346 @@
+"""Predictions: what detectors and calibrators said, brought in, listed and thrown away.
+
+They are a third kind of data beside said and computed: no solve reads them. ``accept`` turns
+those that a person takes over into edits.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from app.datasets.archive import Limits
+from app.datasets.report import Report
+from app.errors import ConflictError, InputError, NotFoundError
+from app.evaluation.frame import Detection
+from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.prediction_files import (
+    ReadPredictedCameras,
+    read_predicted_cameras,
+    read_predictions,
+)
+from app.evaluation.prediction_run import ReadPredictions, listed
+from app.geometry.camera import Camera
+from app.review.datasets.dataset import read_dataset
+from app.soccer.frames import ImageSize
+from app.store.clock import now
+from app.store.codecs import Json, canonical
+from app.store.prediction_models import PredictionSetModel
+from app.store.predictions import (
+    PredictedBox,
+    PredictionSet,
+    delete_prediction_set,
+    insert_prediction_set,
+    predictions_digest,
+    read_prediction_sets,
+    read_view_boxes,
+    read_view_rows,
+)
+from app.store.session import Store
+
+LISTED = 100
+"""Unknown frames and problems that a report names; all are counted."""
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
+
+
+@dataclass(frozen=True)
+class PredictionFiles:
+    """What to read.
+
+    Attributes:
+        path: File, folder or zip of ball boxes, or None.
+        format: ``coco``, ``yolo`` or ``csv``.
+        images: The COCO document that numbers in ``coco`` results refer to, or None.
+        cameras: Folder or zip of SoccerNet camera JSON, or None.
+        category: The class that is the ball, where the file has several.
+        size: Size of the images that boxes in pixels refer to, where that is not the annotated.
+        cameras_size: The same for the cameras.
+    """
+
+    path: Path | None
+    format: str = "coco"
+    images: Path | None = None
+    cameras: Path | None = None
+    category: int | None = None
+    size: ImageSize | None = None
+    cameras_size: ImageSize | None = None
+
+
+def add_predictions(
+    store: Store,
+    dataset: str | int,
+    name: str,
+    files: PredictionFiles,
+    *,
+    actor: str,
+    source: str | None = None,
+    reuse: bool = False,
+) -> PredictionSet:
+    """Read files into a new set.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        name: Of the set; unique in its dataset.
+        files: What to read.
+        actor: Who brings them.
+        source: What people call the file; its own name by default.
+        reuse: Answer the set that came of the very same reading, where there is one, and find
+            another name where the name is taken.
+
+    Raises:
+        InputError: A file cannot be used, no box or camera belongs to a frame of the dataset, or
+            the name is impossible.
+        ConflictError: There is a set of that name.
+    """
+    check_name(name)
+    if files.path is None and files.cameras is None:
+        raise InputError("there is nothing to read: neither boxes nor cameras", pointer="/upload")
+    names = frame_names(store, dataset)
+    limits = Limits.of(store.settings)
+    boxes, cameras = _read(files, names, limits)
+    if not boxes.detections and not cameras.cameras and _is_for_another(boxes, cameras):
+        raise _nothing_known(boxes, cameras)
+    first = files.path or files.cameras
+    assert first is not None
+    return save_predictions(
+        store,
+        dataset,
+        name,
+        boxes.detections,
+        cameras.cameras,
+        names=names,
+        format=files.format if files.path is not None else "cameras",
+        source=source or first.name,
+        report=_report(boxes, cameras),
+        unknown=len(boxes.unknown) + len(cameras.unknown),
+        actor=actor,
+        reuse=reuse,
+    )
+
+
+def save_predictions(
+    store: Store,
+    dataset: str | int,
+    name: str,
+    detections: Mapping[int, Sequence[Detection]],
+    cameras: Mapping[int, Camera],
+    *,
+    names: FrameNames,
+    format: str,  # noqa: A002
+    source: str,
+    report: Json,
+    unknown: int = 0,
+    actor: str,
+    reuse: bool = False,
+) -> PredictionSet:
+    """Keep what was read, or found by a detector, as a new set.
+
+    Raises:
+        ConflictError: There is a set of that name.
+    """
+    boxes = {
+        view: [(d.box.x, d.box.y, d.box.width, d.box.height, d.score) for d in found]
+        for view, found in detections.items()
+    }
+    keys = {i: f"{frame.group} {frame.view}" for i, frame in names.frames.items()}
+    values: dict[str, Any] = {
+        "name": name,
+        "format": format,
+        "source": source[:300],
+        "created": now(),
+        "actor": actor,
+        "digest": predictions_digest(keys, boxes, cameras),
+        "frames": len(boxes),
+        "boxes": sum(map(len, boxes.values())),
+        "cameras": len(cameras),
+        "unknown": unknown,
+        "report": report,
+    }
+    with store.write() as session:
+        found = read_dataset(session, dataset)
+        if reuse:
+            own = read_prediction_sets(session, PredictionSetModel.dataset_id == found.id)
+            known = next((item for item in own if _same_reading(item, values)), None)
+            if known is not None:
+                return known
+            values["name"] = name = _free_name(name, {item.name for item in own})
+        require_free(session, found.id, name)
+        present = {row.id for row in read_view_rows(session, found.id)}
+        identity = insert_prediction_set(
+            session,
+            {**values, "dataset_id": found.id},
+            # A view can have gone since its name was looked up.
+            {view: found for view, found in boxes.items() if view in present},
+            {view: camera for view, camera in cameras.items() if view in present},
+        )
+        return read_set(session, identity)
+
+
+def frame_names(store: Store, dataset: str | int) -> FrameNames:
+    """The frames of a dataset by every name that a file may give them."""
+    with store.read() as session:
+        rows = read_view_rows(session, read_dataset(session, dataset).id)
+    return FrameNames.of(
+        NamedFrame(
+            id=row.id,
+            group=row.group,
+            view=row.view,
+            match=row.match,
+            size=ImageSize(row.width, row.height),
+            station=row.station if row.shared else "",
+        )
+        for row in rows
+    )
+
+
+def list_predictions(store: Store, dataset: str | int) -> list[PredictionSet]:
+    """The sets of a dataset, the newest first."""
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        return read_prediction_sets(session, PredictionSetModel.dataset_id == found.id)
+
+
+def get_predictions(store: Store, set_id: int) -> PredictionSet:
+    """A set by its id.
+
+    Raises:
+        NotFoundError: There is none.
+    """
+    with store.read() as session:
+        return read_set(session, set_id)
+
+
+def delete_predictions(store: Store, set_id: int) -> None:
+    """Throw a set away; evaluations of it stay, and so do balls that were accepted from it.
+
+    Raises:
+        NotFoundError: There is none.
+    """
+    with store.write() as session:
+        read_set(session, set_id)
+        delete_prediction_set(session, set_id)
+
+
+def view_predictions(store: Store, view_id: int) -> list[tuple[PredictionSet, list[PredictedBox]]]:
+    """What was predicted for a view, by set, the newest set first."""
+    with store.read() as session:
+        boxes = read_view_boxes(session, view_id)
+        ids = {box.set_id for box in boxes}
+        sets = read_prediction_sets(session, PredictionSetModel.id.in_(ids)) if ids else []
+    return [(item, [box for box in boxes if box.set_id == item.id]) for item in sets]
+
+
+def read_set(session: Session, set_id: int) -> PredictionSet:
+    """``get_predictions`` within a session."""
+    found = read_prediction_sets(session, PredictionSetModel.id == set_id)
+    if not found:
+        raise NotFoundError(f"there is no set of predictions {set_id}")
+    return found[0]
+
+
+def check_name(name: str) -> None:
+    """Raise InputError where a set cannot have that name."""
+    if not _NAME.fullmatch(name):
+        raise InputError(
+            f'"{name}" cannot be the name of a set of predictions',
+            hint="Use letters, digits, spaces and . _ -, up to 100.",
+            pointer="/name",
+        )
+
+
+def require_free(session: Session, dataset_id: int, name: str) -> None:
+    """Raise ConflictError where a dataset has a set of that name."""
+    model = PredictionSetModel
+    if read_prediction_sets(session, model.dataset_id == dataset_id, model.name == name):
+        raise ConflictError(
+            f'there is a set of predictions "{name}" already',
+            hint="Choose another name, or delete that one first.",
+        )
+
+
+def _same_reading(known: PredictionSet, values: Mapping[str, Any]) -> bool:
+    """Whether a set has the same boxes and cameras, from the same source with the same report."""
+    names = ("digest", "format", "source", "unknown")
+    same = all(getattr(known, name) == values[name] for name in names)
+    return same and canonical(known.report) == canonical(values["report"])
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    """The name, or with the first number that makes it free."""
+    return next(
+        found
+        for number in count(1)
+        if (found := name if number == 1 else f"{name}-{number}") not in taken
+    )
+
+
+def _read(
+    files: PredictionFiles, names: FrameNames, limits: Limits
+) -> tuple[ReadPredictions, ReadPredictedCameras]:
+    boxes, cameras = ReadPredictions(), ReadPredictedCameras()
+    if files.path is not None:
+        boxes = read_predictions(
+            files.path,
+            files.format,
+            names,
+            category=files.category,
+            size=files.size,
+            images=files.images,
+            limits=limits,
+        )
+    if files.cameras is not None:
+        cameras = read_predicted_cameras(
+            files.cameras, names, size=files.cameras_size, limits=limits
+        )
+    return boxes, cameras
+
+
+def _is_for_another(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> bool:
+    return bool(boxes.unknown or cameras.unknown or boxes.report.problems)
+
+
+def _nothing_known(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> InputError:
+    if boxes.report.problems and not boxes.unknown:
+        return boxes.report.problems[0]
+    unknown, reasons = boxes.unknown + cameras.unknown, {**boxes.reasons, **cameras.reasons}
+    name = sorted(unknown)[0]
+    return InputError(
+        f'none of the {len(unknown)} frames belongs to the dataset: "{name}" {reasons[name]}',
+        hint="Frames are called <match>/7_1.png, <camera>/<frame>, or as an export calls them.",
+    )
+
+
+def _report(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> Json:
+    return {
+        "read": boxes.report.read,
+        "without_score": boxes.without_score,
+        "other_classes": boxes.report.counts["other classes"],
+        "unknown_boxes": sum(boxes.unknown.values()),
+        "unknown_frames": list(listed(boxes.unknown, boxes.reasons, LISTED)),
+        "unknown_cameras": list(listed(cameras.unknown, cameras.reasons, LISTED)),
+        **_problems(boxes.report, cameras.report),
+    }
+
+
+def _problems(*reports: Report) -> dict[str, Any]:
+    every = [problem for report in reports for problem in report.problems]
+    dropped = sum(report.dropped for report in reports)
+    return {
+        "problems": [
+            {
+                "file": Path(item.path).name,
+                "record": item.record,
+                "field": item.field,
+                "problem": item.problem,
+            }
+            for item in every[:LISTED]
+        ],
+        "more_problems": max(len(every) - LISTED, 0) + dropped,
+    }

@@ -1,0 +1,242 @@
+"""Export: what people accepted (or everything), as a folder or zip with a manifest."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from sqlalchemy.orm import Session
+
+from app.datasets.export_record import BOX_KINDS, ExportRecord
+from app.datasets.issia import FramePersons
+from app.datasets.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
+from app.datasets.output import output_tree
+from app.errors import InputError
+from app.review.datasets.dataset import read_dataset
+from app.review.datasets.licence import licence_of
+from app.review.exporting.formats import (
+    CONTENT,
+    FORMATS,
+    WriteOptions,
+    box_settings,
+    frame_layout,
+    missing_sentence,
+    write_format,
+)
+from app.review.exporting.images import ExportImages
+from app.review.exporting.source import ExportSource, LiveSource, VersionSource
+from app.review.importing.carry import FORMAT as CARRY
+from app.review.importing.carry import carry_out
+from app.review.importing.spare import spare_persons
+from app.review.versions.version import find_version
+from app.store.session import Store
+
+IMAGES = ("none", "copy", "link")
+
+Progress = Callable[[int, int], None]
+"""Called with the number of groups done and the number that are exported."""
+
+
+@dataclass(frozen=True)
+class ExportReport:
+    """What was written.
+
+    Attributes:
+        counts: As the format counts: groups, views, balls, cameras ...
+        left_out: Accepted groups that are not in it, by reason: ``stale`` (changed after the
+            verdict), ``failing`` (a gate, and nobody overrode it), ``unsolved``.
+        missing_images: Frames that could not be copied, with the reason.
+    """
+
+    out: Path
+    format: str
+    counts: Mapping[str, int]
+    left_out: Mapping[str, int] = field(default_factory=dict)
+    missing_images: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Options:
+    format: str
+    everything: bool
+    boxes: str
+    images: str
+
+    def check(self, out: Path) -> None:
+        for name, value, choices in (
+            ("format", self.format, FORMATS),
+            ("boxes", self.boxes, BOX_KINDS),
+            ("images", self.images, IMAGES),
+        ):
+            if value not in choices:
+                raise InputError(
+                    f'"{value}" is not possible for {name}; {", ".join(choices)} are',
+                    pointer=f"/{name}",
+                )
+        if self.images == "link" and out.suffix.lower() == ".zip":
+            raise InputError("a zip cannot hold links; export a folder or copy the images")
+
+
+def export(
+    store: Store,
+    dataset: str | int,
+    format: str,  # noqa: A002
+    out: Path,
+    *,
+    everything: bool = False,
+    boxes: str = "optimized",
+    images: str = "none",
+    version: str | None = None,
+    progress: Progress | None = None,
+) -> ExportReport:
+    """Write a dataset's accepted groups, or all groups, in a format that consumers read.
+
+    Accepted means: the newest verdict accepts the group as it is now, and the policy passes it
+    or a person overrode the gate with a reason. All is read from one snapshot of the database.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        format: One of ``FORMATS``.
+        out: Folder, or file that ends in .zip; appears whole or not at all.
+        everything: Every group, whatever its verdict.
+        boxes: ``optimized``, ``annotated`` or ``exact``: which ball box Labels-v3D.json, COCO,
+            YOLO and Parquet hold. Other formats have no place for a chosen box, and their
+            manifests name none.
+        images: ``none``, ``copy`` or ``link`` (folders only).
+        version: Name, id or hash of a frozen version to export instead of the dataset as it is:
+            the same bytes every time.
+        progress: Called as groups are written.
+
+    Raises:
+        InputError: Nothing to export, or the groups do not fit the format.
+        StorageError: The disk refuses.
+    """
+    options = _Options(format, everything, boxes, images)
+    options.check(out)
+    if format == CARRY:
+        return _carry(store, dataset, out, version, progress)
+    with store.read() as session:
+        source = _source(session, store, dataset, everything, version)
+        with output_tree(out) as root:
+            frames = ExportImages(root, images, store.settings, frame_layout(format))
+            run = _Run(source, options, frames, progress)
+            # A version is the same every time; spare frames are the dataset's as it is.
+            if format == "issia" and isinstance(source, LiveSource):
+                run.spare = spare_persons(session, dataset)
+            counts = run.write(root)
+            _require_content(source.dataset, format, counts)
+            write_manifest(root, run.manifest(counts))
+    left_out = source.left_out if isinstance(source, LiveSource) else {}
+    return ExportReport(out, format, counts, left_out, tuple(frames.missing))
+
+
+def _carry(
+    store: Store, dataset: str | int, out: Path, version: str | None, progress: Progress | None
+) -> ExportReport:
+    """Everything that was said about a dataset, for another installation of Touchline."""
+    if version is not None:
+        raise InputError(
+            "the format touchline carries the whole dataset; choose another format to export a frozen version"
+        )
+    return ExportReport(out, CARRY, carry_out(store, dataset, out, progress))
+
+
+def _source(
+    session: Session, store: Store, dataset: str | int, everything: bool, version: str | None
+) -> LiveSource | VersionSource:
+    found = read_dataset(session, dataset)
+    if version is not None:
+        if everything:
+            raise InputError(
+                "a frozen version always exports exactly its own groups; leave out all, or export the dataset itself"
+            )
+        frozen = find_version(store, found.id, version)
+        return VersionSource(session, frozen)
+    source = LiveSource(session, found, everything)
+    source.require_some()
+    return source
+
+
+class _Run:
+    """One export under way: streams records to a writer and notes what the manifest says."""
+
+    def __init__(
+        self,
+        source: ExportSource,
+        options: _Options,
+        images: ExportImages,
+        progress: Progress | None,
+    ):
+        self._source, self._options = source, options
+        self._images, self._progress = images, progress
+        self._licences: set[str] = set()
+        self._verdicts: Counter[str] = Counter()
+        self._overrides: list[dict[str, str | None]] = []
+        self.spare: Iterable[FramePersons] = ()
+
+    def write(self, root: Path) -> dict[str, int]:
+        """Write the format's files; returns its counts."""
+        source, options = self._source, self._options
+        policy = source.settings()
+        provenance = {
+            "dataset": source.dataset,
+            "version": source.version,
+            "policy": policy["policy"]["name"],
+            "policy_hash": policy["policy_hash"],
+            "date": source.date,
+        }
+        wanted = WriteOptions(
+            options.format, options.everything, options.boxes, provenance, self.spare
+        )
+        return write_format(root, self._records(), wanted)
+
+    def manifest(self, counts: Mapping[str, int]) -> Manifest:
+        """What the manifest says of this export."""
+        source = self._source
+        terms = " ".join(sorted(self._licences)) or UNKNOWN_LICENCE
+        return Manifest(
+            dataset=source.dataset,
+            format=self._options.format,
+            date=source.date,
+            counts=counts,
+            settings={
+                **source.settings(),
+                "images": self._options.images,
+                **box_settings(self._options.format, self._options.boxes),
+                **missing_sentence(self._options.format, counts),
+            },
+            licence=source.licence or terms,
+            version=source.version,
+            media=tuple(self._images.media),
+            verdicts=dict(sorted(self._verdicts.items())),
+            overrides=tuple(self._overrides),
+            stamp=source.stamp(),
+        )
+
+    def _records(self) -> Iterator[ExportRecord]:
+        for place, (record, facts) in enumerate(self._source.items(), 1):
+            self._licences.add(licence_of(record.group.match))
+            self._images.add(record.group, facts, record.splits)
+            self._note(record)
+            yield replace(record, frames=self._images.placed)
+            if self._progress is not None:
+                self._progress(place, self._source.count)
+
+    def _note(self, record: ExportRecord) -> None:
+        """What the manifest says of a verdict."""
+        self._verdicts[record.verdict] += 1
+        if record.override is not None and record.verdict == "accepted":
+            group, gate = record.group.key, record.override
+            self._overrides.append({"group": group, "gate": gate, "reason": record.reason})
+
+
+def _require_content(dataset: str, format: str, counts: Mapping[str, int]) -> None:  # noqa: A002
+    """Raises InputError where a format has no place for anything that the groups hold."""
+    count, what = CONTENT.get(format, ("groups", "group"))
+    if not counts[count]:
+        raise InputError(
+            f'no group of "{dataset}" has a {what} for {format}, so there is nothing to export'
+        )

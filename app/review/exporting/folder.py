@@ -1,0 +1,109 @@
+"""The folder of exports made over REST: a zip and, once that is complete, its record."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from app.errors import NotFoundError
+from app.finite import json_text
+from app.review.exporting.export import ExportReport
+from app.store.clock import now
+
+_ID = re.compile(r"[0-9a-f]{32}|[1-9][0-9]{0,18}")
+"""Ids of jobs, and those of exports that were made before there were jobs."""
+
+
+@dataclass(frozen=True)
+class ExportEntry:
+    """One finished export: what was asked for, and what came of it."""
+
+    id: str
+    request: dict[str, Any]
+    created: str
+    counts: dict[str, int]
+    left_out: dict[str, int]
+    missing_images: list[str]
+    bytes: int
+
+
+class ExportFolder:
+    """Exports by id; ids and file names are ours, never the caller's."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+
+    def prepare(self) -> None:
+        """Make the folder, and clear what a killed server left half written."""
+        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        for path in self.folder.glob(".*.partial"):
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+
+    def keep(self, name: str, request: Mapping[str, Any], report: ExportReport) -> ExportEntry:
+        """Record an export whose zip is written; only then it can be found.
+
+        Args:
+            name: Its id.
+            request: What was asked for, plain JSON values.
+            report: What came of it.
+        """
+        entry = ExportEntry(
+            id=name,
+            request=dict(request),
+            created=now(),
+            counts=dict(report.counts),
+            left_out=dict(report.left_out),
+            missing_images=list(report.missing_images),
+            bytes=self.content(name).stat().st_size,
+        )
+        _write_atomically(self._record(name), json_text(asdict(entry), ascii_=True).encode())
+        return entry
+
+    def find(self, name: str) -> ExportEntry | None:
+        """The finished export of that id, or None."""
+        if not _ID.fullmatch(name) or not self._record(name).is_file():
+            return None
+        return ExportEntry(**json.loads(self._record(name).read_bytes()))
+
+    def get(self, name: str) -> ExportEntry:
+        """The finished export of that id.
+
+        Raises:
+            NotFoundError: There is none.
+        """
+        entry = self.find(name)
+        if entry is None:
+            raise NotFoundError("there is no such export")
+        return entry
+
+    def content(self, name: str) -> Path:
+        """Path of the zip of an export."""
+        return self.folder / f"{name}.zip"
+
+    def forget(self, name: str) -> None:
+        """Delete an export, its record first: what is listed has a file."""
+        if _ID.fullmatch(name):
+            self._record(name).unlink(missing_ok=True)
+            self.content(name).unlink(missing_ok=True)
+
+    def _record(self, name: str) -> Path:
+        return self.folder / f"{name}.json"
+
+
+def _write_atomically(path: Path, content: bytes) -> None:
+    """A reader sees the whole file or none, also after a power cut."""
+    temporary = path.with_name(f".{path.name}.partial")
+    with temporary.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)

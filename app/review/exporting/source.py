@@ -1,0 +1,226 @@
+"""Where an export comes from: a dataset as it is now, or a frozen version of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any, Protocol
+
+from sqlalchemy import ColumnElement, func, not_, or_, select
+from sqlalchemy.orm import Session
+
+from app.datasets.export_record import ExportRecord
+from app.errors import InputError
+from app.review.datasets.dataset import Dataset
+from app.review.editing.state import GroupState, VerdictState, read_states
+from app.review.versions.manifest import policy_settings, version_settings, version_stamp
+from app.review.versions.version import BATCH, FrozenGroup, Version, VersionGroup, read_rows, thaw
+from app.soccer.solution import SOLVER_VERSION
+from app.store.codecs import Json
+from app.store.models import LogModel, QueueModel
+
+Facts = Mapping[str, Mapping[str, int]]
+"""Size and checksum of frames by view, as they were when a version was frozen."""
+Item = tuple[ExportRecord, Facts | None]
+"""A record, and the facts about its frames where they were frozen with it."""
+
+
+class ExportSource(Protocol):
+    """What an export reads."""
+
+    @property
+    def dataset(self) -> str:
+        """Name of the dataset."""
+
+    @property
+    def count(self) -> int:
+        """Number of groups."""
+
+    @property
+    def date(self) -> str:
+        """Of the manifest."""
+
+    @property
+    def version(self) -> str | None:
+        """Name of the version, or None for the dataset as it is."""
+
+    @property
+    def licence(self) -> str | None:
+        """Licence text, where there is one of its own."""
+
+    def settings(self) -> dict[str, Any]:
+        """What decided what is in it, for the manifest."""
+
+    def stamp(self) -> dict[str, Json]:
+        """What else the manifest says of it."""
+
+    def items(self) -> Iterator[Item]:
+        """Its groups, streamed."""
+
+
+class LiveSource:
+    """The accepted groups of a dataset, or all of them, in a session's snapshot."""
+
+    version = None
+    licence = None
+
+    def __init__(self, session: Session, dataset: Dataset, everything: bool):
+        self._session, self._found, self._everything = session, dataset, everything
+        self._ids = _ids(session, dataset.id, everything)
+        self.dataset, self.count = dataset.name, len(self._ids)
+        self.left_out = {} if everything else _left_out(session, dataset.id)
+
+    @property
+    def date(self) -> str:
+        """Time of the newest thing that was said about the dataset; freezing it says nothing."""
+        statement = select(func.max(LogModel.at)).where(
+            LogModel.dataset_id == self._found.id, LogModel.kind != "freeze"
+        )
+        return str(self._session.execute(statement).scalar_one())
+
+    def settings(self) -> dict[str, Any]:
+        """Policy, solver, and which groups."""
+        groups = "all" if self._everything else "accepted"
+        return {**policy_settings(self._found.policy, SOLVER_VERSION), "groups": groups}
+
+    def stamp(self) -> dict[str, Json]:
+        """Nothing but what the records say."""
+        return {}
+
+    def items(self) -> Iterator[Item]:
+        """Groups in the order of the dataset."""
+        for start in range(0, self.count, BATCH):
+            for state in read_states(self._session, self._ids[start : start + BATCH]):
+                yield _live_record(state), None
+
+    def require_some(self) -> None:
+        """Raise InputError where there is nothing to export."""
+        if not self.count:
+            raise _nothing(self._found, self.left_out, self._everything)
+
+
+class VersionSource:
+    """The groups of a frozen version, as they were."""
+
+    def __init__(self, session: Session, version: Version):
+        self._session, self._version = session, version
+        self.dataset, self.version = version.dataset, version.name
+        self.date, self.licence = version.created, version.licence or None
+        self.count = int(version.counts["groups"])
+
+    def settings(self) -> dict[str, Any]:
+        """Policy and solver as they were frozen, and which groups."""
+        return version_settings(self._version)
+
+    def stamp(self) -> dict[str, Json]:
+        """Hash, note, counts and changelog, and who is not in it and why."""
+        return version_stamp(self._session, self._version)
+
+    def items(self) -> Iterator[Item]:
+        """Groups by match and key."""
+        batch: list[VersionGroup] = []
+        for row in read_rows(self._session, self._version.id, members=True):
+            batch.append(row)
+            if len(batch) == BATCH:
+                yield from self._thawed(batch)
+                batch = []
+        yield from self._thawed(batch)
+
+    def _thawed(self, rows: list[VersionGroup]) -> Iterator[Item]:
+        for item in thaw(self._session, self._version, rows):
+            frames = item.row.frames or {}
+            facts = {key: frame["facts"] for key, frame in frames.items() if "facts" in frame}
+            yield frozen_record(item), facts
+
+
+def frozen_record(item: FrozenGroup) -> ExportRecord:
+    """A group of a version as writers get it."""
+    verdict = item.row.verdict or {"state": "unreviewed", "reason": None}
+    return ExportRecord(
+        group=replace(item.group, split=item.row.split),
+        solution=item.solution,
+        verdict=verdict["state"],
+        reason=verdict_reason(
+            verdict["state"],
+            verdict["reason"],
+            verdict.get("note"),
+            verdict.get("override"),
+        ),
+        override=verdict.get("override"),
+        splits=item.row.splits or {},
+    )
+
+
+def _live_record(state: GroupState) -> ExportRecord:
+    verdict = state.verdict
+    return ExportRecord(
+        group=state.group,
+        solution=state.solution,
+        verdict=_verdict(verdict),
+        reason=verdict_reason(verdict.state, verdict.reason, verdict.note, verdict.override),
+        override=verdict.override,
+    )
+
+
+def _verdict(verdict: VerdictState) -> str:
+    """The verdict; an accepted group that changed since says so, as it is not accepted now."""
+    stale = verdict.stale and verdict.state == "accepted"
+    return f"{verdict.state} (stale)" if stale else verdict.state
+
+
+def verdict_reason(
+    state: str, reason: str | None, note: str | None, override: str | None
+) -> str | None:
+    """Why it was rejected, or why it was accepted against a gate."""
+    if state == "rejected":
+        return f"{reason}: {note}" if note else reason
+    if override is not None:
+        return f"overrides {override}: {note}"
+    return None
+
+
+def _ids(session: Session, dataset_id: int, everything: bool) -> list[int]:
+    where = [QueueModel.dataset_id == dataset_id]
+    if not everything:
+        where += [
+            QueueModel.status == "accepted",
+            _CURRENT,
+            QueueModel.solved.is_(True),
+            _QUALIFIES,
+        ]
+    statement = select(QueueModel.group_id).where(*where).order_by(QueueModel.number)
+    return list(session.scalars(statement))
+
+
+def _left_out(session: Session, dataset_id: int) -> dict[str, int]:
+    """Accepted groups that are not exported, counted by the first reason that holds."""
+    reasons: dict[str, list[ColumnElement[bool]]] = {
+        "stale": [not_(_CURRENT)],
+        "unsolved": [_CURRENT, not_(QueueModel.solved)],
+        "failing": [_CURRENT, QueueModel.solved.is_(True), not_(_QUALIFIES)],
+    }
+    counts = {}
+    for reason, where in reasons.items():
+        statement = select(func.count()).where(
+            QueueModel.dataset_id == dataset_id, QueueModel.status == "accepted", *where
+        )
+        counts[reason] = int(session.execute(statement).scalar_one())
+    return {reason: count for reason, count in counts.items() if count}
+
+
+def _nothing(dataset: Dataset, left_out: Mapping[str, int], everything: bool) -> InputError:
+    if everything:
+        return InputError(
+            f'dataset "{dataset.name}" holds no groups, so there is nothing to export'
+        )
+    if left_out:
+        reasons = ", ".join(f"{count} {reason}" for reason, count in left_out.items())
+        return InputError(f'no accepted group of "{dataset.name}" can be exported ({reasons})')
+    return InputError(
+        f'nobody has accepted a group of "{dataset.name}" yet, so there is nothing to export'
+    )
+
+
+_CURRENT = not_(QueueModel.stale)
+_QUALIFIES = or_(QueueModel.passes.is_(True), QueueModel.override == QueueModel.gate)
+"""An override speaks of the gate that failed then, of no other that fails now."""

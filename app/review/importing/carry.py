@@ -1,0 +1,223 @@
+"""Carry: a dataset with its edits and verdicts as JSON lines, for another installation.
+
+``touchline.json`` says what it is; ``stations.jsonl``, ``groups.jsonl`` and ``spare.jsonl`` hold a
+line each for a static camera, a group, a frame with persons only. Each line has what is said now,
+what the dataset brought, the digests of all states in between, and who said what and when. Media
+are not carried: they lie elsewhere on each machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.datasets.manifest import Manifest, write_manifest
+from app.datasets.output import output_tree
+from app.finite import json_text
+from app.review.datasets.dataset import Dataset, read_dataset
+from app.review.datasets.licence import licence_text
+from app.review.editing.lineage import Lineage, Lineages, station_lineage
+from app.soccer.group import Group
+from app.soccer.solution import SOLVER_VERSION
+from app.store.codecs import (
+    Json,
+    canonical,
+    group_head_to_json,
+    policy_to_json,
+    station_to_json,
+    unpack,
+    view_to_json,
+)
+from app.store.groups import StoredGroup, read_groups, stored_station
+from app.store.log import read_log
+from app.store.models import GroupModel, LogModel, SpareFrameModel, StationModel, VerdictModel
+from app.store.session import Store
+
+FORMAT = "touchline"
+FORMAT_VERSION = 1
+HEAD, STATIONS, GROUPS, SPARE = "touchline.json", "stations.jsonl", "groups.jsonl", "spare.jsonl"
+VERDICT = (
+    "actor",
+    "at",
+    "state",
+    "reason",
+    "note",
+    "inputs_hash",
+    "policy_hash",
+    "fixed",
+    "override",
+)
+"""What is carried of a verdict."""
+EDIT_KINDS = ("edit", "undo", "redo", "station_edit", "station_undo", "station_redo")
+_BATCH = 200
+
+Progress = Callable[[int, int], None]
+
+
+def carry_out(
+    store: Store, dataset: str | int, out: Path, progress: Progress | None = None
+) -> dict[str, int]:
+    """Write everything that was said about a dataset, from one snapshot; returns counts.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        out: Folder, or file that ends in .zip; appears whole or not at all.
+        progress: Called as groups are written.
+    """
+    with store.read() as session, output_tree(out) as root:
+        found = read_dataset(session, dataset)
+        counts = {
+            "stations": _write_lines(root / STATIONS, _stations(session, found.id)),
+            "groups": _write_lines(root / GROUPS, _groups(session, found, progress)),
+            "spare": _write_lines(root / SPARE, _spare(session, found.id)),
+        }
+        head = {
+            "format": FORMAT,
+            "version": FORMAT_VERSION,
+            "dataset": found.name,
+            "policy": policy_to_json(found.policy),
+        }
+        (root / HEAD).write_text(json_text(head, indent=1, ascii_=True) + "\n", encoding="utf-8")
+        write_manifest(root, _manifest(session, found, counts))
+    return counts
+
+
+def carried_group(group: Group) -> dict[str, Json]:
+    """A group without media; a shared station is its key."""
+    views = []
+    for view in group.views:
+        value = view_to_json(view, view.station.key if view.station.shared else None)
+        del value["media"]
+        views.append(value)
+    return {**group_head_to_json(group), "views": views}
+
+
+def _write_lines(path: Path, items: Iterator[Json]) -> int:
+    count = 0
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        for item in items:
+            file.write(canonical(item) + "\n")
+            count += 1
+    return count
+
+
+def _stations(session: Session, dataset_id: int) -> Iterator[Json]:
+    statement = (
+        select(*StationModel.__table__.columns)
+        .where(StationModel.dataset_id == dataset_id, StationModel.shared)
+        .order_by(StationModel.key)
+    )
+    for row in session.execute(statement):
+        stored = stored_station(row)
+        lineage = station_lineage(session, stored)
+        station, base = station_to_json(stored.station), station_to_json(lineage.base)
+        yield {
+            "key": row.key,
+            "station": station,
+            "base": None if base == station else base,
+            "states": list(lineage.states),
+            "log": _log(session, LogModel.station_id == stored.id, LogModel.group_id.is_(None)),
+        }
+
+
+def _groups(session: Session, dataset: Dataset, progress: Progress | None) -> Iterator[Json]:
+    lineages = Lineages(session, dataset.id)
+    ids = list(
+        session.scalars(
+            select(GroupModel.id)
+            .where(GroupModel.dataset_id == dataset.id)
+            .order_by(GroupModel.number)
+        )
+    )
+    for start in range(0, len(ids), _BATCH):
+        stored = read_groups(session, ids[start : start + _BATCH])
+        known, verdicts = lineages.of(stored.values()), _verdicts(session, list(stored))
+        for item in stored.values():
+            yield _group(session, item, known[item.id], verdicts.get(item.id, []))
+        if progress is not None:
+            progress(start + len(stored), len(ids))
+
+
+def _group(session: Session, stored: StoredGroup, lineage: Lineage, verdicts: Json) -> Json:
+    group, base = carried_group(stored.group), carried_group(lineage.base)
+    walked = len(lineage.bases) > 1 or base != group or _has_past(lineage)
+    return {
+        "group": group,
+        "base": None if base == group else base,
+        "bases": list(lineage.bases),
+        "views": {key: list(states) for key, states in lineage.views.items()},
+        "stations": {key: list(states) for key, states in lineage.stations.items()},
+        "log": _log(session, LogModel.group_id == stored.id) if walked else [],
+        "verdicts": verdicts,
+    }
+
+
+def _has_past(lineage: Lineage) -> bool:
+    states = [*lineage.views.values(), *lineage.stations.values()]
+    return any(len(item) > 1 for item in states)
+
+
+def _log(session: Session, *where: Any) -> list[Json]:
+    """Who edited what and when; carried edits of a third installation too."""
+    entries: list[Json] = []
+    for entry in read_log(session, *where):
+        if entry.kind in EDIT_KINDS:
+            body = {"kind": entry.kind, "actor": entry.actor, "at": entry.at}
+            entries.append({**body, "edit": entry.body["edit"]})
+        elif entry.kind in ("import", "station"):
+            entries += entry.body.get("carried", [])
+    return entries
+
+
+def _verdicts(session: Session, ids: list[int]) -> dict[int, list[Json]]:
+    columns = [getattr(VerdictModel, name) for name in VERDICT]
+    statement = (
+        select(VerdictModel.group_id, *columns)
+        .where(VerdictModel.group_id.in_(ids))
+        .order_by(VerdictModel.id)
+    )
+    verdicts: dict[int, list[Json]] = {}
+    for row in session.execute(statement):
+        values = dict(row._mapping)
+        verdicts.setdefault(row.group_id, []).append({name: values[name] for name in VERDICT})
+    return verdicts
+
+
+def _spare(session: Session, dataset_id: int) -> Iterator[Json]:
+    model = SpareFrameModel
+    statement = (
+        select(model.camera, model.frame, model.extras)
+        .where(model.dataset_id == dataset_id)
+        .order_by(model.camera, model.frame)
+    )
+    for row in session.execute(statement.execution_options(yield_per=_BATCH)):
+        yield {"camera": row.camera, "frame": row.frame, "extras": unpack(row.extras)}
+
+
+def _manifest(session: Session, dataset: Dataset, counts: Mapping[str, int]) -> Manifest:
+    matches = session.scalars(
+        select(GroupModel.match).where(GroupModel.dataset_id == dataset.id).distinct()
+    )
+    newest = session.scalar(
+        select(LogModel.at)
+        .where(LogModel.dataset_id == dataset.id, LogModel.kind != "freeze")
+        .order_by(LogModel.at.desc())
+        .limit(1)
+    )
+    return Manifest(
+        dataset=dataset.name,
+        format=FORMAT,
+        date=newest or dataset.created,
+        counts=counts,
+        settings={
+            "policy": policy_to_json(dataset.policy),
+            "policy_hash": dataset.policy.hash,
+            "solver_version": SOLVER_VERSION,
+        },
+        licence=licence_text(matches),
+    )

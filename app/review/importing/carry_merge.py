@@ -1,0 +1,163 @@
+"""Carry, merged: one group of this installation with the same group of another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.review.editing.lineage import Lineage
+from app.review.editing.upstream import Kept
+from app.review.importing.body import import_body, places_of
+from app.review.importing.carry_parse import CarriedGroup
+from app.review.importing.ingest import IngestReport, Origin, note_kept
+from app.soccer.group import Group, View
+from app.store.clock import now
+from app.store.digest import station_digest, view_digest
+from app.store.groups import StoredGroup, read_groups, save_group
+from app.store.log import Entry, append
+from app.store.models import ImportFindingModel
+
+
+@dataclass(frozen=True)
+class Side:
+    """One unit that is edited as a whole, as an installation has it.
+
+    Attributes:
+        now: Digest of its present state.
+        base: Digest of what its dataset brought.
+        past: Digests of the states that it went through, oldest first, the present one last.
+    """
+
+    now: str
+    base: str
+    past: Sequence[str]
+
+    def goes_through(self, other: Side) -> bool:
+        """Whether it went through everything that the other did, in that order."""
+        states = iter(self.past)
+        return all(state in states for state in other.past)
+
+
+FOLLOW, STAY, CONFLICT, UPSTREAM = "follow", "stay", "conflict", "upstream"
+
+
+def decide(here: Side, there: Side) -> str:
+    """What becomes of a unit here.
+
+    Returns:
+        ``follow``: take the other's; ``stay``: nothing to do; ``conflict``: both edited it and
+        neither is behind the other; ``upstream``: take the other's edit, which was made on
+        another state of the dataset than the one here.
+    """
+    if here.now == there.now:
+        return STAY
+    if there.goes_through(here):
+        return FOLLOW
+    if here.goes_through(there) or there.now == there.base:
+        return STAY
+    if here.now == here.base:
+        return FOLLOW if here.now in there.past else UPSTREAM
+    behind, ahead = here.now in there.past, there.now in here.past
+    if behind == ahead:
+        return CONFLICT
+    return FOLLOW if behind else STAY
+
+
+def merge_group(
+    session: Session,
+    origin: Origin,
+    stored: StoredGroup,
+    lineage: Lineage,
+    carried: CarriedGroup,
+    report: IngestReport,
+) -> bool:
+    """Bring a group up to what another installation made of it; whether anything changed."""
+    merged, kept = _merged(stored, lineage, carried)
+    fresh = _not_noticed(session, stored.id, kept)
+    if merged == stored.group and not fresh:
+        return False
+    at = now()
+    save_group(session, stored, merged, at=at, source=lineage.base)
+    after = read_groups(session, [stored.id])[stored.id]
+    noticed = note_kept(session, after, kept)
+    base = lineage.base
+    body = import_body(merged, base, origin.source, stored.source_hash, places_of(after))
+    body["kept"] = [[item.view, item.sentence] for item in noticed]
+    body["carried"] = list(carried.log)
+    append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, stored.id)])
+    report.findings += len(fresh)
+    return True
+
+
+def _merged(
+    stored: StoredGroup, lineage: Lineage, carried: CarriedGroup
+) -> tuple[Group, list[Kept]]:
+    group, kept = stored.group, list[Kept]()
+    for view in stored.group.views:
+        other, base = carried.group.view(view.key), carried.base.view(view.key)
+        if other is None or base is None or other.station.shared != view.station.shared:
+            continue
+        ball = decide(_view_side(stored, lineage, view), _other_view(carried, other, base))
+        if ball in (FOLLOW, UPSTREAM):
+            view = replace(
+                view, balls=other.balls, included=other.included, left_out=other.left_out
+            )
+        kept += _kept(view, ball, "ball")
+        if not view.station.shared:
+            here, there = _station_side(stored, lineage, view), _other_station(carried, other, base)
+            lines = decide(here, there)
+            if lines in (FOLLOW, UPSTREAM):
+                said = other.station
+                station = replace(
+                    view.station, lines=said.lines, given=said.given, calibration=said.calibration
+                )
+                view = replace(view, station=station)
+            kept += _kept(view, lines, "lines or the camera")
+        group = group.with_view(view)
+    return group, kept
+
+
+def _kept(view: View, decision: str, what: str) -> list[Kept]:
+    if decision == CONFLICT:
+        sentence = f"another installation edited the {what} of {view.key} too; what is here stays"
+    elif decision == UPSTREAM:
+        sentence = (
+            f"another installation edited the {what} of {view.key} on another state of the "
+            "dataset; its edit is in place now"
+        )
+    else:
+        return []
+    return [Kept(view.key, sentence)]
+
+
+def _view_side(stored: StoredGroup, lineage: Lineage, view: View) -> Side:
+    present, base = stored.view_digests[view.key]
+    return Side(present, base, lineage.views.get(view.key, (present,)))
+
+
+def _other_view(carried: CarriedGroup, view: View, base: View) -> Side:
+    past = carried.views.get(view.key, ())
+    return Side(view_digest(view), view_digest(base), past)
+
+
+def _station_side(stored: StoredGroup, lineage: Lineage, view: View) -> Side:
+    own = stored.stations[view.key]
+    return Side(own.digest, own.source_digest, lineage.stations.get(view.key, (own.digest,)))
+
+
+def _other_station(carried: CarriedGroup, view: View, base: View) -> Side:
+    past = carried.stations.get(view.key, ())
+    return Side(station_digest(view.station), station_digest(base.station), past)
+
+
+def _not_noticed(session: Session, group_id: int, kept: list[Kept]) -> list[Kept]:
+    """Those of the findings that are not there already."""
+    if not kept:
+        return []
+    model = ImportFindingModel
+    statement = select(model.view, model.sentence).where(model.group_id == group_id)
+    known = {(row.view, row.sentence) for row in session.execute(statement)}
+    return [item for item in kept if (item.view, item.sentence) not in known]

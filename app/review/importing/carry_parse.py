@@ -1,0 +1,263 @@
+"""Carry, parsed: lines that another installation wrote, looked at before anything is believed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import IO, Any
+
+from app.datasets.archive import FileTree
+from app.datasets.json_text import read_json
+from app.datasets.report import Report
+from app.errors import DatasetFormatError, InputError, ReviewError
+from app.review.editing.edit import CALIBRATIONS, MAX_POINTS
+from app.review.editing.lineage import logged_group
+from app.review.importing.carry import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD, VERDICT
+from app.review.verdicts.verdict import STATES
+from app.soccer.annotation import Extras
+from app.soccer.group import Group, Station, View
+from app.soccer.pitch import canonical_marking
+from app.soccer.policy import Policy
+from app.soccer.reasons import MAX_NOTE, REASONS, left_out
+from app.store.codecs import Json, extras_from_json, policy_from_json, station_from_json
+
+MAX_LINE = 32 * 1024 * 1024
+MAX_VIEWS, MAX_BALLS, MAX_SIDE, MAX_TEXT = 100, 100, 20_000, 1000
+MAX_STATES = 100_000
+
+
+@dataclass(frozen=True)
+class CarriedHead:
+    """What the file says of itself."""
+
+    dataset: str
+    policy: Policy
+
+
+@dataclass(frozen=True)
+class CarriedStation:
+    """A static camera: as it is there, as its dataset brought it, and its past."""
+
+    station: Station
+    base: Station
+    states: tuple[str, ...]
+    log: tuple[Json, ...]
+
+
+@dataclass(frozen=True)
+class CarriedGroup:
+    """A group: as it is there, as its dataset brought it, its past, and what people decided."""
+
+    group: Group
+    base: Group
+    views: Mapping[str, tuple[str, ...]]
+    stations: Mapping[str, tuple[str, ...]]
+    log: tuple[Json, ...]
+    verdicts: tuple[Mapping[str, Any], ...]
+
+
+def read_head(tree: FileTree) -> CarriedHead:
+    """What the file says of itself.
+
+    Raises:
+        DatasetFormatError: It is none of ours, or of a newer kind.
+    """
+    shown = tree.shown(HEAD)
+    if HEAD not in tree.names():
+        raise DatasetFormatError(shown, None, None, "is missing; this is no export as touchline")
+    value = read_json(tree.read_bytes(HEAD), shown)
+    if not isinstance(value, dict) or value.get("format") != FORMAT:
+        raise DatasetFormatError(shown, None, "format", f'is not "{FORMAT}"')
+    if value.get("version") != FORMAT_VERSION:
+        problem = f"is {value.get('version')}; this version of Touchline reads {FORMAT_VERSION}"
+        raise DatasetFormatError(shown, None, "version", problem)
+    try:
+        policy = policy_from_json(_mapping(value["policy"]))
+        # Its values reach the solver: a text in place of a number would break there.
+        assert policy.hash
+        return CarriedHead(_text(value["dataset"]), policy)
+    except (ReviewError, KeyError, TypeError, ValueError) as error:
+        raise DatasetFormatError(shown, None, "policy", "is not a policy") from error
+
+
+def read_lines(tree: FileTree, name: str, report: Report) -> Iterator[tuple[str, Json]]:
+    """The records of a file of lines with their places; a broken line is skipped and told."""
+    if name not in tree.names():
+        return
+    with tree.open(name) as file:
+        for number, line in enumerate(_lines(file, tree.shown(name)), 1):
+            report.read += 1
+            try:
+                yield f"line {number}", read_json(line, tree.shown(name), record=f"line {number}")
+            except DatasetFormatError as error:
+                report.skip(error)
+
+
+def _lines(file: IO[bytes], shown: str) -> Iterator[bytes]:
+    while line := file.readline(MAX_LINE + 1):
+        if len(line) > MAX_LINE:
+            raise DatasetFormatError(shown, None, None, f"has a line above {MAX_LINE:,} bytes")
+        yield line
+
+
+def parse_station(value: Json) -> CarriedStation:
+    """A static camera of its line.
+
+    Raises:
+        InputError: It is not what Touchline writes.
+    """
+    try:
+        station = _station(_mapping(value)["station"])
+        base = station if value["base"] is None else _station(value["base"])
+        if not (station.shared and base.shared and station.key == base.key):
+            raise InputError("is not one static camera")
+        return CarriedStation(station, base, _states(value["states"]), _log(value["log"]))
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ReviewError) as error:
+        raise _problem(error) from error
+
+
+def parse_group(value: Json, shared: Mapping[str, Station]) -> CarriedGroup:
+    """A group of its line.
+
+    Raises:
+        InputError: It is not what Touchline writes.
+    """
+    try:
+        group = _group(_mapping(value)["group"], shared)
+        base = group if value["base"] is None else _group(value["base"], shared)
+        if group.key != base.key:
+            raise InputError("is not one group")
+        return CarriedGroup(
+            group=group,
+            base=base,
+            views={key: _states(item) for key, item in _mapping(value["views"]).items()},
+            stations={key: _states(item) for key, item in _mapping(value["stations"]).items()},
+            log=_log(value["log"]),
+            verdicts=tuple(map(_verdict, _list(value["verdicts"], MAX_STATES))),
+        )
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ReviewError) as error:
+        raise _problem(error) from error
+
+
+def parse_spare(value: Json) -> tuple[str, str, Extras]:
+    """Camera, frame and extras of a line.
+
+    Raises:
+        InputError: It is not what Touchline writes.
+    """
+    try:
+        extras = _mapping(value)["extras"]
+        return _text(value["camera"]), _text(value["frame"]), _extras(extras)
+    except (KeyError, TypeError, ValueError, AttributeError, ReviewError) as error:
+        raise _problem(error) from error
+
+
+def _problem(error: Exception) -> InputError:
+    if isinstance(error, ReviewError):
+        return InputError(error.message)
+    what = f"lacks {error}" if isinstance(error, KeyError) else "is not what Touchline writes"
+    return InputError(what)
+
+
+def _group(value: Json, shared: Mapping[str, Station]) -> Group:
+    views = _list(_mapping(value)["views"], MAX_VIEWS)
+    names = {view["station"] for view in views if isinstance(view["station"], str)}
+    if names - shared.keys():
+        raise InputError(f'names the static camera "{min(names - shared.keys())}", unknown here')
+    group = logged_group({**value, "views": [{**view, "media": None} for view in views]}, shared)
+    keys = [_text(view.key) for view in group.views]
+    if not keys or len(set(keys)) < len(keys):
+        raise InputError("has no views, or two views of the same name")
+    for text in (group.key, group.match, group.split, group.label):
+        _text(text, empty=text is not group.key)
+    if not (0 < group.pitch.length < 1000 and 0 < group.pitch.width < 1000):
+        raise InputError("has a pitch of an impossible size")
+    for view, said in zip(group.views, views, strict=True):
+        _list(said["balls"], MAX_BALLS)
+        _extras(said["extras"])
+        if view.included not in (True, False):
+            raise InputError("has another value where true or false is expected for a view")
+        if view.left_out is not None:
+            _check_left_out(view)
+        if not view.station.shared:
+            _checked(view.station)
+    return group
+
+
+def _check_left_out(view: View) -> None:
+    why = view.left_out
+    if view.included or why is None or left_out(_text(why.reason), why.note) != why:
+        raise InputError("has a view that was left out for a reason that Touchline does not know")
+
+
+def _station(value: Json) -> Station:
+    return _checked(station_from_json(_mapping(value)))
+
+
+def _checked(station: Station) -> Station:
+    _text(station.key)
+    for side in (station.size.width, station.size.height):
+        if not isinstance(side, int) or isinstance(side, bool) or not 1 <= side <= MAX_SIDE:
+            raise InputError(f"has an image side of {side}")
+    if station.calibration not in CALIBRATIONS or station.flipped not in (True, False):
+        raise InputError("has a calibration or a flip that Touchline does not know")
+    for marking, points in station.lines.items():
+        if canonical_marking(marking) != marking or len(points) > MAX_POINTS:
+            raise InputError(f"has {marking}, which is not a pitch marking or has too many points")
+    return station
+
+
+def _verdict(value: Json) -> Mapping[str, Any]:
+    values = {name: _mapping(value)[name] for name in VERDICT}
+    for name in ("actor", "at", "inputs_hash", "policy_hash"):
+        _text(values[name])
+    for name in ("reason", "note", "override"):
+        if values[name] is not None:
+            _text(values[name], most=MAX_NOTE)
+    if values["state"] not in STATES or values["fixed"] not in (True, False):
+        raise InputError("has a verdict that Touchline does not know")
+    if (values["state"] == "rejected") != (values["reason"] in REASONS):
+        raise InputError("has a rejection without a reason, or a reason without a rejection")
+    return values
+
+
+def _log(value: Json) -> tuple[Json, ...]:
+    for entry in _list(value, MAX_STATES):
+        if entry["kind"] not in EDIT_KINDS:
+            raise InputError("has a log entry of an unknown kind")
+        _text(entry["actor"])
+        _text(entry["at"])
+        _mapping(entry["edit"])
+    return tuple(value)
+
+
+def _extras(value: Json) -> Extras:
+    if value is None:
+        return Extras()
+    for name in ("boxes", "lines"):
+        for item in _list(_mapping(value)[name], MAX_STATES):
+            _mapping(item)
+    _mapping(value["metadata"])
+    return extras_from_json(value)
+
+
+def _states(value: Json) -> tuple[str, ...]:
+    return tuple(_text(item) for item in _list(value, MAX_STATES))
+
+
+def _mapping(value: Json) -> dict[str, Json]:
+    if not isinstance(value, dict):
+        raise InputError("has another value where an object is expected")
+    return value
+
+
+def _list(value: Json, most: int) -> list[Json]:
+    if not isinstance(value, list) or len(value) > most:
+        raise InputError(f"has another value where a list is expected, of at most {most}")
+    return value
+
+
+def _text(value: Json, *, empty: bool = False, most: int = MAX_TEXT) -> str:
+    if not isinstance(value, str) or len(value) > most or not (value or empty):
+        raise InputError("has another value where a text is expected")
+    return value

@@ -1,0 +1,55 @@
+"""Carry, verdicts: everyone's are kept, and the newest of all counts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from sqlalchemy import insert, select
+from sqlalchemy.orm import Session
+
+from app.review.importing.carry import VERDICT
+from app.review.importing.ingest import Origin
+from app.store.clock import now
+from app.store.group_rows import next_id
+from app.store.log import Entry, append
+from app.store.models import VerdictModel
+
+
+def merge_verdicts(
+    session: Session, origin: Origin, group_id: int, carried: Sequence[Mapping[str, Any]]
+) -> bool:
+    """Add the verdicts of another installation that are not here; whether there were any.
+
+    The last one added is the one that counts, so one that was given here later than all of
+    theirs is given once more, with its own time and person.
+    """
+    if not carried:
+        return False
+    known = _known(session, group_id)
+    seen = {_identity(item) for item in known}
+    fresh = [item for item in carried if _identity(item) not in seen]
+    if not fresh:
+        return False
+    fresh = sorted(fresh, key=lambda item: str(item["at"]))
+    if known and str(known[-1]["at"]) > str(fresh[-1]["at"]):
+        fresh.append(known[-1])
+    first, at = next_id(session, VerdictModel), now()
+    rows = [{**item, "id": first + place, "group_id": group_id} for place, item in enumerate(fresh)]
+    session.execute(insert(VerdictModel), rows, execution_options={"render_nulls": True})
+    entries = [
+        Entry("verdict", origin.actor, at, dict(item), origin.dataset_id, group_id)
+        for item in fresh
+    ]
+    append(session, entries)
+    return True
+
+
+def _known(session: Session, group_id: int) -> list[dict[str, Any]]:
+    columns = [getattr(VerdictModel, name) for name in VERDICT]
+    statement = select(*columns).where(VerdictModel.group_id == group_id).order_by(VerdictModel.id)
+    return [dict(row._mapping) for row in session.execute(statement)]
+
+
+def _identity(verdict: Mapping[str, Any]) -> tuple[Any, ...]:
+    return tuple(verdict[name] for name in VERDICT)

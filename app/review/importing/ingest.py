@@ -1,0 +1,291 @@
+"""Ingest: groups from an importer into a dataset; again and again without doing anything twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from itertools import islice
+from pathlib import Path
+
+from sqlalchemy import delete, func, insert, select
+from sqlalchemy.orm import Session
+
+from app.review.datasets.dataset import find_dataset, insert_dataset
+from app.review.editing.shared_stations import SharedStations
+from app.review.editing.upstream import KIND, Kept, follow_group
+from app.review.importing.body import import_body, places_of
+from app.review.importing.missing import gone_groups, note_gone, of_read_matches
+from app.soccer.group import Group, View
+from app.soccer.policy import PAPER
+from app.store.clock import now
+from app.store.digest import source_hash
+from app.store.group_rows import NewRows
+from app.store.groups import StoredGroup, read_groups, save_group
+from app.store.log import Entry, append, read_log
+from app.store.models import GroupModel, ImportFindingModel, LogModel
+from app.store.queue import refresh_queue
+from app.store.session import Store
+
+BATCH = 200
+"""Groups a transaction: one import holds the writers up for a fraction of a second at a time."""
+
+Progress = Callable[[int], None]
+"""Called with the number of groups done so far."""
+
+
+@dataclass
+class IngestReport:
+    """What became of the groups.
+
+    Attributes:
+        changed: Groups, and static cameras that many groups share.
+        findings: Edits that a changed source met.
+        without_picture: Groups of which no view has a picture.
+        missing: Groups that this source brought before and does not bring any more; they stay.
+        problems: What to tell about single groups, or about the missing ones.
+    """
+
+    new: int = 0
+    changed: int = 0
+    unchanged: int = 0
+    findings: int = 0
+    missing: int = 0
+    without_picture: int = 0
+    problems: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Into which dataset, from where, and who brings it."""
+
+    dataset_id: int
+    source: str
+    actor: str
+
+
+def ingest(
+    store: Store,
+    dataset: str,
+    groups: Iterable[Group],
+    *,
+    source: str,
+    actor: str,
+    progress: Progress | None = None,
+    dry_run: bool = False,
+) -> IngestReport:
+    """Bring groups into a dataset, which the first of them makes when there is none of that name.
+
+    Killed anywhere and started again, it ends in the same state. What nobody edited follows a
+    changed source; what a person edited stays and becomes a finding.
+
+    Args:
+        store: The database.
+        dataset: Name.
+        groups: As an importer yields them; read as they come, so any number fits.
+        source: Where they come from, for the log.
+        actor: Who imports.
+        progress: Called after each batch.
+        dry_run: Say what would happen, and keep nothing.
+    """
+    report, seen, done = IngestReport(), set[str](), 0
+    sound, stations = _sound(groups, seen, report), set[str]()
+    while batch := list(islice(sound, BATCH)):
+        with attempt(store, keep=not dry_run) as session:
+            origin = Origin(_ensure_dataset(session, dataset, actor), source, actor)
+            ingest_batch(session, origin, batch, report, stations)
+        done += len(batch)
+        if progress is not None:
+            progress(done)
+    if done:
+        with store.read() as session:
+            missing = _note_missing(session, origin, seen, report)
+            gone = of_read_matches(session, origin.dataset_id, seen, missing)
+        for start in range(0, 0 if dry_run else len(gone), BATCH):
+            with store.write() as session:
+                ids = gone[start : start + BATCH]
+                report.findings += note_gone(
+                    session, origin.dataset_id, ids, source=origin.source, actor=actor
+                )
+    return report
+
+
+class _TakenBack(Exception):  # noqa: N818
+    """Ends a transaction that shall leave nothing."""
+
+
+@contextmanager
+def attempt(store: Store, *, keep: bool) -> Iterator[Session]:
+    """A write session; where nothing shall be kept, what it did is taken back at its end."""
+    try:
+        with store.write() as session:
+            yield session
+            if not keep:
+                raise _TakenBack
+    except _TakenBack:
+        pass
+
+
+def ensure_dataset(store: Store, dataset: str, actor: str) -> int:
+    """Id of the dataset of that name, made with the default policy when there is none."""
+    with store.write() as session:
+        return _ensure_dataset(session, dataset, actor)
+
+
+def _ensure_dataset(session: Session, dataset: str, actor: str) -> int:
+    row = find_dataset(session, dataset)
+    return insert_dataset(session, dataset, PAPER, actor) if row is None else int(row.id)
+
+
+def _note_missing(
+    session: Session, origin: Origin, seen: Collection[str], report: IngestReport
+) -> set[int]:
+    """Count the groups that the same source brought last and that did not come this time."""
+    missing: set[int] = set()
+    statement = select(GroupModel.id, GroupModel.key).where(
+        GroupModel.dataset_id == origin.dataset_id
+    )
+    absent = [row.id for row in session.execute(statement) if row.key not in seen]
+    for start in range(0, len(absent), BATCH):
+        newest = (
+            select(func.max(LogModel.id))
+            .where(LogModel.kind == "import", LogModel.group_id.in_(absent[start : start + BATCH]))
+            .group_by(LogModel.group_id)
+        )
+        entries = read_log(session, LogModel.id.in_(newest))
+        missing |= {
+            entry.group_id or 0 for entry in entries if entry.body["source"] == origin.source
+        }
+    report.missing = len(missing)
+    if report.missing:
+        groups = "1 group" if report.missing == 1 else f"{report.missing} groups"
+        report.problems.append(f"{groups} of an earlier import did not come again; all stay")
+    return missing
+
+
+def _sound(groups: Iterable[Group], seen: set[str], report: IngestReport) -> Iterator[Group]:
+    """Groups that can be stored, their media by absolute path."""
+    for group in groups:
+        keys = [view.key for view in group.views]
+        if group.key in seen:
+            report.problems.append(f"group {group.key} appears twice; the first one counts")
+        elif len(set(keys)) < len(keys):
+            report.problems.append(f"group {group.key} has two views of one name")
+        else:
+            seen.add(group.key)
+            report.without_picture += all(view.media is None for view in group.views)
+            yield replace(group, views=tuple(map(_absolute, group.views)))
+
+
+def _absolute(view: View) -> View:
+    if view.media is None:
+        return view
+    return replace(view, media=replace(view.media, path=str(Path(view.media.path).absolute())))
+
+
+def ingest_batch(
+    session: Session,
+    origin: Origin,
+    batch: Sequence[Group],
+    report: IngestReport,
+    stations: set[str],
+) -> None:
+    """Bring a batch of groups, inside the caller's write transaction.
+
+    ``stations`` are shared ones that are counted already: a dry run meets them again.
+    """
+    shared = SharedStations(session, origin.dataset_id, origin.source, origin.actor)
+    for group in batch:
+        shared.follow(view.station for view in group.views)
+    report.changed += len(set(shared.changed) - stations)
+    report.findings += len(set(shared.kept) - stations)
+    stations.update(shared.changed)
+    known = _known(session, origin.dataset_id, [group.key for group in batch])
+    gone = gone_groups(session, [number for number, _ in known.values()])
+    fresh: list[tuple[Group, str]] = []
+    for group in batch:
+        digest = source_hash(group)
+        if group.key not in known:
+            fresh.append((group, digest))
+        elif known[group.key][1] == digest and known[group.key][0] not in gone:
+            report.unchanged += 1
+        else:
+            _follow(session, origin, known[group.key][0], group, digest, shared.ids, report)
+    _insert(session, origin, fresh, shared.ids)
+    report.new += len(fresh)
+
+
+def _known(session: Session, dataset_id: int, keys: list[str]) -> dict[str, tuple[int, str]]:
+    statement = select(GroupModel.key, GroupModel.id, GroupModel.source_hash).where(
+        GroupModel.dataset_id == dataset_id, GroupModel.key.in_(keys)
+    )
+    return {row.key: (row.id, row.source_hash) for row in session.execute(statement)}
+
+
+def _insert(
+    session: Session, origin: Origin, fresh: Sequence[tuple[Group, str]], shared: dict[str, int]
+) -> None:
+    if not fresh:
+        return
+    at, rows = now(), NewRows(session, origin.dataset_id)
+    ids, entries = [], []
+    for group, digest in fresh:
+        first = len(rows.views)
+        identity = rows.add_group(group, digest, at, shared)
+        places = {row["key"]: (row["id"], row["station_id"]) for row in rows.views[first:]}
+        body = import_body(group, None, origin.source, digest, places)
+        entries.append(Entry("import", origin.actor, at, body, origin.dataset_id, identity))
+        ids.append(identity)
+    rows.insert()
+    append(session, entries)
+    refresh_queue(session, ids)
+
+
+def _follow(
+    session: Session,
+    origin: Origin,
+    group_id: int,
+    incoming: Group,
+    digest: str,
+    shared: dict[str, int],
+    report: IngestReport,
+) -> None:
+    stored, at = read_groups(session, [group_id])[group_id], now()
+    followed = follow_group(stored, incoming)
+    save_group(
+        session, stored, followed.group, at=at, source=followed.base, digest=digest, shared=shared
+    )
+    after = read_groups(session, [group_id])[group_id]
+    kept = note_kept(session, after, followed.kept)
+    body = import_body(followed.group, followed.base, origin.source, digest, places_of(after))
+    body["kept"] = [[item.view, item.sentence] for item in kept]
+    append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, group_id)])
+    refresh_queue(session, [group_id])
+    report.changed += 1
+    report.findings += len(followed.kept)
+
+
+def note_kept(session: Session, stored: StoredGroup, kept: Sequence[Kept]) -> list[Kept]:
+    """Save what imports noticed about a group: this one, and earlier ones as far as it holds.
+
+    A finding goes when its view is as the dataset has it now. Returns what is noticed then.
+    """
+    model = ImportFindingModel
+    fresh = {item.view for item in kept}
+    earlier = session.execute(
+        select(model.view, model.sentence).where(model.group_id == stored.id).order_by(model.id)
+    )
+    noticed = [
+        Kept(row.view, row.sentence)
+        for row in earlier
+        if row.view not in fresh and row.view in stored.view_ids and stored.is_edited(row.view)
+    ]
+    noticed.extend(kept)
+    session.execute(delete(model).where(model.group_id == stored.id))
+    rows = [
+        {"group_id": stored.id, "view": item.view, "kind": KIND, "sentence": item.sentence}
+        for item in noticed
+    ]
+    if rows:
+        session.execute(insert(model), rows)
+    return noticed

@@ -1,0 +1,98 @@
+"""Missing: groups that their source brought before and does not bring any more.
+
+They stay, for nobody but a person takes a group out; a finding says what happened, until the
+source brings the group again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+
+from sqlalchemy import insert, select
+from sqlalchemy.orm import Session
+
+from app.review.editing.lineage import Lineages
+from app.review.editing.upstream import KIND
+from app.review.importing.body import import_body, places_of
+from app.soccer.group import Group
+from app.store.clock import now
+from app.store.codecs import Json
+from app.store.groups import StoredGroup, read_groups, save_group
+from app.store.log import Entry, append
+from app.store.models import GroupModel, ImportFindingModel
+from app.store.queue import refresh_queue
+
+GONE = "this group is gone from the dataset; it stays until a person rejects it"
+
+
+def gone_groups(session: Session, ids: Collection[int]) -> set[int]:
+    """Those of the groups that are told to be gone already."""
+    model = ImportFindingModel
+    statement = select(model.group_id).where(
+        model.group_id.in_(list(ids)), model.view.is_(None), model.sentence == GONE
+    )
+    return {int(number) for number in session.scalars(statement) if number is not None}
+
+
+def of_read_matches(
+    session: Session, dataset_id: int, seen: Collection[str], missing: Collection[int]
+) -> list[int]:
+    """Those of the missing groups whose match came all the same: they are truly gone.
+
+    A source may bring a part of what it brought last, a match at a time.
+
+    Args:
+        session: Any session.
+        dataset_id: The dataset.
+        seen: Keys of the groups that came.
+        missing: Ids of groups that the same source brought last and that did not come.
+    """
+    if not missing:
+        return []
+    rows = session.execute(
+        select(GroupModel.id, GroupModel.key, GroupModel.match).where(
+            GroupModel.dataset_id == dataset_id
+        )
+    ).all()
+    matches = {row.match for row in rows if row.key in seen}
+    return [row.id for row in rows if row.id in missing and row.match in matches]
+
+
+def note_gone(
+    session: Session, dataset_id: int, ids: Sequence[int], *, source: str, actor: str
+) -> int:
+    """Save a finding for each group that has none of the kind yet; returns how many."""
+    fresh = sorted(set(ids) - gone_groups(session, ids))
+    stored = read_groups(session, fresh)
+    lineages = Lineages(session, dataset_id).of(stored.values())
+    at, entries = now(), []
+    for number, item in stored.items():
+        base = lineages[number].base
+        save_group(session, item, item.group, at=at, source=base)
+        body = _body(item, base, source, _noticed(session, number))
+        entries.append(Entry("import", actor, at, body, dataset_id, number))
+    if entries:
+        append(session, entries)
+        rows = [
+            {"group_id": number, "view": None, "kind": KIND, "sentence": GONE} for number in stored
+        ]
+        session.execute(insert(ImportFindingModel), rows)
+        refresh_queue(session, list(stored))
+    return len(entries)
+
+
+def _noticed(session: Session, group_id: int) -> Iterable[tuple[str | None, str]]:
+    model = ImportFindingModel
+    statement = select(model.view, model.sentence).where(model.group_id == group_id)
+    return [(row.view, row.sentence) for row in session.execute(statement.order_by(model.id))]
+
+
+def _body(
+    stored: StoredGroup,
+    base: Group,
+    source: str,
+    noticed: Iterable[tuple[str | None, str]],
+) -> dict[str, Json]:
+    body = import_body(stored.group, base, source, stored.source_hash, places_of(stored))
+    body["kept"] = [[view, sentence] for view, sentence in [*noticed, (None, GONE)]]
+    return body

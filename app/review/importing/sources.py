@@ -1,0 +1,238 @@
+"""Sources: which reader reads which format, and what an import says about it in the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+from app.config import Settings
+from app.datasets.archive import Limits
+from app.datasets.camera_json import read_cameras
+from app.datasets.coco_reader import read_coco
+from app.datasets.format_names import ImportFormat
+from app.datasets.gamestate import read_gamestate
+from app.datasets.guess_format import guess_format
+from app.datasets.issia import DEFAULT_SIZE as ISSIA_SIZE
+from app.datasets.issia import IssiaFolder, IssiaOptions, open_issia
+from app.datasets.issia_3d_reader import open_issia_3d
+from app.datasets.parquet_reader import read_parquet
+from app.datasets.report import Report
+from app.datasets.sn_calibration import DEFAULT_SIZE
+from app.datasets.sn_calibration_groups import read_sn_calibration
+from app.datasets.snv3d_reader import read_soccernet_v3d
+from app.datasets.soccernet_v3 import read_soccernet_v3
+from app.review.importing.cameras import ingest_cameras
+from app.review.importing.carry_in import carry_in
+from app.review.importing.ingest import IngestReport, ingest
+from app.review.importing.spare import SpareFrame, ingest_spare
+from app.soccer.annotation import Extras
+from app.soccer.frames import ImageSize
+from app.soccer.group import Group
+from app.store.session import Store
+
+FORMATS: tuple[str, ...] = get_args(ImportFormat)
+STATIC = ("issia", "issia-3d")
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class Source:
+    """Files of one format, and what they do not say themselves.
+
+    Attributes:
+        format: One of ``FORMATS``.
+        path: Folder, zip or file.
+        lines: ISSIA: folder of the line files of the static cameras.
+        calibration: Which calibration counts where there are both.
+        frame_offset: ISSIA: number in the XGTF file minus number in video, also by camera.
+        flipped: ISSIA: cameras whose frames are mirrored.
+        size: Size of the annotated images, for formats that do not say it; None: the usual one.
+        name: What people call it; the log keeps it. Empty: the path.
+    """
+
+    format: str
+    path: Path
+    size: ImageSize | None = None
+    lines: Path | None = None
+    calibration: str = "given"
+    frame_offset: int | Mapping[int, int] = 8
+    flipped: frozenset[int] = frozenset()
+    name: str = ""
+
+    @property
+    def label(self) -> str:
+        """What the log calls it."""
+        return self.name or str(self.path)
+
+    def shown(self, text: str) -> str:
+        """A text without the place of a source that has a name of its own."""
+        if not self.name:
+            return text
+        for path in (self.path, self.path.parent, self.lines):
+            if path is not None:
+                text = text.replace(f"{path}/", "").replace(str(path), self.name)
+        return text
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What the files held (``report``) and what became of it (``result``)."""
+
+    source: Source
+    report: Report
+    result: IngestReport
+
+    @property
+    def something(self) -> bool:
+        """Whether anything of the files is in the dataset now."""
+        return self.result.new + self.result.changed + self.result.unchanged > 0
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing was left out and no picture is missing."""
+        report = self.report
+        missing = self.result.without_picture or report.counts["views without frame"]
+        return self.something and not (report.problems or report.dropped or missing)
+
+    def nothing_read(self) -> tuple[str, str]:
+        """Why nothing could be imported, naming the file, and what to do about it."""
+        source, problems = self.source, self.report.problems
+        name = source.shown(str(source.path))
+        sentence = f"nothing could be imported from {name} as {source.format}"
+        if problems:
+            first = source.shown(problems[0].message)
+            sentence += f". The first of {len(problems)} problems: " if problems[1:] else ": "
+            sentence += first
+        guess = guess_format(source.path)
+        if guess is not None and guess != source.format:
+            return sentence, f"It looks like {guess}: choose that format and import it again."
+        if self.report.read:
+            return sentence, "Every record was left out; the report names each with its reason."
+        return sentence, (
+            f"Check that it is the right file or folder, and that it holds what {source.format} "
+            "asks for (docs/formats.md)."
+        )
+
+    def values(self) -> dict[str, Any]:
+        """Everything that there is to tell, as plain values."""
+        shown = self.source.shown
+        return {
+            "outcome": "complete" if self.complete else "partial" if self.something else "nothing",
+            "read": self.report.read,
+            "imported": self.report.imported,
+            "new": self.result.new,
+            "changed": self.result.changed,
+            "unchanged": self.result.unchanged,
+            "missing": self.result.missing,
+            "without_picture": self.result.without_picture,
+            "findings": self.result.findings,
+            "counts": dict(self.report.counts),
+            "skipped": [
+                {
+                    "file": shown(problem.path),
+                    "record": problem.record,
+                    "field": problem.field,
+                    "problem": shown(problem.problem),
+                }
+                for problem in self.report.problems
+            ],
+            "more_skipped": self.report.dropped,
+            "remarks": list(self.result.problems),
+        }
+
+
+def import_source(
+    store: Store,
+    dataset: str,
+    source: Source,
+    settings: Settings,
+    progress: Progress | None = None,
+    *,
+    actor: str = "local",
+    dry_run: bool = False,
+) -> Imported:
+    """Bring the files into a dataset, which is made when there is none of that name.
+
+    Killed anywhere and started again, it ends in the same state.
+
+    Args:
+        store: The database.
+        dataset: Name.
+        source: What to read, and how.
+        settings: Caps on what is read.
+        progress: Called with the number of groups done.
+        actor: Who imports.
+        dry_run: Say what would happen, and keep nothing.
+    """
+    report, limits = Report(), Limits.of(settings)
+    if source.format == "cameras":
+        cameras = read_cameras(source.path, report, limits)
+        result = ingest_cameras(
+            store, dataset, cameras, source=source.label, actor=actor, dry_run=dry_run
+        )
+        return Imported(source, report, result)
+    if source.format == "touchline":
+        result = carry_in(
+            store,
+            dataset,
+            source.path,
+            report,
+            limits,
+            source=source.label,
+            actor=actor,
+            progress=progress,
+            dry_run=dry_run,
+        )
+        return Imported(source, report, result)
+    folder = _static(source, report, limits) if source.format in STATIC else None
+    groups = _groups(source, report, limits) if folder is None else folder.groups()
+    result = ingest(
+        store,
+        dataset,
+        groups,
+        source=source.label,
+        actor=actor,
+        progress=progress,
+        dry_run=dry_run,
+    )
+    if folder is not None and not dry_run:
+        ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)
+    return Imported(source, report, result)
+
+
+def _groups(source: Source, report: Report, limits: Limits) -> Iterator[Group]:
+    path, calibration = source.path, source.calibration
+    match source.format:
+        case "soccernet-v3":
+            return read_soccernet_v3(path, report, limits)
+        case "soccernet-v3d":
+            return read_soccernet_v3d(path, report, calibration=calibration, limits=limits)
+        case "gamestate":
+            return read_gamestate(path, report, calibration=calibration, limits=limits)
+        case "coco":
+            return read_coco(path, report, calibration=calibration, limits=limits)
+        case "parquet":
+            return read_parquet(path, report, limits=limits)
+        case _:
+            size = source.size or DEFAULT_SIZE
+            return read_sn_calibration(path, size, report, calibration=calibration, limits=limits)
+
+
+def _static(source: Source, report: Report, limits: Limits) -> IssiaFolder:
+    options = IssiaOptions(
+        frame_offset=source.frame_offset,
+        flipped=source.flipped,
+        lines=source.lines,
+        calibration=source.calibration,
+        size=source.size or ISSIA_SIZE,
+    )
+    read = open_issia if source.format == "issia" else open_issia_3d
+    return read(source.path, options, report, limits)
+
+
+def _spare(folder: IssiaFolder) -> Iterator[SpareFrame]:
+    for item in folder.persons():
+        yield SpareFrame(item.camera, str(item.frame), Extras(boxes=item.boxes))

@@ -1,0 +1,136 @@
+"""Spare frames: what a dataset knows of images that are no view of a group (persons only)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+from sqlalchemy import select
+from sqlalchemy.dialects.sqlite import insert
+from sqlalchemy.orm import Session
+
+from app.datasets.issia import FramePersons
+from app.review.datasets.dataset import read_dataset
+from app.review.importing.ingest import IngestReport, ensure_dataset
+from app.soccer.annotation import Extras
+from app.store.clock import now
+from app.store.codecs import extras_from_json, extras_to_json, pack, unpack
+from app.store.log import Entry, append
+from app.store.models import SpareFrameModel
+from app.store.session import Store
+
+BATCH = 1000
+"""Frames a transaction and a log entry."""
+_NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
+_CAMERA = re.compile(r"cam[1-6]", re.ASCII)
+
+
+@dataclass(frozen=True)
+class SpareFrame:
+    """One image: the camera that took it, its frame, and what is known of it."""
+
+    camera: str
+    frame: str
+    extras: Extras
+
+
+def ingest_spare(
+    store: Store, dataset: str, frames: Iterable[SpareFrame], *, source: str, actor: str
+) -> IngestReport:
+    """Keep spare frames with a dataset; keeping them again changes nothing.
+
+    People do not edit them, so they follow whatever the dataset brings.
+    """
+    report, items = IngestReport(), iter(frames)
+    while batch := list(islice(items, BATCH)):
+        dataset_id = ensure_dataset(store, dataset, actor)
+        with store.write() as session:
+            _keep(session, dataset_id, batch, source, actor, report)
+    return report
+
+
+def read_spare(store: Store, dataset: str | int) -> Iterator[SpareFrame]:
+    """The spare frames of a dataset, by camera and frame as texts."""
+    with store.read() as session:
+        yield from spare_frames(session, read_dataset(session, dataset).id)
+
+
+def spare_frames(session: Session, dataset_id: int) -> Iterator[SpareFrame]:
+    """The same within a session's snapshot."""
+    model, after = SpareFrameModel, 0
+    while True:
+        rows = session.execute(
+            select(model.id, model.camera, model.frame, model.extras)
+            .where(model.dataset_id == dataset_id, model.id > after)
+            .order_by(model.id)
+            .limit(BATCH)
+        ).all()
+        for row in rows:
+            yield SpareFrame(row.camera, row.frame, extras_from_json(unpack(row.extras)))
+        if len(rows) < BATCH:
+            return
+        after = rows[-1].id
+
+
+def spare_persons(session: Session, dataset: str | int) -> Iterator[FramePersons]:
+    """People of the spare frames of a dataset of ISSIA, for its original shape."""
+    for item in spare_frames(session, read_dataset(session, dataset).id):
+        if _NUMBER.fullmatch(item.frame) and _CAMERA.fullmatch(item.camera):
+            yield FramePersons(int(item.frame), item.camera, item.extras.boxes)
+
+
+def _keep(
+    session: Session,
+    dataset_id: int,
+    batch: Sequence[SpareFrame],
+    source: str,
+    actor: str,
+    report: IngestReport,
+) -> None:
+    model = SpareFrameModel
+    known = {
+        (row.camera, row.frame): row.extras
+        for row in session.execute(
+            select(model.camera, model.frame, model.extras).where(
+                model.dataset_id == dataset_id, model.frame.in_({item.frame for item in batch})
+            )
+        )
+    }
+    fresh = {}
+    for item in batch:
+        place, body = (item.camera, item.frame), pack(extras_to_json(item.extras))
+        if known.get(place) == body:
+            report.unchanged += 1
+        else:
+            report.changed += place in known
+            report.new += place not in known
+            fresh[place] = body
+    _write(session, dataset_id, fresh, source, actor)
+
+
+def _write(
+    session: Session,
+    dataset_id: int,
+    fresh: dict[tuple[str, str], bytes],
+    source: str,
+    actor: str,
+) -> None:
+    if not fresh:
+        return
+    rows = [
+        {"dataset_id": dataset_id, "camera": camera, "frame": frame, "extras": body}
+        for (camera, frame), body in fresh.items()
+    ]
+    statement = insert(SpareFrameModel)
+    session.execute(
+        statement.on_conflict_do_update(
+            index_elements=["dataset_id", "camera", "frame"],
+            set_={"extras": statement.excluded.extras},
+        ),
+        rows,
+    )
+    frames = [[camera, frame, unpack(body)] for (camera, frame), body in fresh.items()]
+    body = {"source": source, "frames": frames}
+    append(session, [Entry("spare", actor, now(), body, dataset_id)])

@@ -1,0 +1,91 @@
+"""The job that writes an export; its id is the export's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from app.review.datasets.dataset import get_dataset
+from app.review.exporting.export import export
+from app.review.exporting.folder import ExportFolder
+from app.review.exporting.source import LiveSource
+from app.review.importing.carry import FORMAT as CARRY
+from app.review.jobs.jobs import Jobs, Progress, Work, counting
+from app.review.versions.version import find_version
+from app.store.codecs import Json
+from app.store.jobs import Job
+from app.store.session import Store
+
+KIND = "export"
+
+
+def request_export(
+    jobs: Jobs, store: Store, folder: ExportFolder, request: Mapping[str, Any], *, actor: str
+) -> Job:
+    """Write an export, soon; what can be refused is refused at once.
+
+    Args:
+        jobs: Where it is queued.
+        store: The database.
+        folder: Where it is written.
+        request: The fields of an export request, plain JSON values.
+        actor: Who wants it.
+
+    Raises:
+        NotFoundError: There is no such dataset or version.
+        InputError: There is nothing to export.
+        OverloadedError: Too many jobs wait.
+    """
+    found = get_dataset(store, request["dataset"])
+    version = request.get("version")
+    with store.read() as session:
+        if version is None:
+            everything = bool(request["all"]) or request["format"] == CARRY
+            LiveSource(session, found, everything).require_some()
+        else:
+            find_version(store, found.id, str(version))
+    asked = {**request, "dataset": found.name}
+    return jobs.submit(
+        KIND,
+        f"Export {found.name} as {request['format']}",
+        export_work(store, folder, found.id, asked),
+        dataset_id=found.id,
+        actor=actor,
+        request=asked,
+    )
+
+
+def resume_exports(jobs: Jobs, store: Store, folder: ExportFolder) -> None:
+    """Let exports that an earlier server was at be written from their beginning."""
+    jobs.resumes(KIND, lambda job: export_work(store, folder, job.dataset_id or 0, job.request))
+
+
+def export_work(store: Store, folder: ExportFolder, dataset_id: int, request: Json) -> Work:
+    """The work itself; the zip appears whole or not at all, and its record after it."""
+
+    def work(progress: Progress) -> Json:
+        name, version = str(progress.job_id), request.get("version")
+        progress(0, None, f"Writing {request['format']}.")
+        folder.prepare()
+        report = export(
+            store,
+            dataset_id,
+            request["format"],
+            folder.content(name),
+            everything=request["all"],
+            boxes=request["boxes"],
+            images=request["images"],
+            version=None if version is None else str(version),
+            progress=counting(progress, "groups written"),
+        )
+        entry = folder.keep(name, request, report)
+        return {
+            "export": entry.id,
+            "content": f"/api/v1/exports/{entry.id}/content",
+            "bytes": entry.bytes,
+            "counts": entry.counts,
+            "left_out": entry.left_out,
+            "missing_images": len(entry.missing_images),
+        }
+
+    return work

@@ -1,0 +1,187 @@
+"""Imports as jobs: asked for, carried out beside the requests, taken up again after a restart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from app.config import Settings
+from app.errors import InputError
+from app.review.datasets.dataset import find_dataset, get_dataset, require_name
+from app.review.importing.folders import resolve_folder
+from app.review.importing.sources import FORMATS, Imported, Source, import_source
+from app.review.jobs.jobs import FailedWithReportError, Jobs, Progress, Work
+from app.review.jobs.solve import request_solve
+from app.soccer.frames import ImageSize
+from app.store.codecs import Json
+from app.store.jobs import Job
+from app.store.session import Store
+from app.store.uploads import get_upload, keep_upload, upload_path
+
+KIND = "import"
+SHOWN = 500
+"""Left-out records that a job's result names; all are counted."""
+
+
+@dataclass(frozen=True)
+class ImportRequest:
+    """What somebody wants imported.
+
+    Attributes:
+        source: ``{"upload": id}`` or ``{"folder": path}``.
+        lines: The same for ISSIA's line files, or None.
+        options: ``calibration``, ``frame_offset``, ``flipped``, ``size`` ([width, height]).
+    """
+
+    dataset: str
+    format: str
+    source: Mapping[str, str]
+    lines: Mapping[str, str] | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+    dry_run: bool = False
+
+    def values(self) -> dict[str, Json]:
+        """As a job keeps it."""
+        return {
+            "dataset": self.dataset,
+            "format": self.format,
+            "source": dict(self.source),
+            "lines": None if self.lines is None else dict(self.lines),
+            "options": dict(self.options),
+            "dry_run": self.dry_run,
+        }
+
+
+def request_import(
+    jobs: Jobs,
+    store: Store,
+    settings: Settings,
+    request: ImportRequest,
+    *,
+    actor: str,
+) -> Job:
+    """Import, soon; what can be refused is refused at once.
+
+    Args:
+        jobs: Carries it out.
+        store: The database.
+        settings: Where uploads lie, and which folders may be read.
+        request: What to import.
+        actor: Who imports.
+
+    Raises:
+        InputError: Format, name or path cannot be used.
+        NotFoundError: There is no such upload or folder.
+    """
+    source = source_of(settings, request)
+    with store.read() as session:
+        row = find_dataset(session, request.dataset)
+    if row is None:
+        require_name(request.dataset, "/dataset")
+    would = "Look at" if request.dry_run else "Import"
+    return jobs.submit(
+        KIND,
+        f"{would} {source.name} ({request.format}) for {request.dataset}",
+        import_work(jobs, store, settings, request, actor),
+        dataset_id=None if row is None else int(row.id),
+        actor=actor,
+        request=request.values(),
+    )
+
+
+def resume_imports(jobs: Jobs, store: Store, settings: Settings) -> None:
+    """Let imports that an earlier server was at go on; what is there already stays as it is."""
+
+    def work_of(job: Job) -> Work:
+        return import_work(jobs, store, settings, ImportRequest(**job.request), job.actor)
+
+    jobs.resumes(KIND, work_of)
+
+
+def import_work(
+    jobs: Jobs, store: Store, settings: Settings, request: ImportRequest, actor: str
+) -> Work:
+    """The work itself; its result is the report, also where it fails because it read nothing."""
+
+    def work(progress: Progress) -> Json:
+        source = source_of(settings, request)
+        sentence = f"{'Looking at' if request.dry_run else 'Importing'} {source.name}."
+        progress(0, None, sentence)
+        if not request.dry_run and "upload" in request.source:
+            # Frames are read where they are, so the file must stay from the first group on.
+            keep_upload(settings, request.source["upload"])
+        imported = import_source(
+            store,
+            request.dataset,
+            source,
+            settings,
+            _step(progress, sentence),
+            actor=actor,
+            dry_run=request.dry_run,
+        )
+        if not imported.something:
+            problem, hint = imported.nothing_read()
+            raise FailedWithReportError(problem, hint, _result(imported, request))
+        if not request.dry_run and imported.result.new + imported.result.changed:
+            _solve(jobs, store, request.dataset, actor)
+        return _result(imported, request)
+
+    return work
+
+
+def _step(progress: Progress, sentence: str) -> Callable[[int], None]:
+    return lambda done: progress(done, None, f"{sentence} {done:,} groups so far.")
+
+
+def _solve(jobs: Jobs, store: Store, dataset: str, actor: str) -> None:
+    request_solve(jobs, store, get_dataset(store, dataset), actor=actor)
+
+
+def _result(imported: Imported, request: ImportRequest) -> Json:
+    values = imported.values()
+    hidden = max(len(values["skipped"]) - SHOWN, 0)
+    return {
+        **values,
+        "dataset": request.dataset,
+        "dry_run": request.dry_run,
+        "skipped": values["skipped"][:SHOWN],
+        "more_skipped": values["more_skipped"] + hidden,
+    }
+
+
+def source_of(settings: Settings, request: ImportRequest) -> Source:
+    """What a request means, under a name that tells nobody where it lies.
+
+    Raises:
+        InputError: Unknown format or unusable path.
+        NotFoundError: There is no such upload or folder.
+    """
+    if request.format not in FORMATS:
+        raise InputError(
+            f'"{request.format}" cannot be imported; {", ".join(FORMATS)} can', pointer="/format"
+        )
+    path, name = _place(settings, request.source)
+    options = dict(request.options)
+    size = options.pop("size", None)
+    offset = options.pop("frame_offset", 8)
+    if isinstance(offset, dict):
+        offset = {int(camera): number for camera, number in offset.items()}
+    return Source(
+        request.format,
+        path,
+        size=None if size is None else ImageSize(*size),
+        lines=None if request.lines is None else _place(settings, request.lines)[0],
+        calibration=options.get("calibration", "given"),
+        frame_offset=offset,
+        flipped=frozenset(options.get("flipped", ())),
+        name=name,
+    )
+
+
+def _place(settings: Settings, source: Mapping[str, str]) -> tuple[Path, str]:
+    if "upload" in source:
+        upload = get_upload(settings, source["upload"])
+        return upload_path(settings, upload.id), upload.name
+    return resolve_folder(settings, source["folder"]), source["folder"].rstrip("/")

@@ -1,0 +1,414 @@
+"""Jobs: work that outlasts a request, one piece at a time, with progress, cancel and a record.
+
+The record of a job is a row of the database; the work itself is a function of this process. A
+server that stops leaves its jobs where they are, and the next one takes up again those whose kind
+knows how (``Jobs.resumes``) and marks the others failed.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+import structlog
+
+from app.errors import (
+    ConflictError,
+    JobCancelled,
+    NotFoundError,
+    OverloadedError,
+    ReviewError,
+    StorageError,
+)
+from app.store.clock import now
+from app.store.codecs import Json
+from app.store.jobs import (
+    CANCELLED,
+    DONE,
+    FAILED,
+    OPEN,
+    RUNNING,
+    WAITING,
+    Job,
+    NewJob,
+    insert_job,
+    read_job,
+    read_jobs,
+    trim_jobs,
+    update_job,
+)
+from app.store.session import Store
+
+log = structlog.get_logger("touchline.jobs")
+
+CAPACITY = 32
+"""Jobs that may wait; one more is told to come back."""
+TICK = 0.25
+"""Seconds between two looks at the progress of the running job."""
+CLOSE_SECONDS = 10.0
+"""How long a server that stops waits for the running job's next step."""
+PROMPT = frozenset({"solve"})
+"""Kinds that go before the others: somebody looks at the numbers and waits."""
+KEPT = {"solve": 200, "bulk": 200, "verify": 200}
+"""How many finished jobs of a kind are remembered; kinds that are not named keep all."""
+
+Work = Callable[["Progress"], Json]
+"""What a job does; returns its result. It must be safe to start again from the beginning."""
+Listener = Callable[[Job], None]
+Pool = Callable[[], AbstractContextManager[Executor]]
+"""Makes an executor for the length of one large job, so that requests keep their processor."""
+
+
+class FailedWithReportError(ReviewError):
+    """A job that failed, and what it has to tell all the same.
+
+    Args:
+        message: One sentence that says what is wrong.
+        hint: What to do about it.
+        result: The job's result.
+    """
+
+    def __init__(self, message: str, hint: str | None, result: Json):
+        super().__init__(message, hint=hint)
+        self.result = result
+
+
+def counting(progress: Progress, what: str) -> Callable[[int, int], None]:
+    """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``."""
+    return lambda done, total: progress(done, total, f"{done:,} of {total:,} {what}")
+
+
+class Progress:
+    """How far a job is; its work calls it often, and it costs next to nothing.
+
+    ``job_id`` is the job's, for what its work writes under that name.
+    """
+
+    def __init__(self, job_id: int, closing: threading.Event):
+        self.job_id = job_id
+        self.place: tuple[int, int | None, str] = (0, None, "")
+        self.cancelled = threading.Event()
+        self._closing = closing
+
+    def __call__(self, done: int, total: int | None = None, sentence: str = "") -> None:
+        """Note how much is done; what is not said stays as it was.
+
+        Raises:
+            JobCancelled: The work shall end here.
+        """
+        _, last_total, last_sentence = self.place
+        self.place = (done, last_total if total is None else total, sentence or last_sentence)
+        if self.cancelled.is_set() or self._closing.is_set():
+            raise JobCancelled
+
+
+@dataclass(eq=False)
+class _Run:
+    """A job of this process that waits or runs."""
+
+    id: int
+    kind: str
+    dataset_id: int | None
+    work: Work
+    progress: Progress
+    over: threading.Event = field(default_factory=threading.Event)
+
+
+class Jobs:
+    """The jobs of one server: a worker beside the requests, and who wants to hear of them.
+
+    ``pool`` is for work that is worth processes of its own; without one it stays in this process.
+    """
+
+    def __init__(self, store: Store, *, capacity: int = CAPACITY, pool: Pool | None = None):
+        self._store, self._capacity, self.pool = store, capacity, pool
+        self._waiting: list[_Run] = []
+        self._running: _Run | None = None
+        self._changed = threading.Condition()
+        self._closing = threading.Event()
+        self._worker: threading.Thread | None = None
+        self._resumers: dict[str, Callable[[Job], Work]] = {}
+        self._listeners: list[Listener] = []
+
+    def resumes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
+        """Start jobs of a kind again after a restart; to be told before ``start``.
+
+        Args:
+            kind: The kind.
+            work_of: From a job's record (its ``request`` above all) to its work.
+        """
+        self._resumers[kind] = work_of
+
+    def listen(self, listener: Listener) -> None:
+        """Call a function, on the worker's thread, whenever a job changes; it must be quick."""
+        self._listeners.append(listener)
+
+    def start(self) -> None:
+        """Take up what an earlier server left behind, or say that it is lost."""
+        with self._store.write() as session:
+            for kind, keep in KEPT.items():
+                trim_jobs(session, kind, keep)
+            left = read_jobs(session, states=OPEN, limit=10_000)[::-1]
+            for job in left:
+                update_job(session, job.id, **self._settled(job))
+        with self._changed:
+            self._waiting += [self._run(job) for job in left if job.kind in self._resumers]
+            self._wake()
+
+    def submit(
+        self,
+        kind: str,
+        title: str,
+        work: Work,
+        *,
+        dataset_id: int | None = None,
+        actor: str,
+        request: Json = None,
+        once: bool = False,
+    ) -> Job:
+        """Queue work; not to be called inside a transaction.
+
+        Args:
+            kind: What it is, for programs.
+            title: What it is, for people.
+            work: Does it.
+            dataset_id: The dataset that it belongs to.
+            actor: Who wants it.
+            request: What was asked for; a kind that is resumed finds its way from it.
+            once: Where a job of this kind waits for this dataset already, answer that one.
+
+        Raises:
+            OverloadedError: Too many jobs wait.
+        """
+        with self._changed:
+            if once and (known := self._waiting_for(kind, dataset_id)) is not None:
+                return self.get(known.id)
+            if not once and len(self._waiting) >= self._capacity:
+                raise OverloadedError(
+                    f"{len(self._waiting)} jobs wait already", hint="Send it again in a while."
+                )
+            new = NewJob(kind, title, actor, dataset_id, request)
+            with self._store.write() as session:
+                identity = insert_job(session, new)
+            job = self.get(identity)
+            run = _Run(identity, kind, dataset_id, work, Progress(identity, self._closing))
+            self._waiting.append(run)
+            self._wake()
+        self._announce(job)
+        return job
+
+    def get(self, job_id: int) -> Job:
+        """A job as it stands.
+
+        Raises:
+            NotFoundError: There is none of that id.
+        """
+        with self._store.read() as session:
+            job = read_job(session, job_id)
+        if job is None:
+            raise NotFoundError(f"there is no job {job_id}")
+        return job
+
+    def find(
+        self,
+        *,
+        dataset_id: int | None = None,
+        kinds: Sequence[str] = (),
+        states: Sequence[str] = (),
+        before: int | None = None,
+        limit: int = 50,
+    ) -> list[Job]:
+        """Jobs, the newest first; ``before`` is the id of the last one of the page before."""
+        with self._store.read() as session:
+            return read_jobs(
+                session,
+                dataset_id=dataset_id,
+                kinds=kinds,
+                states=states,
+                before=before,
+                limit=limit,
+            )
+
+    def cancel(self, job_id: int) -> Job:
+        """End a job: one that waits at once, one that runs at its next step.
+
+        Raises:
+            NotFoundError: There is none of that id.
+            ConflictError: It is done or failed already.
+        """
+        job = self.get(job_id)
+        if job.state in (DONE, FAILED):
+            raise ConflictError(f"job {job_id} is over already")
+        with self._changed:
+            run = next((item for item in self._waiting if item.id == job_id), None)
+            if run is not None:
+                self._waiting.remove(run)
+            elif self._running is not None and self._running.id == job_id:
+                self._running.progress.cancelled.set()
+        if run is not None:
+            self._finish(run, state=CANCELLED, sentence="Cancelled before it began.")
+        return self.get(job_id)
+
+    def cancel_all(self, dataset_id: int, seconds: float = CLOSE_SECONDS) -> None:
+        """End all jobs of a dataset and wait until none of them runs any more.
+
+        Raises:
+            ConflictError: The running one has not ended in time.
+        """
+        for job in self.find(dataset_id=dataset_id, states=OPEN, limit=1000):
+            with suppress(ConflictError):
+                self.cancel(job.id)
+        running = self._running
+        if running is None or running.dataset_id != dataset_id:
+            return
+        if not running.over.wait(seconds):
+            raise ConflictError(f"job {running.id} of this dataset is still running")
+
+    def wait(self, job_id: int, seconds: float) -> Job:
+        """A job once it is over, or as it stands after some seconds."""
+        with self._changed:
+            runs = [*self._waiting, *([self._running] if self._running else [])]
+        run = next((item for item in runs if item.id == job_id), None)
+        if run is not None:
+            run.over.wait(seconds)
+        return self.get(job_id)
+
+    def is_open(self, job_id: int, kind: str) -> bool:
+        """Whether a job of a kind waits or runs here; asks no database."""
+        with self._changed:
+            runs = [*self._waiting, *([self._running] if self._running else [])]
+        return any((run.id, run.kind) == (job_id, kind) for run in runs)
+
+    def close(self) -> None:
+        """Stop after the running job's next step; its record says where it was."""
+        with self._changed:
+            self._closing.set()
+            self._changed.notify_all()
+        if self._worker is not None:
+            self._worker.join(CLOSE_SECONDS)
+            if self._worker.is_alive():
+                log.warning("a job did not end in time", job=self._running and self._running.id)
+
+    def _waiting_for(self, kind: str, dataset_id: int | None) -> _Run | None:
+        """The waiting job of a kind and dataset."""
+        place = (kind, dataset_id)
+        return next((run for run in self._waiting if (run.kind, run.dataset_id) == place), None)
+
+    def _settled(self, job: Job) -> dict[str, Any]:
+        """What an earlier server's job becomes."""
+        if job.kind in self._resumers:
+            return {"state": WAITING, "started": None, "sentence": "Started again."}
+        sentence = "The server stopped before this was done. Start it again."
+        problem = {"detail": sentence, "hint": None, "pointer": None}
+        return {"state": FAILED, "ended": now(), "sentence": sentence, "problem": problem}
+
+    def _run(self, job: Job) -> _Run:
+        work = self._resumers[job.kind](job)
+        return _Run(job.id, job.kind, job.dataset_id, work, Progress(job.id, self._closing))
+
+    def _wake(self) -> None:
+        if self._worker is None and self._waiting:
+            # A daemon: a job that does not come to its next step must not hold the process.
+            self._worker = threading.Thread(target=self._work, name="jobs", daemon=True)
+            self._worker.start()
+        self._changed.notify_all()
+
+    def _work(self) -> None:
+        while (run := self._next()) is not None:
+            try:
+                self._carry_out(run)
+            except Exception:
+                log.exception("the record of a job could not be written", job=run.id)
+            finally:
+                with self._changed:
+                    self._running = None
+                run.over.set()
+
+    def _next(self) -> _Run | None:
+        """The next job to run; None when the server stops."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._closing.is_set())
+            if self._closing.is_set():
+                return None
+            run = min(self._waiting, key=lambda item: (item.kind not in PROMPT, item.id))
+            self._waiting.remove(run)
+            self._running = run
+            return run
+
+    def _carry_out(self, run: _Run) -> None:
+        self._save(run.id, state=RUNNING, started=now())
+        ended = threading.Event()
+        ticker = threading.Thread(target=self._tick, args=(run, ended), daemon=True)
+        ticker.start()
+        try:
+            values = self._outcome(run)
+        finally:
+            ended.set()
+            ticker.join()
+        if values is not None:
+            self._finish(run, **values)
+
+    def _outcome(self, run: _Run) -> dict[str, Any] | None:
+        """How a job ended, as columns; None where the server stops and the next one decides."""
+        try:
+            return {"state": DONE, "result": run.work(run.progress)}
+        except JobCancelled:
+            if not run.progress.cancelled.is_set():
+                return None
+            return {"state": CANCELLED, "sentence": "Cancelled."}
+        except FailedWithReportError as error:
+            return {**_failure(error.message, error.hint), "result": error.result}
+        except ReviewError as error:
+            return _failure(error.message, error.hint, error.pointer)
+        except Exception:
+            log.exception("job failed", job=run.id, kind=run.kind)
+            return _failure(
+                "something went wrong inside the server", f"The server's log names job {run.id}."
+            )
+
+    def _tick(self, run: _Run, ended: threading.Event) -> None:
+        """Keep the record in step with the progress, off the work's own thread: the work may hold
+        the write lock when it tells how far it is."""
+        shown = run.progress.place
+        while not ended.wait(TICK):
+            if run.progress.place != shown:
+                shown = run.progress.place
+                with suppress(StorageError):
+                    self._save(run.id, **_columns(shown))
+
+    def _finish(self, run: _Run, **values: Any) -> None:
+        place = _columns(run.progress.place)
+        # Where the disk is full for a moment, the record waits for it.
+        for _ in range(5):
+            try:
+                self._save(run.id, **{**place, "ended": now(), **values})
+            except StorageError as error:
+                log.warning("the record of a job could not be written", error=str(error))
+                self._closing.wait(1.0)
+            else:
+                break
+        run.over.set()
+
+    def _save(self, job_id: int, **values: Any) -> None:
+        with self._store.write() as session:
+            update_job(session, job_id, **values)
+            job = read_job(session, job_id)
+        if job is not None:
+            self._announce(job)
+
+    def _announce(self, job: Job) -> None:
+        for listener in self._listeners:
+            listener(job)
+
+
+def _columns(place: tuple[int, int | None, str]) -> dict[str, Any]:
+    return dict(zip(("done", "total", "sentence"), place, strict=True))
+
+
+def _failure(detail: str, hint: str | None, pointer: str | None = None) -> dict[str, Any]:
+    problem = {"detail": detail, "hint": hint, "pointer": pointer}
+    return {"state": FAILED, "sentence": detail, "problem": problem}

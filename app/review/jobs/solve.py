@@ -1,0 +1,68 @@
+"""The job that solves what a change of a station, a policy or an import left without a solution."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+from app.review.datasets.dataset import Dataset, get_dataset, list_datasets
+from app.review.editing.recompute import SolveReport, solve_dataset, stale_groups
+from app.review.jobs.jobs import Jobs, Pool, Progress, Work, counting
+from app.store.codecs import Json
+from app.store.jobs import Job
+from app.store.session import Store
+
+KIND = "solve"
+WORTH_A_POOL = 400
+"""Groups from which on starting processes costs less than it saves the requests."""
+NAMED = 20
+"""Groups whose solving broke that are named in a result; all are counted."""
+
+
+def request_solve(jobs: Jobs, store: Store, dataset: Dataset, *, actor: str) -> Job:
+    """Solve what is stale in a dataset, soon; one job a dataset waits at most."""
+    return jobs.submit(
+        KIND,
+        f"Solve {dataset.name}",
+        solve_work(store, dataset.id, jobs.pool),
+        dataset_id=dataset.id,
+        actor=actor,
+        once=True,
+    )
+
+
+def resume_solving(jobs: Jobs, store: Store) -> None:
+    """Let solving that an earlier server was at go on."""
+    jobs.resumes(KIND, lambda job: solve_work(store, job.dataset_id or 0, jobs.pool))
+
+
+def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
+    """Solve whatever an earlier run, of the server or of a command, left undone."""
+    for dataset in list_datasets(store):
+        if dataset.solved < dataset.groups:
+            request_solve(jobs, store, dataset, actor=actor)
+
+
+def solve_work(store: Store, dataset_id: int, pool: Pool | None = None) -> Work:
+    """The work itself: what to do is found in the data when it starts."""
+
+    def work(progress: Progress) -> Json:
+        found = get_dataset(store, dataset_id)
+        progress(0, None, f"Solving {found.name}.")
+        large = len(stale_groups(store, dataset_id)) >= WORTH_A_POOL
+        with pool() if pool is not None and large else nullcontext() as executor:
+            told = counting(progress, "groups solved")
+            report = solve_dataset(store, dataset_id, executor, told)
+        return {"policy": found.policy.name, **_report(report)}
+
+    return work
+
+
+def _report(report: SolveReport) -> Json:
+    named = [{"group": key, "problem": problem} for key, problem in report.failed[:NAMED]]
+    return {
+        "groups": report.total,
+        "solved": report.solved,
+        "passed": report.passed,
+        "failed": len(report.failed),
+        "failures": named,
+    }

@@ -1,0 +1,122 @@
+"""The jobs that freeze a dataset and verify a version; a server that starts again takes them up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from app.errors import NotFoundError
+from app.review.datasets.dataset import get_dataset
+from app.review.jobs.jobs import Jobs, Progress, Work
+from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
+from app.review.versions.verify import verify_and_keep
+from app.review.versions.version import Version, find_version, get_version
+from app.soccer.split import Split
+from app.store.codecs import Json
+from app.store.jobs import Job
+from app.store.session import Store
+
+FREEZE, VERIFY = "freeze", "verify"
+_Step = Callable[[int, int], None]
+
+
+def request_freeze(
+    jobs: Jobs, store: Store, dataset: str, request: FreezeRequest, *, actor: str
+) -> Job:
+    """Freeze a dataset, soon; what can be refused is refused at once.
+
+    Raises:
+        InputError, ConflictError: As ``freeze`` does.
+    """
+    found = get_dataset(store, dataset)
+    plan_freeze(store, found.id, request, strict=True)
+    return jobs.submit(
+        FREEZE,
+        f"Freeze {found.name} as {request.name}",
+        freeze_work(store, found.id, request, actor),
+        dataset_id=found.id,
+        actor=actor,
+        request=_request_values(request),
+    )
+
+
+def request_verify(jobs: Jobs, store: Store, version_id: int, *, actor: str) -> Job:
+    """Verify a version, soon."""
+    version = get_version(store, version_id)
+    return jobs.submit(
+        VERIFY,
+        f"Verify {version.name} of {version.dataset}",
+        verify_work(store, version_id, actor),
+        dataset_id=version.dataset_id,
+        actor=actor,
+        request={"version": version_id},
+    )
+
+
+def resume_versions(jobs: Jobs, store: Store) -> None:
+    """Let freezing and verifying that an earlier server was at go on."""
+
+    def freezing(job: Job) -> Work:
+        values = dict(job.request)
+        request = FreezeRequest(**{**values, "split": Split.of(values["split"])})
+        dataset_id = job.dataset_id or 0
+
+        def work(progress: Progress) -> Json:
+            # The server may have stopped between the version and the record of its job.
+            done = _frozen_since(store, dataset_id, request.name, job.created)
+            if done is not None:
+                return version_result(done)
+            return freeze_work(store, dataset_id, request, job.actor)(progress)
+
+        return work
+
+    jobs.resumes(FREEZE, freezing)
+    jobs.resumes(VERIFY, lambda job: verify_work(store, job.request["version"], job.actor))
+
+
+def freeze_work(store: Store, dataset_id: int, request: FreezeRequest, actor: str) -> Work:
+    """The work of freezing; its result names the version."""
+
+    def work(progress: Progress) -> Json:
+        step = _step(progress, f"Freezing {request.name}.")
+        return version_result(freeze(store, dataset_id, request, actor=actor, progress=step))
+
+    return work
+
+
+def verify_work(store: Store, version_id: int, actor: str) -> Work:
+    """The work of verifying; its result is the report, which the version keeps, too."""
+
+    def work(progress: Progress) -> Json:
+        step = _step(progress, f"Verifying {get_version(store, version_id).name}.")
+        report = verify_and_keep(store, version_id, progress=step, actor=actor)
+        return {"version_id": version_id, **report.values()}
+
+    return work
+
+
+def version_result(version: Version) -> dict[str, Any]:
+    """What the job of a freeze leaves."""
+    return {
+        "version": version.id,
+        "name": version.name,
+        "hash": version.hash,
+        "counts": dict(version.counts),
+    }
+
+
+def _step(progress: Progress, sentence: str) -> _Step:
+    progress(0, None, sentence)
+    return lambda done, total: progress(done, total)
+
+
+def _request_values(request: FreezeRequest) -> Json:
+    return {**vars(request), "split": request.split.values()}
+
+
+def _frozen_since(store: Store, dataset_id: int, name: str, since: str) -> Version | None:
+    try:
+        found = find_version(store, dataset_id, name)
+    except NotFoundError:
+        return None
+    return found if found.name == name and found.created >= since else None

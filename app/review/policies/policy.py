@@ -1,0 +1,103 @@
+"""The policy of a dataset: the present one, those before it, and the change to another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy import select, text
+from sqlalchemy.orm import Session
+
+from app.review.datasets.dataset import read_dataset, save_policy
+from app.review.editing.state import require_etag
+from app.soccer.policy import Policy
+from app.store.codecs import policy_from_json, unpack
+from app.store.digest import digest
+from app.store.models import LogModel
+from app.store.session import Store
+
+
+@dataclass(frozen=True)
+class PolicyVersion:
+    """A policy that judged a dataset from some time on."""
+
+    version: int
+    at: str
+    actor: str
+    policy: Policy
+
+
+@dataclass(frozen=True)
+class PolicyState:
+    """What judges a dataset now; ``history`` is oldest first and ends with it."""
+
+    dataset_id: int
+    dataset: str
+    policy: Policy
+    history: tuple[PolicyVersion, ...]
+
+    @property
+    def version(self) -> int:
+        """How many policies there have been."""
+        return len(self.history)
+
+    @property
+    def etag(self) -> str:
+        """Quoted, for ETag and If-Match."""
+        return f'"{digest([self.dataset_id, self.version, self.policy.name, self.policy.hash])}"'
+
+
+def read_policy(store: Store, dataset: str | int) -> PolicyState:
+    """The policy of a dataset and its history.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        return _read(session, dataset)
+
+
+def change_policy(
+    store: Store, dataset: str | int, policy: Policy, *, if_match: str | None, actor: str
+) -> PolicyState:
+    """Judge a dataset by another policy; what that leaves without a solution is stale.
+
+    The same policy again changes nothing. ``solve_job.request_solve`` solves what is stale;
+    calibrations are known wherever the calibration part of the policy is.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        policy: The policy.
+        if_match: ETag of the policy that the change builds on; None: whatever it is.
+        actor: Who wants it.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+        StaleRevisionError: Somebody else was faster.
+    """
+    with store.write() as session:
+        state = _read(session, dataset)
+        if if_match is not None:
+            require_etag(state.etag, if_match, f'the policy of "{state.dataset}"')
+        if policy == state.policy:
+            return state
+        save_policy(session, state.dataset_id, policy, actor)
+        return _read(session, state.dataset_id)
+
+
+def _read(session: Session, dataset: str | int) -> PolicyState:
+    found = read_dataset(session, dataset)
+    return PolicyState(found.id, found.name, found.policy, _history(session, found.id))
+
+
+def _history(session: Session, dataset_id: int) -> tuple[PolicyVersion, ...]:
+    statement = (
+        select(LogModel.at, LogModel.actor, LogModel.body)
+        # Word for word the condition of the index, which holds a few of a million entries.
+        .where(LogModel.dataset_id == dataset_id, text("kind IN ('dataset', 'policy')"))
+        .order_by(LogModel.id)
+    )
+    return tuple(
+        PolicyVersion(number, row.at, row.actor, policy_from_json(unpack(row.body)["policy"]))
+        for number, row in enumerate(session.execute(statement), 1)
+    )

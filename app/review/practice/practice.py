@@ -1,0 +1,219 @@
+"""Practice: the dataset of eight lessons, made, begun again, and how far somebody has come in it."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from sqlalchemy import select
+
+from app.config import Settings
+from app.datasets.match_frames import ARCHIVE
+from app.errors import ConflictError, NotFoundError
+from app.review.datasets.dataset import find_dataset
+from app.review.datasets.delete import delete_dataset
+from app.review.editing.recompute import solve_dataset
+from app.review.editing.state import GroupState, read_states
+from app.review.importing.sources import Source, import_source
+from app.review.jobs.jobs import Jobs, Progress, Work
+from app.review.practice.lessons import Feedback, judge, kind_of
+from app.review.practice.words import WORDS
+from app.sample.practice import LESSONS, write_practice
+from app.sample.scene import SceneTruth
+from app.sample.truth import TRUTH, read_truth
+from app.store.codecs import Json
+from app.store.jobs import Job
+from app.store.models import GroupModel
+from app.store.session import Store
+
+KIND = "practice"
+DATASET = "practice"
+"""Name of the dataset, and of its folder in the home."""
+
+Step = Callable[[int, int, str], None]
+"""Called with what is done, what there is to do, and a sentence."""
+
+
+@dataclass(frozen=True)
+class PracticeLesson:
+    """One lesson with what has come of it.
+
+    Attributes:
+        group: Id of its group.
+        number: From 1.
+        total: Lessons in all.
+        verdict: ``unreviewed``, ``accepted``, ``rejected`` or ``deferred``.
+    """
+
+    group: int
+    number: int
+    total: int
+    question: str
+    hint: str
+    verdict: str
+    feedback: Feedback
+
+
+@dataclass(frozen=True)
+class Practice:
+    """The practice dataset; ``lessons`` is empty until it is made."""
+
+    dataset: str
+    lessons: tuple[PracticeLesson, ...]
+
+
+def request_practice(
+    jobs: Jobs, store: Store, settings: Settings, *, again: bool, actor: str
+) -> Job:
+    """Make the practice dataset soon; what is there already stays, unless it shall begin again.
+
+    Raises:
+        ConflictError: There is a dataset of that name with other groups.
+    """
+    _require_own(store, settings)
+    return jobs.submit(
+        KIND,
+        "Begin the practice again" if again else "Make the practice groups",
+        practice_work(store, settings, again=again, actor=actor),
+        actor=actor,
+        request={"again": again},
+        once=True,
+    )
+
+
+def resume_practice(jobs: Jobs, store: Store, settings: Settings) -> None:
+    """Let what an earlier server was at go on."""
+
+    def work_of(job: Job) -> Work:
+        again = bool((job.request or {}).get("again"))
+        return practice_work(store, settings, again=again, actor=job.actor)
+
+    jobs.resumes(KIND, work_of)
+
+
+def practice_work(store: Store, settings: Settings, *, again: bool, actor: str) -> Work:
+    """The work itself; its result names the dataset and its first group."""
+
+    def work(progress: Progress) -> Json:
+        return make_practice_dataset(store, settings, progress, again=again, actor=actor)
+
+    return work
+
+
+def make_practice_dataset(
+    store: Store, settings: Settings, step: Step, *, again: bool = False, actor: str
+) -> dict[str, Json]:
+    """Draw, import and solve the lessons; done once, nothing more unless ``again``.
+
+    Returns:
+        ``dataset``, ``groups``, ``first`` (id of the first group) and ``made`` (False where
+        everything was there already).
+
+    Raises:
+        ConflictError: There is a dataset of that name with other groups.
+    """
+    _require_own(store, settings)
+    ids = _group_ids(store)
+    if len(ids) == len(LESSONS) and not again and _is_drawn(settings):
+        return {"dataset": DATASET, "groups": len(ids), "first": ids[0], "made": False}
+    folder = settings.home / DATASET
+    if not _is_drawn(settings):
+        write_practice(folder, lambda done, total: step(done, total, "Drawing the pictures."))
+    if again and ids:
+        delete_dataset(store, DATASET, confirm=DATASET, actor=actor)
+    step(0, 1, "Reading the groups.")
+    source = Source("soccernet-v3", folder.resolve(), name="the practice groups")
+    import_source(store, DATASET, source, settings, None, actor=actor)
+    total = len(LESSONS)
+    solve_dataset(store, DATASET, None, lambda done, _: step(done, total, "Solving the groups."))
+    ids = _group_ids(store)
+    return {"dataset": DATASET, "groups": len(ids), "first": ids[0], "made": True}
+
+
+def read_practice(store: Store, settings: Settings) -> Practice:
+    """Every lesson with what has come of it; none where the dataset is not made yet."""
+    truths = _truths(settings)
+    with store.read() as session:
+        states = read_states(session, _group_ids(store))
+    lessons = [
+        _lesson(state, truths) for state in states if truths is not None and state.key in truths
+    ]
+    return Practice(DATASET, tuple(sorted(lessons, key=lambda lesson: lesson.number)))
+
+
+def read_lesson(settings: Settings, state: GroupState) -> PracticeLesson:
+    """The lesson of a group.
+
+    Raises:
+        NotFoundError: The group is no lesson.
+    """
+    truths = _truths(settings)
+    if state.dataset != DATASET or truths is None or state.key not in truths:
+        raise NotFoundError(f"group {state.id} is no practice group")
+    return _lesson(state, truths)
+
+
+def _lesson(state: GroupState, truths: dict[str, SceneTruth]) -> PracticeLesson:
+    truth = truths[state.key]
+    words = WORDS[kind_of(truth)]
+    return PracticeLesson(
+        group=state.id,
+        number=list(truths).index(state.key) + 1,
+        total=len(truths),
+        question=words.question,
+        hint=words.hint,
+        verdict=state.verdict.state,
+        feedback=judge(truth, state.group, state.verdict),
+    )
+
+
+def _group_ids(store: Store) -> list[int]:
+    """Ids of the practice groups in the order of the dataset."""
+    with store.read() as session:
+        row = find_dataset(session, DATASET)
+        if row is None:
+            return []
+        statement = select(GroupModel.id).where(GroupModel.dataset_id == row.id)
+        return list(session.scalars(statement.order_by(GroupModel.number)))
+
+
+def _require_own(store: Store, settings: Settings) -> None:
+    """Raise ConflictError where somebody's own dataset has the name."""
+    with store.read() as session:
+        row = find_dataset(session, DATASET)
+        if row is None:
+            return
+        statement = select(GroupModel.key).where(GroupModel.dataset_id == row.id)
+        keys = set(session.scalars(statement))
+    known = _truths(settings)
+    if keys and not keys <= set(known or ()):
+        raise ConflictError(
+            f'there is a dataset "{DATASET}" with groups of your own',
+            hint="The practice groups need that name. Rename or delete your dataset first.",
+        )
+
+
+def _is_drawn(settings: Settings) -> bool:
+    """Whether labels, truth and frames of all lessons are there."""
+    truths = _truths(settings)
+    if truths is None or len(truths) != len(LESSONS):
+        return False
+    archives = {settings.home / DATASET / Path(key).parent / ARCHIVE for key in truths}
+    return all(archive.is_file() and zipfile.is_zipfile(archive) for archive in archives)
+
+
+def _truths(settings: Settings) -> dict[str, SceneTruth] | None:
+    """The truth of every lesson by the key of its group, in order; None where none is written."""
+    file = settings.home / DATASET / TRUTH
+    try:
+        return _read(file, file.stat().st_mtime_ns)
+    except FileNotFoundError:
+        return None
+
+
+@lru_cache(maxsize=4)
+def _read(file: Path, _changed: int) -> dict[str, SceneTruth]:
+    return read_truth(file)

@@ -1,0 +1,258 @@
+"""Queue: pages of groups by query, and where a group stands among them.
+
+There are two ways to read on: a cursor (no group is seen twice or missed while others edit) and a
+position (any place at once, true at the moment of reading).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from sqlalchemy import ColumnElement, Select, func, select
+from sqlalchemy.orm import Session
+
+from app.errors import InputError, NotFoundError
+from app.review.queue.order import Order
+from app.review.queue.query import Query, parse_query
+from app.store.models import QueueModel
+from app.store.session import Store
+
+MAX_PAGE = 500
+MAX_IDS = 100_000
+_NEIGHBOURS = 5
+
+
+@dataclass(frozen=True)
+class GroupRow:
+    """One group in a list; numbers are None where there is none, all while it is not solved.
+
+    Attributes:
+        gate: The first failing gate with its view and sentence, None when the group passes.
+        main_view: Id of the main view, None when it has no frame to show.
+        override: The gate that was overridden when the group was accepted, or None.
+        findings: Kinds.
+    """
+
+    id: int
+    number: int
+    key: str
+    label: str
+    match: str
+    split: str
+    changed: str
+    views: int
+    pictures: int
+    main_view: int | None
+    status: str
+    stale: bool
+    fixed: bool
+    reason: str | None
+    reviewer: str | None
+    override: str | None
+    solved: bool
+    passes: bool | None
+    gate: str | None
+    gate_view: str | None
+    gate_sentence: str | None
+    margin: float | None
+    value: float | None
+    min_jac: float | None
+    error_px: float | None
+    error_percent: float | None
+    sigma_m: float | None
+    parallax_degrees: float | None
+    size_ratio: float | None
+    height_m: float | None
+    distance_m: float | None
+    box_px: float | None
+    x_m: float | None
+    y_m: float | None
+    findings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Page:
+    """Groups in order; ``next`` is the cursor of the page after, None at the end."""
+
+    items: list[GroupRow]
+    next: str | None
+    total: int
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Where a group stands among those that match.
+
+    Attributes:
+        index: From 0; None when the group itself does not match (any more).
+        previous: Ids before it, the nearest first; ``next`` likewise after it.
+    """
+
+    index: int | None
+    total: int
+    previous: tuple[int, ...]
+    next: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Ids:
+    """Ids of groups in order, out of ``total`` that match."""
+
+    ids: tuple[int, ...]
+    total: int
+
+
+def list_groups(
+    store: Store,
+    dataset_id: int,
+    query: str = "",
+    limit: int = 50,
+    cursor: str | None = None,
+    start: int | None = None,
+) -> Page:
+    """A page of the groups that match.
+
+    Args:
+        store: The database.
+        dataset_id: The dataset.
+        query: As ``query.parse_query`` reads it.
+        limit: Most groups of the page, 1 to 500.
+        cursor: ``next`` of the page before, for the same query.
+        start: Position of the first group, from 0, instead of a cursor.
+
+    Raises:
+        InputError: The query, the limit, the cursor or the position cannot be understood.
+    """
+    parsed = parse_query(query)
+    if not 1 <= limit <= MAX_PAGE:
+        raise InputError(f"a page has 1 to {MAX_PAGE} groups", pointer="/limit")
+    if cursor is not None and start is not None:
+        raise InputError("a page begins at a cursor or at a position, not both", pointer="/from")
+    where = _where(dataset_id, parsed)
+    order = Order(parsed)
+    columns = select(*_COLUMNS, *order.keys).order_by(*order.ascending)
+    with store.read() as session:
+        total = _count(session, where)
+        if start is not None:
+            ids = _ids_from(session, where, order, start, limit, total)
+            rows = session.execute(columns.where(QueueModel.group_id.in_(ids))).all()
+            more = start + limit < total
+        else:
+            after = [] if cursor is None else [order.after(order.decode(cursor))]
+            rows = session.execute(columns.where(*where, *after).limit(limit + 1)).all()
+            more = len(rows) > limit
+    rows = rows[:limit]
+    return Page([_row(row) for row in rows], order.encode(rows[-1]) if more else None, total)
+
+
+def list_ids(
+    store: Store, dataset_id: int, query: str = "", limit: int = MAX_IDS, start: int = 0
+) -> Ids:
+    """The ids alone of the groups that match, in order, from a position on.
+
+    Raises:
+        InputError: The query cannot be understood.
+    """
+    parsed = parse_query(query)
+    where = _where(dataset_id, parsed)
+    with store.read() as session:
+        total = _count(session, where)
+        return Ids(
+            tuple(_ids_from(session, where, Order(parsed), start, limit, total)), total=total
+        )
+
+
+def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
+    """Where a group stands in a query's order, and up to five groups on either side.
+
+    A group that does not match (it was just accepted, say) still has a place in the order.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    parsed = parse_query(query)
+    order = Order(parsed)
+    with store.read() as session:
+        here = session.execute(
+            select(QueueModel.dataset_id, *order.keys).where(QueueModel.group_id == group_id)
+        ).one_or_none()
+        if here is None:
+            raise NotFoundError(f"there is no group {group_id}")
+        where = _where(here.dataset_id, parsed)
+        # One pass over all that match is faster than counting what comes before each time.
+        ids = list(session.scalars(_ordered(where, order)))
+        if group_id in ids:
+            return _around(ids, ids.index(group_id))
+        values = [here[index + 1] for index in range(len(order.keys))]
+        before, after = order.before(values), order.after(values)
+        return Neighbours(
+            index=None,
+            total=len(ids),
+            previous=_ids(session, [*where, before], order.backwards),
+            next=_ids(session, [*where, after], order.ascending),
+        )
+
+
+def _ids_from(
+    session: Session,
+    where: Sequence[ColumnElement[bool]],
+    order: Order,
+    start: int,
+    limit: int,
+    total: int,
+) -> list[int]:
+    """Ids from a position on, in order.
+
+    SQLite sorts as many rows as it skips and reads, and wide rows cost it several times as much:
+    hence ids alone, and behind the middle from the end.
+    """
+    count = min(limit, total - start)
+    if count <= 0:
+        return []
+    behind = total - start - count
+    if start <= behind:
+        return list(session.scalars(_ordered(where, order).offset(start).limit(count)))
+    backwards = select(QueueModel.group_id).where(*where).order_by(*order.backwards)
+    return list(session.scalars(backwards.offset(behind).limit(count)))[::-1]
+
+
+def _ordered(where: Sequence[ColumnElement[bool]], order: Order) -> Select[int]:
+    return select(QueueModel.group_id).where(*where).order_by(*order.ascending)
+
+
+def _around(ids: Sequence[int], index: int) -> Neighbours:
+    before = ids[max(index - _NEIGHBOURS, 0) : index]
+    after = ids[index + 1 : index + 1 + _NEIGHBOURS]
+    return Neighbours(index, len(ids), tuple(reversed(before)), tuple(after))
+
+
+def _where(dataset_id: int, query: Query) -> list[ColumnElement[bool]]:
+    return [QueueModel.dataset_id == dataset_id, *query.conditions]
+
+
+def _count(session: Session, where: Sequence[ColumnElement[bool]]) -> int:
+    statement = select(func.count()).select_from(QueueModel).where(*where)
+    return int(session.execute(statement).scalar_one())
+
+
+def _ids(
+    session: Session, where: Sequence[ColumnElement[bool]], order: Sequence[ColumnElement[Any]]
+) -> tuple[int, ...]:
+    statement = select(QueueModel.group_id).where(*where).order_by(*order).limit(_NEIGHBOURS)
+    return tuple(session.scalars(statement))
+
+
+_STORED = [item.name for item in fields(GroupRow) if item.name not in ("id", "findings")]
+_COLUMNS = [
+    QueueModel.group_id,
+    QueueModel.findings,
+    *(getattr(QueueModel, name) for name in _STORED),
+]
+
+
+def _row(row: Any) -> GroupRow:
+    kinds = tuple(row.findings.strip(",").split(",")) if row.findings else ()
+    values = {name: getattr(row, name) for name in _STORED}
+    return GroupRow(id=row.group_id, findings=kinds, **values)

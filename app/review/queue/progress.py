@@ -1,0 +1,100 @@
+"""Progress: how far the groups of a query are, and how their numbers are spread."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from sqlalchemy import select
+from sqlalchemy.orm import InstrumentedAttribute
+
+from app.review.queue.bins import ERROR_PERCENT, SIGMA_M, even, places
+from app.review.queue.query import STATUSES, parse_query
+from app.store.models import QueueModel
+from app.store.session import Store
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the queue with the bins of its histogram; the first bin has no lower end.
+
+    Attributes:
+        open_high: The last bin has no upper end.
+        log: Its bins are powers of ten apart (see ``bins.decades``).
+    """
+
+    column: InstrumentedAttribute[Any]
+    edges: tuple[float, ...]
+    open_high: bool = True
+    log: bool = False
+
+
+COLUMNS = {
+    "jac": Column(QueueModel.min_jac, even(0, 1, 20), open_high=False),
+    "error_percent": Column(QueueModel.error_percent, ERROR_PERCENT, log=True),
+    "sigma": Column(QueueModel.sigma_m, SIGMA_M, log=True),
+    "parallax": Column(QueueModel.parallax_degrees, even(0, 180, 20), open_high=False),
+    "size_ratio": Column(QueueModel.size_ratio, even(0, 2, 20)),
+}
+"""The bins are fixed, so that they stay put while one filters."""
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """Counts of a column over the groups that match; ``unknown`` ones have no such number."""
+
+    column: Column
+    counts: tuple[int, ...]
+    unknown: int
+
+
+@dataclass(frozen=True)
+class Summary:
+    """How many groups match, how many of them are in each state, and the histograms."""
+
+    groups: int
+    solved: int
+    accepted: int
+    rejected: int
+    deferred: int
+    unreviewed: int
+    stale: int
+    histograms: dict[str, Histogram]
+
+
+def summary(store: Store, dataset_id: int, query: str = "") -> Summary:
+    """Progress and histograms over the groups of a dataset that match a query.
+
+    Raises:
+        InputError: The query cannot be understood.
+    """
+    where = [QueueModel.dataset_id == dataset_id, *parse_query(query).conditions]
+    columns = [item.column for item in COLUMNS.values()]
+    # One pass for all of it: seven statements over ten thousand groups take seven times as long.
+    statement = select(QueueModel.status, QueueModel.solved, QueueModel.stale, *columns)
+    with store.read() as session:
+        rows = session.execute(statement.where(*where)).all()
+    status, solved, stale, *numbers = (
+        zip(*rows, strict=True) if rows else ((),) * (3 + len(COLUMNS))
+    )
+    states = Counter(status)
+    return Summary(
+        groups=len(rows),
+        solved=sum(solved),
+        stale=sum(stale),
+        histograms={
+            name: _histogram(column, values)
+            for (name, column), values in zip(COLUMNS.items(), numbers, strict=True)
+        },
+        **{state: states[state] for state in STATUSES},
+    )
+
+
+def _histogram(column: Column, values: Sequence[float | None]) -> Histogram:
+    numbers = np.array(values, float)
+    place = places(column.edges, numbers, open_low=True, open_high=column.open_high)
+    counts = np.bincount(place[place >= 0], minlength=len(column.edges) - 1)
+    return Histogram(column, tuple(counts.tolist()), int(np.isnan(numbers).sum()))

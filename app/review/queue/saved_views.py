@@ -1,0 +1,113 @@
+"""Saved views: queries of the queue under names that everybody on the dataset sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import delete, func, insert, select
+from sqlalchemy.orm import Session
+
+from app.errors import ConflictError, InputError, NotFoundError
+from app.review.queue.query import parse_query
+from app.store.clock import now
+from app.store.group_rows import next_id
+from app.store.models import QueueModel
+from app.store.session import Store
+from app.store.view_models import SavedViewModel
+
+MAX_NAME = 80
+MAX_VIEWS = 200
+"""Of one dataset: a list that people read."""
+
+
+@dataclass(frozen=True)
+class SavedView:
+    """A query with its name; ``groups`` match it now."""
+
+    id: int
+    name: str
+    query: str
+    actor: str
+    created: str
+    groups: int
+
+
+def list_saved_views(store: Store, dataset_id: int) -> list[SavedView]:
+    """The saved views of a dataset, by name, each with the number of groups that match."""
+    model = SavedViewModel
+    statement = select(*model.__table__.columns).where(model.dataset_id == dataset_id)
+    with store.read() as session:
+        rows = session.execute(statement.order_by(model.name)).all()
+        return [_saved_view(row, _matching(session, row)) for row in rows]
+
+
+def save_view(store: Store, dataset_id: int, name: str, query: str, *, actor: str) -> SavedView:
+    """Keep a query under a name.
+
+    Raises:
+        InputError: There is no name, or the query cannot be understood.
+        ConflictError: The name is taken; nobody's view is replaced unseen.
+    """
+    name = _checked(name)
+    parse_query(query)
+    values = {"dataset_id": dataset_id, "name": name, "query": query.strip(), "actor": actor}
+    with store.write() as session:
+        mine = SavedViewModel.dataset_id == dataset_id
+        if session.scalar(select(SavedViewModel.id).where(mine, SavedViewModel.name == name)):
+            raise ConflictError(
+                f'there is a view "{name}" already', hint="Delete it, or choose another name."
+            )
+        count = session.scalar(select(func.count()).select_from(SavedViewModel).where(mine))
+        if (count or 0) >= MAX_VIEWS:
+            raise ConflictError(f"a dataset has at most {MAX_VIEWS} saved views")
+        identity = next_id(session, SavedViewModel)
+        session.execute(insert(SavedViewModel), [{**values, "id": identity, "created": now()}])
+        return _read(session, identity)
+
+
+def get_view(store: Store, view_id: int) -> SavedView:
+    """A saved view; raises NotFoundError when there is none."""
+    with store.read() as session:
+        return _read(session, view_id)
+
+
+def delete_view(store: Store, view_id: int) -> SavedView:
+    """Forget a saved view; returns what it was.
+
+    Raises:
+        NotFoundError: There is none.
+    """
+    with store.write() as session:
+        view = _read(session, view_id)
+        session.execute(delete(SavedViewModel).where(SavedViewModel.id == view_id))
+    return view
+
+
+def _read(session: Session, view_id: int) -> SavedView:
+    statement = select(*SavedViewModel.__table__.columns).where(SavedViewModel.id == view_id)
+    row = session.execute(statement).one_or_none()
+    if row is None:
+        raise NotFoundError(f"there is no saved view {view_id}")
+    return _saved_view(row, _matching(session, row))
+
+
+def _checked(name: str) -> str:
+    name = name.strip()
+    if not name or len(name) > MAX_NAME or not name.isprintable():
+        raise InputError(f"a saved view has a name of 1 to {MAX_NAME} letters", pointer="/name")
+    return name
+
+
+def _matching(session: Session, row: Any) -> int:
+    """How many groups match; none where a query of an older version is no longer understood."""
+    try:
+        conditions = parse_query(row.query).conditions
+    except InputError:
+        return 0
+    where = [QueueModel.dataset_id == row.dataset_id, *conditions]
+    return session.scalar(select(func.count()).select_from(QueueModel).where(*where)) or 0
+
+
+def _saved_view(row: Any, groups: int) -> SavedView:
+    return SavedView(row.id, row.name, row.query, row.actor, row.created, groups)

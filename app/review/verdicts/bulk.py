@@ -1,0 +1,379 @@
+"""Bulk: one verdict for every group that a query matches, tried first.
+
+A batch is many short write transactions, so that others go on working; killed in between it
+leaves whole verdicts, and given again it does the rest. ``bulk_undo`` takes it back, and
+``bulk_redo`` gives it once more after that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from sqlalchemy import ColumnElement, insert, select, update
+from sqlalchemy.orm import Session
+
+from app.errors import ConflictError
+from app.finite import json_text
+from app.review.editing.idempotency import Request, is_repeated, remember
+from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
+from app.review.verdicts.verdict import Verdict, check_verdict
+from app.store.clock import now
+from app.store.group_rows import next_id
+from app.store.log import Entry, append
+from app.store.models import (
+    DatasetModel,
+    GroupModel,
+    IdempotencyModel,
+    QueueModel,
+    VerdictModel,
+)
+from app.store.queue import edited_groups, refresh_verdicts
+from app.store.session import Store
+from app.store.view_models import VerdictBatchModel
+
+CHUNK = 500
+"""Groups a transaction: a few hundredths of a second."""
+SAMPLE = 5
+UNSOLVED, NEEDS_NOTE, NO_PICTURE = "unsolved", "needs_note", "no_picture"
+"""Why a group is left alone: its gates are not known, or it fails one, or no view of it has a
+picture, and nobody says why it shall be accepted all the same."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Groups that a bulk verdict leaves alone, and why."""
+
+    reason: str
+    groups: int
+
+
+@dataclass(frozen=True)
+class SampleGroup:
+    """A group that would change, with the number and label that the queue shows."""
+
+    id: int
+    key: str
+    number: int
+    label: str
+
+
+@dataclass(frozen=True)
+class BulkPlan:
+    """What a bulk verdict would do.
+
+    Attributes:
+        matches: Groups that the query finds.
+        would_change: Those that would get the verdict.
+        sample: The first of them.
+    """
+
+    matches: int
+    would_change: int
+    refused: tuple[Refusal, ...]
+    sample: tuple[SampleGroup, ...]
+
+
+@dataclass(frozen=True)
+class BatchReport:
+    """What a bulk verdict did; ``batch`` is None when there was nothing to do."""
+
+    batch: int | None
+    changed: int
+    refused: tuple[Refusal, ...]
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A bulk verdict as it is remembered.
+
+    Attributes:
+        done: False while it runs, or when it was killed.
+        undone: When it was taken back; ``redone`` is the batch that gave it again after that.
+    """
+
+    id: int
+    at: str
+    actor: str
+    query: str
+    state: str
+    reason: str | None
+    note: str | None
+    changed: int
+    done: bool
+    undone: str | None
+    undone_by: str | None
+    redone: int | None
+
+
+def plan_verdicts(
+    store: Store,
+    dataset_id: int,
+    query: str,
+    state: str,
+    reason: str | None = None,
+    note: str | None = None,
+) -> BulkPlan:
+    """What a verdict on all groups of a query would do; nothing is saved.
+
+    Raises:
+        InputError: The query or the verdict cannot be.
+    """
+    verdict = check_verdict(state, reason, note)
+    with store.read() as session:
+        rows = queue_rows(session, _where(dataset_id, query))
+    sorted_out = sort_out(rows, verdict)
+    sample = [
+        SampleGroup(row.group_id, row.key, row.number, row.label)
+        for row in sorted_out.change[:SAMPLE]
+    ]
+    return BulkPlan(len(rows), len(sorted_out.change), sorted_out.refused, tuple(sample))
+
+
+def give_verdicts(
+    store: Store,
+    dataset_id: int,
+    query: str,
+    state: str,
+    reason: str | None = None,
+    note: str | None = None,
+    *,
+    actor: str,
+    expected: int | None = None,
+    idempotency_key: str | None = None,
+) -> BatchReport:
+    """Give a verdict to all groups of a query, as each of them is when its turn comes.
+
+    Accepting a group that fails a gate overrides the policy, as it does for one group alone:
+    without a note such groups are refused and counted, and so are groups without any picture.
+
+    Args:
+        store: The database.
+        dataset_id: The dataset.
+        query: As ``query.parse_query`` reads it; its sort is of no matter. It may list
+            thousands of groups one by one (``id:12,15``).
+        state: As ``verdict.set_verdict`` takes it, like ``reason`` and ``note``.
+        actor: Who says so.
+        expected: How many groups ``plan_verdicts`` said would change; refuse another number.
+        idempotency_key: The caller's name for this request; sent again it changes nothing.
+
+    Raises:
+        InputError: The query or the verdict cannot be.
+        ConflictError: Another number of groups would change than the caller expects.
+        IdempotencyError: The key was used for something else.
+    """
+    verdict = check_verdict(state, reason, note)
+    content = ["verdicts", dataset_id, query, verdict.state, verdict.reason, verdict.note]
+    request = Request(idempotency_key, actor, content)
+    where = _where(dataset_id, query)
+    with store.read() as session:
+        if is_repeated(session, request):
+            return _again(session, request)
+        found = sort_out(queue_rows(session, where), verdict)
+    if expected is not None and expected != len(found.change):
+        raise ConflictError(
+            f"{len(found.change)} groups would change, not {expected}",
+            hint="Look at what would happen once more (dry_run=true).",
+        )
+    if not found.change:
+        return BatchReport(None, 0, found.refused)
+    run = BatchRun(dataset_id, query, verdict, request)
+    ids = [row.group_id for row in found.change]
+    for start in range(0, len(ids), CHUNK):
+        with store.write() as session:
+            chosen = [*where, QueueModel.group_id.in_(ids[start : start + CHUNK])]
+            run.save(session, sort_out(queue_rows(session, chosen), verdict).change)
+    with store.write() as session:
+        run.close(session)
+    return BatchReport(run.batch, run.changed, found.refused)
+
+
+def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[Batch]:
+    """The newest bulk verdicts of a dataset, the newest first."""
+    model = VerdictBatchModel
+    statement = select(*model.__table__.columns).where(model.dataset_id == dataset_id)
+    with store.read() as session:
+        rows = session.execute(statement.order_by(model.id.desc()).limit(limit)).all()
+    return [_batch(row) for row in rows]
+
+
+@dataclass(frozen=True)
+class SortedOut:
+    """Rows that a verdict changes, and those that it is refused for."""
+
+    change: list[Any]
+    refused: tuple[Refusal, ...]
+
+
+def _where(dataset_id: int, query: str) -> list[ColumnElement[bool]]:
+    conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
+    return [QueueModel.dataset_id == dataset_id, *conditions]
+
+
+def queue_rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[Any]:
+    """Rows of the queue with what a bulk verdict asks of them, in their order."""
+    names = (
+        "group_id",
+        "key",
+        "number",
+        "label",
+        "status",
+        "stale",
+        "reason",
+        "solved",
+        "passes",
+        "gate",
+        "pictures",
+    )
+    columns = [getattr(QueueModel, name) for name in names]
+    statement = select(*columns).where(*where).order_by(QueueModel.number)
+    return list(session.execute(statement).all())
+
+
+def sort_out(rows: Sequence[Any], verdict: Verdict) -> SortedOut:
+    """The groups that a verdict changes, and how many it is refused for, and why."""
+    change, refused = [], {UNSOLVED: 0, NEEDS_NOTE: 0, NO_PICTURE: 0}
+    for row in rows:
+        if _has(row, verdict):
+            continue
+        if verdict.state == "accepted" and not row.solved:
+            refused[UNSOLVED] += 1
+        elif verdict.state == "accepted" and not row.passes and verdict.note is None:
+            refused[NEEDS_NOTE] += 1
+        elif verdict.state == "accepted" and not row.pictures and verdict.note is None:
+            refused[NO_PICTURE] += 1
+        else:
+            change.append(row)
+    reasons = (Refusal(reason, count) for reason, count in refused.items() if count)
+    return SortedOut(change, tuple(reasons))
+
+
+def _has(row: Any, verdict: Verdict) -> bool:
+    """Whether a group has the verdict already; one with a note of its own is always new."""
+    if verdict.state == row.status == "unreviewed":
+        return True
+    same = row.status == verdict.state and row.reason == verdict.reason and not row.stale
+    return bool(same and verdict.note is None)
+
+
+class BatchRun:
+    """A batch while it is given, chunk by chunk; ``again`` is the batch that it gives again."""
+
+    def __init__(
+        self,
+        dataset_id: int,
+        query: str,
+        verdict: Verdict,
+        request: Request,
+        again: int | None = None,
+    ):
+        self._again = {} if again is None else {"again": again}
+        self.batch: int | None = None
+        self.changed = 0
+        self._dataset_id, self._query = dataset_id, query
+        self._verdict, self._request = verdict, request
+        self._spans: list[tuple[int, int]] = []
+
+    def save(self, session: Session, rows: Sequence[Any]) -> None:
+        """Save the verdicts of one chunk with its log entries, in one transaction."""
+        if not rows:
+            return
+        at = now()
+        verdicts = _verdict_rows(session, rows, self._verdict, self._request.actor, at)
+        save_verdicts(session, self._dataset_id, self._request.actor, at, verdicts)
+        self.changed += len(verdicts)
+        self._spans.append((verdicts[0]["id"], verdicts[-1]["id"]))
+        self._save_batch(session, at)
+
+    def close(self, session: Session) -> None:
+        """Say in the log that the batch is complete."""
+        if self.batch is None:
+            return
+        at = now()
+        body = {"batch": self.batch, "q": self._query, "changed": self.changed}
+        body |= asdict(self._verdict) | self._again
+        entry = Entry("verdict_batch", self._request.actor, at, body, self._dataset_id)
+        (log_id,) = append(session, [entry])
+        remember(session, self._request, log_id, at)
+        mine = VerdictBatchModel.id == self.batch
+        session.execute(update(VerdictBatchModel).where(mine).values(log_id=log_id))
+
+    def _save_batch(self, session: Session, at: str) -> None:
+        values: dict[str, Any] = {"changed": self.changed, "spans": json_text(self._spans)}
+        if self.batch is not None:
+            mine = VerdictBatchModel.id == self.batch
+            session.execute(update(VerdictBatchModel).where(mine).values(values))
+            return
+        self.batch = next_id(session, VerdictBatchModel)
+        values |= {"id": self.batch, "dataset_id": self._dataset_id, "at": at}
+        values |= {"actor": self._request.actor, "query": self._query, **asdict(self._verdict)}
+        session.execute(insert(VerdictBatchModel), [values])
+
+
+def _verdict_rows(
+    session: Session, rows: Sequence[Any], verdict: Verdict, actor: str, at: str
+) -> list[dict[str, Any]]:
+    ids = [row.group_id for row in rows]
+    heads, edited = _heads(session, ids), edited_groups(session, ids)
+    number = next_id(session, VerdictModel)
+    accepts = verdict.state == "accepted"
+    return [
+        {
+            "id": number + place,
+            "group_id": row.group_id,
+            "actor": actor,
+            "at": at,
+            **asdict(verdict),
+            "inputs_hash": heads[row.group_id].inputs_hash,
+            "policy_hash": heads[row.group_id].policy_hash,
+            "fixed": bool(accepts and row.passes and row.group_id in edited),
+            "override": (row.gate or "unknown") if accepts and not row.passes else None,
+        }
+        for place, row in enumerate(rows)
+    ]
+
+
+def _heads(session: Session, ids: Sequence[int]) -> dict[int, Any]:
+    """What a verdict keeps of its group: what it was given for, and under which policy."""
+    statement = (
+        select(GroupModel.id, GroupModel.inputs_hash, DatasetModel.policy_hash)
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .where(GroupModel.id.in_(ids))
+    )
+    return {row.id: row for row in session.execute(statement)}
+
+
+def save_verdicts(
+    session: Session, dataset_id: int, actor: str, at: str, rows: Sequence[dict[str, Any]]
+) -> None:
+    """Insert verdicts, log them under who gives them, and show them in the queue."""
+    session.execute(insert(VerdictModel), rows, execution_options={"render_nulls": True})
+    bodies = [
+        {name: value for name, value in row.items() if name not in ("id", "group_id")}
+        for row in rows
+    ]
+    entries = [
+        Entry("verdict", actor, at, body, dataset_id, row["group_id"])
+        for row, body in zip(rows, bodies, strict=True)
+    ]
+    append(session, entries)
+    refresh_verdicts(session, list({row["group_id"]: None for row in rows}))
+
+
+def _again(session: Session, request: Request) -> BatchReport:
+    """What the same request did the first time."""
+    statement = (
+        select(VerdictBatchModel.id, VerdictBatchModel.changed)
+        .join(IdempotencyModel, IdempotencyModel.log_id == VerdictBatchModel.log_id)
+        .where(IdempotencyModel.key == request.key, IdempotencyModel.actor == request.actor)
+    )
+    row = session.execute(statement).one()
+    return BatchReport(row.id, row.changed, ())
+
+
+def _batch(row: Any) -> Batch:
+    same = ("id", "at", "actor", "query", "state", "reason", "note", "changed")
+    values = {name: getattr(row, name) for name in same}
+    taken_back = {"undone": row.undone, "undone_by": row.undone_by, "redone": row.redone}
+    return Batch(**values, done=row.log_id is not None, **taken_back)

@@ -1,0 +1,105 @@
+"""Bulk redo: a batch that was taken back is given again, as a batch of its own."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import func, select, update
+from sqlalchemy.orm import Session
+
+from app.errors import ConflictError
+from app.review.editing.idempotency import Request
+from app.review.verdicts.bulk import BatchRun, Refusal, queue_rows, sort_out
+from app.review.verdicts.bulk_undo import read_batch
+from app.review.verdicts.verdict import check_verdict
+from app.store.models import GroupModel, QueueModel, VerdictModel
+from app.store.session import Store
+from app.store.view_models import VerdictBatchModel
+
+
+@dataclass(frozen=True)
+class RedoReport:
+    """What giving a batch again did.
+
+    Attributes:
+        batch: The new batch, which can be taken back like any other; None when nothing changed.
+        changed: Groups that have the verdict again.
+        kept: Groups that somebody has judged or edited since; they stay as they are.
+        refused: Groups that the verdict cannot be given to any more, and why.
+    """
+
+    batch: int | None
+    changed: int
+    kept: int
+    refused: tuple[Refusal, ...]
+
+
+def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
+    """Give the verdicts of a batch again after they were taken back.
+
+    A group keeps what it has when somebody judged it after the batch was taken back, or edited
+    it since the batch judged it: nobody has seen what the verdict would speak of.
+
+    Raises:
+        NotFoundError: There is no such batch.
+        ConflictError: It was not taken back, or it was given again already.
+    """
+    with store.read() as session:
+        batch = read_batch(session, batch_id)
+    spans = _spans(batch)
+    verdict = check_verdict(batch.state, batch.reason, batch.note)
+    run = BatchRun(batch.dataset_id, batch.query, verdict, Request(None, actor, []), batch_id)
+    refused: Counter[str] = Counter()
+    for first, last in spans:
+        with store.write() as session:
+            ids = _unchanged(session, json.loads(batch.spans), first, last)
+            rows = queue_rows(session, [QueueModel.group_id.in_(ids)])
+            found = sort_out(rows, verdict)
+            run.save(session, found.change)
+            refused.update({item.reason: item.groups for item in found.refused})
+            if run.batch is not None:
+                mine = VerdictBatchModel.id == batch_id
+                session.execute(update(VerdictBatchModel).where(mine).values(redone=run.batch))
+    with store.write() as session:
+        run.close(session)
+    kept = batch.changed - run.changed - refused.total()
+    reasons = tuple(Refusal(reason, groups) for reason, groups in refused.items())
+    return RedoReport(run.batch, run.changed, kept, reasons)
+
+
+def _spans(batch: Any) -> list[tuple[int, int]]:
+    """First and last id of the verdicts that took a batch back, chunk by chunk."""
+    if batch.undone is None:
+        raise ConflictError("this batch was not taken back, so there is nothing to give again")
+    if batch.redone is not None:
+        raise ConflictError("the verdicts of this batch were given again already")
+    if batch.undo_spans is None:
+        raise ConflictError(
+            "this batch was taken back by an older version of Touchline, which kept no record "
+            "of the groups",
+            hint="Give the verdict once more in the queue.",
+        )
+    return [(first, last) for first, last in json.loads(batch.undo_spans)]
+
+
+def _unchanged(session: Session, given: list[tuple[int, int]], first: int, last: int) -> list[int]:
+    """Groups of one chunk that nobody has judged since it was taken back, or edited."""
+    chunk = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
+    newest = (
+        select(VerdictModel.group_id, func.max(VerdictModel.id).label("newest"))
+        .where(VerdictModel.group_id.in_(chunk))
+        .group_by(VerdictModel.group_id)
+    )
+    ids = [row.group_id for row in session.execute(newest) if first <= row.newest <= last]
+    heads = select(GroupModel.id, GroupModel.inputs_hash).where(GroupModel.id.in_(ids))
+    hashes = {row.id: row.inputs_hash for row in session.execute(heads)}
+    judged: dict[int, str] = {}
+    for start, end in given:
+        statement = select(VerdictModel.group_id, VerdictModel.inputs_hash).where(
+            VerdictModel.id.between(start, end), VerdictModel.group_id.in_(ids)
+        )
+        judged |= {row.group_id: row.inputs_hash for row in session.execute(statement)}
+    return [group for group in ids if judged.get(group) == hashes[group]]

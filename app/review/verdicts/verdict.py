@@ -1,0 +1,145 @@
+"""Verdicts: accept, reject with a reason, defer, or take it back; everyone's are kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy import insert
+from sqlalchemy.orm import Session
+
+from app.errors import InputError
+from app.review.editing.etags import require_unchanged
+from app.review.editing.idempotency import Request, is_repeated, remember
+from app.review.editing.solver import Solver
+from app.review.editing.state import GroupState
+from app.review.editing.submit import load, solved
+from app.soccer.reasons import MAX_NOTE, REASONS
+from app.solving.solve import solve
+from app.store.clock import now
+from app.store.group_rows import next_id
+from app.store.log import Entry, append
+from app.store.models import VerdictModel
+from app.store.queue import refresh_queue
+from app.store.session import Store
+
+STATES = ("unreviewed", "accepted", "rejected", "deferred")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A verdict as it is given, checked."""
+
+    state: str
+    reason: str | None
+    note: str | None
+
+
+def set_verdict(
+    store: Store,
+    group_id: int,
+    state: str,
+    reason: str | None = None,
+    note: str | None = None,
+    *,
+    if_match: str,
+    actor: str,
+    idempotency_key: str | None = None,
+    solver: Solver = solve,
+) -> GroupState:
+    """Save a person's verdict on a group as it is; the newest of all people's counts.
+
+    Accepting a group that fails a gate overrides the policy: it needs a note, which goes into
+    the export. So does accepting a group without any picture: nobody can have looked at it.
+
+    Raises:
+        InputError: Unknown state or reason, or a note is missing.
+        StaleRevisionError: The group is not what the person saw.
+    """
+    verdict = check_verdict(state, reason, note)
+    request = Request(idempotency_key, actor, ["verdict", group_id, state, reason, note])
+    # Accepting weighs the gates, so they must be known.
+    seen = solved(store, group_id, solver=solver) if state == "accepted" else load(store, group_id)
+    override = _override(seen, verdict)
+    _require_seen(seen, verdict)
+    with store.write() as session:
+        if not is_repeated(session, request):
+            require_unchanged(session, group_id, if_match, f"group {seen.key}")
+            # The override was judged on what the person saw, and that has not changed.
+            require_unchanged(session, group_id, seen.etag, f"group {seen.key}")
+            _save(session, seen, verdict, override, request)
+    return load(store, group_id)
+
+
+def check_verdict(state: str, reason: str | None, note: str | None) -> Verdict:
+    """A verdict from what was sent.
+
+    Raises:
+        InputError: Unknown state or reason, or a note is missing or too long.
+    """
+    note = (note or "").strip() or None
+    if state not in STATES:
+        raise InputError(f'"{state}" is no verdict; {", ".join(STATES)} are', pointer="/state")
+    if note is not None and len(note) > MAX_NOTE:
+        raise InputError(f"a note has at most {MAX_NOTE} characters", pointer="/note")
+    if state != "rejected" and reason is not None:
+        raise InputError("only a rejection has a reason", pointer="/reason")
+    if state == "rejected" and reason not in REASONS:
+        known = ", ".join(REASONS)
+        raise InputError(f"a rejection needs a reason: {known}", pointer="/reason")
+    if reason == "other" and note is None:
+        raise InputError('the reason "other" needs a note', pointer="/note")
+    return Verdict(state, reason, note)
+
+
+def _override(state: GroupState, verdict: Verdict) -> str | None:
+    """The gate that an acceptance overrides, or None."""
+    if verdict.state != "accepted" or state.solution is None or state.solution.passes:
+        return None
+    gate = state.solution.first_failing
+    if verdict.note is None:
+        sentence = gate.sentence if gate is not None else "it fails"
+        raise InputError(
+            f"this group fails a gate ({sentence}); accepting it needs a note that says why",
+            hint="The note goes into the export as the reason of the override.",
+            pointer="/note",
+        )
+    return gate.name if gate is not None else "unknown"
+
+
+def _require_seen(state: GroupState, verdict: Verdict) -> None:
+    """Refuse a bare acceptance of a group that nobody can have looked at."""
+    seen = any(view.media is not None for view in state.group.views)
+    if verdict.state == "accepted" and verdict.note is None and not seen:
+        raise InputError(
+            "this group has no picture in any view, so nobody can have looked at it; accepting "
+            "it needs a note that says what it was judged by",
+            hint="Import it again with its frames, or say in the note why it is right.",
+            pointer="/note",
+        )
+
+
+def _save(
+    session: Session,
+    state: GroupState,
+    verdict: Verdict,
+    override: str | None,
+    request: Request,
+) -> None:
+    at = now()
+    values = {
+        "actor": request.actor,
+        "at": at,
+        "state": verdict.state,
+        "reason": verdict.reason,
+        "note": verdict.note,
+        "inputs_hash": state.stored.inputs_hash,
+        "policy_hash": state.policy.hash,
+        "fixed": state.stored.edited and verdict.state == "accepted" and override is None,
+        "override": override,
+    }
+    row = {**values, "id": next_id(session, VerdictModel), "group_id": state.id}
+    session.execute(insert(VerdictModel), [row])
+    entry = Entry("verdict", request.actor, at, values, state.dataset_id, state.id)
+    (log_id,) = append(session, [entry])
+    remember(session, request, log_id, at)
+    refresh_queue(session, [state.id])

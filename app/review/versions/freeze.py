@@ -1,0 +1,401 @@
+"""Freeze: a dataset as it is now becomes a version that never changes.
+
+Content goes in first, in short transactions, under keys that follow from it; the rows and the
+version's own row come last, in one. Killed anywhere and started again it ends in the same state.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from sqlalchemy import insert, select
+from sqlalchemy.orm import Session
+
+from app.datasets.manifest import software_version
+from app.errors import ConflictError, InputError
+from app.review.datasets.dataset import Dataset, read_dataset
+from app.review.datasets.licence import licence_text
+from app.review.versions.membership import RULES, Candidate, read_candidates, require_solved
+from app.review.versions.version import BATCH, Version, calibration_names, read_version
+from app.review.versions.version_hash import version_hash
+from app.soccer.group import Group
+from app.soccer.policy import Policy
+from app.soccer.solution import SOLVER_VERSION
+from app.soccer.split import Split, Splitter
+from app.store.clock import now
+from app.store.codecs import Json, canonical, pack, policy_to_json
+from app.store.frozen import (
+    CALIBRATION,
+    SOLUTION,
+    body_of,
+    digest_of,
+    frames_of,
+    freeze_said,
+    insert_frozen,
+    json_of,
+    known_frozen,
+)
+from app.store.group_rows import next_id
+from app.store.groups import read_groups
+from app.store.log import Entry, append
+from app.store.media import media_facts
+from app.store.models import CalibrationModel, GroupModel, SolutionModel
+from app.store.session import Store
+from app.store.solutions import read_calibration_bodies
+from app.store.version_models import VersionGroupModel, VersionModel
+
+MAX_NOTE = 2000
+MAX_LICENCE = 100_000
+NO_SPLIT = "none"
+"""What counts call groups and views that are in no split, or in two."""
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
+
+Progress = Callable[[int, int], None]
+"""Called with the number of groups done and the number that there are."""
+
+
+@dataclass(frozen=True)
+class FreezeRequest:
+    """What to freeze.
+
+    Attributes:
+        name: Of the version; unique in its dataset.
+        note: What a reader of the list should know.
+        licence: Text under which the version is passed on; empty: the terms of its sources.
+        groups: ``accepted``: what people accepted and the policy passes, or a person overrode;
+            ``passing``: whatever the policy passes, unless a person rejected or deferred it.
+    """
+
+    name: str
+    note: str = ""
+    licence: str = ""
+    split: Split = field(default_factory=Split)
+    groups: str = "accepted"
+
+    def check(self) -> None:
+        """Raise InputError where it says something impossible."""
+        self.split.check()
+        if not _NAME.fullmatch(self.name) or self.name.isdigit():
+            raise InputError(
+                f'"{self.name}" cannot be the name of a version',
+                hint="Use letters, digits, spaces and . _ -, up to 100, not digits alone.",
+                pointer="/name",
+            )
+        if self.groups not in RULES:
+            raise InputError(f'groups are "{RULES[0]}" or "{RULES[1]}"', pointer="/groups")
+        if len(self.note) > MAX_NOTE:
+            raise InputError(f"a note has at most {MAX_NOTE} characters", pointer="/note")
+        if len(self.licence) > MAX_LICENCE:
+            raise InputError(f"a licence has at most {MAX_LICENCE} characters", pointer="/licence")
+
+
+@dataclass(frozen=True)
+class FreezePlan:
+    """What a freeze would do: how many groups enter, and why the others do not."""
+
+    groups: int
+    left_out: Mapping[str, int]
+    unsolved: int
+
+
+def plan_freeze(
+    store: Store, dataset: str | int, request: FreezeRequest, *, strict: bool = False
+) -> FreezePlan:
+    """What ``freeze`` would do; saves nothing.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        request: What would be frozen.
+        strict: Refuse what ``freeze`` would refuse: no group, or groups that are not solved.
+    """
+    request.check()
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        _require_free(session, found, request.name)
+        candidates = read_candidates(session, found.id, request.groups)
+    if strict:
+        require_solved(candidates)
+        _require_some(found, candidates, request.groups)
+    Splitter.of(request.split, {item.match for item in candidates})
+    return FreezePlan(
+        groups=sum(item.why is None for item in candidates),
+        left_out=_reasons(candidates),
+        unsolved=sum(item.unsolved for item in candidates),
+    )
+
+
+def freeze(
+    store: Store,
+    dataset: str | int,
+    request: FreezeRequest,
+    *,
+    actor: str,
+    progress: Progress | None = None,
+) -> Version:
+    """Freeze a dataset as it is in one snapshot.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        request: Name, note, licence, split, and which groups enter.
+        actor: Who freezes.
+        progress: Called after each batch; an error that it raises ends the freeze.
+
+    Raises:
+        InputError: The request says something impossible, or no group would be in the version.
+        ConflictError: The name is taken, or groups that would enter are not solved.
+    """
+    request.check()
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        _require_free(session, found, request.name)
+        candidates = read_candidates(session, found.id, request.groups)
+        require_solved(candidates)
+        _require_some(found, candidates, request.groups)
+        run = _Run(store, session, found, request, candidates, progress)
+        rows = run.rows()
+    values = run.values(rows, actor)
+    with store.write() as session:
+        _require_free(session, found, request.name)
+        return _save(session, values, rows)
+
+
+class _Run:
+    """One freeze under way: rows of the version, and content brought into the database."""
+
+    def __init__(
+        self,
+        store: Store,
+        session: Session,
+        dataset: Dataset,
+        request: FreezeRequest,
+        candidates: Sequence[Candidate],
+        progress: Progress | None,
+    ):
+        self._store, self._session, self._dataset = store, session, dataset
+        self._request, self._candidates, self._progress = request, candidates, progress
+        self._splitter = Splitter.of(request.split, {item.match for item in candidates})
+        self._views: dict[str, int] = {}
+        self._balls: dict[str, int] = {}
+        self._cameras: set[str] = set()
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows of all groups, in their order; content is frozen on the way."""
+        rows: list[dict[str, Any]] = []
+        for start in range(0, len(self._candidates), BATCH):
+            batch = self._candidates[start : start + BATCH]
+            members = self._members([item.id for item in batch if item.why is None])
+            for position, item in enumerate(batch, start):
+                rows.append({**_row(item, position), **members.get(item.id, {})})
+            if self._progress is not None:
+                self._progress(start + len(batch), len(self._candidates))
+        self._require_cameras()
+        return rows
+
+    def values(self, rows: Sequence[Mapping[str, Any]], actor: str) -> dict[str, Any]:
+        """Columns of the version itself."""
+        request, dataset = self._request, self._dataset
+        return {
+            "dataset_id": dataset.id,
+            "name": request.name,
+            "note": request.note,
+            "licence": request.licence.strip() or licence_text(self._matches(rows)),
+            "created": now(),
+            "actor": actor,
+            "hash": version_hash(dataset.policy, SOLVER_VERSION, rows),
+            "groups": request.groups,
+            "policy": canonical(policy_to_json(dataset.policy)),
+            "policy_hash": dataset.policy.hash,
+            "solver_version": SOLVER_VERSION,
+            "software_version": software_version(),
+            "split": canonical(request.split.values()),
+            "counts": canonical(self._counts(rows)),
+        }
+
+    def _matches(self, rows: Sequence[Mapping[str, Any]]) -> set[str]:
+        return {row["match"] for row in rows if row["member"]}
+
+    def _members(self, ids: Sequence[int]) -> dict[int, dict[str, Any]]:
+        """What the rows of members hold besides what every row has."""
+        if not ids:
+            return {}
+        stored = read_groups(self._session, ids)
+        solutions = _solutions(self._session, ids, self._dataset.policy)
+        if len(solutions) < len(ids):
+            raise ConflictError("a group lost its solution", hint="Solve the dataset first.")
+        texts: dict[str, str] = {}
+        rows = {}
+        for number, item in stored.items():
+            said = freeze_said(item.group)
+            texts.update(said.texts)
+            rows[number] = self._member(item.group, said.key, solutions[number])
+        self._keep(texts, solutions.values())
+        return rows
+
+    def _member(self, group: Group, said: str, body: bytes) -> dict[str, Any]:
+        views = [view.key for view in group.views]
+        solved, splits = json_of(body), self._splitter.views(views)
+        split = self._splitter.group(group.match, group.split, views)
+        self._cameras.update(views)
+        for view in solved["views"]:
+            side = (splits or {}).get(view["view"], split) or NO_SPLIT
+            self._views[side] = self._views.get(side, 0) + 1
+            # As ``soccer.ball_boxes.has_ball_3d``: what every format counts as a ball.
+            ball = solved["ball"] is not None and view["included"]
+            self._balls[side] = self._balls.get(side, 0) + bool(ball)
+        frames = frames_of(group, _facts(group))
+        return {
+            "split": split,
+            "splits": None if splits is None else canonical(splits),
+            "said": said,
+            "solution": SOLUTION + digest_of(body),
+            "ball": canonical(solved["ball"]["point"]) if solved["ball"] else None,
+            "frames": None if frames is None else pack(frames),
+        }
+
+    def _keep(self, texts: Mapping[str, str], solutions: Iterable[bytes]) -> None:
+        """Bring what is not frozen yet into the database, in a transaction of its own."""
+        bodies = {SOLUTION + digest_of(body): body for body in solutions}
+        names = {name for body in bodies.values() for name in calibration_names(json_of(body))}
+        known = known_frozen(self._session, self._dataset.id, {*texts, *bodies, *names})
+        fresh: dict[str, bytes | None] = dict.fromkeys(names - known)
+        fresh |= {key: body for key, body in bodies.items() if key not in known}
+        fresh |= {key: body_of(text) for key, text in texts.items() if key not in known}
+        if fresh:
+            with self._store.write() as session:
+                gone = self._gone(session, names - known)
+                insert_frozen(session, self._dataset.id, {**fresh, **gone})
+
+    def _gone(self, session: Session, names: set[str]) -> dict[str, bytes]:
+        """Calibrations that somebody deleted since the snapshot, as they are in it."""
+        keys = {name.removeprefix(CALIBRATION) for name in names}
+        found = select(CalibrationModel.key).where(CalibrationModel.key.in_(keys))
+        gone = keys - set(session.scalars(found))
+        bodies = read_calibration_bodies(self._session, gone) if gone else {}
+        return {CALIBRATION + key: body for key, body in bodies.items()}
+
+    def _require_cameras(self) -> None:
+        split = self._request.split
+        if split.kind == "camera" and not self._cameras & set(split.test_cameras):
+            names = ", ".join(split.test_cameras)
+            raise InputError(
+                f"no view of the version is from a test camera ({names})",
+                pointer="/split/test_cameras",
+            )
+
+    def _counts(self, rows: Sequence[Mapping[str, Any]]) -> Json:
+        members = [row for row in rows if row["member"]]
+        groups: dict[str, int] = {}
+        for row in members:
+            side = row["split"] or NO_SPLIT
+            groups[side] = groups.get(side, 0) + 1
+        splits = {
+            side: {
+                "groups": groups.get(side, 0),
+                "views": self._views.get(side, 0),
+                "balls": self._balls.get(side, 0),
+            }
+            for side in sorted({*groups, *self._views})
+        }
+        return {
+            "groups": len(members),
+            "views": sum(self._views.values()),
+            "balls": sum(self._balls.values()),
+            "overrides": sum(bool(item.overrides) for item in self._candidates),
+            "splits": splits,
+            "left_out": _reasons(self._candidates),
+        }
+
+
+def _solutions(session: Session, ids: Sequence[int], policy: Policy) -> dict[int, bytes]:
+    """Bodies of the solutions that fit the groups as they are."""
+    statement = (
+        select(SolutionModel.group_id, SolutionModel.body)
+        .join(GroupModel, GroupModel.id == SolutionModel.group_id)
+        .where(
+            SolutionModel.group_id.in_(ids),
+            SolutionModel.inputs_hash == GroupModel.inputs_hash,
+            SolutionModel.policy_hash == policy.hash,
+            SolutionModel.solver_version == SOLVER_VERSION,
+        )
+    )
+    return {row.group_id: row.body for row in session.execute(statement)}
+
+
+def _row(item: Candidate, position: int) -> dict[str, Any]:
+    """What every row has; that of a member is completed."""
+    nothing = dict.fromkeys(("splits", "said", "solution", "ball", "frames"))
+    return {
+        **nothing,
+        "position": position,
+        "key": item.key,
+        "match": item.match,
+        "member": item.why is None,
+        "why": item.why,
+        "split": item.split,
+        "verdict": None if item.verdict is None else canonical(item.verdict),
+    }
+
+
+def _facts(group: Group) -> dict[str, dict[str, int]]:
+    return {view.key: media_facts(view.media) for view in group.views if view.media is not None}
+
+
+def _reasons(candidates: Iterable[Candidate]) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for item in candidates:
+        if item.why is not None:
+            counts[item.why] = counts.get(item.why, 0) + 1
+    return dict(sorted(counts.items()))
+
+
+def _require_free(session: Session, dataset: Dataset, name: str) -> None:
+    statement = select(VersionModel.id).where(
+        VersionModel.dataset_id == dataset.id, VersionModel.name == name
+    )
+    if session.scalar(statement) is not None:
+        raise ConflictError(
+            f'"{dataset.name}" has a version "{name}" already',
+            hint="A version never changes; choose another name.",
+        )
+
+
+def _require_some(dataset: Dataset, candidates: Sequence[Candidate], rule: str) -> None:
+    if any(item.why is None for item in candidates):
+        return
+    reasons = ", ".join(f"{count} {reason}" for reason, count in _reasons(candidates).items())
+    hint = None
+    if rule == "accepted":
+        hint = "Accept groups first, or freeze with groups=passing what the policy alone passes."
+    raise InputError(
+        f'no group of "{dataset.name}" enters the version ({reasons or "it has no groups"})',
+        hint=hint,
+    )
+
+
+def _save(
+    session: Session, values: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]
+) -> Version:
+    identity = next_id(session, VersionModel)
+    newest = (
+        select(VersionModel.id)
+        .where(VersionModel.dataset_id == values["dataset_id"])
+        .order_by(VersionModel.id.desc())
+        .limit(1)
+    )
+    previous = session.scalar(newest)
+    session.execute(
+        insert(VersionGroupModel),
+        [{**row, "version_id": identity} for row in rows],
+        execution_options={"render_nulls": True},
+    )
+    # Its own row comes last: from here on nothing can be added to the version.
+    session.execute(insert(VersionModel), [{**values, "id": identity, "previous": previous}])
+    body = {"version": identity, "name": values["name"], "hash": values["hash"]}
+    entry = Entry("freeze", values["actor"], values["created"], body, values["dataset_id"])
+    append(session, [entry])
+    return read_version(session, identity)

@@ -1,0 +1,253 @@
+"""Versions: a dataset as it was frozen, listed and read back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.errors import InputError, NotFoundError, StorageError
+from app.review.datasets.dataset import read_dataset
+from app.review.versions.verification import Verification, read_verifications
+from app.soccer.group import Group
+from app.soccer.policy import Policy
+from app.soccer.solution import Solution
+from app.soccer.split import Split
+from app.store.codecs import Json, parse, policy_from_json, unpack
+from app.store.frozen import CALIBRATION, json_of, read_frozen, station_keys, thaw_group
+from app.store.models import DatasetModel
+from app.store.session import Store
+from app.store.solutions import decode_calibration, decode_solution
+from app.store.version_models import VersionGroupModel, VersionModel
+
+BATCH = 200
+
+
+@dataclass(frozen=True)
+class Version:
+    """A frozen version.
+
+    Attributes:
+        hash: The same on every machine for the same annotations, verdicts, split, policy and
+            solver version.
+        groups: Which groups entered: ``accepted`` or ``passing``.
+        counts: Groups, views and balls; the same by split; why groups are not in it.
+        previous: Id of the version frozen before, or None.
+    """
+
+    id: int
+    dataset_id: int
+    dataset: str
+    name: str
+    note: str
+    licence: str
+    created: str
+    actor: str
+    hash: str
+    groups: str
+    policy: Policy
+    solver_version: str
+    software_version: str
+    split: Split
+    counts: Mapping[str, Any]
+    previous: int | None
+    verified: Verification | None = None
+    """What came of verifying it the last time; None: nobody has."""
+
+
+@dataclass(frozen=True)
+class VersionGroup:
+    """One row of a version: a group that is in it, or the reason why it is not."""
+
+    position: int
+    key: str
+    match: str
+    member: bool
+    why: str | None
+    split: str
+    splits: Mapping[str, str] | None
+    verdict: Json
+    said: str | None
+    solution: str | None
+    ball: tuple[float, float, float] | None
+    frames: Mapping[str, Mapping[str, Any]] | None
+
+
+@dataclass(frozen=True)
+class FrozenGroup:
+    """A group of a version with its content: the group as it was said, and the solution."""
+
+    row: VersionGroup
+    group: Group
+    solution: Solution
+
+
+def list_versions(store: Store, dataset: str | int) -> list[Version]:
+    """The versions of a dataset, newest first."""
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        rows = session.execute(
+            _VERSIONS.where(VersionModel.dataset_id == found.id).order_by(VersionModel.id.desc())
+        )
+        return _versions(session, rows.all())
+
+
+def get_version(store: Store, version_id: int) -> Version:
+    """A version by its id.
+
+    Raises:
+        NotFoundError: There is none.
+    """
+    with store.read() as session:
+        return read_version(session, version_id)
+
+
+def find_version(store: Store, dataset: str | int, version: str) -> Version:
+    """A version of a dataset by its name, its id, or the first eight or more digits of its hash.
+
+    Raises:
+        NotFoundError: There is none.
+        InputError: The digits fit several versions that differ.
+    """
+    found = list_versions(store, dataset)
+    for item in found:
+        if version in (item.name, str(item.id)):
+            return item
+    fitting = [item for item in found if len(version) >= 8 and item.hash.startswith(version)]
+    if len({item.hash for item in fitting}) > 1:
+        raise InputError(f'several versions have a hash that starts with "{version}"')
+    if not fitting:
+        known = ", ".join(item.name for item in found[:10])
+        raise NotFoundError(
+            f'there is no version "{version}" of this dataset',
+            hint=f"There are: {known}." if known else "Freeze one first.",
+        )
+    return fitting[0]
+
+
+def next_name(store: Store, dataset: str | int) -> str:
+    """The next free name of the kind v1, v2, ..."""
+    names = {item.name for item in list_versions(store, dataset)}
+    return next(name for number in count(1) if (name := f"v{number}") not in names)
+
+
+def read_version(session: Session, version_id: int) -> Version:
+    """``get_version`` within a session."""
+    row = session.execute(_VERSIONS.where(VersionModel.id == version_id)).one_or_none()
+    if row is None:
+        raise NotFoundError(f"there is no version {version_id}")
+    return _versions(session, [row])[0]
+
+
+def read_rows(
+    session: Session, version_id: int, *, members: bool = False
+) -> Iterator[VersionGroup]:
+    """The rows of a version in their order, in batches."""
+    rows = read_page(session, version_id, -1, BATCH, members=members)
+    while rows:
+        yield from rows
+        rows = read_page(session, version_id, rows[-1].position, BATCH, members=members)
+
+
+def read_page(
+    session: Session, version_id: int, after: int, limit: int, *, members: bool = False
+) -> list[VersionGroup]:
+    """The next rows of a version after a position."""
+    model = VersionGroupModel
+    where = [model.member.is_(True)] if members else []
+    statement = (
+        select(*model.__table__.columns)
+        .where(model.version_id == version_id, model.position > after, *where)
+        .order_by(model.position)
+        .limit(limit)
+    )
+    return [_row(row) for row in session.execute(statement)]
+
+
+def thaw(session: Session, version: Version, rows: Sequence[VersionGroup]) -> list[FrozenGroup]:
+    """Members of a version with their content; at most a few hundred.
+
+    Raises:
+        StorageError: Content is missing.
+    """
+    keys = {key for row in rows for key in (row.said, row.solution) if key}
+    bodies = read_frozen(session, version.dataset_id, keys)
+    require_frozen(keys, bodies)
+    said = {row.key: json_of(bodies[row.said or ""]) for row in rows}
+    solved = {row.key: json_of(bodies[row.solution or ""]) for row in rows}
+    shared = {key for value in said.values() for key in station_keys(value)}
+    names = {name for value in solved.values() for name in calibration_names(value)}
+    more = read_frozen(session, version.dataset_id, shared | names)
+    require_frozen(shared | names, more)
+    stations = {key: json_of(more[key]) for key in shared}
+    calibrations = {
+        name.removeprefix(CALIBRATION): decode_calibration(more[name]) for name in names
+    }
+    return [
+        FrozenGroup(
+            row,
+            thaw_group(said[row.key], stations, row.frames),
+            decode_solution(solved[row.key], calibrations),
+        )
+        for row in rows
+    ]
+
+
+def calibration_names(solved: Json) -> set[str]:
+    """Keys of the frozen calibrations that a frozen solution names."""
+    return {CALIBRATION + view["calibration_key"] for view in solved["views"]}
+
+
+def require_frozen(keys: set[str], found: Mapping[str, bytes]) -> None:
+    """Raise StorageError where content that a version names is not there."""
+    missing = keys - found.keys()
+    if missing:
+        raise StorageError(
+            f"{len(missing)} frozen parts of the version are missing, {sorted(missing)[0]} first",
+            hint="Restore the database from a backup.",
+        )
+
+
+def _versions(session: Session, rows: Sequence[Any]) -> list[Version]:
+    verified = read_verifications(session, [row.id for row in rows])
+    return [replace(_version(row), verified=verified.get(row.id)) for row in rows]
+
+
+def _version(row: Any) -> Version:
+    values = dict(row._mapping)
+    del values["policy_hash"]
+    return Version(
+        **{
+            **values,
+            "policy": policy_from_json(parse(row.policy)),
+            "split": Split.of(parse(row.split)),
+            "counts": parse(row.counts),
+        }
+    )
+
+
+def _row(row: Any) -> VersionGroup:
+    ball = None if row.ball is None else parse(row.ball)
+    return VersionGroup(
+        position=row.position,
+        key=row.key,
+        match=row.match,
+        member=row.member,
+        why=row.why,
+        split=row.split,
+        splits=None if row.splits is None else parse(row.splits),
+        verdict=None if row.verdict is None else parse(row.verdict),
+        said=row.said,
+        solution=row.solution,
+        ball=None if ball is None else (ball[0], ball[1], ball[2]),
+        frames=None if row.frames is None else unpack(row.frames),
+    )
+
+
+_VERSIONS = select(*VersionModel.__table__.columns, DatasetModel.name.label("dataset")).join(
+    DatasetModel, DatasetModel.id == VersionModel.dataset_id
+)

@@ -1,0 +1,82 @@
+"""Yield cache: a table in a file, so that a restart need not read every solution again.
+
+A cache like the thumbnails: it can be deleted at any time, and what cannot be read is made again.
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import structlog
+
+from app.review.yields.table import EMPTY, SHAPES, YieldTable
+
+FORMAT = "1"
+"""Raised with every change of ``YieldTable``."""
+
+log = structlog.get_logger("touchline.yields")
+
+
+def keep_table(path: Path, calibration: str, table: YieldTable) -> None:
+    """Write a table, whole or not at all; a full disk costs the cache and no answer.
+
+    Args:
+        path: The file.
+        calibration: What the calibrations of the table were made by.
+        table: Every array of it.
+    """
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    made_by = np.array([FORMAT, calibration])
+    arrays: dict[str, Any] = {name: getattr(table, name) for name in SHAPES}
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            np.savez(file, allow_pickle=False, made_by=made_by, **arrays)
+        partial.replace(path)
+    except OSError as error:
+        log.warning("a yield table could not be kept", error=str(error))
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+
+
+def kept_table(path: Path, calibration: str) -> YieldTable:
+    """The table in a file; an empty one where there is none of this kind."""
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            if arrays["made_by"].tolist() != [FORMAT, calibration]:
+                return EMPTY
+            table = YieldTable(**{name: arrays[name] for name in SHAPES})
+    except FileNotFoundError:
+        return EMPTY
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        log.warning("a kept yield table cannot be read and is made again", error=str(error))
+        return EMPTY
+    return table if _is_sound(table) else EMPTY
+
+
+def forget_table(path: Path) -> None:
+    """Delete a kept table."""
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
+
+
+def _is_sound(table: YieldTable) -> bool:
+    """Whether every array has its type, its shape and rows that exist."""
+    lengths = {"group": table.groups, "inputs": table.groups}
+    for name, (kind, shape) in SHAPES.items():
+        array, per = getattr(table, name), name.partition("_")[0]
+        rows = lengths.setdefault(per, len(array))
+        if array.shape != (rows, *shape) or not np.issubdtype(array.dtype, kind):
+            return False
+    inside = (
+        (table.view_group, table.groups),
+        (table.mark_view, lengths["view"]),
+        (table.pair_group, table.groups),
+        (table.pair_view, lengths["view"]),
+    )
+    return all(not len(rows) or 0 <= rows.min() <= rows.max() < count for rows, count in inside)

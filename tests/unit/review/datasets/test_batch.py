@@ -1,0 +1,164 @@
+import json
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from app.datasets.sn_calibration import LineFile, write_line_files
+from app.errors import InputError
+from app.review.datasets.batch import calibrate_files, estimate_pitch_of_files, score_files
+from app.soccer.annotation import make_lines
+from app.soccer.pitch import Pitch
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, SIZE, click, looking
+
+
+def write(folder, **frames):
+    folder.mkdir(parents=True, exist_ok=True)
+    write_line_files(folder, [LineFile(stem, SIZE, lines) for stem, lines in frames.items()])
+    return folder
+
+
+def run(source, out, **options):
+    with ThreadPoolExecutor(1) as executor:
+        return calibrate_files(source, out, size=SIZE, executor=executor, **options)
+
+
+@pytest.fixture
+def lines(tmp_path):
+    swapped = dict(click(MAIN, 0.5))
+    swapped["Circle left"] = swapped.pop("Circle right")
+    few = {"Circle right": click(MAIN)["Circle right"]}
+    return write(
+        tmp_path / "lines",
+        good=click(BEHIND_GOAL, 0.5),
+        other=click(OPPOSITE, 0.5),
+        swapped=make_lines(swapped),
+        few=make_lines(few),
+    )
+
+
+class TestCalibrateFiles:
+    def test_every_frame_with_enough_lines_gets_a_camera_file(self, lines, tmp_path):
+        summary = run(lines, tmp_path / "out")
+        assert (summary["frames"], summary["calibrated"]) == (4, 3)
+        assert [item["frame"] for item in summary["failed"]] == ["few"]
+        assert "a camera needs 7" in summary["failed"][0]["reason"]
+        assert sorted(path.name for path in (tmp_path / "out").glob("camera_*")) == [
+            "camera_good.json",
+            "camera_other.json",
+            "camera_swapped.json",
+        ]
+        assert json.loads((tmp_path / "out" / "calibrate.json").read_text()) == summary
+
+    def test_findings_name_the_frame_and_the_marking(self, lines, tmp_path):
+        run(lines, tmp_path / "out")
+        findings = json.loads((tmp_path / "out" / "findings.json").read_text())
+        (wrong,) = [item for item in findings if item["kind"] == "wrong_label"]
+        assert (wrong["frame"], wrong["marking"], wrong["suggested"]) == (
+            "swapped",
+            "Circle left",
+            "Circle right",
+        )
+
+    def test_labels_taken_as_given_are_not_doubted(self, lines, tmp_path):
+        run(lines, tmp_path / "out", labels="given")
+        findings = json.loads((tmp_path / "out" / "findings.json").read_text())
+        assert "wrong_label" not in {item["kind"] for item in findings}
+
+    def test_each_marking_is_left_out_in_turn_when_asked(self, lines, tmp_path):
+        run(lines, tmp_path / "out", with_leave_one_out=True)
+        rows = json.loads((tmp_path / "out" / "leave_one_out.json").read_text())
+        marked = {row["marking"] for row in rows if row["frame"] == "good"}
+        assert marked == set(click(BEHIND_GOAL))
+
+    def test_cameras_of_an_earlier_run_do_not_stay(self, lines, tmp_path):
+        run(lines, tmp_path / "out")
+        (lines / "other.json").unlink()
+        run(lines, tmp_path / "out")
+        assert not (tmp_path / "out" / "camera_other.json").exists()
+
+    def test_foreign_files_in_the_folder_stay(self, lines, tmp_path):
+        foreign = tmp_path / "out" / "camera_mine.json"
+        foreign.parent.mkdir()
+        foreign.write_text("{}")
+        run(lines, tmp_path / "out")
+        assert foreign.read_text() == "{}"
+
+    def test_a_broken_file_is_named_and_the_rest_is_done(self, lines, tmp_path):
+        (lines / "broken.json").write_text('{"Middle line": [')
+        summary = run(lines, tmp_path / "out")
+        assert summary["calibrated"] == 3
+        assert "broken" in {item["frame"] for item in summary["failed"]}
+        assert "broken.json" in summary["problems"][0]
+
+    def test_frames_of_the_same_name_stay_in_their_folders(self, tmp_path):
+        source = tmp_path / "lines"
+        write(source / "train", same=click(MAIN, 0.5))
+        write(source / "valid", same=click(OPPOSITE, 0.5))
+        assert run(source, tmp_path / "out")["calibrated"] == 2
+        assert (tmp_path / "out" / "train" / "camera_same.json").is_file()
+        assert score_files(source, tmp_path / "out", size=SIZE)["calibrated"] == 2
+        (source / "valid" / "same.json").unlink()
+        run(source, tmp_path / "out")
+        assert not (tmp_path / "out" / "valid" / "camera_same.json").exists()
+
+    def test_a_folder_without_line_files_is_refused(self, tmp_path):
+        (tmp_path / "empty").mkdir()
+        with pytest.raises(InputError, match="holds no line files"):
+            run(tmp_path / "empty", tmp_path / "out")
+        assert not (tmp_path / "out").exists()
+
+
+class TestScoreFiles:
+    def test_a_frame_without_a_camera_counts_as_zero(self, lines, tmp_path):
+        run(lines, tmp_path / "out")
+        total = score_files(lines, tmp_path / "out", size=SIZE)
+        assert (total["frames"], total["calibrated"], total["completeness"]) == (4, 3, 0.75)
+        assert 0.6 < total["jac_0.5"] <= 0.75
+        assert total["ms_median"] > 0
+
+    def test_markings_called_mislabelled_can_be_left_out(self, lines, tmp_path):
+        run(lines, tmp_path / "out")
+        plain = score_files(lines, tmp_path / "out", size=SIZE)
+        without = score_files(
+            lines, tmp_path / "out", size=SIZE, without=tmp_path / "out" / "findings.json"
+        )
+        assert without["jac_0.5"] > plain["jac_0.5"]
+
+    def test_cameras_of_others_have_no_times(self, lines, tmp_path):
+        run(lines, tmp_path / "out")
+        (tmp_path / "out" / "calibrate.json").unlink()
+        assert score_files(lines, tmp_path / "out", size=SIZE)["ms_median"] is None
+
+    def test_a_line_file_that_cannot_be_read_counts_as_a_frame(self, lines, tmp_path):
+        run(lines, tmp_path / "out")
+        (lines / "broken.json").write_text("[")
+        total = score_files(lines, tmp_path / "out", size=SIZE)
+        assert (total["frames"], len(total["problems"])) == (5, 1)
+
+    def test_a_folder_without_cameras_is_refused(self, lines, tmp_path):
+        (tmp_path / "empty").mkdir()
+        with pytest.raises(InputError, match="holds no camera files"):
+            score_files(lines, tmp_path / "empty", size=SIZE)
+
+    @pytest.mark.parametrize("text", ["[1]", '{"ms_median": "fast"}'])
+    def test_times_that_are_no_numbers_are_passed_over(self, lines, tmp_path, text):
+        run(lines, tmp_path / "out")
+        (tmp_path / "out" / "calibrate.json").write_text(text)
+        assert score_files(lines, tmp_path / "out", size=SIZE)["ms_median"] is None
+
+
+class TestEstimatePitchOfFiles:
+    def test_frames_of_one_match_tell_their_pitch(self, tmp_path):
+        true = Pitch(102.0, 66.0)
+        frames = {
+            f"{index}": click(
+                looking((0.0, 62.0, -16.0), (-36.0 + 12.0 * index, -4.0, 0.0), 1300.0),
+                0.6,
+                index,
+                true,
+            )
+            for index in range(7)
+        }
+        found = estimate_pitch_of_files(write(tmp_path / "lines", **frames), size=SIZE)
+        assert found["length_m"] == pytest.approx(102.0, abs=0.6)
+        assert found["width_m"] == pytest.approx(66.0, abs=0.6)

@@ -1,0 +1,170 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from sqlalchemy import func, select, text
+from sqlalchemy.exc import IntegrityError
+
+from app.errors import ConflictError, NotFoundError
+from app.review.datasets import delete as module
+from app.review.datasets.dataset import get_dataset, list_datasets
+from app.review.datasets.delete import delete_dataset, read_contents
+from app.review.editing.edit import SetBall
+from app.review.editing.ledger import read_ledger
+from app.review.editing.recompute import solve_dataset
+from app.review.editing.replay import rebuild, replay
+from app.review.editing.submit import history, load, submit
+from app.review.importing.ingest import ingest
+from app.review.importing.spare import SpareFrame, ingest_spare
+from app.review.queue.listing import list_groups
+from app.review.queue.saved_views import save_view
+from app.review.verdicts.bulk import give_verdicts
+from app.review.yields.store import YieldStore
+from app.soccer.annotation import BallAnnotation, Extras
+from app.soccer.frames import Box
+from app.store.log import verify_chain
+from app.store.models import CalibrationModel, LogModel
+from app.store.session import Store
+from app.store.tables import Base
+
+
+@pytest.fixture
+def two(store: Store, once, fill, make_group, make_static) -> Store:
+    """The dataset "demo", to which much was done, and "other" with the same frames."""
+
+    def make() -> None:
+        ids = fill(make_group(7), make_group(8), make_static(10))
+        state = load(store, ids[0])
+        ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
+        submit(store, ids[0], SetBall("7.png", ball), if_match=state.etag, actor="ann")
+        other_lines = replace(make_static(10).views[0].station, lines={})
+        changed = make_static(10)
+        changed = changed.with_view(replace(changed.views[0], station=other_lines))
+        ingest(
+            store, "demo", [replace(make_group(7), label="new"), changed], source="b", actor="ann"
+        )
+        spare = [SpareFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
+        ingest_spare(store, "demo", spare, source="spare", actor="ann")
+        give_verdicts(store, 1, "", "deferred", actor="ben")
+        save_view(store, 1, "All", "", actor="ben")
+        ingest(store, "other", [make_group(7), make_group(9)], source="test", actor="ann")
+        solve_dataset(store, "other")
+
+    once("demo and other", make)
+    return store
+
+
+def rows(store: Store, table: str) -> int:
+    with store.read() as session:
+        return session.execute(text(f'SELECT count(*) FROM "{table}"')).scalar_one()
+
+
+def log_entries(store: Store) -> list[tuple[str, int | None]]:
+    with store.read() as session:
+        statement = select(LogModel.kind, LogModel.dataset_id).order_by(LogModel.id)
+        return [tuple(row) for row in session.execute(statement)]
+
+
+class TestReadContents:
+    def test_counts_what_hangs_on_it(self, two: Store) -> None:
+        contents = read_contents(two, "demo")
+        assert (contents.id, contents.name) == (1, "demo")
+        assert contents.counts["groups"] == contents.counts["verdicts"] == 3
+        assert contents.counts["views"] == 7
+        assert contents.counts["saved_views"] == 1
+
+    def test_a_dataset_that_is_not_there_is_said(self, store) -> None:
+        with pytest.raises(NotFoundError):
+            read_contents(store, "demo")
+
+
+class TestDeleteDataset:
+    def test_all_of_it_goes_and_the_other_stays(self, two: Store) -> None:
+        before = list_groups(two, 2, limit=500)
+        contents = delete_dataset(two, "demo", confirm="demo", actor="eve")
+        assert contents.counts["groups"] == 3
+        assert [item.name for item in list_datasets(two)] == ["other"]
+        assert list_groups(two, 2, limit=500) == before
+        assert load(two, before.items[0].id).solution is not None
+        with two.read() as session:
+            assert not list(session.execute(text("PRAGMA foreign_key_check")))
+            for table in Base.metadata.sorted_tables:
+                if "dataset_id" in table.c and table.name not in ("log", "job"):
+                    owners = set(session.scalars(select(table.c.dataset_id)))
+                    assert owners <= {2}, table.name
+
+    def test_the_log_stays_whole_and_its_replay_is_what_is_left(self, two: Store) -> None:
+        before = log_entries(two)
+        delete_dataset(two, "demo", confirm="demo", actor="eve")
+        assert log_entries(two) == [*before, ("dataset_deleted", 1)]
+        with two.read() as session:
+            assert verify_chain(session) == len(before) + 1
+            assert replay(session) == read_ledger(session)
+        assert rebuild(two) == 2
+
+    def test_no_id_is_given_again(self, two: Store, make_group) -> None:
+        old = [row.id for row in list_groups(two, 2, limit=500).items]
+        delete_dataset(two, "other", confirm="other", actor="eve")
+        ingest(two, "other", [make_group(7)], source="again", actor="ann")
+        found = get_dataset(two, "other")
+        assert found.id == 3
+        (row,) = list_groups(two, 3).items
+        assert row.id > max(old)
+        with pytest.raises(NotFoundError):
+            history(two, old[0])
+        with pytest.raises(NotFoundError):
+            load(two, old[0])
+        with two.read() as session:
+            assert replay(session) == read_ledger(session)
+
+    def test_calibrations_that_the_other_dataset_uses_stay(self, two: Store) -> None:
+        assert rows(two, "calibration") == 3
+        delete_dataset(two, "demo", confirm="demo", actor="eve")
+        with two.read() as session:
+            left = session.scalar(select(func.count()).select_from(CalibrationModel))
+        assert left == 2
+        delete_dataset(two, "other", confirm="other", actor="eve")
+        assert rows(two, "calibration") == rows(two, "solution") == 0
+
+    def test_calibrations_stay_while_something_is_to_be_solved(self, two, make_group) -> None:
+        ingest(two, "third", [make_group(7)], source="test", actor="ann")
+        before = rows(two, "calibration")
+        delete_dataset(two, "demo", confirm="demo", actor="eve")
+        assert rows(two, "calibration") == before
+        assert solve_dataset(two, "third").solved == 1
+
+    @pytest.mark.parametrize("confirm", ["", "Demo", "other", "1"])
+    def test_without_its_name_nothing_happens(self, two: Store, confirm: str) -> None:
+        with pytest.raises(ConflictError, match='called "demo"'):
+            delete_dataset(two, "demo", confirm=confirm, actor="eve")
+        assert rows(two, "dataset") == 2
+        assert rows(two, "solution") > 2
+
+    def test_killed_midway_what_was_said_is_all_there(self, two: Store, monkeypatch) -> None:
+        def killed(_session, _identity):
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(module, "_delete_rows", killed)
+        with pytest.raises(KeyboardInterrupt):
+            delete_dataset(two, "demo", confirm="demo", actor="eve")
+        monkeypatch.undo()
+        with two.read() as session:
+            assert replay(session) == read_ledger(session)
+        solve_dataset(two, "demo")
+        assert get_dataset(two, "demo").solved == 3
+        delete_dataset(two, "demo", confirm="demo", actor="eve")
+        assert rows(two, "groups") == 2
+
+    def test_the_database_lets_no_verdict_go_but_so(self, two: Store) -> None:
+        delete_dataset(two, "other", confirm="other", actor="eve")
+        with pytest.raises(IntegrityError), two.write() as session:
+            session.execute(text("DELETE FROM verdict"))
+        assert rows(two, "verdict") == 3
+
+    def test_its_yield_is_not_found_any_more(self, two: Store) -> None:
+        yields = YieldStore(two)
+        yields.snapshot(1)
+        delete_dataset(two, "demo", confirm="demo", actor="eve")
+        with pytest.raises(NotFoundError):
+            yields.snapshot(1)

@@ -1,0 +1,128 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from app.errors import InputError, NotFoundError, UnknownMarkingError
+from app.review.editing.codec import edit_from_json, edit_to_json, station_edit_from_json
+from app.review.editing.edit import (
+    IncludeView,
+    SetBall,
+    SetBalls,
+    SetCalibrationSource,
+    SetLines,
+    SetStationCalibration,
+    SetStationLines,
+)
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box, ImagePoint
+
+HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))
+BALL = BallAnnotation(box=Box(500.0, 300.25, 14.0, 15.0), occluded=True)
+EDITS = [
+    SetLines("7.png", {"Middle line": HERE, "Side line top": None, "Side line left": HERE}),
+    SetLines("7.png", {" Middle line ": ()}),
+    SetBall("7.png", BALL),
+    SetBall("7.png", None),
+    SetBalls("7.png", (BALL, BallAnnotation(point=ImagePoint(1.0, 2.0)))),
+    IncludeView("7_1.png", False),
+    IncludeView("7_1.png", False, "not_same_instant"),
+    IncludeView("7_1.png", False, "other", "another match"),
+    SetCalibrationSource("7.png", "lines"),
+]
+STATION_EDITS = [
+    SetStationLines({"Middle line": HERE, "Circle central": None}),
+    SetStationCalibration("lines"),
+]
+
+
+class TestApply:
+    def test_lines_are_set_deleted_and_kept(self, make_group) -> None:
+        group = make_group()
+        before = group.views[0].station.lines
+        after = EDITS[0].apply(group).views[0].station.lines
+        assert after["Middle line"] == HERE
+        assert "Side line top" not in after
+        assert after["Circle central"] == before["Circle central"]
+        assert list(after) == sorted(after)
+
+    def test_a_trailing_space_does_not_matter(self, make_group) -> None:
+        after = SetLines("7.png", {"Goal left post left ": HERE}).apply(make_group())
+        assert "Goal left post left" in after.views[0].station.lines
+
+    def test_lines_of_a_shared_station_change_in_every_view_of_it(self, make_static) -> None:
+        after = SetLines("cam1", {"Middle line": HERE}).apply(make_static())
+        assert after.view("cam1").station.lines["Middle line"] == HERE
+        assert after.view("cam2").station == make_static().view("cam2").station
+
+    def test_a_ball_takes_the_place_of_all_others(self, make_group) -> None:
+        two = SetBalls("7.png", (BALL, BALL)).apply(make_group())
+        assert SetBall("7.png", BALL).apply(two).view("7.png").balls == (BALL,)
+
+    @pytest.mark.parametrize("edit", EDITS)
+    def test_the_group_that_it_is_applied_to_stays(self, edit, make_group) -> None:
+        group = make_group()
+        edit.apply(group)
+        assert group == make_group()
+
+    @pytest.mark.parametrize(
+        ("edit", "error", "sentence"),
+        [
+            (SetLines("7.png", {"Midle line": HERE}), UnknownMarkingError, "Midle line"),
+            (SetLines("9.png", {}), NotFoundError, "no view 9.png"),
+            (
+                SetLines("7.png", {"Middle line": (ImagePoint(math.nan, 1),)}),
+                InputError,
+                "number of pixels",
+            ),
+            (SetLines("7.png", {"Middle line": HERE * 501}), InputError, "1000 points"),
+            (SetBall("7.png", BallAnnotation()), InputError, "box or a point"),
+            (SetBall("7.png", BallAnnotation(box=Box(1, 2, 0, 3))), InputError, "above zero"),
+            (
+                SetBall("7.png", BallAnnotation(point=ImagePoint(1e9, 0))),
+                InputError,
+                "number of pixels",
+            ),
+            (
+                SetBall("7.png", BallAnnotation(box=Box(1, 2, 3, 4), point=ImagePoint(1, 2))),
+                InputError,
+                "not both",
+            ),
+            (SetCalibrationSource("7.png", "guess"), InputError, "given"),
+        ],
+    )
+    def test_the_impossible_is_refused_in_one_sentence(
+        self, edit, error, sentence, make_group
+    ) -> None:
+        with pytest.raises(error, match=sentence):
+            edit.apply(make_group())
+
+    def test_a_ball_out_of_view_needs_no_box(self, make_group) -> None:
+        ball = BallAnnotation(out_of_view=True)
+        assert SetBall("7.png", ball).apply(make_group()).view("7.png").ball is None
+
+
+class TestInverse:
+    @pytest.mark.parametrize("edit", EDITS)
+    def test_leads_back(self, edit, make_group) -> None:
+        group = make_group()
+        assert edit.inverse(group).apply(edit.apply(group)) == group
+
+    @pytest.mark.parametrize("edit", STATION_EDITS)
+    def test_leads_back_on_a_station(self, edit, make_static) -> None:
+        station = make_static().views[0].station
+        assert edit.inverse(station).apply(edit.apply(station)) == station
+
+
+class TestCodec:
+    @pytest.mark.parametrize("edit", EDITS)
+    def test_an_edit_from_the_log_does_the_same(self, edit, make_group) -> None:
+        again = edit_from_json(edit_to_json(edit))
+        assert again.apply(make_group()) == edit.apply(make_group())
+
+    @pytest.mark.parametrize("edit", STATION_EDITS)
+    def test_a_station_edit_from_the_log_does_the_same(self, edit, make_static) -> None:
+        again = station_edit_from_json(edit_to_json(edit))
+        station = make_static().views[0].station
+        assert again.apply(station) == edit.apply(station)

@@ -1,0 +1,59 @@
+"""ETags worked out from rows are those of the whole states."""
+
+from __future__ import annotations
+
+from app.review.editing.edit import IncludeView
+from app.review.editing.etags import read_etags, read_said
+from app.review.editing.state import GroupState
+from app.review.editing.submit import load, submit
+from app.review.importing.ingest import ingest
+from app.review.verdicts.verdict import set_verdict
+from app.store.session import Store
+
+
+def etags_of(store: Store, *ids: int) -> dict[int, str]:
+    with store.read() as session:
+        return read_etags(session, ids)
+
+
+class TestReadEtags:
+    def test_follows_edits_and_verdicts(self, store: Store, state: GroupState) -> None:
+        seen = [state.etag]
+        edited = submit(store, state.id, IncludeView("7.png", False), if_match=seen[0], actor="ann")
+        seen.append(edited.etag)
+        assert etags_of(store, state.id) == {state.id: edited.etag}
+        judged = set_verdict(store, state.id, "deferred", if_match=edited.etag, actor="ann")
+        seen.append(judged.etag)
+        assert etags_of(store, state.id) == {state.id: judged.etag}
+        assert len(set(seen)) == 3
+
+    def test_without_a_solution_is_another(self, store: Store, fill, make_group) -> None:
+        (one,) = fill(make_group(), solved=False)
+        before = load(store, one).etag
+        assert etags_of(store, one) == {one: before}
+        fill()
+        assert etags_of(store, one) == {one: load(store, one).etag} != {one: before}
+
+    def test_counts_the_findings_of_the_solution_and_of_imports(
+        self, store: Store, fill, make_group
+    ) -> None:
+        ids = fill(make_group(7, shift=300.0), make_group(8))
+        edit = IncludeView("8.png", False)
+        etag = load(store, ids[1]).etag
+        submit(store, ids[1], edit, if_match=etag, actor="ann")
+        # The same group comes with another ball: what a person edited stays, with a finding.
+        ingest(store, "demo", [make_group(8, ball=(6.0, 2.0, -0.5))], source="b", actor="ann")
+        fill()
+        states = {number: load(store, number) for number in ids}
+        assert all(state.solution.findings for state in states.values())
+        assert etags_of(store, *ids) == {number: item.etag for number, item in states.items()}
+
+    def test_leaves_out_what_does_not_exist(self, store: Store, state: GroupState) -> None:
+        assert list(etags_of(store, state.id, 99)) == [state.id]
+
+
+class TestReadSaid:
+    def test_is_the_first_part_of_the_etag(self, store: Store, state: GroupState) -> None:
+        with store.read() as session:
+            assert read_said(session, state.id) == state.etag.strip('"').partition("-")[0]
+            assert read_said(session, 99) is None

@@ -1,0 +1,308 @@
+from __future__ import annotations
+
+import threading
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+from sqlalchemy import text
+
+from app.config import Settings
+from app.errors import (
+    ConflictError,
+    IdempotencyError,
+    NotFoundError,
+    SharedStationError,
+    StaleRevisionError,
+)
+from app.review.editing import state as state_module
+from app.review.editing.edit import IncludeView, SetBall, SetBalls, SetLines
+from app.review.editing.state import GroupState
+from app.review.editing.submit import history, load, preview, redo, solved, submit, undo
+from app.review.queue.listing import list_groups
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box, ImagePoint
+from app.solving.solve import solve
+from app.store import solutions
+from app.store.session import Store
+
+BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
+HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))
+
+
+def change(store, state, edit, **more):
+    return submit(store, state.id, edit, if_match=state.etag, actor="ann", **more)
+
+
+def count(store: Store, table: str) -> int:
+    with store.read() as session:
+        return session.execute(text(f"SELECT count(*) FROM {table}")).scalar_one()
+
+
+class TestLoad:
+    def test_an_unknown_group_is_not_found(self, store) -> None:
+        with pytest.raises(NotFoundError, match="no group 99"):
+            load(store, 99)
+
+    def test_the_solution_is_the_solvers_to_the_last_bit(self, state) -> None:
+        assert state.solution == solve(state.group, state.policy)
+        assert state.solution.passes
+
+
+class TestSubmit:
+    def test_answers_with_the_group_as_it_is_then_solved(self, store, state) -> None:
+        after = change(store, state, SetBall("7.png", BALL))
+        assert after.group.view("7.png").balls == (BALL,)
+        assert after.revision == state.revision + 1
+        assert after.etag != state.etag
+        assert after.solution == solve(after.group, after.policy)
+        assert after.solution != state.solution
+        assert load(store, state.id) == after
+
+    def test_edit_revision_solution_and_log_are_one_transaction(self, store, state) -> None:
+        before = {name: count(store, name) for name in ("log", "solution")}
+
+        def broken(group, policy, calibrations):
+            solution = solve(group, policy, calibrations)
+            view = replace(solution.views[0], calibration_key=object())
+            return replace(solution, views=(view, *solution.views[1:]))
+
+        with pytest.raises(Exception):  # noqa: B017
+            change(store, state, SetBall("7.png", BALL), solver=broken)
+        assert load(store, state.id) == state
+        assert {name: count(store, name) for name in before} == before
+
+    def test_an_older_state_is_refused_with_both_etags(self, store, state) -> None:
+        after = change(store, state, SetBall("7.png", BALL))
+        with pytest.raises(StaleRevisionError) as caught:
+            change(store, state, SetBall("7.png", None))
+        assert caught.value.base_etag == state.etag
+        assert caught.value.current_etag == after.etag
+        assert load(store, state.id) == after
+
+    def test_a_change_during_the_solve_is_seen_before_saving(self, store, state) -> None:
+        def slow(group, policy, calibrations):
+            change(store, load(store, state.id), IncludeView("7_1.png", False))
+            return solve(group, policy, calibrations)
+
+        with pytest.raises(StaleRevisionError):
+            change(store, state, SetBall("7.png", BALL), solver=slow)
+        after = load(store, state.id)
+        assert after.group.view("7.png") == state.group.view("7.png")
+        assert not after.group.view("7_1.png").included
+
+    def test_of_many_at_once_one_wins_and_nothing_is_mixed(self, store, state) -> None:
+        results: list[object] = []
+
+        def work(number: int) -> None:
+            ball = BallAnnotation(box=Box(number, 300.0, 14.0, 14.0))
+            try:
+                results.append(change(store, state, SetBall("7.png", ball)))
+            except StaleRevisionError as error:
+                results.append(error)
+
+        threads = [threading.Thread(target=work, args=(number,)) for number in range(6)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        winners = [item for item in results if not isinstance(item, StaleRevisionError)]
+        assert len(results) == 6
+        assert len(winners) == 1
+        assert load(store, state.id).group == winners[0].group
+        assert len(history(store, state.id)) == 2
+
+    def test_two_views_of_one_group_at_once_are_a_conflict_too(self, store, state) -> None:
+        change(store, state, SetBall("7.png", BALL))
+        with pytest.raises(StaleRevisionError):
+            change(store, state, SetBall("7_1.png", BALL))
+
+    def test_a_solution_that_arrives_is_no_conflict(self, store, fill, make_group) -> None:
+        unsolved = load(store, fill(make_group(), solved=False)[0])
+        with_solution = solved(store, unsolved.id)
+        assert with_solution.etag != unsolved.etag
+        after = change(store, unsolved, SetBall("7.png", BALL))
+        assert after.group.view("7.png").balls == (BALL,)
+
+    def test_what_changes_nothing_makes_no_revision(self, store, state) -> None:
+        same = SetBalls("7.png", state.group.view("7.png").balls)
+        assert change(store, state, same) == state
+        assert len(history(store, state.id)) == 1
+
+    def test_lines_of_a_shared_station_name_the_station(self, store, fill, make_static) -> None:
+        state = load(store, fill(make_static())[0])
+        with pytest.raises(SharedStationError) as caught:
+            change(store, state, SetLines("cam1", {"Middle line": HERE}))
+        assert caught.value.station == state.station_ids["cam1"]
+        after = change(store, state, SetBall("cam1", None))
+        assert after.group.view("cam1").balls == ()
+
+    def test_a_moved_ball_calibrates_nothing(self, store, state, monkeypatch) -> None:
+        def refuse(*_):
+            raise AssertionError("calibrated again")
+
+        monkeypatch.setattr("app.solving.solve.calibrate_station", refuse)
+        after = change(store, state, SetBall("7.png", BALL))
+        undo(store, state.id, if_match=after.etag, actor="ann")
+
+    def test_the_queue_is_in_step(self, store, state) -> None:
+        after = change(store, state, SetBall("7.png", None))
+        (row,) = list_groups(store, state.dataset_id).items
+        assert row.passes is False
+        assert row.gate == after.solution.first_failing.name == "ball"
+        assert row.solved
+
+
+class TestIdempotency:
+    def test_the_same_request_again_is_done_once(self, store, state) -> None:
+        first = change(store, state, SetBall("7.png", BALL), idempotency_key="k")
+        again = change(store, state, SetBall("7.png", BALL), idempotency_key="k")
+        assert again == first
+        assert len(history(store, state.id)) == 2
+
+    def test_another_request_under_the_key_is_refused(self, store, state) -> None:
+        change(store, state, SetBall("7.png", BALL), idempotency_key="k")
+        with pytest.raises(IdempotencyError):
+            change(store, state, SetBall("7.png", None), idempotency_key="k")
+
+    def test_keys_belong_to_people(self, store, state) -> None:
+        first = change(store, state, SetBall("7.png", BALL), idempotency_key="k")
+        edit = SetBall("7.png", None)
+        second = submit(
+            store, state.id, edit, if_match=first.etag, actor="ben", idempotency_key="k"
+        )
+        assert second.group.view("7.png").balls == ()
+
+
+class TestUndo:
+    def test_steps_back_and_forth_across_views(self, store, state) -> None:
+        edits = [
+            SetBall("7.png", BALL),
+            SetLines("7_1.png", {"Middle line": None}),
+            IncludeView("7_1.png", False),
+        ]
+        states = [state]
+        for edit in edits:
+            states.append(change(store, states[-1], edit))
+        now = states[-1]
+        for earlier in reversed(states[:-1]):
+            assert now.can_undo
+            now = undo(store, state.id, if_match=now.etag, actor="ann")
+            assert now.group == earlier.group
+            assert now.solution == earlier.solution
+        assert not now.can_undo
+        for later in states[1:]:
+            assert now.can_redo
+            now = redo(store, state.id, if_match=now.etag, actor="ann")
+            assert now.group == later.group
+        assert not now.can_redo
+
+    def test_a_fresh_edit_clears_redo(self, store, state) -> None:
+        after = change(store, state, SetBall("7.png", BALL))
+        back = undo(store, state.id, if_match=after.etag, actor="ann")
+        assert back.can_redo
+        fresh = change(store, back, SetBall("7.png", None))
+        assert fresh.can_undo
+        assert not fresh.can_redo
+        with pytest.raises(ConflictError, match="nothing to redo"):
+            redo(store, state.id, if_match=fresh.etag, actor="ann")
+
+    def test_survives_a_restart(self, store, state) -> None:
+        after = change(store, state, SetBall("7.png", BALL))
+        store.close()
+        other = Store.open(Settings(home=store.settings.home))
+        back = undo(other, state.id, if_match=after.etag, actor="ben")
+        assert back.group == state.group
+        assert (back.can_undo, back.can_redo) == (False, True)
+        other.close()
+
+    def test_without_an_edit_there_is_nothing_to_undo(self, store, state) -> None:
+        with pytest.raises(ConflictError, match="nothing to undo"):
+            undo(store, state.id, if_match=state.etag, actor="ann")
+
+    def test_is_logged_as_an_edit_of_its_own(self, store, state) -> None:
+        after = change(store, state, SetBall("7.png", BALL))
+        undo(store, state.id, if_match=after.etag, actor="ben")
+        entries = history(store, state.id)
+        assert [(item.kind, item.actor) for item in entries] == [
+            ("import", "ann"),
+            ("edit", "ann"),
+            ("undo", "ben"),
+        ]
+        assert entries[2].body["of"] == entries[1].id
+        assert entries[2].body["edit"] == entries[1].body["inverse"]
+
+    def test_several_balls_come_back(self, store, state) -> None:
+        two = change(store, state, SetBalls("7.png", (BALL, BALL)))
+        picked = change(store, two, SetBall("7.png", BALL))
+        back = undo(store, state.id, if_match=picked.etag, actor="ann")
+        assert back.group.view("7.png").balls == (BALL, BALL)
+
+
+class TestPreview:
+    def test_is_what_a_save_would_give_and_saves_nothing(self, store, state) -> None:
+        edits = [SetBall("7.png", BALL), SetLines("7_1.png", {"Middle line": None})]
+        solution = preview(store, state.id, edits)
+        assert load(store, state.id) == state
+        after = state
+        for edit in edits:
+            after = change(store, after, edit)
+        assert after.solution == solution
+
+    def test_a_shared_station_may_move_in_it(self, store, fill, make_static) -> None:
+        (group_id,) = fill(make_static())
+        solution = preview(store, group_id, [SetLines("cam1", {"Middle line": None})])
+        markings = {item.marking: item.outcome for item in solution.views[0].calibration.markings}
+        assert markings["Middle line"] == "fp"
+
+
+class TestHistory:
+    def test_an_unknown_group_is_not_found(self, store) -> None:
+        with pytest.raises(NotFoundError):
+            history(store, 99)
+
+
+class TestCost:
+    def test_an_edit_decodes_no_stored_solution_and_answers_what_a_reader_gets(
+        self, store: Store, state: GroupState, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        decoded: list[object] = []
+        plain = solutions.decode_solution
+
+        def counted(*arguments):
+            decoded.append(arguments)
+            return plain(*arguments)
+
+        monkeypatch.setattr(solutions, "decode_solution", counted)
+        edit = SetBall("7.png", None)
+        done = submit(store, state.id, edit, if_match=state.etag, actor="ann")
+        assert decoded == []
+        read = load(store, state.id)
+        assert len(decoded) == 1
+        assert (done.etag, done.revision, done.can_undo) == (read.etag, read.revision, True)
+        assert done.solution is not None
+        assert done.solution.gates == read.solution.gates
+        assert done.solution.findings == read.solution.findings
+        assert done.group == read.group
+
+    def test_while_others_wait_no_group_is_decoded(
+        self, store: Store, state: GroupState, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        writing, seen = [], []
+        plain_write, plain_read = Store.write, state_module.read_groups
+
+        @contextmanager
+        def write(self):
+            with plain_write(self) as session:
+                writing.append(session)
+                yield session
+                writing.remove(session)
+
+        def read_groups(session, ids, **options):
+            seen.append(session in writing)
+            return plain_read(session, ids, **options)
+
+        monkeypatch.setattr(Store, "write", write)
+        monkeypatch.setattr(state_module, "read_groups", read_groups)
+        submit(store, state.id, SetBall("7.png", None), if_match=state.etag, actor="ann")
+        assert seen == [False, False]

@@ -1,0 +1,83 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from app.errors import NotFoundError
+from app.review.datasets.dataset import get_dataset
+from app.review.editing.edit import SetLines
+from app.review.editing.recompute import stale_groups
+from app.review.editing.submit import load, submit
+from app.review.importing.cameras import ingest_cameras
+from app.review.importing.ingest import ingest
+
+
+def attach(store, cameras):
+    return ingest_cameras(store, "demo", cameras, source="cameras.zip", actor="ann")
+
+
+class TestIngestCameras:
+    @pytest.mark.parametrize("name", ["7_1", "{match}/7_1"])
+    def test_a_view_is_meant_by_its_stem(self, store, state, opposite, name) -> None:
+        report = attach(store, {name.format(match=state.group.match): opposite})
+        after = load(store, state.id)
+        assert (report.changed, report.problems) == (1, [])
+        assert after.group.view("7_1.png").station.given == opposite
+        assert (after.revision, after.solution) == (2, None)
+
+    def test_again_it_changes_nothing(self, store, state, opposite) -> None:
+        attach(store, {"7": opposite})
+        before = load(store, state.id)
+        report = attach(store, {"7": opposite})
+        assert (report.changed, report.unchanged) == (0, 1)
+        assert load(store, state.id) == before
+
+    def test_a_static_camera_changes_for_all_its_groups(
+        self, store, fill, make_static, opposite
+    ) -> None:
+        ids = fill(make_static(10), make_static(11))
+        assert attach(store, {"cam1": opposite}).changed == 1
+        assert load(store, ids[1]).group.view("cam1").station.given == opposite
+        assert stale_groups(store, "demo") == ids
+
+    def test_names_that_fit_nothing_or_too_much_are_reported(
+        self, store, fill, make_group, opposite
+    ) -> None:
+        other = replace(make_group(7), key="other/7.png", match="other")
+        fill(make_group(7), other, solved=False)
+        report = attach(store, {"7": opposite, "99": opposite})
+        assert report.changed == 0
+        assert report.problems == [
+            'camera "7": several views are called so',
+            'camera "99": no view is called so',
+        ]
+
+    def test_the_camera_stays_when_the_labels_are_imported_again(
+        self, store, fill, make_group, opposite
+    ) -> None:
+        bare = make_group()
+        for view in bare.views:
+            bare = bare.with_view(replace(view, station=replace(view.station, given=None)))
+        (group_id,) = fill(bare, solved=False)
+        attach(store, {"7": opposite})
+        ingest(store, "demo", [replace(bare, label="new")], source="x", actor="ann")
+        after = load(store, group_id)
+        assert after.group.label == "new"
+        assert after.group.view("7.png").station.given == opposite
+        assert not after.stored.edited
+
+    def test_is_no_edit_of_a_person(self, store, state, opposite) -> None:
+        attach(store, {"7": opposite})
+        assert not load(store, state.id).stored.edited
+        now = load(store, state.id)
+        edit = SetLines("7.png", {"Middle line": None})
+        submit(store, state.id, edit, if_match=now.etag, actor="ann")
+        attach(store, {"7": replace(opposite, skew=0.5)})
+        assert load(store, state.id).stored.edited
+
+    def test_needs_a_dataset(self, store, opposite) -> None:
+        with pytest.raises(NotFoundError):
+            ingest_cameras(store, "nothing", {"7": opposite}, source="x", actor="ann")
+        with pytest.raises(NotFoundError):
+            get_dataset(store, "nothing")

@@ -1,0 +1,378 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+from app.datasets.archive import DEFAULT_LIMITS
+from app.datasets.report import Report
+from app.errors import InputError
+from app.review.datasets.dataset import get_dataset, set_policy
+from app.review.editing.edit import IncludeView, SetBall, SetLines, SetStationLines
+from app.review.editing.ledger import read_ledger
+from app.review.editing.recompute import solve_dataset
+from app.review.editing.replay import replay
+from app.review.editing.stations import load_station, submit_station, undo_station
+from app.review.editing.submit import history, load, submit, undo
+from app.review.exporting.export import export
+from app.review.importing.cameras import ingest_cameras
+from app.review.importing.carry import GROUPS, STATIONS
+from app.review.importing.carry_in import carry_in
+from app.review.importing.ingest import ingest
+from app.review.importing.spare import SpareFrame, ingest_spare, read_spare
+from app.review.verdicts.verdict import set_verdict
+from app.review.versions.freeze import FreezeRequest, freeze
+from app.soccer.annotation import BallAnnotation, Extras
+from app.soccer.frames import Box, ImagePoint
+from app.soccer.policy import STRICT
+from app.store.models import LogModel
+from app.store.session import Store
+
+BALL, OTHER = (BallAnnotation(box=Box(500.0 + n, 300.0, 14.0, 14.0)) for n in (0, 9))
+
+
+@pytest.fixture
+def bring(tmp_path: Path) -> Callable:
+    """Carries the dataset of one home to another; returns what the import says."""
+
+    def run(source: Store, target: Store, out: str = "carried.zip", dry_run: bool = False):
+        export(source, "demo", "touchline", tmp_path / out)
+        return bring_file(target, tmp_path / out, dry_run=dry_run)
+
+    return run
+
+
+def bring_file(store: Store, path: Path, dry_run: bool = False):
+    report = Report()
+    result = carry_in(
+        store, "demo", path, report, DEFAULT_LIMITS, source="there", actor="zoe", dry_run=dry_run
+    )
+    result.problems += [str(problem) for problem in report.problems]
+    return result
+
+
+def edit(store, group_id, change, actor="ann"):
+    return submit(store, group_id, change, if_match=load(store, group_id).etag, actor=actor)
+
+
+def judge(store, group_id, state, reason=None, note=None, actor="ann"):
+    etag = load(store, group_id).etag
+    return set_verdict(store, group_id, state, reason, note, if_match=etag, actor=actor)
+
+
+def entries(store: Store) -> int:
+    with store.read() as session:
+        return len(list(session.scalars(select(LogModel.id))))
+
+
+def assert_replays(store: Store) -> None:
+    """The log still rebuilds the tables."""
+    with store.read() as session:
+        assert replay(session) == read_ledger(session)
+
+
+def findings(store: Store, group_id: int) -> list[str]:
+    solve_dataset(store, "demo")
+    noticed = load(store, group_id).solution.findings
+    return [item.sentence for item in noticed if item.kind == "upstream_changed"]
+
+
+def ball_of(store: Store, group_id: int, view: str):
+    return load(store, group_id).group.view(view).ball
+
+
+@pytest.fixture
+def busy(store, once, fill, make_group, make_static, opposite):
+    """Edits, verdicts, a camera of its own, a static camera's lines, spare frames, a policy."""
+
+    def make():
+        ids = fill(make_group(7), make_group(8), make_group(9, shift=80.0), make_static(10))
+        edit(store, ids[0], SetBall("7.png", BALL))
+        edit(store, ids[0], SetLines("7_1.png", {"Middle line": None}))
+        edit(store, ids[1], IncludeView("8_1.png", False))
+        undo(store, ids[1], if_match=load(store, ids[1]).etag, actor="ben")
+        judge(store, ids[0], "deferred", actor="ben")
+        judge(store, ids[1], "accepted")
+        judge(store, ids[2], "accepted", note="seen on video")
+        station = load_station(store, load(store, ids[3]).station_ids["cam2"])
+        lines = SetStationLines({"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))})
+        submit_station(store, station.id, lines, if_match=station.etag, actor="ann")
+        ingest_cameras(store, "demo", {"8_1": opposite}, source="cameras", actor="ann")
+        spare = [SpareFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
+        ingest_spare(store, "demo", spare, source="spare", actor="ann")
+        set_policy(store, "demo", replace(STRICT, min_jac=0.5))
+        solve_dataset(store, "demo")
+        return ids
+
+    return once("busy", make)
+
+
+class TestRoundTrip:
+    def test_a_fresh_home_freezes_the_same_hash(self, store, there, busy, bring) -> None:
+        report = bring(store, there)
+        assert (report.new, report.problems) == (4, [])
+        solve_dataset(there, "demo")
+        hashes = {
+            freeze(home, "demo", FreezeRequest("v1", groups="passing"), actor="x").hash
+            for home in (store, there)
+        }
+        assert len(hashes) == 1
+        assert get_dataset(there, "demo").policy == get_dataset(store, "demo").policy
+        assert list(read_spare(there, "demo")) == list(read_spare(store, "demo"))
+        assert_replays(there)
+
+    def test_what_a_person_edited_is_still_known_to_be_edited(
+        self, store, there, busy, bring, make_group
+    ) -> None:
+        bring(store, there)
+        assert load(there, 1).stored.edited_views == {"7.png"}
+        assert not load(there, 2).stored.edited
+        told = [entry.body["carried"] for entry in history(there, 1) if "carried" in entry.body]
+        assert [entry["actor"] for entry in told[0]] == ["ann", "ann"]
+
+    @pytest.mark.parametrize("back", [False, True])
+    def test_twice_changes_nothing_and_neither_does_the_way_back(
+        self, store, there, busy, bring, back: bool
+    ) -> None:
+        bring(store, there)
+        before = entries(store) if back else entries(there)
+        report = bring(there, store, "back.zip") if back else bring(store, there)
+        assert (report.new, report.changed, report.unchanged, report.findings) == (0, 0, 4, 0)
+        assert (entries(store) if back else entries(there)) == before
+
+    def test_a_file_is_the_same_every_time_and_holds_no_place_of_a_frame(
+        self, store, busy, tmp_path
+    ) -> None:
+        for name in ("a.zip", "b.zip"):
+            export(store, "demo", "touchline", tmp_path / name)
+        assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+        export(store, "demo", "touchline", tmp_path / "c")
+        assert "/frames/" not in (tmp_path / "c" / GROUPS).read_text()
+
+    def test_a_dry_run_says_the_same_and_keeps_nothing(self, store, there, busy, bring) -> None:
+        before = entries(there)
+        assert bring(store, there, dry_run=True).new == 4
+        assert entries(there) == before
+
+    def test_a_version_is_not_carried(self, store, busy, tmp_path) -> None:
+        with pytest.raises(InputError, match="carries the whole dataset"):
+            export(store, "demo", "touchline", tmp_path / "x", version="v1")
+
+
+@pytest.fixture
+def both(store, there, fill, make_group, make_static):
+    """Two homes that imported the same two groups."""
+    groups = [make_group(7), make_static(10)]
+    fill(*groups)
+    ingest(there, "demo", groups, source="test", actor="zoe")
+    solve_dataset(there, "demo")
+    return store, there
+
+
+class TestMerge:
+    def test_what_nobody_edited_here_follows(self, both, bring) -> None:
+        here, there = both
+        edit(there, 1, SetBall("7.png", BALL))
+        assert bring(there, here).changed == 1
+        assert ball_of(here, 1, "7.png") == BALL
+        assert load(here, 1).group.view("7.png").media is not None
+        assert findings(here, 1) == []
+        assert_replays(here)
+
+    def test_what_was_edited_here_alone_stays(self, both, bring) -> None:
+        here, there = both
+        edit(here, 1, SetBall("7.png", BALL))
+        assert bring(there, here).unchanged == 2
+        assert ball_of(here, 1, "7.png") == BALL
+
+    def test_two_views_edited_in_two_places_come_together(self, both, bring) -> None:
+        here, there = both
+        edit(here, 1, SetBall("7.png", BALL))
+        edit(there, 1, SetBall("7_1.png", OTHER))
+        assert bring(there, here).findings == 0
+        assert (ball_of(here, 1, "7.png"), ball_of(here, 1, "7_1.png")) == (BALL, OTHER)
+
+    def test_a_conflict_keeps_the_edit_here_and_is_a_finding_once(self, both, bring) -> None:
+        here, there = both
+        edit(here, 1, SetBall("7.png", BALL))
+        edit(there, 1, SetBall("7.png", OTHER))
+        assert bring(there, here).findings == 1
+        assert ball_of(here, 1, "7.png") == BALL
+        (sentence,) = findings(here, 1)
+        assert "edited the ball of 7.png too" in sentence
+        before = entries(here)
+        assert bring(there, here).findings == 0
+        assert entries(here) == before
+        assert_replays(here)
+
+    def test_the_same_edit_in_both_is_no_conflict(self, both, bring) -> None:
+        here, there = both
+        for home in both:
+            edit(home, 1, SetBall("7.png", BALL))
+        assert bring(there, here).findings == 0
+
+    def test_who_is_behind_follows_and_who_is_ahead_stays(self, both, bring) -> None:
+        here, there = both
+        edit(here, 1, SetBall("7.png", BALL))
+        bring(here, there)
+        edit(there, 1, SetBall("7.png", OTHER))
+        assert bring(here, there).findings == 0
+        assert ball_of(there, 1, "7.png") == OTHER
+        assert bring(there, here, "back.zip").findings == 0
+        assert ball_of(here, 1, "7.png") == OTHER
+
+    def test_an_edit_that_was_taken_back_is_taken_back_everywhere(self, both, bring) -> None:
+        here, there = both
+        before = ball_of(here, 1, "7.png")
+        edit(here, 1, SetBall("7.png", BALL))
+        bring(here, there)
+        undo(here, 1, if_match=load(here, 1).etag, actor="ann")
+        bring(here, there)
+        assert ball_of(there, 1, "7.png") == before
+        assert not load(there, 1).stored.edited
+
+    def test_lines_of_a_view_merge_like_balls(self, both, bring) -> None:
+        here, there = both
+        edit(there, 1, SetLines("7.png", {"Middle line": None}))
+        edit(here, 1, SetBall("7.png", BALL))
+        bring(there, here)
+        view = load(here, 1).group.view("7.png")
+        assert ("Middle line" in view.station.lines, view.ball) == (False, BALL)
+
+    def test_a_static_camera_follows_or_is_a_finding(self, both, bring) -> None:
+        here, there = both
+        lines = SetStationLines({"Middle line": None})
+        edit_station(there, lines)
+        assert bring(there, here).changed == 1
+        assert "Middle line" not in station(here).station.lines
+        edit_station(there, SetStationLines({"Circle central": None}))
+        edit_station(here, SetStationLines({"Side line top": None}))
+        assert bring(there, here).findings == 1
+        assert "Circle central" in station(here).station.lines
+        assert bring(there, here).findings == 0
+        assert any("cam2" in sentence for sentence in findings(here, 2))
+        assert_replays(here)
+        undo_station(here, station(here).id, if_match=station(here).etag, actor="ann")
+        assert_replays(here)
+
+    def test_a_newer_state_of_the_source_comes_along(self, both, bring, make_group) -> None:
+        here, there = both
+        edit(here, 1, SetBall("7.png", BALL))
+        newer = make_group(7, ball=(6.0, 2.0, -0.5))
+        ingest(there, "demo", [newer], source="test", actor="zoe")
+        assert bring(there, here).findings == 1
+        assert ball_of(here, 1, "7.png") == BALL
+        assert ball_of(here, 1, "7_1.png") == newer.view("7_1.png").ball
+        assert bring(there, here).changed == 0
+        assert_replays(here)
+
+    def test_an_older_state_of_the_source_does_not_come_back(self, both, bring, make_group) -> None:
+        here, there = both
+        newer = make_group(7, ball=(6.0, 2.0, -0.5))
+        ingest(here, "demo", [newer], source="test", actor="ann")
+        edit(there, 1, SetBall("7_1.png", OTHER))
+        assert bring(there, here).findings == 1
+        assert ball_of(here, 1, "7.png") == newer.view("7.png").ball
+        assert ball_of(here, 1, "7_1.png") == OTHER
+        assert any("another state of the dataset" in item for item in findings(here, 1))
+
+    def test_the_policy_here_stays(self, both, bring) -> None:
+        here, there = both
+        set_policy(there, "demo", STRICT)
+        assert any("another policy" in item for item in bring(there, here).problems)
+        assert get_dataset(here, "demo").policy.name == "paper"
+
+
+def station(store: Store):
+    return load_station(store, load(store, 2).station_ids["cam2"])
+
+
+def edit_station(store: Store, change) -> None:
+    found = station(store)
+    submit_station(store, found.id, change, if_match=found.etag, actor="ann")
+
+
+class TestVerdicts:
+    def test_of_both_are_kept_and_the_newest_counts(self, both, bring) -> None:
+        here, there = both
+        judge(there, 1, "rejected", "bad_calibration", actor="ben")
+        judge(here, 1, "accepted")
+        bring(there, here)
+        state = load(here, 1)
+        assert {item.actor: item.state for item in state.verdicts} == {
+            "ann": "accepted",
+            "ben": "rejected",
+        }
+        assert state.verdict.state == "accepted"
+        judge(there, 1, "deferred", actor="ben")
+        bring(there, here)
+        assert load(here, 1).verdict.state == "deferred"
+        assert_replays(here)
+
+    def test_on_another_state_is_stale(self, both, bring) -> None:
+        here, there = both
+        edit(here, 1, SetBall("7.png", BALL))
+        judge(there, 1, "accepted")
+        bring(there, here)
+        assert load(here, 1).verdict.stale
+
+
+class TestBrokenFiles:
+    @pytest.mark.parametrize(
+        ("path", "value"),
+        [
+            (("group", "key"), 7),
+            (("group", "views"), []),
+            (("group", "views"), {}),
+            (("group", "pitch"), [0, 68]),
+            (("group", "views", 0, "station", "size"), [1280, -720]),
+            (("group", "views", 0, "station", "lines"), {"Midfield": [[1, 2]]}),
+            (("group", "views", 0, "station", "lines"), {"Middle line": [[1, "x"]]}),
+            (("group", "views", 0, "station", "given"), {"rotation": [1]}),
+            (("group", "views", 0, "station", "calibration"), "guess"),
+            (("group", "views", 0, "station"), "cam9"),
+            (("group", "views", 0, "balls"), [{"box": [1, 2, 3]}]),
+            (("group", "views", 0, "extras"), {"boxes": 1, "lines": [], "metadata": {}}),
+            (("verdicts",), [{"state": "loved"}]),
+            (("log",), [{"kind": "drop"}]),
+            (("views",), {"7.png": "x"}),
+            (("base",), 1),
+        ],
+    )
+    def test_a_line_that_is_not_ours_is_skipped_and_told(
+        self, store, there, fill, make_group, tmp_path, path, value
+    ) -> None:
+        fill(make_group(7), make_group(8))
+        export(store, "demo", "touchline", tmp_path / "out")
+        lines = (tmp_path / "out" / GROUPS).read_text().splitlines()
+        record = json.loads(lines[0])
+        place = record
+        for step in path[:-1]:
+            place = place[step]
+        place[path[-1]] = value
+        (tmp_path / "out" / GROUPS).write_text("\n".join([json.dumps(record), lines[1]]))
+        report = bring_file(there, tmp_path / "out")
+        assert report.new == 1
+        assert any("line 1" in problem for problem in report.problems), report.problems
+
+    def test_frames_are_not_read_from_where_a_file_says(
+        self, store, there, fill, make_group, tmp_path
+    ) -> None:
+        fill(make_group(7))
+        export(store, "demo", "touchline", tmp_path / "out")
+        record = json.loads((tmp_path / "out" / GROUPS).read_text())
+        for view in record["group"]["views"]:
+            view["media"] = ["/etc/passwd", None, None]
+        (tmp_path / "out" / GROUPS).write_text(json.dumps(record))
+        bring_file(there, tmp_path / "out")
+        assert [view.media for view in load(there, 1).group.views] == [None, None]
+
+    def test_something_else_is_refused(self, there, tmp_path) -> None:
+        (tmp_path / "out").mkdir()
+        (tmp_path / "out" / STATIONS).write_text("")
+        report = bring_file(there, tmp_path / "out")
+        assert (report.new, len(report.problems)) == (0, 1)

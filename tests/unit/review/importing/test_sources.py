@@ -1,0 +1,288 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+from app.datasets.camera_json import write_cameras
+from app.datasets.soccernet_v3 import write_soccernet_v3
+from app.review.datasets.dataset import get_dataset, list_datasets
+from app.review.editing.edit import SetBall
+from app.review.editing.recompute import solve_dataset
+from app.review.editing.submit import load, submit
+from app.review.exporting.export import export
+from app.review.importing.ingest import BATCH, ingest
+from app.review.importing.sources import FORMATS, Source, import_source
+from app.review.importing.spare import SpareFrame, ingest_spare, read_spare
+from app.review.queue.listing import list_groups
+from app.soccer.annotation import BallAnnotation, Extras, make_lines
+from app.soccer.frames import Box, ImageSize
+from app.soccer.group import Group
+from app.store.models import GroupModel, LogModel
+from app.store.session import Store
+
+SIZE = ImageSize(1280, 720)
+Fill = Callable[..., list[int]]
+Make = Callable[..., Group]
+
+
+def groups_of(store: Store, dataset: str) -> dict[str, Group]:
+    page = list_groups(store, get_dataset(store, dataset).id, limit=500)
+    groups = (load(store, row.id).group for row in page.items)
+    return {group.key: group for group in groups}
+
+
+def hashes(store: Store, dataset: str) -> dict[str, str]:
+    found = get_dataset(store, dataset)
+    with store.read() as session:
+        rows = session.execute(
+            select(GroupModel.key, GroupModel.source_hash).where(GroupModel.dataset_id == found.id)
+        )
+        return {row.key: row.source_hash for row in rows}
+
+
+def there_and_back(store: Store, form: str, out: Path, **options: object) -> dict[str, Group]:
+    """Export "demo" and import what was written as "again"."""
+    export(store, "demo", form, out, everything=True)
+    source = Source(form, out, size=SIZE, **options)  # type: ignore[arg-type]
+    imported = import_source(store, "again", source, store.settings)
+    assert imported.report.problems == []
+    return groups_of(store, "again")
+
+
+def bare(group: Group, **changes: object) -> Group:
+    """A group without what a format has no place for."""
+    views = []
+    for view in group.views:
+        station = replace(view.station, **changes)  # type: ignore[arg-type]
+        views.append(replace(view, station=station, media=None, extras=Extras()))
+    return replace(group, views=tuple(views), label="")
+
+
+@pytest.fixture
+def broadcast(fill: Fill, make_group: Make) -> list[int]:
+    return fill(make_group(7), make_group(8, split="test"))
+
+
+class TestThereAndBack:
+    """Import, export, import: the same state, in a folder and in a zip."""
+
+    @pytest.mark.parametrize("out", ["out", "out.zip"])
+    @pytest.mark.parametrize("form", ["coco", "parquet"])
+    def test_everything_that_was_said(self, store, broadcast, tmp_path, form, out) -> None:
+        again = there_and_back(store, form, tmp_path / out)
+        for key, group in groups_of(store, "demo").items():
+            assert bare(again[key]) == bare(group)
+            assert (again[key].label, again[key].split) == (group.label, group.split)
+
+    def test_parquet_keeps_what_the_ball_pipeline_does_not_use(
+        self, store, broadcast, tmp_path
+    ) -> None:
+        again = there_and_back(store, "parquet", tmp_path / "out")
+        for key, group in groups_of(store, "demo").items():
+            assert [view.extras for view in again[key].views] == [
+                view.extras for view in group.views
+            ]
+
+    def test_soccernet_v3_has_all_but_the_cameras(self, store, broadcast, tmp_path) -> None:
+        again = there_and_back(store, "soccernet-v3", tmp_path / "out")
+        for key, group in groups_of(store, "demo").items():
+            assert bare(again[key]) == bare(group, given=None)
+
+    def test_soccernet_v3d_has_the_cameras_and_the_annotated_boxes(
+        self, store, broadcast, tmp_path
+    ) -> None:
+        again = there_and_back(store, "soccernet-v3d", tmp_path / "out.zip")
+        for key, group in groups_of(store, "demo").items():
+            assert bare(again[key]) == bare(group)
+
+    @pytest.mark.parametrize("form", ["soccernet-v3", "soccernet-v3d", "gamestate", "parquet"])
+    def test_the_second_time_every_byte_is_the_same(
+        self, store, broadcast, tmp_path, form: str
+    ) -> None:
+        there_and_back(store, form, tmp_path / "first")
+        solve_dataset(store, "again")
+        export(store, "again", form, tmp_path / "second", everything=True)
+        again = Source(form, tmp_path / "second", size=SIZE)
+        imported = import_source(store, "third", again, store.settings)
+        assert imported.result.new == len(groups_of(store, "again"))
+        assert hashes(store, "third") == hashes(store, "again")
+
+    def test_gamestate_has_an_image_a_view(self, store, broadcast, tmp_path) -> None:
+        again = there_and_back(store, "gamestate", tmp_path / "out")
+        balls = [view.balls for group in again.values() for view in group.views]
+        first = [view.balls for group in groups_of(store, "demo").values() for view in group.views]
+        assert balls == first
+
+    def test_sn_calibration_has_lines_and_matches(self, store, tmp_path) -> None:
+        lines = make_lines({"Side line top": [(0.0, 80.25), (1279.0, 85.5)]})
+        for name in ("00002", "00005"):
+            text = {"Side line top": [{"x": 0.25, "y": 0.5}, {"x": 1.125, "y": 0.75}]}
+            (tmp_path / f"{name}.json").write_text(json.dumps(text))
+        info = {"00002.jpg": {"league": "l", "season": "s", "match": "m", "ms_time": 7}}
+        (tmp_path / "match_info.json").write_text(json.dumps(info))
+        source = Source("sn-calibration", tmp_path, size=SIZE)
+        import_source(store, "demo", source, store.settings)
+        again = there_and_back(store, "sn-calibration", tmp_path / "out")
+        assert hashes(store, "again") == hashes(store, "demo")
+        assert again["00002"].match == "l/s/m"
+        assert lines.keys() == again["00002"].views[0].station.lines.keys()
+
+    @pytest.mark.parametrize("out", ["out", "out.zip"])
+    def test_issia_in_its_original_shape(self, store, fill, make_static, tmp_path, out) -> None:
+        person = {
+            "class": "Person",
+            "ID": "12",
+            "points": {"x1": 10.0, "y1": 20.0, "x2": 40.0, "y2": 90.0},
+        }
+        group = make_static(10)
+        first = replace(group.views[0], extras=Extras((person,), (), {"ball": {"SHOT": "true"}}))
+        fill(replace(group, views=(first, *group.views[1:])), make_static(-3))
+        spare = SpareFrame("cam2", "99", Extras(boxes=(person,)))
+        ingest_spare(store, "demo", [spare], source="test", actor="ann")
+        again = there_and_back(store, "issia", tmp_path / out)
+        assert list(read_spare(store, "again")) == [spare]
+        for key, group in groups_of(store, "demo").items():
+            views = [replace(view, media=None) for view in group.views]
+            assert list(again[key].views) == views
+
+    def test_issia_3d_has_the_centres_and_the_cameras(
+        self, store, fill, make_static, tmp_path
+    ) -> None:
+        fill(make_static(10), make_static(2))
+        again = there_and_back(store, "issia-3d", tmp_path / "out")
+        assert list(again) == ["2", "10"]
+        for key, group in groups_of(store, "demo").items():
+            assert bare(again[key]) == bare(group, lines={})
+
+    def test_cameras_go_where_they_came_from(self, store, fill, make_group, tmp_path) -> None:
+        fill(make_group(7))
+        export(store, "demo", "cameras", tmp_path / "out", everything=True)
+        views = [
+            replace(view, station=replace(view.station, given=None)) for view in make_group(7).views
+        ]
+        store_groups = [replace(make_group(7), views=tuple(views))]
+        ingest(store, "again", store_groups, source="test", actor="ann")
+        source = Source("cameras", tmp_path / "out")
+        imported = import_source(store, "again", source, store.settings)
+        assert (imported.result.changed, imported.result.problems) == (2, [])
+        (again,), (group,) = (groups_of(store, name).values() for name in ("again", "demo"))
+        assert [view.station.given for view in again.views] == [
+            view.station.given for view in group.views
+        ]
+
+
+class TestImportSource:
+    def test_every_format_says_when_there_is_nothing_of_it(self, store, tmp_path) -> None:
+        (tmp_path / "readme.txt").write_text("nothing here")
+        for form in FORMATS:
+            if form in ("cameras", "sn-calibration"):
+                continue
+            imported = import_source(store, "demo", Source(form, tmp_path), store.settings)
+            assert len(imported.report.problems) == 1, form
+            assert not imported.something
+        assert list_datasets(store) == []
+
+    def test_an_import_that_was_killed_ends_in_the_same_state(
+        self, store, make_group, tmp_path, monkeypatch
+    ) -> None:
+        _write_labels(store, make_group, tmp_path)
+        monkeypatch.setattr("app.review.importing.ingest.BATCH", 2)
+
+        def kill(done: int) -> None:
+            raise KeyboardInterrupt
+
+        source = Source("soccernet-v3", tmp_path)
+        with pytest.raises(KeyboardInterrupt):
+            import_source(store, "demo", source, store.settings, kill)
+        assert get_dataset(store, "demo").groups == 2
+        imported = import_source(store, "demo", source, store.settings)
+        assert (imported.result.new, imported.result.unchanged) == (3, 2)
+        import_source(store, "whole", source, store.settings)
+        assert hashes(store, "demo") == hashes(store, "whole")
+
+    def test_the_batch_is_smaller_than_a_match(self) -> None:
+        # What a kill loses, and how long it holds the writers up.
+        assert BATCH <= 200
+
+
+class TestDryRun:
+    def test_says_what_would_happen_and_keeps_nothing(self, store, make_group, tmp_path) -> None:
+        _write_labels(store, make_group, tmp_path)
+        source = Source("soccernet-v3", tmp_path)
+        dry = import_source(store, "demo", source, store.settings, dry_run=True)
+        assert list_datasets(store) == []
+        assert _log_size(store) == 0
+        done = import_source(store, "demo", source, store.settings)
+        assert dry.values() == done.values()
+
+    def test_counts_changes_and_findings_as_the_import_does(
+        self, store, make_group, tmp_path
+    ) -> None:
+        root = _write_labels(store, make_group, tmp_path)
+        source = Source("soccernet-v3", tmp_path)
+        import_source(store, "demo", source, store.settings)
+        first = list_groups(store, get_dataset(store, "demo").id, limit=1).items[0].id
+        ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
+        state = load(store, first)
+        submit(store, first, SetBall(state.group.views[0].key, ball), if_match=state.etag,
+               actor="ben")  # fmt: skip
+        labels = json.loads(root.read_text())
+        for number in (1, 2):
+            labels["actions"][f"{number}.png"]["bboxes"][0]["points"]["x1"] -= 2
+        root.write_text(json.dumps(labels))
+        before = (hashes(store, "demo"), _log_size(store))
+        dry = import_source(store, "demo", source, store.settings, dry_run=True)
+        assert (hashes(store, "demo"), _log_size(store)) == before
+        assert (dry.result.changed, dry.result.findings, dry.result.unchanged) == (2, 1, 3)
+        done = import_source(store, "demo", source, store.settings)
+        assert dry.values() == done.values()
+
+    def test_a_shared_station_that_changed_counts_once(
+        self, store, make_static, tmp_path, monkeypatch, fill
+    ) -> None:
+        monkeypatch.setattr("app.review.importing.ingest.BATCH", 1)
+        fill(make_static(1), make_static(2), make_static(3), solved=False)
+        export(store, "demo", "issia-3d", tmp_path, everything=True)
+        import_source(store, "again", Source("issia-3d", tmp_path), store.settings)
+        wider = Source("issia-3d", tmp_path, size=ImageSize(1921, 1080))
+        dry = import_source(store, "again", wider, store.settings, dry_run=True)
+        assert (dry.result.changed, dry.result.unchanged) == (3, 3)
+        done = import_source(store, "again", wider, store.settings)
+        assert done.result == dry.result
+
+    def test_cameras_are_not_attached(self, store, fill, make_group, tmp_path, opposite) -> None:
+        fill(make_group(7), solved=False)
+        write_cameras(tmp_path, {"7": opposite})
+        before = groups_of(store, "demo")
+        dry = import_source(
+            store, "demo", Source("cameras", tmp_path), store.settings, dry_run=True
+        )
+        assert dry.result.changed == 1
+        assert groups_of(store, "demo") == before
+
+
+class TestSource:
+    def test_a_source_with_a_name_does_not_tell_where_it_lies(self, store, tmp_path) -> None:
+        (tmp_path / "Labels-v3.json").write_text("{")
+        source = Source("soccernet-v3", tmp_path, name="mine")
+        imported = import_source(store, "demo", source, store.settings)
+        text = json.dumps(imported.values())
+        assert str(tmp_path) not in text
+        assert imported.values()["skipped"][0]["file"] == "Labels-v3.json"
+
+
+def _write_labels(store: Store, make_group: Make, root: Path) -> Path:
+    """A tree of one match with five groups; its labels file."""
+    groups = [make_group(number) for number in range(1, 6)]
+    (path,) = write_soccernet_v3(root, groups)
+    return path
+
+
+def _log_size(store: Store) -> int:
+    with store.read() as session:
+        return len(session.scalars(select(LogModel.id)).all())

@@ -1,0 +1,299 @@
+"""Jobs: one at a time, with progress, cancel and a record that survives the server."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from structlog.testing import capture_logs
+
+from app.errors import ConflictError, InputError, JobCancelled, NotFoundError, OverloadedError
+from app.review.datasets.dataset import create_dataset
+from app.review.jobs.jobs import Jobs, Progress
+from app.review.jobs.jobs import jobs as module
+from app.store.codecs import Json
+from app.store.jobs import Job
+from app.store.session import Store
+
+SECONDS = 20
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "TICK", 0.01)
+
+
+@pytest.fixture
+def jobs(store: Store) -> Iterator[Jobs]:
+    jobs = Jobs(store, capacity=3)
+    yield jobs
+    jobs.close()
+
+
+class Gate:
+    """Work that says when it runs, and goes on when it is told to."""
+
+    def __init__(self, result: Json = None):
+        self.started, self.finish, self.result = threading.Event(), threading.Event(), result
+
+    def __call__(self, progress: Progress) -> Json:
+        self.started.set()
+        while not self.finish.wait(0.005):
+            progress(1, 2, "Half of it.")
+        return self.result
+
+
+def until(happens: Callable[[], Any]) -> Any:
+    """What a function returns, once that is something."""
+    end = time.monotonic() + SECONDS
+    while time.monotonic() < end:
+        if found := happens():
+            return found
+        time.sleep(0.005)
+    raise AssertionError("it did not happen")
+
+
+def submit(jobs: Jobs, work: Callable[[Progress], Json], **options: Any) -> Job:
+    kind = options.pop("kind", "bulk")
+    return jobs.submit(kind, "Some work", work, actor="ann", **options)
+
+
+class TestSubmit:
+    def test_what_the_work_returns_is_the_result(self, jobs: Jobs, store: Store) -> None:
+        found = create_dataset(store, "demo")
+        job = submit(jobs, lambda progress: {"n": 3}, dataset_id=found.id, request={"a": 1})
+        assert (job.state, job.dataset, job.request) == ("waiting", "demo", {"a": 1})
+        done = jobs.wait(job.id, SECONDS)
+        assert (done.state, done.result, done.problem) == ("done", {"n": 3}, None)
+        assert done.created <= done.started <= done.ended
+
+    def test_one_runs_at_a_time_in_the_order_asked_for(self, jobs: Jobs) -> None:
+        first, order = Gate(), []
+        one = submit(jobs, first)
+        others = [submit(jobs, lambda _, n=n: order.append(n)) for n in range(2)]
+        assert first.started.wait(SECONDS)
+        assert [jobs.get(job.id).state for job in others] == ["waiting", "waiting"]
+        first.finish.set()
+        for job in (one, *others):
+            assert jobs.wait(job.id, SECONDS).state == "done"
+        assert order == [0, 1]
+
+    def test_solving_goes_before_what_nobody_waits_for(self, jobs: Jobs) -> None:
+        first, order = Gate(), []
+        submit(jobs, first)
+        assert first.started.wait(SECONDS)
+        export = submit(jobs, lambda _: order.append("export"), kind="export")
+        submit(jobs, lambda _: order.append("solve"), kind="solve")
+        first.finish.set()
+        jobs.wait(export.id, SECONDS)
+        assert order == ["solve", "export"]
+
+    def test_when_too_many_wait_the_next_is_told_to_come_back(self, jobs: Jobs) -> None:
+        first = Gate()
+        submit(jobs, first)
+        assert first.started.wait(SECONDS)
+        for _ in range(3):
+            submit(jobs, lambda _: None)
+        with pytest.raises(OverloadedError):
+            submit(jobs, lambda _: None)
+        assert len(jobs.find()) == 4
+        assert submit(jobs, lambda _: None, kind="solve", once=True).state == "waiting"
+        first.finish.set()
+
+    def test_what_waits_already_is_not_queued_twice_but_what_runs_is(
+        self, jobs: Jobs, store: Store
+    ) -> None:
+        one, other = create_dataset(store, "one").id, create_dataset(store, "other").id
+        first = Gate()
+        running = submit(jobs, first, kind="solve", dataset_id=one, once=True)
+        assert first.started.wait(SECONDS)
+        second = submit(jobs, lambda _: None, kind="solve", dataset_id=one, once=True)
+        third = submit(jobs, lambda _: None, kind="solve", dataset_id=one, once=True)
+        fourth = submit(jobs, lambda _: None, kind="solve", dataset_id=other, once=True)
+        assert second.id == third.id
+        assert len({running.id, second.id, fourth.id}) == 3
+        first.finish.set()
+
+
+class TestProgress:
+    def test_is_written_while_the_work_runs(self, jobs: Jobs) -> None:
+        gate = Gate()
+        job = submit(jobs, gate)
+        seen = until(lambda: (found := jobs.get(job.id)).total and found)
+        assert (seen.done, seen.total, seen.sentence) == (1, 2, "Half of it.")
+        assert seen.state == "running"
+        gate.finish.set()
+
+    def test_may_be_told_inside_of_a_transaction(self, jobs: Jobs, store: Store) -> None:
+        def work(progress: Progress) -> Json:
+            with store.write():
+                for done in range(50):
+                    progress(done, 50)
+                    time.sleep(0.001)
+            return "written"
+
+        assert jobs.wait(submit(jobs, work).id, SECONDS).result == "written"
+
+    def test_is_written_a_few_times_a_second_however_often_it_is_told(
+        self, jobs: Jobs, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "TICK", 0.05)
+        heard: list[Job] = []
+        jobs.listen(heard.append)
+
+        def work(progress: Progress) -> Json:
+            end, told = time.monotonic() + 0.3, 0
+            while time.monotonic() < end:
+                told += 1
+                progress(told)
+            return told
+
+        done = jobs.wait(submit(jobs, work).id, SECONDS)
+        # Waiting, running, done, and at most one each tick between.
+        assert 3 <= len(heard) <= 3 + 7 < done.result
+        assert done.done == done.result
+
+
+class TestFailure:
+    def test_is_told_with_its_hint(self, jobs: Jobs) -> None:
+        def work(progress: Progress) -> Json:
+            raise InputError("nothing to export", hint="Accept a group.", pointer="/all")
+
+        failed = jobs.wait(submit(jobs, work).id, SECONDS)
+        assert (failed.state, failed.sentence) == ("failed", "nothing to export")
+        assert failed.problem == {
+            "detail": "nothing to export",
+            "hint": "Accept a group.",
+            "pointer": "/all",
+        }
+
+    def test_of_our_own_making_says_nothing_of_the_inside_and_the_next_job_runs(
+        self, jobs: Jobs
+    ) -> None:
+        def work(progress: Progress) -> Json:
+            raise ZeroDivisionError("secret")
+
+        with capture_logs() as logs:
+            failed = jobs.wait(submit(jobs, work).id, SECONDS)
+        assert [entry["event"] for entry in logs] == ["job failed"]
+        assert failed.state == "failed"
+        assert "secret" not in str(failed)
+        assert jobs.wait(submit(jobs, lambda _: 1).id, SECONDS).result == 1
+
+
+class TestCancel:
+    def test_what_waits_never_runs(self, jobs: Jobs) -> None:
+        gate, ran = Gate(), []
+        submit(jobs, gate)
+        assert gate.started.wait(SECONDS)
+        waiting = submit(jobs, ran.append)
+        assert jobs.cancel(waiting.id).state == "cancelled"
+        gate.finish.set()
+        assert jobs.wait(submit(jobs, lambda _: None).id, SECONDS).state == "done"
+        assert ran == []
+
+    def test_what_runs_ends_at_its_next_step(self, jobs: Jobs) -> None:
+        gate = Gate()
+        job = submit(jobs, gate)
+        assert gate.started.wait(SECONDS)
+        jobs.cancel(job.id)
+        ended = jobs.wait(job.id, SECONDS)
+        assert (ended.state, ended.done, ended.problem) == ("cancelled", 1, None)
+        assert jobs.cancel(job.id).state == "cancelled"
+
+    def test_what_is_over_cannot_be_cancelled(self, jobs: Jobs) -> None:
+        job = submit(jobs, lambda _: None)
+        jobs.wait(job.id, SECONDS)
+        with pytest.raises(ConflictError):
+            jobs.cancel(job.id)
+        with pytest.raises(NotFoundError):
+            jobs.cancel(job.id + 1)
+
+    def test_all_of_a_dataset_are_ended_and_no_others(self, jobs: Jobs, store: Store) -> None:
+        one, other = create_dataset(store, "one").id, create_dataset(store, "other").id
+        gate = Gate()
+        running = submit(jobs, gate, dataset_id=one)
+        assert gate.started.wait(SECONDS)
+        waiting = submit(jobs, lambda _: None, dataset_id=one)
+        kept = submit(jobs, lambda _: 7, dataset_id=other)
+        jobs.cancel_all(one)
+        assert [jobs.get(job.id).state for job in (running, waiting)] == ["cancelled"] * 2
+        assert jobs.wait(kept.id, SECONDS).result == 7
+
+
+class TestRestart:
+    def test_what_was_under_way_is_failed_with_a_sentence(self, store: Store) -> None:
+        first, gate = Jobs(store), Gate()
+        running = submit(first, gate)
+        assert gate.started.wait(SECONDS)
+        waiting = submit(first, lambda _: None)
+        first.close()
+        assert first.get(running.id).state == "running"
+        second = Jobs(store)
+        second.start()
+        for job in (running, waiting):
+            found = second.get(job.id)
+            assert (found.state, found.ended is not None) == ("failed", True)
+            assert found.problem["detail"].startswith("The server stopped")
+
+    def test_a_kind_that_knows_how_starts_again_from_what_was_asked_for(self, store: Store) -> None:
+        first, gate = Jobs(store), Gate()
+        job = submit(first, gate, kind="import", request={"source": 5})
+        assert gate.started.wait(SECONDS)
+        first.close()
+        second = Jobs(store)
+        second.resumes("import", lambda found: lambda progress: found.request["source"] + 1)
+        second.start()
+        done = second.wait(job.id, SECONDS)
+        assert (done.state, done.result, second.find()) == ("done", 6, [done])
+        second.close()
+
+    def test_what_is_over_stays_as_it_was(self, jobs: Jobs, store: Store) -> None:
+        done = jobs.wait(submit(jobs, lambda _: 1).id, SECONDS)
+        second = Jobs(store)
+        second.start()
+        assert second.get(done.id) == done
+
+    def test_old_ones_are_forgotten_only_where_they_are_many(
+        self, jobs: Jobs, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "KEPT", {"solve": 2})
+        kinds = ["solve", "export", "solve", "solve", "export"]
+        for kind in kinds:
+            jobs.wait(submit(jobs, lambda _: None, kind=kind).id, SECONDS)
+        Jobs(store).start()
+        assert [job.kind for job in jobs.find()] == ["export", "solve", "solve", "export"]
+
+
+class TestClose:
+    def test_ends_a_long_run_at_its_next_step(self, store: Store) -> None:
+        jobs, ended = Jobs(store), threading.Event()
+
+        def endless(progress: Progress) -> Json:
+            try:
+                while True:
+                    progress(1)
+            except JobCancelled:
+                ended.set()
+                raise
+
+        job = submit(jobs, endless)
+        until(lambda: jobs.get(job.id).state == "running")
+        jobs.close()
+        assert ended.is_set()
+
+
+class TestFind:
+    def test_gives_the_newest_first_page_by_page(self, jobs: Jobs, store: Store) -> None:
+        one = create_dataset(store, "one").id
+        made = [submit(jobs, lambda _: None, dataset_id=one).id for _ in range(2)]
+        last = submit(jobs, lambda _: None, kind="export")
+        jobs.wait(last.id, SECONDS)
+        assert [job.id for job in jobs.find()] == [last.id, *made[::-1]]
+        assert [job.id for job in jobs.find(dataset_id=one, limit=1)] == [made[1]]
+        assert [job.id for job in jobs.find(before=made[1])] == [made[0]]
+        assert [job.id for job in jobs.find(kinds=["export"])] == [last.id]
+        assert jobs.find(states=["failed"]) == []

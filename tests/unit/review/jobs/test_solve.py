@@ -1,0 +1,123 @@
+"""Solving as a job: what a change left without a solution, found in the data."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from app.review.datasets.dataset import create_dataset, get_dataset
+from app.review.editing.recompute import SolveReport, stale_groups
+from app.review.jobs.jobs import Jobs, Progress
+from app.review.jobs.jobs import solve as solve_job
+from app.review.jobs.solve import request_solve, resume_solving, solve_leftovers
+from app.store.session import Store
+
+SECONDS = 30
+
+
+@pytest.fixture
+def jobs(store: Store) -> Iterator[Jobs]:
+    jobs = Jobs(store)
+    yield jobs
+    jobs.close()
+
+
+class TestRequestSolve:
+    def test_solves_what_is_stale_and_says_how_much(
+        self, jobs: Jobs, store: Store, fill, make_group
+    ) -> None:
+        fill(make_group(7), make_group(8, shift=300.0), solved=False)
+        found = get_dataset(store, "demo")
+        job = request_solve(jobs, store, found, actor="ann")
+        assert (job.kind, job.dataset, job.result) == ("solve", "demo", None)
+        done = jobs.wait(job.id, SECONDS)
+        assert done.result == {
+            "policy": "paper",
+            "groups": 2,
+            "solved": 2,
+            "passed": 1,
+            "failed": 0,
+            "failures": [],
+        }
+        assert (done.done, done.total) == (2, 2)
+        assert done.sentence == "2 of 2 groups solved"
+        assert stale_groups(store, "demo") == []
+
+    @pytest.mark.parametrize(("worth", "made"), [(2, 1), (3, 0)])
+    def test_many_groups_are_solved_in_processes_of_their_own(
+        self, store: Store, fill, make_group, monkeypatch: pytest.MonkeyPatch, worth, made
+    ) -> None:
+        pools: list[ThreadPoolExecutor] = []
+
+        def pool() -> ThreadPoolExecutor:
+            pools.append(ThreadPoolExecutor(1))
+            return pools[-1]
+
+        monkeypatch.setattr(solve_job, "WORTH_A_POOL", worth)
+        fill(make_group(7), make_group(8), solved=False)
+        jobs = Jobs(store, pool=pool)
+        job = request_solve(jobs, store, get_dataset(store, "demo"), actor="ann")
+        assert jobs.wait(job.id, SECONDS).result["solved"] == 2
+        assert len(pools) == made
+        jobs.close()
+
+    def test_groups_that_cannot_be_solved_are_named(
+        self, jobs: Jobs, store: Store, fill, make_group, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        fill(make_group(), solved=False)
+        report = SolveReport(total=1, failed=[("a/7.png", "ValueError: odd")])
+        monkeypatch.setattr(solve_job, "solve_dataset", lambda *_, **__: report)
+        job = request_solve(jobs, store, get_dataset(store, "demo"), actor="ann")
+        result = jobs.wait(job.id, SECONDS).result
+        assert result["failures"] == [{"group": "a/7.png", "problem": "ValueError: odd"}]
+
+    def test_one_job_a_dataset_waits_at_most(self, jobs: Jobs, store: Store) -> None:
+        create_dataset(store, "demo")
+        started, finish = threading.Event(), threading.Event()
+
+        def slow(progress: Progress) -> None:
+            started.set()
+            assert finish.wait(SECONDS)
+
+        jobs.submit("bulk", "Slow", slow, actor="ann")
+        assert started.wait(SECONDS)
+        found = get_dataset(store, "demo")
+        ids = {request_solve(jobs, store, found, actor=name).id for name in ("ann", "bob")}
+        assert len(ids) == 1
+        finish.set()
+
+
+class TestSolveLeftovers:
+    def test_a_restart_goes_on_where_the_server_stopped(
+        self, store: Store, fill, make_group, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        fill(*(make_group(number) for number in range(1, 6)), solved=False)
+        monkeypatch.setattr("app.review.editing.recompute.CHUNK", 1)
+        started = threading.Event()
+
+        def stopping(_store: Store, _id: int, _executor: None, progress: Progress) -> SolveReport:
+            started.set()
+            while True:
+                progress(0, 5)
+
+        first = Jobs(store)
+        with monkeypatch.context() as patch:
+            patch.setattr(solve_job, "solve_dataset", stopping)
+            job = request_solve(first, store, get_dataset(store, "demo"), actor="ann")
+            assert started.wait(SECONDS)
+            first.close()
+        second = Jobs(store)
+        resume_solving(second, store)
+        second.start()
+        solve_leftovers(second, store, actor="ann")
+        done = second.wait(job.id, SECONDS)
+        assert (done.state, done.result["solved"]) == ("done", 5)
+        assert stale_groups(store, "demo") == []
+        second.close()
+
+    def test_a_dataset_that_is_complete_needs_no_job(self, jobs: Jobs, store: Store, state) -> None:
+        solve_leftovers(jobs, store, actor="ann")
+        assert jobs.find() == []

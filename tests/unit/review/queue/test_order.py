@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+import base64
+import json
+
+import pytest
+
+from app.errors import InputError
+from app.review.queue.order import Order
+from app.review.queue.query import parse_query
+
+
+def cursor(*values: object) -> str:
+    return base64.urlsafe_b64encode(json.dumps(values).encode()).decode().rstrip("=")
+
+
+@pytest.fixture
+def order() -> Order:
+    return Order(parse_query("sort:jac"))
+
+
+class TestDecode:
+    def test_takes_the_keys_of_its_own_cursors(self, order: Order) -> None:
+        assert order.decode(cursor("jac", 0, 0.75, 3)) == [0, 0.75, 3]
+
+    @pytest.mark.parametrize(
+        "key", [float("inf"), float("-inf"), float("nan"), 1e300, 2**64, None, [1], {"a": 1}]
+    )
+    def test_no_key_is_beyond_what_a_row_can_have(self, order: Order, key: object) -> None:
+        with pytest.raises(InputError, match="came from another query") as caught:
+            order.decode(cursor("jac", 0, key, 3))
+        assert caught.value.pointer == "/cursor"

@@ -1,0 +1,104 @@
+"""Migrations 0005 and 0006 on a database that holds groups, solutions and verdicts."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from sqlalchemy import text
+from sqlalchemy.exc import IntegrityError
+
+from app.review.editing.submit import load
+from app.review.verdicts.verdict import set_verdict
+from app.store.migrate import KNOWN_REVISIONS, migrate, schema_revision
+from app.store.queue import refresh_queue
+from app.store.session import Store, make_engine
+
+PLACES = ("distance_m", "box_px", "x_m", "y_m")
+
+
+def as_before(store: Store) -> None:
+    """Take back what migration 0005 does, and what came after it."""
+    with store.write() as session:
+        session.execute(text("DROP TABLE version_check"))
+        session.execute(text("ALTER TABLE view DROP COLUMN left_out"))
+        for name in (*PLACES, "pictures"):
+            session.execute(text(f"ALTER TABLE queue DROP COLUMN {name}"))
+        for trigger in ("solution_refuses_update", "verdict_refuses_delete"):
+            session.execute(text(f"DROP TRIGGER {trigger}"))
+        removed = ", ".join(f"'$.{name}'" for name in PLACES)
+        session.execute(text(f"UPDATE solution SET summary = json_remove(summary, {removed})"))
+        session.execute(
+            text(
+                "CREATE TRIGGER solution_refuses_update BEFORE UPDATE ON solution "
+                "BEGIN SELECT RAISE(ABORT, 'never'); END"
+            )
+        )
+        session.execute(
+            text(
+                "CREATE TRIGGER verdict_refuses_delete BEFORE DELETE ON verdict "
+                "BEGIN SELECT RAISE(ABORT, 'never'); END"
+            )
+        )
+        for table in ("saved_view", "verdict_batch", "used_id"):
+            session.execute(text(f"DROP TABLE {table}"))
+        session.execute(text("DROP INDEX log_deleted"))
+        session.execute(text("UPDATE alembic_version SET version_num = '0004'"))
+
+
+def read(store: Store, statement: str) -> list[Any]:
+    with store.read() as session:
+        return list(session.execute(text(statement)).all())
+
+
+QUEUE = f"SELECT group_id, {', '.join(PLACES)}, pictures, views FROM queue ORDER BY group_id"
+SUMMARIES = "SELECT id, summary FROM solution ORDER BY id"
+
+
+@pytest.fixture
+def filled(store: Store, fill, make_group, make_static) -> Store:
+    """A broadcast group, a static one, one without a ball and one that is not solved."""
+    without = make_group(8)
+    without = without.with_view(replace(without.views[0], balls=()))
+    ids = fill(make_group(7), make_static(10), without)
+    state = load(store, ids[0])
+    set_verdict(store, ids[0], "accepted", if_match=state.etag, actor="ann")
+    fill(make_group(9), solved=False)
+    return store
+
+
+class TestUpgrade:
+    def test_places_are_as_a_new_solution_has_them(self, filled: Store) -> None:
+        queue, summaries = read(filled, QUEUE), read(filled, SUMMARIES)
+        assert queue[0].distance_m == pytest.approx(62.57, abs=0.1)
+        assert (queue[0].x_m, queue[0].y_m) == pytest.approx((5.0, 2.0), abs=0.1)
+        assert (queue[0].box_px, queue[2].box_px) == (14.0, 14.0)
+        assert queue[1].box_px == pytest.approx(5.0, abs=2.0)
+        # Static cameras come without frames here.
+        assert [(row.pictures, row.views) for row in queue] == [(2, 2), (0, 3), (2, 2), (2, 2)]
+        assert queue[2].x_m is None and queue[3].box_px is None
+        as_before(filled)
+        migrate(filled.settings)
+        assert schema_revision(make_engine(filled.settings)) == KNOWN_REVISIONS[-1]
+        assert read(filled, QUEUE) == queue
+        again = read(filled, SUMMARIES)
+        assert [json.loads(row.summary) for row in again] == [
+            json.loads(row.summary) for row in summaries
+        ]
+
+    def test_the_queue_stays_so_when_it_is_written_again(self, filled: Store) -> None:
+        queue = read(filled, QUEUE)
+        as_before(filled)
+        migrate(filled.settings)
+        with filled.write() as session:
+            refresh_queue(session, [row.group_id for row in queue])
+        assert read(filled, QUEUE) == queue
+
+    def test_solutions_and_verdicts_are_guarded_again(self, filled: Store) -> None:
+        as_before(filled)
+        migrate(filled.settings)
+        for statement in ("UPDATE solution SET summary = '{}'", "DELETE FROM verdict"):
+            with pytest.raises(IntegrityError), filled.write() as session:
+                session.execute(text(statement))

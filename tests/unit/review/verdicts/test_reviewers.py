@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import pytest
+
+from app.review.editing.submit import load
+from app.review.verdicts import verdict
+from app.review.verdicts.bulk import give_verdicts
+from app.review.verdicts.reviewers import list_reviewers
+from app.review.verdicts.verdict import set_verdict
+from app.store.clock import now
+
+
+@pytest.fixture
+def ids(fill, make_group) -> list[int]:
+    return fill(*(make_group(number) for number in range(7, 12)))
+
+
+def judge(store, group: int, state: str, actor: str, reason: str | None = None) -> None:
+    set_verdict(store, group, state, reason, if_match=load(store, group).etag, actor=actor)
+
+
+class TestListReviewers:
+    def test_counts_verdicts_that_count_and_the_groups_of_today(
+        self, store, ids, monkeypatch
+    ) -> None:
+        give_verdicts(store, 1, "", "accepted", actor="ann")
+        monkeypatch.setattr(verdict, "now", lambda: "2020-02-02T10:00:00.000000+00:00")
+        judge(store, ids[0], "rejected", "ben", "bad_calibration")
+        monkeypatch.undo()
+        for state in ("deferred", "accepted"):
+            judge(store, ids[1], state, "ann")
+        ann, ben = list_reviewers(store, 1)
+        assert (ann.name, ann.accepted, ann.rejected, ann.deferred) == ("ann", 4, 0, 0)
+        assert (ann.today, ann.last[:10]) == (5, now()[:10])
+        assert (ben.name, ben.rejected, ben.today) == ("ben", 1, 0)
+        assert ben.last == "2020-02-02T10:00:00.000000+00:00"
+
+    def test_who_is_overruled_is_listed_still(self, store, ids) -> None:
+        judge(store, ids[0], "accepted", "ann")
+        judge(store, ids[0], "deferred", "ben")
+        assert [(item.name, item.accepted, item.deferred) for item in list_reviewers(store, 1)] == [
+            ("ben", 0, 1),
+            ("ann", 0, 0),
+        ]
+
+    def test_a_dataset_that_nobody_judged_has_nobody(self, store, ids) -> None:
+        assert list_reviewers(store, 1) == []
