@@ -11,9 +11,9 @@ from fastapi import FastAPI
 
 from app.api.deps import LOCAL_USER, Services
 from app.api.errors import install_handlers
-from app.api.first_answers import FirstAnswers
+from app.api.idempotency import Idempotency
 from app.api.openapi import describe
-from app.api.pages import STATIC, Site, install_pages
+from app.api.pages import install_pages
 from app.api.routers import (
     bulk,
     datasets,
@@ -44,6 +44,7 @@ from app.api.security.failures import Failures
 from app.api.security.headers import SecurityHeaders
 from app.api.security.origin import KnownHosts, SameOrigin
 from app.api.security.requests import HeadAsGet, OneRange
+from app.api.site import STATIC, Site
 from app.config import Settings
 from app.review.jobs.jobs import Pool
 
@@ -123,7 +124,7 @@ def software_version() -> str:
 
 def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
     """The first one added is the innermost."""
-    app.add_middleware(FirstAnswers, actor=LOCAL_USER)
+    app.add_middleware(Idempotency, actor=LOCAL_USER)
     app.add_middleware(OneRange)
     app.add_middleware(HeadAsGet)
     app.add_middleware(

@@ -127,7 +127,7 @@ def get_idempotency_key(
 ) -> str | None:
     """The caller's name for this request, so that sending it twice does it once.
 
-    ``FirstAnswers`` has checked its form, on whatever route it was sent.
+    ``Idempotency`` has checked its form, on whatever route it was sent.
     """
     return idempotency_key
 

@@ -15,6 +15,10 @@ from starlette.types import ASGIApp
 
 from app.api.application import create_app
 from app.api.deps import Services
+from app.api.errors import install_handlers
+from app.api.pages import install_pages
+from app.api.security.headers import SecurityHeaders
+from app.api.site import Site
 from app.config import Settings
 from app.geometry.camera import Camera
 from app.review.editing.recompute import solve_dataset
@@ -62,6 +66,16 @@ def write_static(folder: Path) -> Path:
     (folder / "node_modules" / "preact" / "demo.html").write_text("<script>1</script>")
     (folder / "node_modules" / "preact" / "x.svg").write_text("<svg/>")
     return folder
+
+
+@pytest.fixture
+def pages_client(plain_app: FastAPI, client_of, static_folder: Path) -> TestClient:
+    """A client of the pages and modules of a few files, without the rest of the application."""
+    site = Site(static_folder)
+    install_handlers(plain_app)
+    install_pages(plain_app, site)
+    plain_app.add_middleware(SecurityHeaders, policy=site.policy)
+    return client_of(plain_app)
 
 
 @pytest.fixture

@@ -110,7 +110,7 @@ class TestGetContent:
 
 class TestCancel:
     def test_leaves_no_file(self, app, api, monkeypatch: pytest.MonkeyPatch) -> None:
-        from app.review import export
+        from app.review.exporting import export
 
         jobs: Jobs = app.state.services.jobs
         plain, started = export.write_format, threading.Event()

@@ -12,8 +12,8 @@ from structlog.testing import capture_logs
 
 from app.errors import ConflictError, InputError, JobCancelled, NotFoundError, OverloadedError
 from app.review.datasets.dataset import create_dataset
+from app.review.jobs import jobs as module
 from app.review.jobs.jobs import Jobs, Progress
-from app.review.jobs.jobs import jobs as module
 from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.session import Store

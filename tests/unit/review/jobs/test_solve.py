@@ -10,8 +10,8 @@ import pytest
 
 from app.review.datasets.dataset import create_dataset, get_dataset
 from app.review.editing.recompute import SolveReport, stale_groups
+from app.review.jobs import solve as solve_job
 from app.review.jobs.jobs import Jobs, Progress
-from app.review.jobs.jobs import solve as solve_job
 from app.review.jobs.solve import request_solve, resume_solving, solve_leftovers
 from app.store.session import Store
 

@@ -9,6 +9,7 @@ from app.review.editing.edit import IncludeView, SetStationCalibration
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.stations import load_station, submit_station
 from app.review.editing.submit import load, submit
+from app.review.queue import changes as module
 from app.review.queue.changes import (
     Change,
     newest_entry,
@@ -16,7 +17,6 @@ from app.review.queue.changes import (
     read_changes,
     read_solved,
 )
-from app.review.queue.listing import changes as module
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.policy import STRICT
 from app.store.session import Store

@@ -8,10 +8,10 @@ import pytest
 
 from app.errors import JobCancelled, NotFoundError, StorageError
 from app.review.datasets.delete import delete_dataset
+from app.review.versions import verify as verify_module
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.review.versions.verify import verify_and_keep
 from app.review.versions.version import get_version, list_versions
-from app.review.versions.version import verify as verify_module
 from app.soccer.solution import SOLVER_VERSION, Solution
 from app.solving.solve import NO_CALIBRATIONS, solve
 from app.store.session import Store

@@ -14,8 +14,8 @@ import uvicorn
 from sqlalchemy import update
 from structlog.testing import capture_logs
 
-from app.api import first_answers as module
-from app.api.first_answers import FirstAnswers
+from app.api import idempotency as module
+from app.api.idempotency import Idempotency
 from app.api.server import Server, listen
 from app.errors import StorageError
 from app.store.job_models import AnswerModel
@@ -193,7 +193,7 @@ class TestStreamed:
             await send({"type": "http.response.start", "status": 201, "headers": []})
             await send({"type": "http.response.body", "body": str(len(parts)).encode()})
 
-        middleware = FirstAnswers(upload, "local")
+        middleware = Idempotency(upload, "local")
 
         async def call(chunks: list[bytes]) -> list[dict[str, Any]]:
             sent: list[dict[str, Any]] = []

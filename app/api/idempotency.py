@@ -37,7 +37,7 @@ PATIENCE = 60.0
 """Seconds that a repetition waits for the first one to be answered."""
 
 
-class FirstAnswers:
+class Idempotency:
     """Answers a repetition with the first answer, and the same key with another request with 422.
 
     Args:

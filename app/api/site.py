@@ -1,0 +1,97 @@
+"""Site: the folder of the browser application, and its one index.html for every page."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.api.security.headers import content_security_policy
+
+STATIC = Path(__file__).resolve().parents[2] / "static"
+_INLINE_SCRIPT = re.compile(rb"<script\b(?P<attributes>[^>]*)>(?P<text>.*?)</script>", re.S | re.I)
+_SHEET = re.compile(rb'\s*<link rel="stylesheet" href="/static/(?P<path>css/[^"]+)">')
+_ALL_SHEETS = b'\n\t<link rel="stylesheet" href="/static/all.css">'
+_MODULE = re.compile(rb'(?:href|src)="/static/([^"]+\.m?js)"')
+
+
+def script_hashes(html: bytes) -> tuple[str, ...]:
+    """CSP sources of the import maps in a page; no other inline script is admitted."""
+    return tuple(
+        "sha256-" + base64.b64encode(hashlib.sha256(found["text"]).digest()).decode()
+        for found in _INLINE_SCRIPT.finditer(html)
+        if b"importmap" in found["attributes"] and b"src=" not in found["attributes"]
+    )
+
+
+@dataclass(frozen=True)
+class IndexPage:
+    """One reading of index.html."""
+
+    html: bytes
+    etag: str
+    policy: str
+    styles: bytes
+    """All style sheets of the page, in its order."""
+    modules: tuple[str, ...]
+    """What the page asks for beside them: paths below the folder of the application."""
+
+    @staticmethod
+    def make(folder: Path, version: str) -> IndexPage:
+        """The page of a folder, with the policy that admits its import map.
+
+        Its modules are asked for below an address that names their version, so that browsers
+        keep them for good and a start costs no question per module. Its style sheets come as
+        one, in the place of the last.
+
+        Raises:
+            OSError: The page or one of its sheets cannot be read.
+        """
+        html = (folder / "index.html").read_bytes()
+        sheets = list(_SHEET.finditer(html))
+        styles = b"".join((folder / sheet["path"].decode()).read_bytes() for sheet in sheets)
+        if sheets:
+            last = sheets[-1].end()
+            html = _SHEET.sub(b"", html[:last]) + _ALL_SHEETS + html[last:]
+        modules = tuple(found.decode() for found in _MODULE.findall(html))
+        html = html.replace(b'"/static/', f'"/assets/{version}/'.encode())
+        etag = f'"{hashlib.sha256(html).hexdigest()[:32]}"'
+        return IndexPage(html, etag, content_security_policy(script_hashes(html)), styles, modules)
+
+
+class Site:
+    """The folder of the browser application; index.html is read again when it has changed."""
+
+    def __init__(self, folder: Path = STATIC):
+        self.folder = folder
+        self._version: str | None = None
+        self._page: IndexPage | None = None
+        self.index()
+
+    def index(self) -> IndexPage | None:
+        """The page as it is on disk now; None where the application is not installed."""
+        try:
+            version = self._folder_version()
+            if version != self._version:
+                self._page = IndexPage.make(self.folder, version)
+                self._version = version
+        except OSError:
+            self._version = self._page = None
+        return self._page
+
+    def _folder_version(self) -> str:
+        """Digest of the times and sizes of our own files and of the libraries' lock file."""
+        digest = hashlib.sha256()
+        for folder, folders, names in os.walk(self.folder):
+            folders[:] = sorted(name for name in folders if name != "node_modules")
+            for name in sorted(names):
+                status = Path(folder, name).stat()
+                digest.update(f"{folder}/{name} {status.st_mtime_ns} {status.st_size}\n".encode())
+        return digest.hexdigest()[:16]
+
+    def policy(self) -> str:
+        """The Content-Security-Policy of every response."""
+        return self._page.policy if self._page else content_security_policy()
