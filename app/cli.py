@@ -14,6 +14,7 @@ import typer
 
 from app.commands import (
     datasets,
+    doctor,
     evaluation,
     files,
     lines,
@@ -33,7 +34,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for part in (service, sample, files, solving, lines, versions, evaluation):
+for part in (service, sample, files, solving, lines, versions, evaluation, doctor):
     app.add_typer(part.commands)
 app.add_typer(datasets.commands, name="datasets")
 app.add_typer(policy.commands, name="policy")

@@ -1,0 +1,119 @@
+"""Doctor: whether the database is whole and its tables are what was said, and what to do if not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import func, select, text
+from sqlalchemy.orm import Session
+
+from app.errors import StorageError
+from app.review.datasets.dataset import list_datasets
+from app.review.editing.ledger import Ledger, read_ledger
+from app.review.editing.recompute import stale_groups
+from app.review.editing.replay import replay
+from app.store.models import LogModel
+from app.store.session import Store
+
+REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
+RESTORE = "Restore the database from a backup."
+SHOWN = 5
+"""Records that a sentence names."""
+REBUILT = {
+    "groups": "groups",
+    "stations": "cameras",
+    "spare": "spare frames",
+    "noticed": "findings of imports",
+}
+"""Parts of the ledger that ``rebuild`` writes, with the words for them."""
+KEPT = {"datasets": "datasets", "verdicts": "groups' verdicts"}
+"""Parts that it leaves as they are."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that was looked at.
+
+    Attributes:
+        name: What was looked at.
+        ok: Whether it is as it must be.
+        sentence: What was found.
+        mend: What to do; None where nothing is to be done.
+    """
+
+    name: str
+    ok: bool
+    sentence: str
+    mend: str | None = None
+
+
+def examine(store: Store) -> list[Check]:
+    """Look at the file, the log's hash chain, the tables and the solutions.
+
+    Nothing is changed. The tables are compared with what follows from the log alone, unless the
+    log is broken: then nothing follows from it.
+    """
+    with store.read() as session:
+        checks = [_file(session)]
+        entries = session.scalar(select(func.count()).select_from(LogModel))
+        try:
+            said = replay(session)
+        except StorageError as error:
+            checks.append(Check("log", False, error.message, error.hint or RESTORE))
+        else:
+            checks.append(Check("log", True, f"{entries:,} entries, each as it was written"))
+            checks += _tables(said, read_ledger(session))
+    return [*checks, *_solutions(store)]
+
+
+def _file(session: Session) -> Check:
+    """SQLite's own look at its pages and indexes, and at references to rows that are gone."""
+    faults = [str(row[0]) for row in session.execute(text("PRAGMA quick_check(5)"))]
+    lost = len(session.execute(text("PRAGMA foreign_key_check")).all())
+    if faults != ["ok"]:
+        return Check("file", False, f"SQLite finds it damaged: {'; '.join(faults)}", RESTORE)
+    if lost:
+        return Check("file", False, f"{lost} rows refer to rows that are gone", RESTORE)
+    return Check("file", True, "SQLite finds no fault")
+
+
+def _tables(said: Ledger, present: Ledger) -> list[Check]:
+    checks = []
+    for names, mend in ((REBUILT, REBUILD), (KEPT, RESTORE)):
+        for name, words in names.items():
+            ours, theirs = getattr(said, name), getattr(present, name)
+            apart = _apart(ours, theirs)
+            if apart:
+                shown = ", ".join(apart[:SHOWN]) + (" and others" if len(apart) > SHOWN else "")
+                sentence = f"{len(apart):,} not as the log says: {shown}"
+                checks.append(Check(words, False, sentence, mend))
+            else:
+                checks.append(Check(words, True, f"{len(theirs):,}, as the log says"))
+    return checks
+
+
+def _apart(ours: Any, theirs: Any) -> list[str]:
+    """Names of what one side has, or has otherwise."""
+    if isinstance(ours, Mapping):
+        keys = sorted(ours.keys() | theirs.keys())
+        return [_name(key) for key in keys if ours.get(key) != theirs.get(key)]
+    return sorted(_name(item) for item in ours ^ theirs)
+
+
+def _name(key: object) -> str:
+    if isinstance(key, tuple):
+        return " ".join(str(part) for part in key if part is not None)
+    return str(key)
+
+
+def _solutions(store: Store) -> list[Check]:
+    """Groups that wait to be solved are no fault: the next ``solve`` finds them."""
+    checks = []
+    for item in list_datasets(store):
+        waiting = len(stale_groups(store, item.id))
+        mend = f'touchline solve --dataset "{item.name}"' if waiting else None
+        sentence = f"{waiting:,} of {item.groups:,} groups wait to be solved"
+        checks.append(Check(f"solutions of {item.name}", True, sentence, mend))
+    return checks
