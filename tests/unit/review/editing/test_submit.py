@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import threading
 from contextlib import contextmanager
-from dataclasses import replace
 
 import pytest
 from sqlalchemy import text
+from sqlalchemy.exc import IntegrityError
 
 from app.config import Settings
 from app.errors import (
@@ -59,16 +59,16 @@ class TestSubmit:
         assert after.solution != state.solution
         assert load(store, state.id) == after
 
-    def test_edit_revision_solution_and_log_are_one_transaction(self, store, state) -> None:
-        before = {name: count(store, name) for name in ("log", "solution")}
-
-        def broken(group, policy, calibrations):
-            solution = solve(group, policy, calibrations)
-            view = replace(solution.views[0], calibration_key=object())
-            return replace(solution, views=(view, *solution.views[1:]))
-
-        with pytest.raises(Exception):  # noqa: B017
-            change(store, state, SetBall("7.png", BALL), solver=broken)
+    @pytest.mark.parametrize("step", ["INSERT ON log", "INSERT ON solution", "INSERT ON queue"])
+    def test_edit_revision_solution_and_log_are_one_transaction(self, store, state, step) -> None:
+        """Whichever of its writes fails, the others have not happened."""
+        before = {name: count(store, name) for name in ("log", "solution", "calibration")}
+        with store.write() as session:
+            session.execute(
+                text(f"CREATE TRIGGER full BEFORE {step} BEGIN SELECT RAISE(ABORT, 'full'); END")
+            )
+        with pytest.raises(IntegrityError, match="full"):
+            change(store, state, SetBall("7.png", BALL))
         assert load(store, state.id) == state
         assert {name: count(store, name) for name in before} == before
 
