@@ -14,7 +14,6 @@
         IdempotencyError
       GeometryError
         DegenerateGeometryError
-        NoConvergenceError
       StorageError          the disk or the database refuses
       OverloadedError       more work waits than is taken
     ShapeError(ValueError)  our own mistake, outside the tree
@@ -133,10 +132,6 @@ class GeometryError(ReviewError):
 
 class DegenerateGeometryError(GeometryError):
     """The input does not determine the result."""
-
-
-class NoConvergenceError(GeometryError):
-    """An iteration ended before it arrived."""
 
 
 class StorageError(ReviewError):

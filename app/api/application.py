@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from fastapi import FastAPI
@@ -46,6 +45,7 @@ from app.api.security.origin import KnownHosts, SameOrigin
 from app.api.security.requests import HeadAsGet, OneRange
 from app.api.site import STATIC, Site
 from app.config import Settings
+from app.datasets.manifest import software_version
 from app.review.jobs.jobs import Pool
 
 PREFIX = "/api/v1"
@@ -112,14 +112,6 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None =
     describe(app)
     _add_middleware(app, settings, site)
     return app
-
-
-def software_version() -> str:
-    """Version of the installed package."""
-    try:
-        return version("touchline")
-    except PackageNotFoundError:
-        return "0"
 
 
 def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:

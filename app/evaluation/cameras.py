@@ -12,7 +12,8 @@ from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.frame import Frame
 from app.evaluation.table import Cell, Column, Frames, Row, Table
 from app.geometry.camera import Camera
-from app.solving.score import GAMMAS_PERCENT, SHARE_ABOVE, FrameScore, score, score_frame
+from app.soccer.solution import GAMMAS_PERCENT
+from app.solving.score import SHARE_ABOVE, FrameScore, score, score_frame
 
 COLUMNS = (
     Column("completeness", "Calibrated", "", "higher"),

@@ -11,6 +11,7 @@ from app.geometry.camera import Camera
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
+from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.jaccard import (
     camera_jaccard,
     jaccard,
@@ -19,7 +20,6 @@ from app.solving.jaccard import (
     project_markings,
 )
 
-GAMMAS_PERCENT = (0.5, 1.0, 2.0)
 SHARE_ABOVE = 0.75
 CHALLENGE_PX = 5.0
 """Threshold of the sn-calibration challenge."""

@@ -1,5 +1,5 @@
 // @ts-check
-/** The ball as a sphere: from one view, its consistent box, its outline. */
+/** The ball as a sphere: its consistent box, its outline. */
 
 import {
 	calibrationMatrix, idealToPixel, pitchToCamera, pixelToIdeal, rayThrough,
@@ -22,24 +22,6 @@ export function boxDiameter([, , width, height]) {
 /** @param {ImagePoint} center @param {number} diameter @returns {Box} */
 export function squareBox(center, diameter) {
 	return [center.x - diameter / 2, center.y - diameter / 2, diameter, diameter];
-}
-
-/**
- * Where a ball of diameter `phi` is that looks `diameter` pixels wide at `center`.
- *
- * @param {Camera} camera @param {ImagePoint} center @param {number} diameter px
- * @param {number} phi metres
- * @returns {PitchPoint | null}
- */
-export function monocularBall(camera, center, diameter, phi) {
-	const ray = rayThrough(camera, center);
-	const upper = pixelToIdeal(camera, { x: center.x, y: center.y - diameter / 2 });
-	const lower = pixelToIdeal(camera, { x: center.x, y: center.y + diameter / 2 });
-	if (!ray || !upper || !lower) return null;
-	const scale = phi / Math.hypot(lower[0] - upper[0], lower[1] - upper[1]);
-	return [
-		camera.C[0] + scale * ray[0], camera.C[1] + scale * ray[1], camera.C[2] + scale * ray[2],
-	];
 }
 
 /**

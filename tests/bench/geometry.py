@@ -18,20 +18,18 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.jaccard import project_markings
-from app.solving.many_balls import ManyViews, solve_many
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
 from tests.bench.table import print_table
 
 SIZE = ImageSize(960, 540)
 PAIRS = 1_000_000
-GROUPS = 12_764
 REPEATS = 5
 
 
 def bench_geometry() -> None:
     """Triangulation of many pairs, and one refinement of a camera."""
-    rows = [*_triangulation(), *_dataset(), *_refinement()]
+    rows = [*_triangulation(), *_refinement()]
     print_table(
         "Speed against libraries, same run, best of five",
         ("what", "Touchline", "library", "unit", "ratio library / Touchline"),
@@ -56,35 +54,6 @@ def _triangulation() -> list[list[object]]:
     theirs = _best(one_by_one) / few
     name = f"triangulate {PAIRS} pairs (cv2)"
     return [[name, PAIRS * ours, PAIRS * theirs, "s", theirs / ours]]
-
-
-def _dataset() -> list[list[object]]:
-    """As many groups as SoccerNet-v3 has, triangulated and boxed, against OpenCV pair by pair."""
-    generator = np.random.default_rng(2)
-    stands = [_camera(0.0, 60.0, -15.0), _camera(75.0, -10.0, -8.0), _camera(20.0, -62.0, -14.0)]
-    sizes = generator.choice([2, 3, 4], GROUPS, p=[0.5, 0.34, 0.16])
-    group = np.repeat(np.arange(GROUPS), sizes)
-    which = np.concatenate([np.arange(size) % 3 for size in sizes])
-    balls = generator.uniform([15, -15, -5], [35, 15, 0], (GROUPS, 3))[group]
-    pixels = np.stack([camera.project(balls) for camera in stands])[which, np.arange(len(which))]
-    views = ManyViews(
-        group=group,
-        rotation=np.array([camera.rotation for camera in stands])[which],
-        position=np.array([camera.position for camera in stands])[which],
-        K=np.array([camera.K for camera in stands])[which],
-        pixels=pixels + generator.normal(0, 0.7, pixels.shape),
-        tau_px=np.full(len(which), 0.01 * SIZE.diagonal),
-    )
-    ours = _best(lambda: solve_many(views, 0.226, 1.0))
-    solved, P, few = solve_many(views, 0.226, 1.0), views.P, 2000
-
-    def one_by_one() -> None:
-        for a, b in zip(solved.a[:few], solved.b[:few], strict=True):
-            cv2.triangulatePoints(P[a], P[b], views.pixels[a][:, None], views.pixels[b][:, None])
-
-    theirs = _best(one_by_one) / few * len(solved.a)
-    name = f"{GROUPS} groups, {len(solved.a)} pairs, boxes (cv2: pairs only)"
-    return [[name, ours, theirs, "s", theirs / ours]]
 
 
 def _refinement() -> list[list[object]]:

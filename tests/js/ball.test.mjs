@@ -2,20 +2,22 @@ import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
 import {
-	ballOutline, exactBox, monocularBall, optimizedBall, squareBox,
+	ballOutline, exactBox, optimizedBall, squareBox,
 } from '../../static/geometry/ball.js';
-import { cameraFromJson, project } from '../../static/geometry/camera.js';
+import { cameraFromJson, pixelToIdeal, project, rayThrough } from '../../static/geometry/camera.js';
 import { close, mainCamera } from './scene.mjs';
 
 const PHI = 0.226;
 const level = cameraFromJson({ ...mainCamera, pan_degrees: 0, tilt_degrees: 90 });
 
-describe('monocularBall', () => {
-	it('finds a ball on the axis at the depth that its size says', () => {
-		// 0.226 m at 1500 px focal length and 60 m looks 5.65 px wide.
-		close(monocularBall(level, { x: 479.5, y: 269.5 }, 5.65, PHI), [0, 0, -12], 1e-9);
-	});
-});
+/** Where a ball is that looks `diameter` pixels wide at `center`: the oracle of what follows. */
+function monocularBall(camera, center, diameter, phi) {
+	const ray = rayThrough(camera, center);
+	const upper = pixelToIdeal(camera, { x: center.x, y: center.y - diameter / 2 });
+	const lower = pixelToIdeal(camera, { x: center.x, y: center.y + diameter / 2 });
+	const scale = phi / Math.hypot(lower[0] - upper[0], lower[1] - upper[1]);
+	return camera.C.map((start, axis) => start + scale * ray[axis]);
+}
 
 describe('optimizedBall', () => {
 	it('gives the size of the ball at the depth of the point', () => {
