@@ -5,6 +5,7 @@ import { previewBall } from '../geometry/preview.js';
 import { toImage } from '../geometry/viewport.js';
 import { addPoint, markingAt } from './line_edits.js';
 import { expectedDiameter, newBall } from './ball_edits.js';
+import { chosenPlace, dropCross, setCross } from './drawing_cross.js';
 import { applyEdit } from './edits.js';
 import { group, solution, submit } from './group.js';
 import { announce } from './notice.js';
@@ -15,6 +16,7 @@ import { drawing, focused, pointerPlace, selected } from './workspace.js';
 
 /** CSS pixels within which a line is meant. */
 const REACH = 9;
+const BY_KEYS = 'By keyboard: move the cross there with the arrow keys, then press Enter.';
 
 /** @returns {ViewJson | undefined} the view under the pointer, else the focused one */
 function targetView() {
@@ -29,15 +31,16 @@ export function startDrawing(letter) {
 	focused.value = view.letter;
 	const object = selected.value;
 	const goesOn = object?.kind === 'point' && object.view === view.key;
-	drawing.value = goesOn ? { view: view.key, what: 'line', marking: object.marking }
-		: { view: view.key, what: 'ask', marking: '' };
+	if (goesOn) startMarking(view, object.marking);
+	else drawing.value = { view: view.key, what: 'ask', marking: '' };
 }
 
 /** Draw the ball of a view. @param {ViewJson} view */
 export function startBall(view) {
 	focused.value = view.letter;
 	drawing.value = { view: view.key, what: 'ball', marking: '' };
-	announce('Click where the ball is, or press Enter.');
+	setCross(view, likelyPlace(view));
+	announce(`Click where the ball is. ${BY_KEYS}`);
 }
 
 /** Draw a marking of a view. @param {ViewJson} view @param {string} marking */
@@ -45,12 +48,14 @@ export function startMarking(view, marking) {
 	focused.value = view.letter;
 	selected.value = null;
 	drawing.value = { view: view.key, what: 'line', marking };
-	announce(`Drawing ${marking}. Click, or press Enter, to add a point; Escape ends.`);
+	setCross(view, likelyPlace(view));
+	announce(`Drawing ${marking}. Click to add a point; Escape ends. ${BY_KEYS}`);
 }
 
 /** Stop drawing. */
 export function endDrawing() {
 	drawing.value = null;
+	dropCross();
 }
 
 /** What is drawn was chosen: the ball where the pointer is, a marking click by click. @param {string | null} marking null: the ball */
@@ -59,11 +64,10 @@ export function chooseDrawing(marking) {
 	const view = group.value?.views.find(({ key }) => key === present?.view);
 	if (!view) return;
 	if (marking === null) {
-		drawing.value = { view: view.key, what: 'ball', marking: '' };
+		startBall(view);
 		const over = pointerPlace.value;
-		// Where the pointer is not over the view, a click says where.
+		// Who asked for a ball with the pointer on it means that place; elsewhere a click says where.
 		if (over?.view === view.key) drawAt(view, over.at);
-		else announce('Click where the ball is, or press Enter.');
 		return;
 	}
 	startMarking(view, marking);
@@ -76,7 +80,7 @@ export function drawAt(view, at) {
 	if (present.what === 'ball') {
 		submit(sized(view, at));
 		selected.value = { kind: 'ball', view: view.key };
-		drawing.value = null;
+		endDrawing();
 	} else if (present.what === 'line') {
 		putPoint(view, present.marking, at);
 	}
@@ -91,15 +95,16 @@ function sized(view, at) {
 	return diameter ? newBall(view, at, diameter) : edit;
 }
 
-/** Draw at the pointer, else in the middle of what the view shows. */
+/** Draw at the place that the person has chosen, by pointer or by the cross. */
 export function drawHere() {
 	const view = group.value?.views.find(({ key }) => key === drawing.value?.view);
 	if (!view) return;
-	const over = pointerPlace.value;
-	drawAt(view, over?.view === view.key ? over.at : likelyPlace(view));
+	const at = chosenPlace(view);
+	if (at) drawAt(view, at);
+	else announce(BY_KEYS);
 }
 
-/** Where a person without a pointer begins: at the 3D ball, at the ends of the projected line, else in the middle. @param {ViewJson} view */
+/** Where the cross of a person without a pointer begins: at the 3D ball, at the ends of the projected line, else in the middle. @param {ViewJson} view */
 function likelyPlace(view) {
 	const solved = solution.value?.views.find((one) => one.view === view.key);
 	const { what = 'ask', marking = '' } = drawing.value ?? {};
@@ -130,6 +135,8 @@ function putPoint(view, marking, at) {
 	const { edit, index } = addPoint(view, marking, at);
 	submit(edit);
 	selected.value = { kind: 'point', view: view.key, marking, index };
+	const drawn = group.value?.views.find(({ key }) => key === view.key) ?? view;
+	if (drawing.value?.view === view.key) setCross(drawn, likelyPlace(drawn));
 }
 
 /** @param {ViewJson} view @param {PointJson} at */

@@ -21,6 +21,7 @@ import {
 import { attachPointer } from '../tools/pointer.js';
 import { ClassChooser } from './class_chooser.js';
 import { DrawingChip } from './drawing_chip.js';
+import { DrawingCross } from './drawing_cross.js';
 import { InstantChip } from './instant_chip.js';
 import { ObjectList } from './object_list.js';
 import { PanelCaption } from './panel_caption.js';
@@ -194,6 +195,7 @@ export function ImagePanel({ picture, area, sizes }) {
 			${frame.error ? html`<p class="image-panel__missing">The frame of this view cannot be read.</p>` : null}
 			<${PanelCaption} picture=${picture} />
 			<${PanelTools} picture=${picture} sizes=${sizes} />
+			<${DrawingCross} view=${view.key} viewport=${viewport} />
 			<${DrawingChip} view=${view.key} />
 			${instant ? html`<${InstantChip} label=${instant.label} />` : null}
 			${picture.predictions && !drawing.value ? html`<${PredictionChip} picture=${picture} />` : null}

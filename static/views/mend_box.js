@@ -7,6 +7,7 @@ import { suggestedReason } from '../state/advice.js';
 import { mend, mendIndex, mends, turnMend } from '../state/mends.js';
 import { REASONS } from '../state/reasons.js';
 import { askReason } from '../state/verdicts.js';
+import { drawing } from '../state/workspace.js';
 import { mendNow } from './mend_actions.js';
 
 /** @import {SolutionJson} from '../api/types.js' */
@@ -17,6 +18,13 @@ export function MendBox({ solution }) {
 	const count = mends.value.length;
 	const reason = REASONS.find(({ name }) => name === suggestedReason(solution));
 	if (!offered && !reason) return null;
+	if (drawing.value && drawing.value.what !== 'ask') {
+		const { what, marking } = drawing.value;
+		return html`
+			<div class="mend" role="group" aria-label="What to do">
+				<p class="mend__sentence">You are drawing ${what === 'ball' ? 'the ball' : html`“${marking}”`} in the picture. <kbd>Esc</kbd> ends it.</p>
+			</div>`;
+	}
 	return html`
 		<div class="mend" role="group" aria-label="What to do">
 			${offered && !offered.title ? html`<p class="mend__sentence">${offered.sentence}</p>` : null}

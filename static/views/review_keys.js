@@ -4,6 +4,7 @@
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { toggleOccluded, toggleOutOfView } from '../state/ball_edits.js';
 import { drawHere, endDrawing, startDrawing } from '../state/drawing.js';
+import { moveCross } from '../state/drawing_cross.js';
 import { swapSides } from '../state/edits.js';
 import { draft, group, solution, submit, withdraw } from '../state/group.js';
 import { redo, undo } from '../state/history.js';
@@ -14,7 +15,7 @@ import { announce, dismiss, notice } from '../state/notice.js';
 import { revertSelected } from '../state/revert.js';
 import { swapWarning, swappedViews } from '../state/sides.js';
 import { accept, askReason, askViewReason, cancelAsking, defer } from '../state/verdicts.js';
-import { filled, fitAll, fitPanel, isZoomed, toggleFilled, zoomTo } from '../state/viewports.js';
+import { filled, fitAll, fitPanel, isZoomed, toggleFilled, viewportOf, zoomTo } from '../state/viewports.js';
 import {
 	asking, boxes, cycleEstimator, cycleGain, drawing, editing, equalViews, estimator, focused, focusView, gain,
 	gatesOpen, loupe, maximised, otherInstant, overlaysHidden, pinPlace, pointerPlace, projections, selected,
@@ -127,7 +128,8 @@ function swap() {
 function takeBall() {
 	const view = viewInHand();
 	const predicted = selected.value?.kind === 'prediction' || hasPredictions();
-	if (predicted || !view || view.balls.length > 0 || !placeExpected(view)) acceptInHand();
+	if (predicted || !view || view.balls.length > 0) acceptInHand();
+	else if (!placeExpected(view)) announce(`The other views do not see one place for the ball of ${view.letter}: draw it with N.`);
 }
 
 /** Make the group of the view in hand, too. */
@@ -168,12 +170,21 @@ function flipOverlays() {
 	say('Overlays', !overlaysHidden.value);
 }
 
+/** Move the cross where Enter draws. @param {number} x @param {number} y @param {KeyboardEvent} event */
+function aim(x, y, event) {
+	const view = group.value?.views.find(({ key }) => key === drawing.value?.view);
+	const stage = view && document.querySelector(`.image-panel[data-view="${view.letter}"] .image-panel__stage`);
+	if (!stage) return;
+	const { width, height } = stage.getBoundingClientRect();
+	moveCross(view, viewportOf(view.letter, view, { width, height }).scale, x, y, event);
+}
+
 /** @param {string} arrow @param {number} x @param {number} y @returns {Binding} */
 function arrowKey(arrow, x, y) {
 	return {
 		keys: [`Arrow${arrow}`, `Shift+Arrow${arrow}`, `Alt+Arrow${arrow}`], group: 'Edit',
 		label: `Move the selected object ${arrow.toLowerCase()}`, shown: 'hidden',
-		when: isSelected, run: (event) => nudge(x, y, event),
+		when: () => isDrawing() || isSelected(), run: (event) => (isDrawing() ? aim(x, y, event) : nudge(x, y, event)),
 	};
 }
 

@@ -42,9 +42,11 @@ const VIEW_REASONS = {
 
 /** @param {typeof GROUP_REASONS & {suggested?: string | null}} props */
 function ReasonList({ title, choose, again, keys, suggested = null }) {
-	useKeys(useMemo(() => (suggested === null ? keys : [...keys, {
-		keys: ['Enter'], label: `${title}: the suggested reason`, group: 'Verdict', run: () => choose(suggested),
-	}]), [keys, suggested]));
+	// The key that would repeat the last reason takes the one that fits, where one does.
+	const repeated = suggested ?? lastReason.value;
+	useKeys(useMemo(() => (suggested === null ? keys : [{
+		keys: ['Enter', ...keys[keys.length - 1].keys], label: `${title}: the suggested reason`, group: 'Verdict', run: () => choose(suggested),
+	}, ...keys.slice(0, -1)]), [keys, suggested]));
 	return html`
 		<section class="ask" aria-label=${title}>
 			<p class="ask__title">${title} <kbd>Esc</kbd></p>
@@ -52,7 +54,7 @@ function ReasonList({ title, choose, again, keys, suggested = null }) {
 				${REASONS.map(({ name, label }, i) => html`
 					<li key=${name}>
 						<button type="button" data-last=${name === lastReason.value} data-suggested=${name === suggested} onClick=${() => choose(name)}>
-							<kbd>${i + 1}</kbd> ${label} ${name === suggested ? html`<span class="reasons__suggested">fits <kbd>Enter</kbd></span>` : null} ${name === lastReason.value ? html`<kbd>${again}</kbd>` : null}
+							<kbd>${i + 1}</kbd> ${label} ${name === suggested ? html`<span class="reasons__suggested">fits <kbd>Enter</kbd></span>` : null} ${name === repeated ? html`<kbd>${again}</kbd>` : null}
 						</button>
 					</li>
 				`)}

@@ -12,6 +12,9 @@ from playwright.sync_api import Page, expect
 
 from app.sample.practice import LESSONS, Lesson, make_practice
 from app.sample.scene import Scene
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+from app.solving.jaccard import project_markings
 from tests.e2e.conftest import OpenPage
 from tests.e2e.screen import Screen
 from tests.e2e.service import run_touchline, serving
@@ -290,8 +293,15 @@ class TestFiveKeys:
         if lesson.kind == "undrawn_line":
             chip = page.locator(".drawing-chip")
             expect(chip).to_be_visible()
-            # Without a pointer Enter puts points at the ends of the line.
-            screen.press("Enter", "Enter", "Escape")
+            # Two clicks on the paint.
+            view = screen.document()["views"][lesson.view]
+            size = ImageSize(view["width"], view["height"])
+            seen = project_markings(scene.truth.views[lesson.view].camera, Pitch(), size)
+            line = seen[chip.locator("strong").inner_text()]
+            screen.press("0")
+            for share in (0.2, 0.8):
+                page.mouse.click(*screen.place(view, *line[int(share * len(line))]))
+            screen.press("Escape")
             expect(chip).to_have_count(0)
             keys += 3
         page.wait_for_function(CHANGED, arg=[screen.group, before])

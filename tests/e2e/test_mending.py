@@ -240,6 +240,23 @@ class TestMissingBall:
         assert len(one.document()["views"][1]["balls"]) == 1
         expect(one.card).not_to_have_attribute("data-tone", "bad")
 
+    def test_a_second_enter_draws_no_ball_where_nobody_pointed(
+        self, bench: Callable[..., Bench]
+    ) -> None:
+        one = bench(2)
+        one.change(1, "/ball", None)
+        screen = one.open()
+        screen.press("Enter")
+        panel = one.page.locator('.image-panel[data-view="B"]')
+        expect(panel.locator(".drawing-chip")).to_contain_text("Click where the ball is")
+        screen.press("Enter", "Enter")
+        expect(one.page.locator(".save")).to_contain_text("No changes")
+        assert one.document()["views"][1]["balls"] == []
+        expect(panel.locator('.drawing-cross[data-moved="false"]')).to_be_visible()
+        screen.press("Shift+ArrowLeft", "ArrowUp", "Enter")
+        screen.saved()
+        assert len(one.document()["views"][1]["balls"]) == 1
+
     def test_not_visible_is_one_key_too(self, bench: Callable[..., Bench]) -> None:
         one = bench(3)
         one.change(2, "/ball", None)
@@ -276,8 +293,14 @@ class TestUndrawnLine:
         expect(one.card).to_contain_text(missing)
         screen.press("Enter")
         expect(page.locator('.image-panel[data-view="B"] .drawing-chip')).to_contain_text(missing)
+        # The card leads to the drawing, and does not offer it once more.
+        expect(one.card).to_contain_text("You are drawing")
+        expect(page.locator(".mend .button--fix")).to_have_count(0)
+        # Nobody has looked yet: Enter alone draws nothing.
         screen.press("Enter")
-        screen.press("Enter")
+        assert missing not in one.document()["views"][1]["lines"]
+        screen.press("ArrowRight", "Enter")
+        screen.press("ArrowLeft", "Enter")
         screen.press("Escape")
         screen.saved()
         assert len(one.document()["views"][1]["lines"][missing]) == 2
