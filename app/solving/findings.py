@@ -93,7 +93,7 @@ def _sides_swapped(swap: Swap) -> Finding:
     else:
         sentence = (
             "The lines are labelled from the other end of the pitch: with left and right swapped "
-            f"this view sees the ball where the others do, within {swap.turned_error_px:.1f} px."
+            f"this view agrees with the rest about the ball, within {swap.turned_error_px:.1f} px."
         )
     return Finding(
         "sides_swapped",
@@ -152,11 +152,16 @@ def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Ite
         return
     best = min(judged, key=lambda pair: max(pair.errors_px))
     sizes = [view.size.diagonal for view in group.views if view.key in (best.a, best.b)]
+    apart = f"{max(best.errors_px):.0f} px apart"
+    sentence = (
+        f"The two views do not see the ball in the same place ({apart})"
+        if len(group.views) == 2
+        else f"No two views see the ball in the same place (the closest are {apart})"
+    )
     yield Finding(
         "not_synchronous",
-        f"No two views see the ball in the same place ({max(best.errors_px):.0f} px apart at "
-        "best): they may show different instants. Compare the pictures; leave the odd view out, "
-        "or reject the group.",
+        f"{sentence}. Look first whether each ball is drawn on the ball. If they are, compare "
+        "players and clock: the pictures show different instants where these differ.",
         number=max(best.errors_px),
         threshold=policy.tau_percent / 100 * max(sizes),
     )
