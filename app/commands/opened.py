@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
 
 from app.commands.options import read_settings
@@ -20,11 +20,8 @@ def opened_store(settings: Settings | None = None) -> Iterator[Store]:
     """The database of a home; by default the one that the environment names."""
     from app.store.session import Store
 
-    store = Store.open(settings or read_settings())
-    try:
+    with closing(Store.open(settings or read_settings())) as store:
         yield store
-    finally:
-        store.close()
 
 
 @contextmanager
