@@ -8,6 +8,7 @@ import stat
 import unicodedata
 import zipfile
 import zlib
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -398,3 +399,10 @@ def capped_chunks(file: IO[bytes], limit: int, shown: str) -> Iterator[bytes]:
 
 def _is_hidden(name: str) -> bool:
     return (name.startswith(".") and name not in (".", "..")) or name == "__MACOSX"
+
+
+def files_inside(names: list[str], folder: str) -> set[str]:
+    """Of sorted names, those below a folder, by their name from there on."""
+    first = bisect_left(names, folder)
+    last = bisect_left(names, folder + chr(0x10FFFF))
+    return {name[len(folder) :] for name in names[first:last]}

@@ -1,22 +1,14 @@
-"""SoccerNet camera JSON: one camera a file (``camera_00002.json``), or ISSIA's six in one."""
+"""One camera as SoccerNet's JSON, both ways."""
 
 from __future__ import annotations
 
-import re
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
-from pathlib import Path, PurePosixPath
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
 
 from app.datasets import fields
-from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree, resolve_inside
-from app.datasets.json_text import read_json
-from app.datasets.report import Report
 from app.errors import DatasetFormatError, GeometryError
-from app.finite import json_text
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
@@ -30,7 +22,6 @@ ROUNDING = 1e-10
 
 _ANGLES = ("pan_degrees", "tilt_degrees", "roll_degrees")
 _DISTORTION = (("radial_distortion", 6), ("tangential_distortion", 2), ("thin_prism_distortion", 4))
-_FILE = re.compile(r"(?:camera_)?(.+)\.json", re.ASCII | re.IGNORECASE)
 
 T = TypeVar("T")
 
@@ -165,101 +156,3 @@ def _matrix(value: Any) -> list[tuple[float, ...]]:
     if len(rows) != 3:
         raise ValueError(f"has {len(rows)} rows, not 3")
     return [fields.numbers(row, 3) for row in rows]
-
-
-def read_cameras(path: Path, report: Report, limits: Limits = DEFAULT_LIMITS) -> dict[str, Camera]:
-    """Every camera below ``path``, by key.
-
-    ``path`` is a folder or zip of ``camera_<stem>.json``, one such file, or a file with ISSIA's
-    ``{"cam1": {...}, ...}`` (also inside ``{"cameras": {...}}``, also double-encoded). The key
-    is the stem, with ``<league>/<season>/<match>/`` before it where the file lies that deep.
-    """
-    tree = open_tree(path, report, limits)
-    if tree is None:
-        return {}
-    with closing(tree):
-        cameras = cameras_of(tree, _camera_files(tree), report)
-    report.imported += len(cameras)
-    return cameras
-
-
-def cameras_of(tree: FileTree, names: Sequence[str], report: Report) -> dict[str, Camera]:
-    """The cameras of some files of a tree, by key."""
-    cameras: dict[str, Camera] = {}
-    stems = Counter(_key(name, deep=False) for name in names)
-    for name in names:
-        deep = stems[_key(name, deep=False)] > 1
-        _read_file(tree, name, _key(name, deep), cameras, report)
-    return cameras
-
-
-def _camera_files(tree: FileTree) -> list[str]:
-    """Camera files; where none is called ``camera_...``, every JSON file may be one."""
-    names = [name for name in tree.names() if name.lower().endswith(".json")]
-    named = [name for name in names if PurePosixPath(name).name.startswith("camera_")]
-    return named or [name for name in names if PurePosixPath(name).name not in _NO_CAMERAS]
-
-
-_NO_CAMERAS = ("manifest.json", "match_info.json", "findings.json", "calibrate.json")
-
-
-def _key(name: str, deep: bool) -> str:
-    place = PurePosixPath(name)
-    found = _FILE.fullmatch(place.name)
-    stem = found.group(1) if found else place.stem
-    folders = place.parts[:-1]
-    keep = folders if deep else folders[-3:] if len(folders) >= 3 else ()
-    return "/".join((*keep, stem))
-
-
-def _read_file(
-    tree: FileTree, name: str, key: str, cameras: dict[str, Camera], report: Report
-) -> None:
-    shown = tree.shown(name)
-    try:
-        value = read_json(tree.read_bytes(name), shown, double_encoded=True)
-    except DatasetFormatError as error:
-        report.read += 1
-        report.skip(error)
-        return
-    several = _several(value)
-    for record, item in several.items() if several is not None else ((None, value),):
-        report.read += 1
-        try:
-            cameras[record or key] = camera_from_json(item, shown, record)
-        except DatasetFormatError as error:
-            report.skip(error)
-
-
-def _several(value: Any) -> dict[str, Any] | None:
-    """The cameras by name when the file holds several, else None."""
-    if not isinstance(value, dict) or "pan_degrees" in value:
-        return None
-    if isinstance(value.get("cameras"), dict):
-        return dict(value["cameras"])
-    if not any(isinstance(item, dict) for item in value.values()):
-        return None
-    return {name: item for name, item in value.items() if not name.startswith("_")}
-
-
-def camera_text(camera: Camera) -> str:
-    """The text of one camera file."""
-    return json_text(camera_to_json(camera), indent=1, ascii_=True) + "\n"
-
-
-def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:
-    """Write ``camera_<stem>.json`` per camera below an existing folder; the paths written.
-
-    A key with folders (``<league>/<season>/<match>/7_1``) becomes a file in those folders.
-
-    Raises:
-        UnsafePathError: A key that would leave the folder.
-    """
-    written = []
-    for key, camera in cameras.items():
-        place = PurePosixPath(key)
-        path = resolve_inside(root, str(place.with_name(f"camera_{place.name}.json")))
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(camera_text(camera), encoding="utf-8")
-        written.append(path)
-    return written

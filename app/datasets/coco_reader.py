@@ -10,9 +10,9 @@ from typing import Any
 
 from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, check_name, open_tree
 from app.datasets.coco import PREFIX, STATE, UNASSIGNED
+from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
-from app.datasets.sn_calibration import IMAGE_SUFFIXES
 from app.datasets.soccernet_v3 import SPLITS
 from app.datasets.view_groups import PlacedView, ViewGroups
 from app.datasets.view_state import GroupHead, StateReader

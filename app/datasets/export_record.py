@@ -6,13 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from app.datasets.frame_names import likely_suffix, match_frame
 from app.geometry.camera import Camera
-from app.soccer.ball_boxes import BOX_KINDS, ball_boxes, ball_fit, has_ball_3d
+from app.soccer.ball_boxes import ball_boxes, ball_fit, has_ball_3d
 from app.soccer.frames import Box
 from app.soccer.group import Group, View
 from app.soccer.solution import BallFit, Solution, ViewSolution
-
-__all__ = ["BOX_KINDS", "ExportRecord", "chosen_box"]
 
 _NOT_CALIBRATED = ("calibratable", "jac")
 
@@ -85,3 +84,9 @@ def chosen_box(record: ExportRecord, view: View, kind: str) -> Box | None:
     """The ball's box of one of ``BOX_KINDS``; the annotated one where the view has none of it."""
     boxes = ball_boxes(record.solution, view)
     return boxes.get(kind) or boxes.get("annotated")
+
+
+def frame_name(record: ExportRecord, view: View) -> str:
+    """Where the frame of a view is in the export, or would be."""
+    placed = record.frames.get(view.key)
+    return placed or match_frame(record.group, view, record.split(view), likely_suffix(view))

@@ -7,9 +7,9 @@ import re
 from collections.abc import Callable
 from pathlib import PurePosixPath
 
-from app.datasets.sn_calibration import IMAGE_SUFFIXES
 from app.soccer.group import Group, View
 
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
 FOLDER = "Frames-v3"
 """Beside the labels of a match, where SoccerNet's readers look for loose frames."""
 _UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
@@ -53,3 +53,9 @@ def likely_suffix(view: View) -> str:
     name = "" if media is None else media.member or media.path
     suffix = PurePosixPath(name).suffix.lower()
     return suffix if suffix in IMAGE_SUFFIXES else ".jpg"
+
+
+def view_stem(key: str) -> str:
+    """Key of a view without the ending of an image's name."""
+    place = PurePosixPath(key)
+    return str(place.with_suffix("")) if place.suffix.lower() in IMAGE_SUFFIXES else key

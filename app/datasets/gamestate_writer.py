@@ -10,9 +10,9 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.datasets.archive import resolve_inside
+from app.datasets.frame_names import view_stem
 from app.datasets.gamestate import BALL_ID, LABELS, METADATA, PITCH_ID
-from app.datasets.per_view import view_stem
-from app.datasets.sn_calibration import lines_to_json
+from app.datasets.sn_calibration_writer import lines_to_json
 from app.finite import json_text
 from app.soccer.annotation import BallAnnotation
 from app.soccer.group import Group, View

@@ -10,12 +10,12 @@ from pathlib import Path, PurePosixPath
 from app.datasets import fields
 from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
 from app.datasets.csv_text import is_missing, read_rows
-from app.datasets.issia import IssiaFolder, IssiaOptions, complete, count
+from app.datasets.issia import TABLE_3D
+from app.datasets.issia_reader import IssiaFolder, IssiaOptions, complete, count
 from app.datasets.report import Report
-from app.datasets.viper import ViperTrack
+from app.datasets.viper_reader import ViperTrack
 from app.errors import DatasetFormatError
 
-TABLE = "ISSIA-3D.csv"
 _AXES = re.compile(r"x_cam(\d{1,3})", re.ASCII)
 
 
@@ -34,11 +34,13 @@ def open_issia_3d(
         return found
     with closing(tree):
         names = tree.names()
-        tables = [name for name in names if PurePosixPath(name).name == TABLE]
+        tables = [name for name in names if PurePosixPath(name).name == TABLE_3D]
         if not tables:
-            report.note(str(folder), None, None, f"holds no {TABLE}")
+            report.note(str(folder), None, None, f"holds no {TABLE_3D}")
         for name in tables[1:]:
-            report.note(tree.shown(name), None, None, f"is a second {TABLE}; {tables[0]} is used")
+            report.note(
+                tree.shown(name), None, None, f"is a second {TABLE_3D}; {tables[0]} is used"
+            )
         for name in tables[:1]:
             _read_table(tree, name, found, report, limits)
         complete(found, tree, names, options, report, limits)

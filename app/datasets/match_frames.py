@@ -9,8 +9,8 @@ from collections.abc import Collection
 from pathlib import PurePosixPath
 
 from app.datasets.archive import FileTree, Limits, ZipTree
+from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.report import Report
-from app.datasets.sn_calibration import IMAGE_SUFFIXES
 from app.errors import DatasetFormatError
 from app.soccer.group import Media
 

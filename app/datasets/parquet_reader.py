@@ -11,10 +11,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, capped_chunks, open_tree
+from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.json_text import read_json
 from app.datasets.parquet import pyarrow_modules
 from app.datasets.report import Report
-from app.datasets.sn_calibration import IMAGE_SUFFIXES
 from app.datasets.view_groups import PlacedView, ViewGroups
 from app.datasets.view_state import StateReader, extras_from_json
 from app.errors import DatasetFormatError

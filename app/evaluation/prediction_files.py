@@ -26,7 +26,7 @@ from typing import Any
 
 from app.datasets import fields
 from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
-from app.datasets.camera_json import read_cameras
+from app.datasets.cameras_reader import read_cameras
 from app.datasets.csv_text import is_missing, numbers_in, read_rows
 from app.datasets.json_text import read_json
 from app.datasets.report import Report

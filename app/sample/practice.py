@@ -14,7 +14,7 @@ from pathlib import Path
 import cv2
 
 from app.datasets.match_frames import ARCHIVE
-from app.datasets.soccernet_v3 import write_soccernet_v3
+from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.finite import json_text
 from app.sample.faults import FaultPlan
 from app.sample.render import render

@@ -16,7 +16,7 @@ from typing import TypeVar
 import cv2
 
 from app.datasets.match_frames import ARCHIVE
-from app.datasets.soccernet_v3 import write_soccernet_v3
+from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import InputError
 from app.finite import json_text
 from app.sample.fixture import group_counts, make_fixture

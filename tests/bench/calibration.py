@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from app.datasets.report import Report
-from app.datasets.sn_calibration import read_line_files
+from app.datasets.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch

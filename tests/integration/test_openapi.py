@@ -25,7 +25,7 @@ from schemathesis.config import (
 from app.api.application import create_app
 from app.config import Settings
 from app.datasets.report import Report
-from app.datasets.soccernet_v3 import read_soccernet_v3
+from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.stations import load_station
 from app.review.editing.submit import load

@@ -10,17 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.datasets.camera_json import camera_from_json, camera_to_json, read_cameras
+from app.datasets.camera_json import camera_from_json, camera_to_json
+from app.datasets.cameras_reader import read_cameras
 from app.datasets.export_record import ExportRecord
-from app.datasets.issia import IssiaFolder, IssiaOptions, open_issia
-from app.datasets.issia_3d import write_issia_3d
+from app.datasets.issia_3d_writer import write_issia_3d
+from app.datasets.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.datasets.report import Report
-from app.datasets.sn_calibration import (
-    DEFAULT_SIZE,
-    read_line_files,
-    write_line_files,
-)
-from app.datasets.sn_calibration_groups import read_sn_calibration
+from app.datasets.sn_calibration import DEFAULT_SIZE
+from app.datasets.sn_calibration_reader import read_line_files, read_sn_calibration
+from app.datasets.sn_calibration_writer import write_line_files
 from app.soccer.pitch import MARKINGS
 
 REAL_DATA = Path(

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
-from app.datasets.issia import IssiaOptions, read_issia
+from app.datasets.issia_reader import IssiaOptions, open_issia
 from app.datasets.report import Report
 from app.review.datasets.dataset import create_dataset
 from app.review.editing.recompute import solve_dataset
@@ -33,7 +33,7 @@ REPAIRED = (423, 1763, 2045, 3013, 3017)
 
 @pytest.fixture(scope="module")
 def groups():
-    return list(read_issia(DATA, IssiaOptions(), Report()))
+    return list(open_issia(DATA, IssiaOptions(), Report()).groups())
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from sqlalchemy import select
 
 from app.config import Settings
 from app.datasets.archive import DEFAULT_LIMITS
-from app.datasets.issia import IssiaOptions, read_issia
+from app.datasets.issia_reader import IssiaOptions, open_issia
 from app.datasets.report import Report
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load
@@ -45,7 +45,8 @@ def homes(tmp_path_factory: pytest.TempPathFactory):
     one, two = (
         Store.open(Settings(home=tmp_path_factory.mktemp(name) / "home")) for name in ("a", "b")
     )
-    ingest(one, "issia", read_issia(DATA, IssiaOptions(), Report()), source="x", actor="ann")
+    groups = open_issia(DATA, IssiaOptions(), Report()).groups()
+    ingest(one, "issia", groups, source="x", actor="ann")
     solve_dataset(one, "issia")
     reject(one)
     carried = tmp_path_factory.mktemp("carried") / "issia.zip"

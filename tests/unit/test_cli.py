@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from app.cli import main
-from app.datasets.sn_calibration import lines_to_json
+from app.datasets.sn_calibration_writer import lines_to_json
 from app.sample.scenes import make_scenes
 
 Run = Callable[..., tuple[int, str, str]]

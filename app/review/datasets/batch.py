@@ -14,10 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from app.datasets.camera_json import camera_text, read_cameras
+from app.datasets.cameras_reader import read_cameras
+from app.datasets.cameras_writer import camera_text
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
-from app.datasets.sn_calibration import LineFile, read_line_files
+from app.datasets.sn_calibration import LineFile
+from app.datasets.sn_calibration_reader import read_line_files
 from app.errors import DatasetFormatError, InputError
 from app.finite import json_text
 from app.geometry.camera import Camera

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sqlalchemy.orm import Session
 
-from app.datasets.export_record import BOX_KINDS, ExportRecord
+from app.datasets.export_record import ExportRecord
 from app.datasets.issia import FramePersons
 from app.datasets.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
 from app.datasets.output import output_tree
@@ -31,6 +31,7 @@ from app.review.importing.carry import FORMAT as CARRY
 from app.review.importing.carry import carry_out
 from app.review.importing.spare import spare_persons
 from app.review.versions.version import find_version
+from app.soccer.ball_boxes import BOX_KINDS
 from app.store.session import Store
 
 IMAGES = ("none", "copy", "link")

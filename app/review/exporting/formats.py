@@ -7,20 +7,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
 
-from app.datasets.coco import write_coco
+from app.datasets.cameras_writer import write_camera_files
+from app.datasets.coco_writer import write_coco
 from app.datasets.export_record import ExportRecord
 from app.datasets.format_names import ExportFormat
 from app.datasets.frame_names import FrameName, flat_frame, match_frame
 from app.datasets.gamestate_writer import write_gamestate
 from app.datasets.issia import FramePersons
-from app.datasets.issia_3d import write_issia_3d
+from app.datasets.issia_3d_writer import write_issia_3d
+from app.datasets.issia_writer import write_issia
 from app.datasets.manifest import SOFTWARE, software_version
-from app.datasets.parquet import write_parquet
-from app.datasets.per_view import write_camera_files, write_sn_calibration
-from app.datasets.soccernet_v3 import write_soccernet_v3
-from app.datasets.soccernet_v3d import write_soccernet_v3d
-from app.datasets.xgtf import write_issia
-from app.datasets.yolo import write_yolo
+from app.datasets.parquet_writer import write_parquet
+from app.datasets.sn_calibration_writer import write_sn_calibration
+from app.datasets.soccernet_v3_writer import write_soccernet_v3
+from app.datasets.soccernet_v3d_writer import write_soccernet_v3d
+from app.datasets.yolo_writer import write_yolo
 from app.soccer.group import Group
 
 FORMATS: tuple[str, ...] = get_args(ExportFormat)

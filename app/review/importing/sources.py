@@ -9,20 +9,20 @@ from typing import Any, get_args
 
 from app.config import Settings
 from app.datasets.archive import Limits
-from app.datasets.camera_json import read_cameras
+from app.datasets.cameras_reader import read_cameras
 from app.datasets.coco_reader import read_coco
 from app.datasets.format_names import ImportFormat
-from app.datasets.gamestate import read_gamestate
+from app.datasets.gamestate_reader import read_gamestate
 from app.datasets.guess_format import guess_format
 from app.datasets.issia import DEFAULT_SIZE as ISSIA_SIZE
-from app.datasets.issia import IssiaFolder, IssiaOptions, open_issia
 from app.datasets.issia_3d_reader import open_issia_3d
+from app.datasets.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.datasets.parquet_reader import read_parquet
 from app.datasets.report import Report
 from app.datasets.sn_calibration import DEFAULT_SIZE
-from app.datasets.sn_calibration_groups import read_sn_calibration
-from app.datasets.snv3d_reader import read_soccernet_v3d
-from app.datasets.soccernet_v3 import read_soccernet_v3
+from app.datasets.sn_calibration_reader import read_sn_calibration
+from app.datasets.soccernet_v3_reader import read_soccernet_v3
+from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.carry_in import carry_in
 from app.review.importing.ingest import IngestReport, ingest

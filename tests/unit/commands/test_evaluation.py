@@ -11,7 +11,8 @@ from app.cli import app
 from app.commands.evaluation import guess_format
 from app.config import Settings
 from app.datasets.report import Report
-from app.datasets.soccernet_v3 import read_soccernet_v3, write_soccernet_v3
+from app.datasets.soccernet_v3_reader import read_soccernet_v3
+from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.review.editing.recompute import solve_dataset
 from app.review.evaluating.evaluation import tables_of
 from app.review.importing.ingest import ingest

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from app.datasets.coco import write_coco
 from app.datasets.coco_reader import read_coco
+from app.datasets.coco_writer import write_coco
 from app.datasets.export_record import ExportRecord
 from app.datasets.report import Report
 from app.soccer.frames import Box, ImageSize

@@ -3,7 +3,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from app.datasets.frame_names import flat_frame, likely_suffix, match_frame, split_folder
+from app.datasets.frame_names import flat_frame, likely_suffix, match_frame, split_folder, view_stem
 from app.soccer.group import Group, Media
 
 Make = Callable[..., Group]
@@ -41,3 +41,8 @@ class TestLikelySuffix:
         assert likely_suffix(view) == ".jpg"
         assert likely_suffix(replace(view, media=Media("a.zip", "7.PNG"))) == ".png"
         assert likely_suffix(replace(view, media=Media("cam3.mp4", frame=3))) == ".jpg"
+
+
+class TestViewStem:
+    def test_only_the_ending_of_an_image_is_cut(self) -> None:
+        assert [view_stem(key) for key in ("7_1.png", "cam3", "00002")] == ["7_1", "cam3", "00002"]

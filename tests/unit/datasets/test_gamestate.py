@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from app.datasets.gamestate import read_gamestate
+from app.datasets.gamestate_reader import read_gamestate
 from app.datasets.gamestate_writer import write_gamestate
 from app.datasets.report import Report
 from app.soccer.annotation import Extras

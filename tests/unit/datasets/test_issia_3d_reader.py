@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from app.datasets.issia import IssiaOptions
 from app.datasets.issia_3d_reader import open_issia_3d
+from app.datasets.issia_reader import IssiaOptions
 from app.datasets.report import Report
 from app.soccer.frames import ImagePoint
 

@@ -10,8 +10,8 @@ import pytest
 
 from app.datasets.archive import Limits
 from app.datasets.export_record import ExportRecord
-from app.datasets.parquet import write_parquet
 from app.datasets.parquet_reader import read_parquet
+from app.datasets.parquet_writer import write_parquet
 from app.datasets.report import Report
 from app.soccer.group import Group
 from app.soccer.reasons import LeftOut

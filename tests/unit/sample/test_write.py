@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.datasets.report import Report
-from app.datasets.soccernet_v3 import read_soccernet_v3
+from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.errors import InputError
 from app.sample.scenes import make_scenes
 from app.sample.truth import read_truth

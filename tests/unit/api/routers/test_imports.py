@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.datasets.soccernet_v3 import write_soccernet_v3
+from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.review.datasets.dataset import get_dataset
 from app.review.jobs.imports import resume_imports
 from app.soccer.group import Group

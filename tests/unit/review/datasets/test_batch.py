@@ -3,7 +3,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from app.datasets.sn_calibration import LineFile, write_line_files
+from app.datasets.sn_calibration import LineFile
+from app.datasets.sn_calibration_writer import write_line_files
 from app.errors import InputError
 from app.review.datasets.batch import calibrate_files, estimate_pitch_of_files, score_files
 from app.soccer.annotation import make_lines

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from app.datasets.camera_json import write_cameras
-from app.datasets.soccernet_v3 import write_soccernet_v3
+from app.datasets.cameras_writer import write_cameras
+from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.review.datasets.dataset import get_dataset, list_datasets
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from app.datasets.camera_json import read_cameras
+from app.datasets.cameras_reader import read_cameras
 from app.datasets.export_record import ExportRecord
-from app.datasets.issia_3d import write_issia_3d
+from app.datasets.issia_3d_writer import write_issia_3d
 from app.datasets.report import Report
 from app.errors import InputError
 from app.geometry.camera import Camera

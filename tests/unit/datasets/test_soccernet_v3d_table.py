@@ -10,7 +10,7 @@ import pytest
 
 from app.datasets.archive import DEFAULT_LIMITS, open_tree
 from app.datasets.report import Report
-from app.datasets.snv3d_table import SnTable, read_snv3d_table
+from app.datasets.soccernet_v3d_table import SnTable, read_snv3d_table
 from app.soccer.frames import Box, ImageSize
 
 MATCH = "lea/2030-2031/2030-08-17 - 18-00 A 1 - 0 B"

@@ -13,13 +13,12 @@ from app.datasets.csv_text import is_missing, numbers_in, read_rows
 from app.datasets.json_text import parse_literal
 from app.datasets.report import Report
 from app.datasets.soccernet_record import MAX_SIDE
+from app.datasets.soccernet_v3d import SPLIT_FILES, TABLE
 from app.errors import DatasetFormatError, UnsafePathError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImageSize
 
-TABLE = "SNv3D.csv"
-SPLIT_FILES = {"train": "SNv3D-train.txt", "test": "SNv3D-test.txt"}
 REQUIRED = ("league", "season", "match", "main_action", "action", "replay", "img_w", "img_h")
 _TRUE, _FALSE = ("true", "1", "1.0"), ("false", "0", "0.0")
 _MAX_LINES = 1_000_000

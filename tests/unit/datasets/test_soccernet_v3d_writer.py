@@ -13,8 +13,8 @@ import pytest
 from app.datasets.camera_json import camera_from_json
 from app.datasets.export_record import ExportRecord
 from app.datasets.report import Report
-from app.datasets.soccernet_v3 import read_soccernet_v3
-from app.datasets.soccernet_v3d import COLUMNS, write_soccernet_v3d
+from app.datasets.soccernet_v3_reader import read_soccernet_v3
+from app.datasets.soccernet_v3d_writer import COLUMNS, write_soccernet_v3d
 from app.errors import InputError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation

@@ -7,12 +7,10 @@ from pathlib import Path
 import pytest
 
 from app.datasets.camera_json import camera_to_json
-from app.datasets.issia import (
+from app.datasets.issia_reader import (
     IssiaOptions,
     camera_number,
     open_issia,
-    read_issia,
-    read_issia_persons,
 )
 from app.datasets.report import Report
 from app.geometry.camera import Camera
@@ -63,10 +61,10 @@ def lines(tmp_path: Path) -> Path:
 
 
 def _groups(folder: Path, report: Report, options: IssiaOptions | None = None) -> list[Group]:
-    return list(read_issia(folder, options or IssiaOptions(), report))
+    return list(open_issia(folder, options or IssiaOptions(), report).groups())
 
 
-class TestReadIssia:
+class TestGroups:
     def test_frames_with_a_ball_are_groups_by_video_frame(
         self, folder: Path, report: Report
     ) -> None:
@@ -180,9 +178,9 @@ class TestReadIssia:
         ]  # fmt: skip
 
 
-class TestReadIssiaPersons:
+class TestPersons:
     def test_people_that_no_view_holds(self, folder: Path, report: Report) -> None:
-        persons = list(read_issia_persons(folder, IssiaOptions(), report))
+        persons = list(open_issia(folder, IssiaOptions(), report).persons())
         assert [(item.frame, item.camera, len(item.boxes)) for item in persons] == [
             (12, "cam3", 3), (11, "cam4", 1),
         ]  # fmt: skip

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from app.datasets.export_record import ExportRecord
-from app.datasets.yolo import label_line, write_yolo
+from app.datasets.yolo_writer import label_line, write_yolo
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
 

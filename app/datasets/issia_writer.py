@@ -11,9 +11,8 @@ from xml.sax.saxutils import quoteattr
 
 from app.datasets.archive import resolve_inside
 from app.datasets.camera_json import camera_to_json
-from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons
-from app.datasets.issia_3d import frame_number, view_camera
-from app.datasets.sn_calibration import line_file_text
+from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons, frame_number, view_camera
+from app.datasets.sn_calibration_writer import line_file_text
 from app.datasets.spill import Key, Spill, open_spill
 from app.finite import json_text
 from app.soccer.group import Group, Station, View

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from app.datasets.camera_json import camera_to_json
 from app.datasets.csv_text import Table, Value, cell, plain_list
 from app.datasets.export_record import ExportRecord
-from app.datasets.issia import CALIBRATION
-from app.datasets.issia_3d_reader import TABLE
+from app.datasets.issia import CALIBRATION, TABLE_3D, frame_number, view_camera
 from app.datasets.spill import Spill, open_spill
-from app.errors import InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
-from app.soccer.group import Group, View
+from app.soccer.group import View
 from app.soccer.solution import BallFit
 
 CAMERAS = (1, 2, 3, 4, 5, 6)
@@ -30,9 +27,6 @@ COLUMNS = (
     *(f"opt_d_cam{camera}" for camera in CAMERAS),
     *(f"opt_e_cam{camera}" for camera in CAMERAS),
 )
-
-_VIEW = re.compile(r"cam([1-6])", re.ASCII)
-_FRAME = re.compile(r"-?\d{1,9}", re.ASCII)
 
 
 def write_issia_3d(
@@ -64,7 +58,7 @@ def write_issia_3d(
                 counts["groups"] += 1
                 counts["points"] += record.point is not None
                 counts["balls"] += sum(map(record.has_ball_3d, annotating.values()))
-        _write_table(root / TABLE, spill, everything)
+        _write_table(root / TABLE_3D, spill, everything)
     _write_calibration(root, cameras)
     return counts
 
@@ -84,37 +78,6 @@ def _annotating(record: ExportRecord) -> dict[int, View]:
         for camera, view in sorted(numbered.items())
         if view.ball is not None and view.ball.center is not None
     }
-
-
-def view_camera(group: Group, view: View) -> int:
-    """Number of the camera of a view of ISSIA.
-
-    Raises:
-        InputError: The group is from another kind of dataset.
-    """
-    found = _VIEW.fullmatch(view.key)
-    if found is None:
-        raise _not_issia(group, view.key)
-    frame_number(group)
-    return int(found[1])
-
-
-def frame_number(group: Group) -> int:
-    """Number of the frame of a group of ISSIA.
-
-    Raises:
-        InputError: The group is from another kind of dataset.
-    """
-    if not _FRAME.fullmatch(group.key):
-        raise _not_issia(group, ", ".join(view.key for view in group.views))
-    return int(group.key)
-
-
-def _not_issia(group: Group, view: str) -> InputError:
-    return InputError(
-        f"group {group.key}, view {view} is not from ISSIA (frame, cam1 to cam6)",
-        hint="Export it as soccernet-v3d or cameras instead.",
-    )
 
 
 def _collect_cameras(record: ExportRecord, cameras: dict[int, Camera]) -> None:

@@ -7,9 +7,9 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from app.datasets import parquet
+from app.datasets import parquet_writer
 from app.datasets.export_record import ExportRecord
-from app.datasets.parquet import COLUMNS, write_parquet
+from app.datasets.parquet_writer import COLUMNS, write_parquet
 from app.geometry.camera import Camera
 from app.soccer.group import Group
 
@@ -43,7 +43,7 @@ class TestWriteParquet:
     def test_row_groups_are_written_as_they_fill(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(parquet, "ROWS", 4)
+        monkeypatch.setattr(parquet_writer, "ROWS", 4)
         seen: list[int] = []
 
         def records() -> Any:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from app.datasets.camera_json import camera_from_json
-from app.datasets.coco import write_coco
+from app.datasets.coco_writer import write_coco
 from app.datasets.export_record import ExportRecord
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation

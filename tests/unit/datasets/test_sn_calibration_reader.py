@@ -6,32 +6,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from app.datasets.report import Report
-from app.datasets.sn_calibration import (
-    DEFAULT_SIZE,
-    LineFile,
-    lines_from_json,
-    lines_to_json,
-    read_line_files,
-    spelling,
-    write_line_files,
-)
-from app.datasets.sn_calibration_groups import read_sn_calibration
-from app.errors import DatasetFormatError, UnsafePathError
-from app.soccer.annotation import make_lines
+from app.datasets.sn_calibration import DEFAULT_SIZE
+from app.datasets.sn_calibration_reader import lines_from_json, read_line_files, read_sn_calibration
+from app.errors import DatasetFormatError
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
-from app.soccer.pitch import MARKINGS
 
 LINE = [{"x": 0.25, "y": 0.5}, {"x": 1.0, "y": -0.125}]
-
-UNIT = st.floats(-0.5, 1.5)
-LINE_FILES = st.dictionaries(
-    st.sampled_from([spelling(marking) for marking in MARKINGS] + ["Line unknown"]),
-    st.lists(st.fixed_dictionaries({"x": UNIT, "y": UNIT}), min_size=1, max_size=6),
+NAMED_WITH_SPACE = json.dumps(
+    {"Goal left post left ": [{"x": 0.5, "y": 0.5}, {"x": 0.5, "y": 1.125}]}
 )
 
 
@@ -81,28 +66,6 @@ class TestLinesFromJson:
     def test_a_list_is_no_line_file(self, report: Report) -> None:
         with pytest.raises(DatasetFormatError, match="not an object"):
             lines_from_json([], DEFAULT_SIZE, "f", report)
-
-
-class TestLinesToJson:
-    def test_the_formats_own_spelling_is_written(self) -> None:
-        lines = make_lines({"Goal left post left": [(1.0, 2.0)]})
-        assert list(lines_to_json(lines, DEFAULT_SIZE)) == ["Goal left post left "]
-
-    def test_points_far_outside_make_a_file_in_pixels(self, report: Report) -> None:
-        lines = make_lines({"Middle line": [(5000.0, 1.0), (3.0, 4.0)]})
-        value = lines_to_json(lines, DEFAULT_SIZE)
-        assert value["Middle line"][0] == {"x": 5000.0, "y": 1.0}
-        assert lines_from_json(value, DEFAULT_SIZE, "f", report)[0] == lines
-
-    @given(LINE_FILES, st.sampled_from([DEFAULT_SIZE, ImageSize(1280, 720), ImageSize(854, 480)]))
-    def test_import_export_import_gives_the_same_lines(
-        self, value: dict[str, Any], size: ImageSize
-    ) -> None:
-        report = Report()
-        first = lines_from_json(value, size, "f", report)
-        text = json.dumps(lines_to_json(first[0], size, first[1]))
-        assert lines_from_json(json.loads(text), size, "f", report) == first
-        assert report.problems == []
 
 
 class TestReadLineFiles:
@@ -155,16 +118,31 @@ class TestReadSnCalibration:
         assert view.extras.lines[0]["class"] == "Line unknown"
         assert view.size == DEFAULT_SIZE
 
+    def test_the_match_the_split_and_the_record_of_an_image(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        for split in ("train", "test"):
+            (tmp_path / split).mkdir()
+            (tmp_path / split / "00001.json").write_text(NAMED_WITH_SPACE)
+            info = {"00001.jpg": {"league": "l", "season": "s", "match": split, "half": 1}}
+            (tmp_path / split / "match_info.json").write_text(json.dumps(info))
+        groups = {group.key: group for group in read_sn_calibration(tmp_path, DEFAULT_SIZE, report)}
+        assert set(groups) == {"train/00001", "test/00001"}
+        first = groups["train/00001"]
+        assert (first.match, first.split, first.label) == (
+            "l/s/train",
+            "train",
+            "train · frame 00001",
+        )
+        assert first.views[0].extras.metadata["match_info"]["half"] == 1
+        assert report.problems == []
 
-class TestWriteLineFiles:
-    def test_what_is_written_is_read_the_same(self, tmp_path: Path, report: Report) -> None:
-        lines = make_lines({"Middle line": [(0.0, 0.0), (959.0, 539.0)]})
-        others = ({"class": "Line unknown", "points": [0.0, 539.0]},)
-        files = [LineFile("a/00002", DEFAULT_SIZE, lines, others)]
-        write_line_files(tmp_path, files)
-        (again,) = read_line_files(tmp_path, DEFAULT_SIZE, report)
-        assert (again.lines, again.others) == (lines, others)
-
-    def test_a_stem_that_leaves_the_folder_is_refused(self, tmp_path: Path) -> None:
-        with pytest.raises(UnsafePathError):
-            write_line_files(tmp_path, [LineFile("../a", DEFAULT_SIZE, make_lines({}))])
+    def test_the_name_with_a_space_and_points_outside_are_kept(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        (tmp_path / "00001.json").write_text(NAMED_WITH_SPACE)
+        (group,) = read_sn_calibration(tmp_path, DEFAULT_SIZE, report)
+        (points,) = group.views[0].station.lines.values()
+        assert list(group.views[0].station.lines) == ["Goal left post left"]
+        assert points[1].y == 1.125 * 539
+        assert (group.match, group.label) == ("", "Frame 00001")

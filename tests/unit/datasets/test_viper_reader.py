@@ -9,7 +9,7 @@ import pytest
 
 from app.datasets.archive import Limits, open_tree
 from app.datasets.report import Report
-from app.datasets.viper import ViperTrack, read_viper
+from app.datasets.viper_reader import ViperTrack, read_viper
 
 HEAD = (
     '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -129,7 +129,7 @@ class TestReadViper:
     def test_spans_that_unfold_without_end_are_refused(
         self, tmp_path: Path, report: Report, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("app.datasets.viper.MAX_ENTRIES", 1000)
+        monkeypatch.setattr("app.datasets.viper_reader.MAX_ENTRIES", 1000)
         text = HEAD + "".join(person(number, BOX, "1:400") for number in range(5)) + TAIL
         assert _read(tmp_path, text, report).person_boxes == 800
         assert "holds more than 1,000 entries" in str(report.problems[0])

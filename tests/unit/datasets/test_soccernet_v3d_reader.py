@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.datasets.report import Report
-from app.datasets.snv3d_reader import read_soccernet_v3d
+from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
 from app.soccer.frames import Box
 from app.soccer.group import Group
 

@@ -12,17 +12,18 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
+from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, files_inside, open_tree
 from app.datasets.camera_json import camera_from_json
 from app.datasets.match_frames import MatchFrames
 from app.datasets.report import Report
-from app.datasets.snv3d_table import TABLE, SnTable, TableRow, read_snv3d_table
 from app.datasets.soccernet_record import GAME, IMAGE
-from app.datasets.soccernet_v3 import MatchReader, files_inside, group_label
+from app.datasets.soccernet_v3 import group_label
+from app.datasets.soccernet_v3_reader import MatchReader
+from app.datasets.soccernet_v3d import LABELS, TABLE
+from app.datasets.soccernet_v3d_table import SnTable, TableRow, read_snv3d_table
 from app.errors import DatasetFormatError
 from app.soccer.group import Group, Station, View
 
-LABELS = "Labels-v3D.json"
 COMPUTED = (
     "calibration",
     "JaC",

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from app.datasets.issia import FramePersons, IssiaOptions, open_issia
+from app.datasets.issia import FramePersons
+from app.datasets.issia_reader import IssiaOptions, open_issia
+from app.datasets.issia_writer import write_issia
 from app.datasets.report import Report
-from app.datasets.xgtf import write_issia
 from app.errors import InputError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, make_lines

@@ -6,14 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from app.datasets.camera_json import read_cameras
+from app.datasets.cameras_reader import read_cameras
+from app.datasets.cameras_writer import write_camera_files, write_cameras
 from app.datasets.export_record import ExportRecord
-from app.datasets.per_view import view_stem, write_camera_files, write_sn_calibration
 from app.datasets.report import Report
-from app.datasets.sn_calibration import read_line_files
 from app.errors import UnsafePathError
 from app.geometry.camera import Camera
-from app.soccer.frames import ImageSize
 from app.soccer.group import Group
 
 Solved = Callable[..., ExportRecord]
@@ -48,19 +46,7 @@ class TestWriteCameraFiles:
             write_camera_files(tmp_path, [solved(group)])
 
 
-class TestWriteSnCalibration:
-    def test_lines_and_cameras_lie_beside_each_other_and_come_back(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
-    ) -> None:
-        group = soccer_group()
-        counts = write_sn_calibration(tmp_path, [solved(group)])
-        assert counts == {"groups": 1, "frames": 2, "cameras": 2}
-        files = list(read_line_files(tmp_path, ImageSize(1280, 720), report))
-        assert [file.stem for file in files] == ["7", "7_1"]
-        assert [file.lines for file in files] == [view.station.lines for view in group.views]
-        assert len(read_cameras(tmp_path, report)) == 2
-
-
-class TestViewStem:
-    def test_only_the_ending_of_an_image_is_cut(self) -> None:
-        assert [view_stem(key) for key in ("7_1.png", "cam3", "00002")] == ["7_1", "cam3", "00002"]
+class TestWriteCameras:
+    def test_a_key_that_leaves_the_folder_is_refused(self, tmp_path: Path, camera: Camera) -> None:
+        with pytest.raises(UnsafePathError):
+            write_cameras(tmp_path, {"../x": camera})

@@ -1,0 +1,93 @@
+"""Cameras, read: one a file (``camera_00002.json``), or ISSIA's six in one."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
+from app.datasets.camera_json import camera_from_json
+from app.datasets.json_text import read_json
+from app.datasets.report import Report
+from app.errors import DatasetFormatError
+from app.geometry.camera import Camera
+
+_FILE = re.compile(r"(?:camera_)?(.+)\.json", re.ASCII | re.IGNORECASE)
+
+_NO_CAMERAS = ("manifest.json", "match_info.json", "findings.json", "calibrate.json")
+
+
+def read_cameras(path: Path, report: Report, limits: Limits = DEFAULT_LIMITS) -> dict[str, Camera]:
+    """Every camera below ``path``, by key.
+
+    ``path`` is a folder or zip of ``camera_<stem>.json``, one such file, or a file with ISSIA's
+    ``{"cam1": {...}, ...}`` (also inside ``{"cameras": {...}}``, also double-encoded). The key
+    is the stem, with ``<league>/<season>/<match>/`` before it where the file lies that deep.
+    """
+    tree = open_tree(path, report, limits)
+    if tree is None:
+        return {}
+    with closing(tree):
+        cameras = cameras_of(tree, _camera_files(tree), report)
+    report.imported += len(cameras)
+    return cameras
+
+
+def cameras_of(tree: FileTree, names: Sequence[str], report: Report) -> dict[str, Camera]:
+    """The cameras of some files of a tree, by key."""
+    cameras: dict[str, Camera] = {}
+    stems = Counter(_key(name, deep=False) for name in names)
+    for name in names:
+        deep = stems[_key(name, deep=False)] > 1
+        _read_file(tree, name, _key(name, deep), cameras, report)
+    return cameras
+
+
+def _camera_files(tree: FileTree) -> list[str]:
+    """Camera files; where none is called ``camera_...``, every JSON file may be one."""
+    names = [name for name in tree.names() if name.lower().endswith(".json")]
+    named = [name for name in names if PurePosixPath(name).name.startswith("camera_")]
+    return named or [name for name in names if PurePosixPath(name).name not in _NO_CAMERAS]
+
+
+def _key(name: str, deep: bool) -> str:
+    place = PurePosixPath(name)
+    found = _FILE.fullmatch(place.name)
+    stem = found.group(1) if found else place.stem
+    folders = place.parts[:-1]
+    keep = folders if deep else folders[-3:] if len(folders) >= 3 else ()
+    return "/".join((*keep, stem))
+
+
+def _read_file(
+    tree: FileTree, name: str, key: str, cameras: dict[str, Camera], report: Report
+) -> None:
+    shown = tree.shown(name)
+    try:
+        value = read_json(tree.read_bytes(name), shown, double_encoded=True)
+    except DatasetFormatError as error:
+        report.read += 1
+        report.skip(error)
+        return
+    several = _several(value)
+    for record, item in several.items() if several is not None else ((None, value),):
+        report.read += 1
+        try:
+            cameras[record or key] = camera_from_json(item, shown, record)
+        except DatasetFormatError as error:
+            report.skip(error)
+
+
+def _several(value: Any) -> dict[str, Any] | None:
+    """The cameras by name when the file holds several, else None."""
+    if not isinstance(value, dict) or "pan_degrees" in value:
+        return None
+    if isinstance(value.get("cameras"), dict):
+        return dict(value["cameras"])
+    if not any(isinstance(item, dict) for item in value.values()):
+        return None
+    return {name: item for name, item in value.items() if not name.startswith("_")}

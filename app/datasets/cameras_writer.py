@@ -1,0 +1,74 @@
+"""Cameras, written: one file a view (``camera_7_1.json``)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path, PurePosixPath
+
+from app.datasets.archive import resolve_inside
+from app.datasets.camera_json import camera_to_json
+from app.datasets.export_record import ExportRecord
+from app.datasets.frame_names import view_stem
+from app.finite import json_text
+from app.geometry.camera import Camera
+from app.soccer.group import View
+
+
+def camera_text(camera: Camera) -> str:
+    """The text of one camera file."""
+    return json_text(camera_to_json(camera), indent=1, ascii_=True) + "\n"
+
+
+def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:
+    """Write ``camera_<stem>.json`` per camera below an existing folder; the paths written.
+
+    A key with folders (``<league>/<season>/<match>/7_1``) becomes a file in those folders.
+
+    Raises:
+        UnsafePathError: A key that would leave the folder.
+    """
+    written = []
+    for key, camera in cameras.items():
+        place = PurePosixPath(key)
+        path = resolve_inside(root, str(place.with_name(f"camera_{place.name}.json")))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(camera_text(camera), encoding="utf-8")
+        written.append(path)
+    return written
+
+
+def write_camera_files(root: Path, records: Iterable[ExportRecord]) -> dict[str, int]:
+    """Write ``<match>/camera_<stem>.json`` for every view with a camera.
+
+    A static camera that many groups share is written once.
+
+    Returns:
+        Counts: ``groups`` and ``cameras``.
+
+    Raises:
+        UnsafePathError: A key would leave ``root``.
+    """
+    counts = {"groups": 0, "cameras": 0}
+    written: set[str] = set()
+    for record in records:
+        counts["groups"] += 1
+        counts["cameras"] += write_view_cameras(root, record, written)
+    return counts
+
+
+def write_view_cameras(root: Path, record: ExportRecord, written: set[str]) -> int:
+    before = len(written)
+    for view, place in placed_views(record):
+        camera = record.camera(view)
+        if camera is not None and place not in written:
+            write_cameras(root, {place: camera})
+            written.add(place)
+    return len(written) - before
+
+
+def placed_views(record: ExportRecord) -> Iterator[tuple[View, str]]:
+    """Where the files of each view go, without prefix and ending."""
+    for view in record.group.views:
+        # The key of a frame that is a group alone is the place of its file.
+        match = record.group.match if view.key != record.group.key else ""
+        yield view, str(PurePosixPath(match) / view_stem(view.key))

@@ -1,0 +1,173 @@
+"""COCO: ``annotations/instances_<split>.json``, one category ``ball``, and 3D in extra fields."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any
+
+from app.datasets.camera_json import camera_to_json
+from app.datasets.coco import PREFIX, STATE, UNASSIGNED
+from app.datasets.export_record import ExportRecord, chosen_box, frame_name
+from app.datasets.view_state import head_to_json, view_to_json
+from app.finite import json_text
+from app.soccer.frames import Box
+from app.soccer.group import View
+from app.soccer.solution import GAMMAS_PERCENT, BallFit
+
+CATEGORY_ID = 1
+CATEGORY = "ball"
+_CHUNK = 1024 * 1024
+_PART = ".part"
+
+
+def write_coco(
+    root: Path,
+    records: Iterable[ExportRecord],
+    *,
+    everything: bool = False,
+    boxes: str = "optimized",
+    info: Mapping[str, Any] | None = None,
+) -> dict[str, int]:
+    """Write one file a split below an existing folder.
+
+    An annotation is the ball of a view: its chosen box, and where it lies in 3D once that is
+    known. A ball that has only a centre and no 3D point to make a box from has no annotation;
+    its image still says where it is.
+
+    Args:
+        root: Existing folder.
+        records: Groups; one is in memory at a time.
+        everything: Whether views that failed a gate say where the 3D ball is.
+        boxes: One of ``BOX_KINDS``.
+        info: What stands under ``info``.
+
+    Returns:
+        Counts: ``groups``, ``images``, ``annotations`` (boxes), ``balls`` (views in which the 3D
+        ball holds).
+    """
+    counts = {"groups": 0, "images": 0, "annotations": 0, "balls": 0}
+    folder = root / "annotations"
+    folder.mkdir()
+    with ExitStack() as stack:
+        files: dict[str, _Instances] = {}
+        for record in records:
+            counts["groups"] += 1
+            for view in record.group.views:
+                split = record.split(view) or UNASSIGNED
+                if split not in files:
+                    path = folder / f"{PREFIX}{split}.json"
+                    files[split] = stack.enter_context(_Instances(path, info or {}))
+                counts["images"] += 1
+                counts["balls"] += record.has_ball_3d(view)
+                files[split].add_image(_image(record, view, counts["images"], everything))
+                annotation = _annotation(record, view, counts, everything, boxes)
+                if annotation is not None:
+                    files[split].add_annotation(annotation)
+    return counts
+
+
+class _Instances:
+    """One file: images go to its end at once, annotations wait in a file beside it."""
+
+    def __init__(self, path: Path, info: Mapping[str, Any]):
+        self._path, self._beside = path, path.with_suffix(_PART)
+        self._images: IO[str] = path.open("w", encoding="utf-8", newline="\n")
+        self._annotations: IO[str] = self._beside.open("w", encoding="utf-8", newline="\n")
+        self._counts = [0, 0]
+        categories = [{"id": CATEGORY_ID, "name": CATEGORY, "supercategory": "sports"}]
+        head = {"info": dict(info), "licenses": [], "categories": categories}
+        self._images.write(_text(head)[:-1] + ', "images": [')
+
+    def __enter__(self) -> _Instances:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._annotations.close()
+        with self._images, self._beside.open(encoding="utf-8") as beside:
+            self._images.write('\n], "annotations": [')
+            while chunk := beside.read(_CHUNK):
+                self._images.write(chunk)
+            self._images.write("\n]}\n")
+        self._beside.unlink()
+
+    def add_image(self, value: Mapping[str, Any]) -> None:
+        """One image."""
+        self._images.write(("," if self._counts[0] else "") + "\n" + _text(value))
+        self._counts[0] += 1
+
+    def add_annotation(self, value: Mapping[str, Any]) -> None:
+        """One annotation."""
+        self._annotations.write(("," if self._counts[1] else "") + "\n" + _text(value))
+        self._counts[1] += 1
+
+
+def _text(value: Mapping[str, Any]) -> str:
+    return json_text(value)
+
+
+def _image(record: ExportRecord, view: View, identity: int, everything: bool) -> dict[str, Any]:
+    camera, fit = record.camera(view), record.ball_fit(view, everything)
+    solved = record.view_solution(view)
+    jac = solved.calibration.jac if solved else None
+    computed = {
+        "camera": None if camera is None else camera_to_json(camera),
+        "jac": None if jac is None else dict(zip(map(str, GAMMAS_PERCENT), jac, strict=True)),
+        "ball_3d": list(record.point) if fit is not None and record.point else None,
+        "verdict": record.verdict_text,
+    }
+    return {
+        "id": identity,
+        "file_name": frame_name(record, view),
+        "width": view.size.width,
+        "height": view.size.height,
+        "group_id": record.group.key,
+        "view": view.key,
+        **computed,
+        STATE: {
+            **head_to_json(record.group),
+            "position": record.group.views.index(view),
+            **view_to_json(view),
+        },
+    }
+
+
+def _annotation(
+    record: ExportRecord, view: View, counts: dict[str, int], everything: bool, boxes: str
+) -> dict[str, Any] | None:
+    box = chosen_box(record, view, boxes)
+    if view.ball is None or box is None:
+        return None
+    counts["annotations"] += 1
+    fit, annotated = record.ball_fit(view, everything), view.ball.box
+    written = _bbox(box)
+    return {
+        "id": counts["annotations"],
+        "image_id": counts["images"],
+        "category_id": CATEGORY_ID,
+        "bbox": written,
+        "area": written[2] * written[3],
+        "iscrowd": 0,
+        "occluded": view.ball.occluded,
+        # So that a reader can tell a box that somebody changed from the one written here.
+        "written_bbox": written,
+        "annotated_bbox": None if annotated is None else _bbox(annotated),
+        **dict(_fit_fields(record, fit)),
+    }
+
+
+def _fit_fields(record: ExportRecord, fit: BallFit | None) -> Iterator[tuple[str, Any]]:
+    yield "ball_3d", list(record.point) if fit is not None and record.point else None
+    for name in ("error_px", "optimized_diameter_px", "optimized_error_m", "depth_m"):
+        yield name, None if fit is None else getattr(fit, name)
+
+
+def _bbox(box: Box) -> list[float]:
+    return [*map(float, (box.x, box.y, box.width, box.height))]

@@ -1,0 +1,256 @@
+"""sn-gamestate: ``<sequence>/Labels-GameState.json``, each image a group of one view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from app.datasets import fields
+from app.datasets.archive import (
+    DEFAULT_LIMITS,
+    FileTree,
+    Limits,
+    check_name,
+    files_inside,
+    open_tree,
+)
+from app.datasets.gamestate import BALL, LABELS, METADATA, PITCH
+from app.datasets.json_text import read_json
+from app.datasets.report import Report
+from app.datasets.sn_calibration_reader import lines_from_json
+from app.datasets.soccernet_record import MAX_SIDE
+from app.datasets.soccernet_v3 import SPLITS
+from app.errors import DatasetFormatError, UnsafePathError
+from app.soccer.annotation import BallAnnotation, Extras, Lines
+from app.soccer.frames import Box, ImageSize
+from app.soccer.group import Group, Media, Station, View
+
+_IDS = {1: "player", 2: "goalkeeper", 3: "referee", 4: BALL, 5: PITCH, 6: "camera"}
+_FOLDERS = ("img1/", "", "frames/")
+
+
+def read_gamestate(
+    root: Path,
+    report: Report,
+    *,
+    calibration: str = "given",
+    limits: Limits = DEFAULT_LIMITS,
+) -> Iterator[Group]:
+    """Every image of every sequence below ``root``, keyed ``<sequence>/<stem>``.
+
+    People go to ``Extras.boxes`` with their whole annotation; whatever else the file holds is
+    kept for the way back.
+    """
+    tree = open_tree(root, report, limits)
+    if tree is None:
+        return
+    with closing(tree):
+        names = tree.names()
+        files = [name for name in names if PurePosixPath(name).name == LABELS]
+        if not files:
+            report.note(str(root), None, None, f"holds no {LABELS}")
+        seen: dict[str, str] = {}
+        for name in files:
+            try:
+                sequence = _Sequence(tree, name, names, report, limits)
+                if sequence.key in seen:
+                    problem = f"is a second {sequence.key}; {seen[sequence.key]} is used"
+                    raise DatasetFormatError(sequence.path, None, None, problem)
+            except DatasetFormatError as error:
+                report.skip(error)
+                continue
+            seen[sequence.key] = sequence.path
+            yield from sequence.groups(calibration)
+
+
+@dataclass
+class _Image:
+    """The annotations of one image."""
+
+    lines: Lines = field(default_factory=dict)
+    other_lines: tuple[Mapping[str, Any], ...] = ()
+    balls: list[BallAnnotation] = field(default_factory=list)
+    boxes: list[Mapping[str, Any]] = field(default_factory=list)
+    kept: dict[str, Any] = field(default_factory=dict)
+
+
+class _Sequence:
+    """One Labels-GameState.json on its way to groups."""
+
+    def __init__(self, tree: FileTree, name: str, names: list[str], report: Report, limits: Limits):
+        self.path, self._report, self._tree = tree.shown(name), report, tree
+        value = read_json(tree.read_bytes(name), self.path, max_bytes=limits.file_bytes)
+        if not isinstance(value, dict):
+            raise DatasetFormatError(self.path, None, None, "is not an object")
+        self._value = value
+        self._folder = name[: -len(LABELS)]
+        self._inside = files_inside(names, self._folder)
+        self.key = self._key()
+        parts = PurePosixPath(name).parts
+        self._split = next((part for part in reversed(parts) if part in SPLITS), "")
+
+    def _key(self) -> str:
+        folders = PurePosixPath(self._folder).parts
+        info = self._value.get("info")
+        said = info.get("name") if isinstance(info, dict) else None
+        root = self._tree.path
+        name = folders[-1] if folders else said or (root.name if root.is_dir() else root.stem)
+        try:
+            return check_name(str(name)).replace("/", "_")
+        except UnsafePathError as error:
+            raise DatasetFormatError(self.path, None, "info.name", error.message) from error
+
+    def _list(self, name: str) -> list[Any]:
+        value = self._value.get(name)
+        if not isinstance(value, list):
+            self._report.note(self.path, None, name, "is missing or not a list")
+            return []
+        return value
+
+    def groups(self, calibration: str) -> Iterator[Group]:
+        """Image by image, in the file's order."""
+        records = dict(self._records())
+        images = self._annotated(records)
+        common = {name: self._value[name] for name in ("info", "categories") if name in self._value}
+        for identity, (record, size) in records.items():
+            image = images[identity]
+            key = str(record["file_name"])
+            kept = {"image": record, **image.kept, **common}
+            extras = Extras(tuple(image.boxes), image.other_lines, {METADATA: kept})
+            name = f"{self.key}/{PurePosixPath(key).stem}"
+            station = Station(name, size, lines=image.lines, calibration=calibration)
+            view = View(key, station, tuple(image.balls), self._media(key), extras=extras)
+            self._report.imported += 1
+            label = f"{self.key} · {PurePosixPath(key).stem}"
+            yield Group(name, (view,), match=self.key, split=self._split, label=label)
+
+    def _records(self) -> Iterator[tuple[str, tuple[dict[str, Any], ImageSize]]]:
+        """Sound image records by their id as text, each name once."""
+        names: set[str] = set()
+        for index, record in enumerate(self._list("images")):
+            self._report.read += 1
+            where = f"images[{index}]"
+            try:
+                image = fields.mapping(record)
+                key = image.get("file_name")
+                if not isinstance(key, str) or "/" in check_name(key):
+                    raise ValueError("has no file_name that is a file's name")
+                if "image_id" not in image and "id" not in image:
+                    raise ValueError("has no image_id")
+                if PurePosixPath(key).stem in names:
+                    raise ValueError(f"is a second {key}")
+                size = ImageSize(_side(image, "width"), _side(image, "height"))
+            except UnsafePathError as error:
+                self._report.note(self.path, where, "file_name", error.message)
+                continue
+            except ValueError as error:
+                self._report.note(self.path, where, None, str(error))
+                continue
+            names.add(PurePosixPath(key).stem)
+            # Some tools spell the ids as numbers.
+            yield str(image.get("image_id", image.get("id"))), (image, size)
+
+    def _annotated(
+        self, records: Mapping[str, tuple[dict[str, Any], ImageSize]]
+    ) -> dict[str, _Image]:
+        images = {identity: _Image() for identity in records}
+        categories = self._categories()
+        for index, item in enumerate(self._list("annotations")):
+            where = f"annotations[{index}]"
+            identity = str(item.get("image_id")) if isinstance(item, dict) else None
+            if identity is None or identity not in images:
+                self._report.note(self.path, where, "image_id", "names no image of the file")
+                continue
+            name = categories.get(str(item.get("category_id")), "")
+            if name == PITCH:
+                self._add_lines(images[identity], item, records[identity][1], where)
+            elif name == BALL:
+                self._add_ball(images[identity], item, where)
+            elif isinstance(item.get("bbox_image"), dict):
+                images[identity].boxes.append(_box(item))
+            else:
+                images[identity].kept.setdefault("others", []).append(item)
+        return images
+
+    def _categories(self) -> dict[str, str]:
+        """Name of each category by its id as text."""
+        found = {str(identity): name for identity, name in _IDS.items()}
+        listed = self._value.get("categories")
+        for item in listed if isinstance(listed, list) else []:
+            if isinstance(item, dict) and isinstance(item.get("name"), str):
+                found[str(item.get("id"))] = item["name"].strip().lower()
+        return found
+
+    def _add_lines(self, image: _Image, item: dict[str, Any], size: ImageSize, where: str) -> None:
+        if "pitch" in image.kept:
+            self._report.note(self.path, where, None, "is a second pitch of its image; left out")
+            return
+        image.kept["pitch"] = {name: value for name, value in item.items() if name != "lines"}
+        try:
+            shown = f"{self.path}, {where}"
+            lines = item.get("lines") or {}
+            image.lines, image.other_lines = lines_from_json(lines, size, shown, self._report)
+        except DatasetFormatError as error:
+            self._report.note(self.path, where, "lines", error.problem)
+
+    def _add_ball(self, image: _Image, item: dict[str, Any], where: str) -> None:
+        try:
+            image.balls.append(_ball(item))
+        except ValueError as error:
+            self._report.note(self.path, where, "bbox_image", f"{error}; kept without geometry")
+            image.kept.setdefault("others", []).append(item)
+            return
+        rest = {name: value for name, value in item.items() if name != "bbox_image"}
+        image.kept.setdefault("balls", []).append(rest)
+
+    def _media(self, key: str) -> Media | None:
+        for folder in _FOLDERS:
+            if folder + key in self._inside:
+                name = self._folder + folder + key
+                if self._tree.path.is_dir():
+                    return Media(self._tree.shown(name))
+                return Media(str(self._tree.path), name)
+        self._report.counts["views without frame"] += 1
+        return None
+
+
+def _side(image: Mapping[str, Any], name: str) -> int:
+    side = fields.whole(image.get(name))
+    if not 2 <= side <= MAX_SIDE:
+        raise ValueError(f"has a {name} of {side} pixels")
+    return side
+
+
+def _corner_box(item: Mapping[str, Any]) -> Box:
+    place = fields.mapping(item.get("bbox_image"))
+    missing = [name for name in ("x", "y", "w", "h") if name not in place]
+    if missing:
+        raise ValueError(f"has no {missing[0]}")
+    return Box(*(fields.pixel(place[name]) for name in ("x", "y", "w", "h")))
+
+
+def _ball(item: Mapping[str, Any]) -> BallAnnotation:
+    """A box without area is the ball's centre alone."""
+    box = _corner_box(item)
+    if box.width < 0 or box.height < 0:
+        raise ValueError("has a negative width or height")
+    if box.width == 0 or box.height == 0:
+        return BallAnnotation(point=box.center)
+    return BallAnnotation(box=box)
+
+
+def _box(item: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A person in the shape that all datasets show, with the annotation as it was."""
+    attributes = item.get("attributes")
+    said = attributes if isinstance(attributes, dict) else {}
+    role = " ".join(str(said[name]) for name in ("role", "team") if said.get(name))
+    value: dict[str, Any] = {"class": role or None, "ID": said.get("jersey"), METADATA: dict(item)}
+    try:
+        box = _corner_box(item)
+    except ValueError:
+        return value
+    corners = {"x1": box.x, "y1": box.y, "x2": box.x + box.width, "y2": box.y + box.height}
+    return value | {"points": corners}

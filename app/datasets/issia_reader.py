@@ -1,0 +1,298 @@
+"""ISSIA, read: six static cameras, ViPER ground truth, ``issia_calibration.json``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
+from app.datasets.cameras_reader import cameras_of
+from app.datasets.frame_names import IMAGE_SUFFIXES
+from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, DEFAULT_SIZE, MATCH, FramePersons
+from app.datasets.report import Report
+from app.datasets.sn_calibration import LineFile
+from app.datasets.sn_calibration_reader import line_files_of, read_line_files
+from app.datasets.viper_reader import ViperTrack, read_viper
+from app.geometry.camera import Camera
+from app.soccer.annotation import BallAnnotation, Extras
+from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.group import Group, Media, Station, View
+
+TEST_CAMERAS = frozenset({1, 2})
+"""Cameras 3 to 6 train."""
+
+_VIDEO_SUFFIXES = (".mp4", ".avi", ".mpg", ".mpeg", ".mkv", ".mov")
+# "Film Role-0 ID-3 T-0 ...", "cam3", "camera_3", "ground_truth_3": what follows says nothing.
+_NUMBERED = (
+    re.compile(r"\bID-(\d{1,3})\b", re.ASCII),
+    re.compile(r"cam(?:era)?[ _-]?(\d{1,3})(?!\d)", re.ASCII | re.IGNORECASE),
+    re.compile(r"(\d{1,3})(?!.*\d)", re.ASCII),
+)
+_VIDEO = re.compile(r"(?:cam(?:era)?[ _-]?\d{1,3}|Film Role.*\bID-\d{1,3}\b.*)", re.IGNORECASE)
+_OWN_LINES = re.compile(r"lines/cam\d{1,3}\.json", re.ASCII)
+_FRAME = re.compile(r"(?:frame[ _-]?)?(\d{1,9})", re.ASCII | re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class IssiaOptions:
+    """What the files do not say themselves.
+
+    Attributes:
+        frame_offset: Number of a frame = number in the XGTF file - offset; for all cameras, or
+            by camera.
+        flipped: Cameras whose frames are mirrored; annotations and calibration are not.
+        lines: Folder (or zip) of ``cam1.json`` .. with the field lines of the static cameras.
+        calibration: What counts for a camera that has both: ``given`` or ``lines``.
+        size: Size of the annotated images.
+    """
+
+    frame_offset: int | Mapping[int, int] = DEFAULT_OFFSET
+    flipped: frozenset[int] = frozenset()
+    lines: Path | None = None
+    calibration: str = "given"
+    size: ImageSize = DEFAULT_SIZE
+
+    def offset(self, camera: int) -> int:
+        """Offset of one camera."""
+        if isinstance(self.frame_offset, int):
+            return self.frame_offset
+        return self.frame_offset.get(camera, DEFAULT_OFFSET)
+
+
+@dataclass
+class IssiaFolder:
+    """A folder as read: one track and one station per camera, by camera number."""
+
+    tracks: dict[int, ViperTrack] = field(default_factory=dict)
+    stations: dict[int, Station] = field(default_factory=dict)
+    videos: dict[int, str] = field(default_factory=dict)
+    frames: dict[tuple[int, int], Media] = field(default_factory=dict)
+
+    def groups(self) -> Iterator[Group]:
+        """Every frame with a ball annotation as a group, keyed by its number, in their order.
+
+        Its views are the cameras that annotate the ball (``cam1`` ..), which share one station
+        per camera. People of such a view are in its ``Extras.boxes``.
+        """
+        seen: dict[int, list[int]] = {}
+        for camera in sorted(self.tracks):
+            for frame in self.tracks[camera].balls:
+                seen.setdefault(frame, []).append(camera)
+        for frame in sorted(seen):
+            cameras = seen[frame]
+            views = tuple(self._view(camera, frame) for camera in cameras)
+            split = _split(cameras)
+            yield Group(str(frame), views, match=MATCH, split=split, label=f"Frame {frame}")
+
+    def persons(self) -> Iterator[FramePersons]:
+        """Persons of camera and frame pairs without a ball, which no group holds."""
+        for camera in sorted(self.tracks):
+            track = self.tracks[camera]
+            for frame in sorted(track.persons):
+                if frame not in track.balls:
+                    boxes = _person_boxes(track, frame)
+                    yield FramePersons(frame, f"cam{camera}", boxes)
+
+    def _view(self, camera: int, frame: int) -> View:
+        track = self.tracks[camera]
+        balls = tuple(BallAnnotation(point=ImagePoint(x, y)) for x, y in track.balls[frame])
+        notes = track.ball_notes.get(frame)
+        extras = Extras(_person_boxes(track, frame), (), {"ball": notes} if notes else {})
+        media = self.frames.get((camera, frame))
+        if media is None and camera in self.videos:
+            media = Media(self.videos[camera], frame=frame)
+        return View(f"cam{camera}", self.stations[camera], balls, media, extras=extras)
+
+
+def _person_boxes(track: ViperTrack, frame: int) -> tuple[Mapping[str, Any], ...]:
+    """Boxes in the shape of SoccerNet's, so that all datasets show them alike; by id."""
+    persons = sorted(track.persons.get(frame, ()), key=lambda item: (item[0].zfill(12), item[1:]))
+    return tuple(
+        {
+            "class": "Person",
+            "ID": identity,
+            "points": {"x1": x, "y1": y, "x2": x + width, "y2": y + height},
+        }
+        for identity, x, y, width, height in persons
+    )
+
+
+def _split(cameras: list[int]) -> str:
+    """The split of a frame; empty where cameras of both see it."""
+    sides = {"test" if camera in TEST_CAMERAS else "train" for camera in cameras}
+    return sides.pop() if len(sides) == 1 else ""
+
+
+def open_issia(
+    folder: Path, options: IssiaOptions, report: Report, limits: Limits = DEFAULT_LIMITS
+) -> IssiaFolder:
+    """Read a folder (or zip) once, for its groups and its persons.
+
+    XGTF files (plain or .gz) may lie anywhere below it; the camera's number comes from the
+    file's name. ``issia_calibration.json`` gives the cameras. Line files are those of
+    ``options.lines``, else ``lines/cam1.json`` .. of the folder itself.
+    """
+    found = IssiaFolder()
+    tree = open_tree(folder, report, limits)
+    if tree is None:
+        return found
+    with closing(tree):
+        names = tree.names()
+        _read_tracks(tree, names, options, found, report, limits)
+        complete(found, tree, names, options, report, limits)
+    count(found, report)
+    return found
+
+
+def complete(
+    found: IssiaFolder,
+    tree: FileTree,
+    names: list[str],
+    options: IssiaOptions,
+    report: Report,
+    limits: Limits,
+) -> None:
+    """Give each camera that has a track its station and its media."""
+    given = _read_given(tree, names, report)
+    _find_media(tree, names, found)
+    if options.lines is None:
+        lines = _own_lines(tree, names, options.size, report)
+    else:
+        lines = _read_lines(options.lines, options.size, report, limits)
+    for camera in found.tracks:
+        found.stations[camera] = _station(camera, given.get(camera), lines.get(camera), options)
+
+
+def camera_number(name: str) -> int | None:
+    """Number of the camera that a file's name speaks of.
+
+    Example:
+        >>> camera_number("Film Role-0 ID-3 T-0 m00s00-026.xgtf"), camera_number("ground_truth_5")
+        (3, 5)
+    """
+    for pattern in _NUMBERED:
+        found = pattern.search(name)
+        if found:
+            return int(found[1])
+    return None
+
+
+def _read_tracks(
+    tree: FileTree,
+    names: list[str],
+    options: IssiaOptions,
+    found: IssiaFolder,
+    report: Report,
+    limits: Limits,
+) -> None:
+    files = [name for name in names if name.lower().endswith((".xgtf", ".xgtf.gz"))]
+    if not files:
+        report.note(str(tree.path), None, None, "holds no XGTF file")
+    for name in files:
+        stem = re.sub(r"(?i)\.xgtf(\.gz)?$", "", PurePosixPath(name).name)
+        camera = camera_number(stem)
+        if camera is None:
+            report.note(tree.shown(name), None, None, "has no camera number in its name")
+        elif camera in found.tracks:
+            report.note(tree.shown(name), None, None, f"is a second file of camera {camera}")
+        else:
+            track = read_viper(tree, name, report, limits)
+            found.tracks[camera] = _shifted(track, options.offset(camera))
+
+
+def _shifted(track: ViperTrack, offset: int) -> ViperTrack:
+    return ViperTrack(
+        {frame - offset: points for frame, points in track.balls.items()},
+        {frame - offset: boxes for frame, boxes in track.persons.items()},
+        {frame - offset: notes for frame, notes in track.ball_notes.items()},
+    )
+
+
+def _read_given(tree: FileTree, names: list[str], report: Report) -> dict[int, Camera]:
+    files = [name for name in names if PurePosixPath(name).name == CALIBRATION]
+    if not files:
+        return {}
+    for name in files[1:]:
+        report.note(tree.shown(name), None, None, f"is a second {CALIBRATION}; {files[0]} is used")
+    side = Report()
+    cameras = cameras_of(tree, files[:1], side)
+    for problem in side.problems:
+        report.skip(problem)
+    return {
+        number: camera
+        for name, camera in cameras.items()
+        if (number := camera_number(name)) is not None
+    }
+
+
+def _read_lines(path: Path, size: ImageSize, report: Report, limits: Limits) -> dict[int, LineFile]:
+    side = Report()
+    return _by_camera(read_line_files(path, size, side, limits), side, report)
+
+
+def _own_lines(
+    tree: FileTree, names: list[str], size: ImageSize, report: Report
+) -> dict[int, LineFile]:
+    """Lines that an export of this format laid beside the ground truth."""
+    own, side = [name for name in names if _OWN_LINES.fullmatch(name)], Report()
+    return _by_camera(line_files_of(tree, own, size, side), side, report)
+
+
+def _by_camera(files: Iterator[LineFile], side: Report, report: Report) -> dict[int, LineFile]:
+    lines = {}
+    for file in files:
+        number = camera_number(PurePosixPath(file.stem).name)
+        if number is not None:
+            lines[number] = file
+    for problem in side.problems:
+        report.skip(problem)
+    return lines
+
+
+def _station(
+    camera: int, given: Camera | None, lines: LineFile | None, options: IssiaOptions
+) -> Station:
+    return Station(
+        key=f"cam{camera}",
+        size=options.size,
+        shared=True,
+        lines=lines.lines if lines else {},
+        given=given,
+        calibration=options.calibration,
+        flipped=camera in options.flipped,
+    )
+
+
+def _find_media(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
+    """Videos ``cam3.mp4`` and frames ``cam3/000123.jpg``, where they lie in the folder.
+
+    Their numbers count as the groups' keys do.
+    """
+    if not tree.path.is_dir():
+        return
+    for name in names:
+        place = PurePosixPath(name)
+        suffix = place.suffix.lower()
+        if suffix in _VIDEO_SUFFIXES and _VIDEO.fullmatch(place.stem):
+            camera = camera_number(place.stem)
+            if camera is not None:
+                found.videos.setdefault(camera, tree.shown(name))
+        elif suffix in IMAGE_SUFFIXES and _VIDEO.fullmatch(place.parent.name):
+            camera, number = camera_number(place.parent.name), _FRAME.fullmatch(place.stem)
+            if camera is not None and number:
+                found.frames.setdefault((camera, int(number[1])), Media(tree.shown(name)))
+
+
+def count(found: IssiaFolder, report: Report) -> None:
+    """Note what a folder held."""
+    balls = {frame for track in found.tracks.values() for frame in track.balls}
+    persons = {frame for track in found.tracks.values() for frame in track.persons}
+    report.read += len(balls)
+    report.imported += len(balls)
+    report.counts["ball points"] += sum(t.ball_points for t in found.tracks.values())
+    report.counts["persons"] += sum(t.person_boxes for t in found.tracks.values())
+    report.counts["frames with persons only"] += len(persons - balls)

@@ -1,0 +1,186 @@
+"""sn-calibration, read: files of lines, and each image as a group of one view."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from app.datasets import fields
+from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
+from app.datasets.frame_names import IMAGE_SUFFIXES
+from app.datasets.json_text import read_json
+from app.datasets.match_info import METADATA, match_of, read_match_info
+from app.datasets.report import Report
+from app.datasets.sn_calibration import LARGEST_UNIT, LineFile
+from app.datasets.soccernet_v3 import SPLITS
+from app.errors import DatasetFormatError, UnknownMarkingError
+from app.soccer.annotation import Extras, Lines, make_lines
+from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.group import Group, Media, Station, View
+from app.soccer.pitch import WITHOUT_GEOMETRY, canonical_marking
+
+_OTHER_FILES = ("manifest.json", "findings.json", "calibrate.json", "leave_one_out.json")
+_OTHER_PREFIXES = ("camera_", "Labels-", "match_info")
+
+
+def read_line_files(
+    path: Path, size: ImageSize, report: Report, limits: Limits = DEFAULT_LIMITS
+) -> Iterator[LineFile]:
+    """The line files of a folder or zip (or one file), by name.
+
+    Coordinates are normalised by (width - 1, height - 1), or pixels when any lies beyond 2.
+    Points outside the image are kept. Unknown markings and unreadable points are reported; the
+    rest of the file is kept.
+
+    Args:
+        path: Folder, zip or JSON file.
+        size: Size of the annotated images, pixels.
+        report: Takes what had to be left out.
+        limits: Caps on what is read.
+    """
+    tree = open_tree(path, report, limits)
+    if tree is None:
+        return
+    with closing(tree):
+        yield from line_files_of(tree, tree.names(), size, report)
+
+
+def line_files_of(
+    tree: FileTree, names: Sequence[str], size: ImageSize, report: Report
+) -> Iterator[LineFile]:
+    """The line files among some files of a tree, with the images that lie beside them."""
+    beside = _images(names)
+    line_files = [name for name in names if _is_line_file(name)]
+    stems = Counter(PurePosixPath(name).stem for name in line_files)
+    for name in line_files:
+        whole = str(PurePosixPath(name).with_suffix(""))
+        stem = PurePosixPath(name).stem
+        key = stem if stems[stem] == 1 else whole
+        empty = LineFile(key, size, {}, (), _media(tree, beside.get(whole)), whole)
+        file = _read_line_file(tree, name, empty, report)
+        if file is not None:
+            yield file
+
+
+def _read_line_file(tree: FileTree, name: str, empty: LineFile, report: Report) -> LineFile | None:
+    report.read += 1
+    try:
+        value = read_json(tree.read_bytes(name), tree.shown(name))
+        lines, others = lines_from_json(value, empty.size, tree.shown(name), report)
+    except DatasetFormatError as error:
+        report.skip(error)
+        return None
+    report.imported += 1
+    return replace(empty, lines=lines, others=others)
+
+
+def _is_line_file(name: str) -> bool:
+    last = PurePosixPath(name).name
+    if not last.lower().endswith(".json"):
+        return False
+    return last not in _OTHER_FILES and not last.startswith(_OTHER_PREFIXES)
+
+
+def _images(names: Iterable[str]) -> dict[str, str]:
+    places = (PurePosixPath(name) for name in names)
+    return {
+        str(place.with_suffix("")): str(place)
+        for place in places
+        if place.suffix.lower() in IMAGE_SUFFIXES
+    }
+
+
+def _media(tree: FileTree, image: str | None) -> Media | None:
+    if image is None:
+        return None
+    if tree.path.is_dir():
+        return Media(tree.shown(image))
+    return Media(str(tree.path), image)
+
+
+def lines_from_json(
+    value: Any, size: ImageSize, path: str, report: Report
+) -> tuple[Lines, tuple[Mapping[str, Any], ...]]:
+    """Lines with geometry, and the others, of one parsed line file, in pixels.
+
+    Raises:
+        DatasetFormatError: The file is no object at all.
+    """
+    if not isinstance(value, dict):
+        raise DatasetFormatError(path, None, None, "is not an object of lines")
+    known: dict[str, list[ImagePoint]] = {}
+    others = []
+    points = {name: _points(item, path, name, report) for name, item in value.items()}
+    in_pixels = any(max(map(abs, p)) > LARGEST_UNIT for line in points.values() for p in line)
+    for name, line in points.items():
+        pixels = [ImagePoint(*p) if in_pixels else size.unit_to_pixel(*p) for p in line]
+        marking = _marking(name, path, report)
+        if marking is None:
+            flat = [coordinate for point in pixels for coordinate in point]
+            others.append({"class": name, "points": flat})
+        elif pixels:
+            known.setdefault(marking, []).extend(pixels)
+    return make_lines(known), tuple(others)
+
+
+def _points(value: Any, path: str, name: str, report: Report) -> list[tuple[float, float]]:
+    points = []
+    try:
+        for item in fields.sequence(value):
+            point = fields.mapping(item)
+            if "x" not in point or "y" not in point:
+                raise ValueError("has a point without x or y")
+            points.append((fields.pixel(point["x"]), fields.pixel(point["y"])))
+    except ValueError as error:
+        # A line that lost points in the middle would say something its annotator did not.
+        report.note(path, None, name, f"{error}; the line is left out")
+        return []
+    return points
+
+
+def _marking(name: str, path: str, report: Report) -> str | None:
+    """The marking of that name; None (reported unless the format knows it) for any other."""
+    try:
+        return canonical_marking(name)
+    except UnknownMarkingError as error:
+        if name.strip() not in WITHOUT_GEOMETRY:
+            report.note(path, None, name, f"{error.message}; kept without geometry")
+        return None
+
+
+def read_sn_calibration(
+    path: Path,
+    size: ImageSize,
+    report: Report,
+    *,
+    calibration: str = "given",
+    limits: Limits = DEFAULT_LIMITS,
+) -> Iterator[Group]:
+    """Each frame as a group of one view, keyed by its stem.
+
+    Its match comes from match_info.json, its split from a folder ``train``, ``valid``, ``test``
+    or ``challenge``. Cameras that lie beside the lines are not read: import them as ``cameras``.
+    """
+    tree = open_tree(path, report, limits)
+    if tree is None:
+        return
+    with closing(tree):
+        names = tree.names()
+        infos = read_match_info(tree, names, report)
+        for file in line_files_of(tree, names, size, report):
+            yield _group(file, infos.get(file.place, {}), calibration)
+
+
+def _group(file: LineFile, info: Mapping[str, Any], calibration: str) -> Group:
+    station = Station(file.stem, file.size, lines=file.lines, calibration=calibration)
+    extras = Extras(lines=file.others, metadata={METADATA: dict(info)} if info else {})
+    view = View(file.stem, station, media=file.media, extras=extras)
+    match, folders = match_of(info), PurePosixPath(file.place).parts[:-1]
+    split = next((part for part in reversed(folders) if part in SPLITS), "")
+    name = PurePosixPath(file.stem).name
+    label = f"{PurePosixPath(match).name} · frame {name}" if match else f"Frame {file.stem}"
+    return Group(file.stem, (view,), match=match, split=split, label=label)
