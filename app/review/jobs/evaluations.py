@@ -13,7 +13,7 @@ from app.review.evaluating.evaluation import (
     list_evaluations,
     run_evaluation,
 )
-from app.review.jobs.jobs import Jobs, Progress, Work
+from app.review.jobs.jobs import JobProgress, Jobs, Work
 from app.store.codecs import Json
 from app.store.evaluations import StoredEvaluation
 from app.store.jobs import Job
@@ -68,7 +68,7 @@ def resume_evaluations(jobs: Jobs, store: Store) -> None:
     def work_of(job: Job) -> Work:
         request, dataset_id = EvaluationRequest(**job.request), job.dataset_id or 0
 
-        def work(progress: Progress) -> Json:
+        def work(progress: JobProgress) -> Json:
             # The server may have stopped between the result and the record of its job.
             done = _evaluated_since(store, dataset_id, request, job.created)
             if done is not None:
@@ -83,7 +83,7 @@ def resume_evaluations(jobs: Jobs, store: Store) -> None:
 def evaluation_work(store: Store, dataset_id: int, request: EvaluationRequest, actor: str) -> Work:
     """The work of evaluating; its result names the evaluation."""
 
-    def work(progress: Progress) -> Json:
+    def work(progress: JobProgress) -> Json:
         found = run_evaluation(store, dataset_id, request, actor=actor, progress=progress)
         return evaluation_result(found)
 
@@ -93,7 +93,7 @@ def evaluation_work(store: Store, dataset_id: int, request: EvaluationRequest, a
 def accept_work(store: Store, dataset_id: int, request: AcceptRequest, actor: str) -> Work:
     """The work of accepting; its result counts what changed."""
 
-    def work(progress: Progress) -> Json:
+    def work(progress: JobProgress) -> Json:
         return accept_result(accept(store, dataset_id, request, actor=actor, progress=progress))
 
     return work

@@ -10,7 +10,7 @@ from app.review.exporting.export import export
 from app.review.exporting.folder import ExportFolder
 from app.review.exporting.source import LiveSource
 from app.review.importing.carry import FORMAT as CARRY
-from app.review.jobs.jobs import Jobs, Progress, Work, counting
+from app.review.jobs.jobs import JobProgress, Jobs, Work, counting
 from app.review.versions.version import find_version
 from app.store.codecs import Json
 from app.store.jobs import Job
@@ -63,7 +63,7 @@ def resume_exports(jobs: Jobs, store: Store, folder: ExportFolder) -> None:
 def export_work(store: Store, folder: ExportFolder, dataset_id: int, request: Json) -> Work:
     """The work itself; the zip appears whole or not at all, and its record after it."""
 
-    def work(progress: Progress) -> Json:
+    def work(progress: JobProgress) -> Json:
         name, version = str(progress.job_id), request.get("version")
         progress(0, None, f"Writing {request['format']}.")
         folder.prepare()

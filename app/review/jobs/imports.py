@@ -12,7 +12,7 @@ from app.errors import InputError
 from app.review.datasets.dataset import find_dataset, get_dataset, require_name
 from app.review.importing.folders import resolve_folder
 from app.review.importing.sources import FORMATS, Imported, Source, import_source
-from app.review.jobs.jobs import FailedWithReportError, Jobs, Progress, Work
+from app.review.jobs.jobs import FailedWithReportError, JobProgress, Jobs, Work
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
 from app.store.codecs import Json
@@ -105,7 +105,7 @@ def import_work(
 ) -> Work:
     """The work itself; its result is the report, also where it fails because it read nothing."""
 
-    def work(progress: Progress) -> Json:
+    def work(progress: JobProgress) -> Json:
         source = source_of(settings, request)
         sentence = f"{'Looking at' if request.dry_run else 'Importing'} {source.name}."
         progress(0, None, sentence)
@@ -131,7 +131,7 @@ def import_work(
     return work
 
 
-def _step(progress: Progress, sentence: str) -> Callable[[int], None]:
+def _step(progress: JobProgress, sentence: str) -> Callable[[int], None]:
     return lambda done: progress(done, None, f"{sentence} {done:,} groups so far.")
 
 

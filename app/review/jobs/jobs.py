@@ -56,7 +56,7 @@ PROMPT = frozenset({"solve"})
 KEPT = {"solve": 200, "bulk": 200, "verify": 200}
 """How many finished jobs of a kind are remembered; kinds that are not named keep all."""
 
-Work = Callable[["Progress"], Json]
+Work = Callable[["JobProgress"], Json]
 """What a job does; returns its result. It must be safe to start again from the beginning."""
 Listener = Callable[[Job], None]
 Pool = Callable[[], AbstractContextManager[Executor]]
@@ -77,12 +77,12 @@ class FailedWithReportError(ReviewError):
         self.result = result
 
 
-def counting(progress: Progress, what: str) -> Callable[[int, int], None]:
+def counting(progress: JobProgress, what: str) -> Callable[[int, int], None]:
     """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``."""
     return lambda done, total: progress(done, total, f"{done:,} of {total:,} {what}")
 
 
-class Progress:
+class JobProgress:
     """How far a job is; its work calls it often, and it costs next to nothing.
 
     ``job_id`` is the job's, for what its work writes under that name.
@@ -114,7 +114,7 @@ class _Run:
     kind: str
     dataset_id: int | None
     work: Work
-    progress: Progress
+    progress: JobProgress
     over: threading.Event = field(default_factory=threading.Event)
 
 
@@ -195,7 +195,7 @@ class Jobs:
             with self._store.write() as session:
                 identity = insert_job(session, new)
             job = self.get(identity)
-            run = _Run(identity, kind, dataset_id, work, Progress(identity, self._closing))
+            run = _Run(identity, kind, dataset_id, work, JobProgress(identity, self._closing))
             self._waiting.append(run)
             self._wake()
         self._announce(job)
@@ -308,7 +308,7 @@ class Jobs:
 
     def _run(self, job: Job) -> _Run:
         work = self._resumers[job.kind](job)
-        return _Run(job.id, job.kind, job.dataset_id, work, Progress(job.id, self._closing))
+        return _Run(job.id, job.kind, job.dataset_id, work, JobProgress(job.id, self._closing))
 
     def _wake(self) -> None:
         if self._worker is None and self._waiting:

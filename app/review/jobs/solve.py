@@ -6,7 +6,7 @@ from contextlib import nullcontext
 
 from app.review.datasets.dataset import Dataset, get_dataset, list_datasets
 from app.review.editing.recompute import SolveReport, solve_dataset, stale_groups
-from app.review.jobs.jobs import Jobs, Pool, Progress, Work, counting
+from app.review.jobs.jobs import JobProgress, Jobs, Pool, Work, counting
 from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.session import Store
@@ -45,7 +45,7 @@ def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
 def solve_work(store: Store, dataset_id: int, pool: Pool | None = None) -> Work:
     """The work itself: what to do is found in the data when it starts."""
 
-    def work(progress: Progress) -> Json:
+    def work(progress: JobProgress) -> Json:
         found = get_dataset(store, dataset_id)
         progress(0, None, f"Solving {found.name}.")
         large = len(stale_groups(store, dataset_id)) >= WORTH_A_POOL

@@ -7,7 +7,7 @@ from typing import Any
 
 from app.errors import NotFoundError
 from app.review.datasets.dataset import get_dataset
-from app.review.jobs.jobs import Jobs, Progress, Work
+from app.review.jobs.jobs import JobProgress, Jobs, Work
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.review.versions.verify import verify_and_keep
 from app.review.versions.version import Version, find_version, get_version
@@ -61,7 +61,7 @@ def resume_versions(jobs: Jobs, store: Store) -> None:
         request = FreezeRequest(**{**values, "split": Split.of(values["split"])})
         dataset_id = job.dataset_id or 0
 
-        def work(progress: Progress) -> Json:
+        def work(progress: JobProgress) -> Json:
             # The server may have stopped between the version and the record of its job.
             done = _frozen_since(store, dataset_id, request.name, job.created)
             if done is not None:
@@ -77,7 +77,7 @@ def resume_versions(jobs: Jobs, store: Store) -> None:
 def freeze_work(store: Store, dataset_id: int, request: FreezeRequest, actor: str) -> Work:
     """The work of freezing; its result names the version."""
 
-    def work(progress: Progress) -> Json:
+    def work(progress: JobProgress) -> Json:
         step = _step(progress, f"Freezing {request.name}.")
         return version_result(freeze(store, dataset_id, request, actor=actor, progress=step))
 
@@ -87,7 +87,7 @@ def freeze_work(store: Store, dataset_id: int, request: FreezeRequest, actor: st
 def verify_work(store: Store, version_id: int, actor: str) -> Work:
     """The work of verifying; its result is the report, which the version keeps, too."""
 
-    def work(progress: Progress) -> Json:
+    def work(progress: JobProgress) -> Json:
         step = _step(progress, f"Verifying {get_version(store, version_id).name}.")
         report = verify_and_keep(store, version_id, progress=step, actor=actor)
         return {"version_id": version_id, **report.values()}
@@ -105,7 +105,7 @@ def version_result(version: Version) -> dict[str, Any]:
     }
 
 
-def _step(progress: Progress, sentence: str) -> _Step:
+def _step(progress: JobProgress, sentence: str) -> _Step:
     progress(0, None, sentence)
     return lambda done, total: progress(done, total)
 

@@ -18,7 +18,7 @@ from app.review.datasets.delete import delete_dataset
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.state import GroupState, read_states
 from app.review.importing.sources import Source, import_source
-from app.review.jobs.jobs import Jobs, Progress, Work
+from app.review.jobs.jobs import JobProgress, Jobs, Work
 from app.review.practice.lessons import Feedback, judge, kind_of
 from app.review.practice.words import WORDS
 from app.sample.practice import LESSONS, write_practice
@@ -97,7 +97,7 @@ def resume_practice(jobs: Jobs, store: Store, settings: Settings) -> None:
 def practice_work(store: Store, settings: Settings, *, again: bool, actor: str) -> Work:
     """The work itself; its result names the dataset and its first group."""
 
-    def work(progress: Progress) -> Json:
+    def work(progress: JobProgress) -> Json:
         return make_practice_dataset(store, settings, progress, again=again, actor=actor)
 
     return work

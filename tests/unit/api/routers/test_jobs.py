@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from app.review.jobs.jobs import Progress
+from app.review.jobs.jobs import JobProgress
 
 SECONDS = 20
 API = "/api/v1/jobs"
@@ -62,7 +62,7 @@ class TestCancelJob:
     def test_ends_it_and_once_it_is_over_it_is_409(self, app, api) -> None:
         started = threading.Event()
 
-        def endless(progress: Progress) -> None:
+        def endless(progress: JobProgress) -> None:
             while True:
                 started.set()
                 progress(1, 2)

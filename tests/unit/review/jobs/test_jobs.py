@@ -13,7 +13,7 @@ from structlog.testing import capture_logs
 from app.errors import ConflictError, InputError, JobCancelled, NotFoundError, OverloadedError
 from app.review.datasets.dataset import create_dataset
 from app.review.jobs import jobs as module
-from app.review.jobs.jobs import Jobs, Progress
+from app.review.jobs.jobs import JobProgress, Jobs
 from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.session import Store
@@ -39,7 +39,7 @@ class Gate:
     def __init__(self, result: Json = None):
         self.started, self.finish, self.result = threading.Event(), threading.Event(), result
 
-    def __call__(self, progress: Progress) -> Json:
+    def __call__(self, progress: JobProgress) -> Json:
         self.started.set()
         while not self.finish.wait(0.005):
             progress(1, 2, "Half of it.")
@@ -56,7 +56,7 @@ def until(happens: Callable[[], Any]) -> Any:
     raise AssertionError("it did not happen")
 
 
-def submit(jobs: Jobs, work: Callable[[Progress], Json], **options: Any) -> Job:
+def submit(jobs: Jobs, work: Callable[[JobProgress], Json], **options: Any) -> Job:
     kind = options.pop("kind", "bulk")
     return jobs.submit(kind, "Some work", work, actor="ann", **options)
 
@@ -128,7 +128,7 @@ class TestProgress:
         gate.finish.set()
 
     def test_may_be_told_inside_of_a_transaction(self, jobs: Jobs, store: Store) -> None:
-        def work(progress: Progress) -> Json:
+        def work(progress: JobProgress) -> Json:
             with store.write():
                 for done in range(50):
                     progress(done, 50)
@@ -144,7 +144,7 @@ class TestProgress:
         heard: list[Job] = []
         jobs.listen(heard.append)
 
-        def work(progress: Progress) -> Json:
+        def work(progress: JobProgress) -> Json:
             end, told = time.monotonic() + 0.3, 0
             while time.monotonic() < end:
                 told += 1
@@ -159,7 +159,7 @@ class TestProgress:
 
 class TestFailure:
     def test_is_told_with_its_hint(self, jobs: Jobs) -> None:
-        def work(progress: Progress) -> Json:
+        def work(progress: JobProgress) -> Json:
             raise InputError("nothing to export", hint="Accept a group.", pointer="/all")
 
         failed = jobs.wait(submit(jobs, work).id, SECONDS)
@@ -173,7 +173,7 @@ class TestFailure:
     def test_of_our_own_making_says_nothing_of_the_inside_and_the_next_job_runs(
         self, jobs: Jobs
     ) -> None:
-        def work(progress: Progress) -> Json:
+        def work(progress: JobProgress) -> Json:
             raise ZeroDivisionError("secret")
 
         with capture_logs() as logs:
@@ -272,7 +272,7 @@ class TestClose:
     def test_ends_a_long_run_at_its_next_step(self, store: Store) -> None:
         jobs, ended = Jobs(store), threading.Event()
 
-        def endless(progress: Progress) -> Json:
+        def endless(progress: JobProgress) -> Json:
             try:
                 while True:
                     progress(1)

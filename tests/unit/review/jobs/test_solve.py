@@ -11,7 +11,7 @@ import pytest
 from app.review.datasets.dataset import create_dataset, get_dataset
 from app.review.editing.recompute import SolveReport, stale_groups
 from app.review.jobs import solve as solve_job
-from app.review.jobs.jobs import Jobs, Progress
+from app.review.jobs.jobs import JobProgress, Jobs
 from app.review.jobs.solve import request_solve, resume_solving, solve_leftovers
 from app.store.session import Store
 
@@ -78,7 +78,7 @@ class TestRequestSolve:
         create_dataset(store, "demo")
         started, finish = threading.Event(), threading.Event()
 
-        def slow(progress: Progress) -> None:
+        def slow(progress: JobProgress) -> None:
             started.set()
             assert finish.wait(SECONDS)
 
@@ -98,7 +98,9 @@ class TestSolveLeftovers:
         monkeypatch.setattr("app.review.editing.recompute.CHUNK", 1)
         started = threading.Event()
 
-        def stopping(_store: Store, _id: int, _executor: None, progress: Progress) -> SolveReport:
+        def stopping(
+            _store: Store, _id: int, _executor: None, progress: JobProgress
+        ) -> SolveReport:
             started.set()
             while True:
                 progress(0, 5)
