@@ -3,7 +3,8 @@
 
 import { colours } from '../lib/colours.js';
 import Konva from '../lib/konva.js';
-import { drawBall, drawEpipolars } from './ball.js';
+import { drawBall } from './ball.js';
+import { drawEpipolars } from './epipolars.js';
 import { drawExpected } from './expected_ball.js';
 import { drawGhosts } from './ghosts.js';
 import { drawMarkings } from './markings.js';

@@ -6,7 +6,7 @@ import { effect, signal, untracked } from '@preact/signals';
 import { ApiError } from '../api/problem.js';
 import { navigate, page } from '../lib/router.js';
 import { dataset, failure, loadDatasets } from './datasets.js';
-import { document, open } from './group.js';
+import { groupDocument, open } from './group.js';
 import { currentId, firstGroup, lastGroup, locate, query, reviewAddress } from './navigation.js';
 import { complain } from './notice.js';
 import { resetForGroup } from './workspace.js';
@@ -22,7 +22,7 @@ async function enter(id) {
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		// While the server is away what is known stays on screen; the save state says so.
-		if (currentId() !== id || (error.status === 0 && document.value?.id === id)) return;
+		if (currentId() !== id || (error.status === 0 && groupDocument.value?.id === id)) return;
 		if (error.status === 404) lastGroup.value = 0;
 		absent.value = id;
 		complain(`Group ${id} cannot be shown: ${error.message}`, {
@@ -46,7 +46,7 @@ async function enterFirst() {
 function followVerdict() {
 	let said = { id: 0, state: '' };
 	effect(() => {
-		const at = document.value;
+		const at = groupDocument.value;
 		const now = { id: at?.id ?? 0, state: at?.verdict.state ?? '' };
 		const turned = now.id === said.id && now.state !== said.state;
 		said = now;

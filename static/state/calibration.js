@@ -9,7 +9,7 @@ import { latest } from '../lib/latest.js';
 import { page, param } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 import { applyEdit } from './edits.js';
-import { document, group, solution, submit } from './group.js';
+import { group, groupDocument, solution, submit } from './group.js';
 import { redo as redoSaved, undo as undoSaved } from './history.js';
 import { sameLines } from './line_changes.js';
 import { announce } from './notice.js';
@@ -79,11 +79,11 @@ export const isCurrent = computed(() => (
 
 /** @param {number} station */
 function keyOf(station) {
-	return `${document.value?.id} ${station}`;
+	return `${groupDocument.value?.id} ${station}`;
 }
 
 const asking = latest(INTERVAL, async (/** @type {LinesJson} */ wanted, abort) => {
-	const [at, id] = [view.value, document.value?.id];
+	const [at, id] = [view.value, groupDocument.value?.id];
 	if (!at || id === undefined) return;
 	const body = { views: { [at.key]: { lines: changes.value } } };
 	try {

@@ -4,7 +4,7 @@
 import { batch, computed } from '@preact/signals';
 
 import { leftOutBy, viewOf } from './edits.js';
-import { document, submit, submitVerdict } from './group.js';
+import { groupDocument, submit, submitVerdict } from './group.js';
 import { announce } from './notice.js';
 import { discard, outbox } from './outbox.js';
 
@@ -31,7 +31,7 @@ export const held = computed(() => outbox.value.filter((item) => item.held));
 
 /** What is to be decided about the group on screen; null when nothing. */
 export const conflict = computed(() => {
-	const theirs = document.value;
+	const theirs = groupDocument.value;
 	const own = theirs ? held.value.filter(({ group }) => group === theirs.id) : [];
 	return theirs && own.length ? conflictOf(theirs, own) : null;
 });
@@ -129,7 +129,7 @@ export function takeTheirs() {
 /** @param {(field: Field) => boolean} wanted @param {string} said */
 function resolve(wanted, said) {
 	const present = conflict.value;
-	const id = document.value?.id;
+	const id = groupDocument.value?.id;
 	if (!present) return;
 	batch(() => {
 		discard((item) => item.held && item.group === id);

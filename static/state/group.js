@@ -27,14 +27,14 @@ import { resetForGroup } from './workspace.js';
 const PREVIEW_INTERVAL = 100;
 
 /** The group as the server last gave it. */
-export const document = signal(/** @type {GroupDocument | null} */ (null));
+export const groupDocument = signal(/** @type {GroupDocument | null} */ (null));
 /** The edit in hand while something is dragged. */
 export const draft = signal(/** @type {Edit | null} */ (null));
 /** What the server expects of the edits not yet saved. */
 const expected = signal(/** @type {SolutionJson | null} */ (null));
 
 /** What the person said about this group and the server has not answered yet. */
-const own = computed(() => outbox.value.filter(({ group: id, held }) => id === document.value?.id && !held));
+const own = computed(() => outbox.value.filter(({ group: id, held }) => id === groupDocument.value?.id && !held));
 /** Edits of this group that the server has not answered yet. */
 export const pending = computed(() => own.value.flatMap(({ edit }) => (edit ? [edit] : [])));
 
@@ -45,7 +45,7 @@ const edits = computed(() => (draft.value ? [...pending.value, draft.value] : pe
 
 /** The group as people see it, edits and verdict included. */
 export const group = computed(() => {
-	const base = document.value;
+	const base = groupDocument.value;
 	if (!base) return null;
 	const said = own.value.findLast(({ verdict }) => verdict)?.verdict;
 	const edited = edits.value.reduce(applyEdit, base);
@@ -57,7 +57,7 @@ export const group = computed(() => {
 
 /** The solution that fits `group`: the server's, with the ball computed here while it moves. */
 export const solution = computed(() => {
-	const base = expected.value ?? document.value?.solution ?? null;
+	const base = expected.value ?? groupDocument.value?.solution ?? null;
 	const moved = edits.value.some((edit) => edit.kind !== 'lines');
 	return group.value && base && moved ? previewBall(group.value, base) : base;
 });
@@ -66,11 +66,11 @@ export const solution = computed(() => {
 export const isPreview = computed(() => edits.value.length > 0);
 
 const asking = latest(PREVIEW_INTERVAL, async (/** @type {Edit} */ edit, abort) => {
-	const id = document.value?.id;
+	const id = groupDocument.value?.id;
 	if (id === undefined || isAway.value) return;
 	try {
 		const answer = await client.preview(id, previewBody(edit), abort);
-		if (id === document.value?.id && edits.value.length > 0) expected.value = answer.solution;
+		if (id === groupDocument.value?.id && edits.value.length > 0) expected.value = answer.solution;
 	} catch (error) {
 		// A preview is a courtesy: the save that follows will say what is wrong.
 		if (!(error instanceof ApiError)) throw error;
@@ -83,14 +83,14 @@ const asking = latest(PREVIEW_INTERVAL, async (/** @type {Edit} */ edit, abort) 
  * @param {number} id
  */
 export async function open(id) {
-	if (document.value?.id !== id) turnTo(id);
+	if (groupDocument.value?.id !== id) turnTo(id);
 	wanted = id;
 	try {
 		const loaded = await load(id);
 		if (wanted === id) renew(loaded);
 	} catch (error) {
 		// What is known can be worked on while the server is away.
-		if (!(error instanceof ApiError) || error.status !== 0 || document.value?.id !== id) throw error;
+		if (!(error instanceof ApiError) || error.status !== 0 || groupDocument.value?.id !== id) throw error;
 	}
 }
 
@@ -108,7 +108,7 @@ function turnTo(id) {
 function show(next) {
 	asking.cancel();
 	batch(() => {
-		document.value = next;
+		groupDocument.value = next;
 		draft.value = null;
 		expected.value = null;
 	});
@@ -116,7 +116,7 @@ function show(next) {
 
 /** Show a newer state of the group on screen, unless the person is in the middle of something. @param {GroupDocument} newer */
 export function renew(newer) {
-	const present = document.value;
+	const present = groupDocument.value;
 	if (present && present.id !== newer.id) return;
 	const untouched = own.value.length === 0 && draft.value === null && present?.etag !== newer.etag;
 	if (present === null || untouched) show(newer);
@@ -144,7 +144,7 @@ export function settle() {
 
 /** Save an edit. @param {Edit} edit */
 export function submit(edit) {
-	const at = document.value;
+	const at = groupDocument.value;
 	if (!at) return;
 	const shown = pending.value.reduce(applyEdit, at);
 	batch(() => {
@@ -160,7 +160,7 @@ export function submit(edit) {
 
 /** Save a verdict. @param {Verdict} verdict */
 export function submitVerdict(verdict) {
-	const at = document.value;
+	const at = groupDocument.value;
 	if (!at) return;
 	enqueue({
 		path: `/groups/${at.id}/verdict`, body: verdict, etag: at.etag, group: at.id, method: 'PUT',
@@ -171,7 +171,7 @@ export function submitVerdict(verdict) {
 
 /** Take the last edit back, or make it again. @param {'undo' | 'redo'} verb */
 export function submitTurn(verb) {
-	const at = document.value;
+	const at = groupDocument.value;
 	if (!at) return;
 	const last = lastStation.value?.group === at.id ? lastStation.value.station : null;
 	const station = at.views.find((view) => view.station.id === last)?.station;
@@ -247,7 +247,7 @@ function isGroup(body) {
 /** Go on from a newer state of a group. @param {GroupDocument} newer */
 export function takeOver(newer) {
 	rememberAnswer(newer);
-	if (document.value?.id === newer.id) document.value = newer;
+	if (groupDocument.value?.id === newer.id) groupDocument.value = newer;
 }
 
 hearFrom({ delivered, refused });

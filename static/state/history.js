@@ -4,7 +4,7 @@
 import { computed } from '@preact/signals';
 
 import { navigate, page } from '../lib/router.js';
-import { document, lastStation, open, pending, submitTurn } from './group.js';
+import { groupDocument, lastStation, open, pending, submitTurn } from './group.js';
 import { actions, didAgain, forget, forgetEdit, nextBack, tookBack, undone } from './last_action.js';
 import { reviewAddress } from './navigation.js';
 import { announce, complain } from './notice.js';
@@ -15,12 +15,12 @@ import { giveVerdictAgain, takeVerdictBack } from './verdicts.js';
 /** @import {EditDone} from './last_action.js' */
 
 const ownStation = computed(() => (
-	lastStation.value?.group === document.value?.id ? (lastStation.value?.station ?? null) : null
+	lastStation.value?.group === groupDocument.value?.id ? (lastStation.value?.station ?? null) : null
 ));
 /** The group that the page is about, in the review as in the calibration editor. */
 const onScreen = computed(() => ('group' in page.value ? page.value.group : null));
 const next = computed(() => {
-	const shown = onScreen.value === document.value?.id ? document.value : null;
+	const shown = onScreen.value === groupDocument.value?.id ? groupDocument.value : null;
 	const edited = shown !== null && (shown.can_undo || ownStation.value !== null || pending.value.length > 0);
 	return nextBack(actions.value, onScreen.value, edited);
 });
@@ -33,7 +33,7 @@ export const undoable = computed(() => {
 	if (action.kind === 'edit') return `Go back to group ${action.number} and undo its last edit`;
 	return `Take back the verdict on group ${action.number}`;
 });
-const canRedoHere = computed(() => Boolean(document.value?.can_redo) || ownStation.value !== null);
+const canRedoHere = computed(() => Boolean(groupDocument.value?.can_redo) || ownStation.value !== null);
 /** What redo would do again, in words; null when there is nothing. */
 export const redoable = computed(() => {
 	const action = undone.value.at(-1);
@@ -65,7 +65,7 @@ async function undoOne() {
 }
 
 function undoHere() {
-	const at = document.value;
+	const at = groupDocument.value;
 	if (!at) return;
 	forgetEdit(at.id);
 	if (isAway.value) undoUnsent();
@@ -78,9 +78,9 @@ function undoHere() {
 /** Return to a group and undo its last edit. @param {EditDone} action */
 async function undoThere(action) {
 	navigate(reviewAddress(action.group));
-	if (document.value?.id !== action.group) await open(action.group);
-	if (document.value?.id !== action.group) return;
-	if (document.value.can_undo) undoHere();
+	if (groupDocument.value?.id !== action.group) await open(action.group);
+	if (groupDocument.value?.id !== action.group) return;
+	if (groupDocument.value.can_undo) undoHere();
 	else forget(action);
 }
 
@@ -105,15 +105,15 @@ async function redoOne() {
 /** Return to a group and make its undone edit again. @param {EditDone} action */
 async function redoThere(action) {
 	if (onScreen.value !== action.group) navigate(reviewAddress(action.group));
-	if (document.value?.id !== action.group) await open(action.group);
-	if (document.value?.id !== action.group) return;
+	if (groupDocument.value?.id !== action.group) await open(action.group);
+	if (groupDocument.value?.id !== action.group) return;
 	didAgain();
 	submitTurn('redo');
 }
 
 /** While the server is away only what it never saw can be taken back. */
 function undoUnsent() {
-	const own = outbox.value.filter(({ group, edit }) => group === document.value?.id && edit);
+	const own = outbox.value.filter(({ group, edit }) => group === groupDocument.value?.id && edit);
 	const last = own.at(-1);
 	if (!last) {
 		complain('Undo needs the server, which cannot be reached.');

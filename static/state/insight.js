@@ -8,7 +8,7 @@ import { effect, signal, untracked } from '@preact/signals';
 
 import { request } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
-import { document, isPreview } from './group.js';
+import { groupDocument, isPreview } from './group.js';
 import { focused } from './workspace.js';
 
 /** @import {FixJson, GroupDocument} from '../api/types.js' */
@@ -95,7 +95,7 @@ function askLater(what, path, key, into) {
 /** Follow the group and the view that the person looks at. */
 export function startInsight() {
 	effect(() => {
-		const at = document.value;
+		const at = groupDocument.value;
 		if (!at || isPreview.value || !needsHelp(at)) {
 			remedies.value = null;
 			return undefined;
@@ -103,7 +103,7 @@ export function startInsight() {
 		return untracked(() => askLater('remedies', `/groups/${at.id}/remedies`, `remedies ${at.id} ${at.etag}`, remedies));
 	});
 	effect(() => {
-		const at = document.value;
+		const at = groupDocument.value;
 		const view = at?.views.find(({ letter }) => letter === focused.value);
 		const solved = at?.solution?.views.find((one) => one.view === view?.key);
 		if (!at || !view || isPreview.value || !solved?.calibration.camera || Object.keys(view.lines).length === 0) {

@@ -7,7 +7,7 @@ import { listen } from '../api/events.js';
 import { ApiError } from '../api/problem.js';
 import { page } from '../lib/router.js';
 import { forget, forgetOthers, known, load } from './documents.js';
-import { document, draft, renew } from './group.js';
+import { draft, groupDocument, renew } from './group.js';
 import { announce } from './notice.js';
 import { outbox } from './outbox.js';
 
@@ -23,7 +23,7 @@ let open = null;
 function heard(told) {
 	const present = known(told.group);
 	if (!present || present.etag === told.etag) return;
-	if (told.group !== document.value?.id) {
+	if (told.group !== groupDocument.value?.id) {
 		forget(told.group);
 		return;
 	}
@@ -34,7 +34,7 @@ function heard(told) {
 /** Show what was told, once the person has nothing in hand and nothing on its way. */
 async function catchUp() {
 	const told = open;
-	const at = document.value;
+	const at = groupDocument.value;
 	if (!told || !at || draft.value || outbox.value.some(({ group, held }) => group === at.id && !held)) return;
 	open = null;
 	if (told.group !== at.id || told.etag === at.etag) return;
@@ -52,7 +52,7 @@ async function catchUp() {
 
 /** Nobody was told for a while: what lies ready may be old, and so may the group on screen. */
 function missed() {
-	const at = document.value;
+	const at = groupDocument.value;
 	forgetOthers(at?.id ?? null);
 	if (at) heard({ group: at.id, etag: null, actor: null });
 }
@@ -61,6 +61,6 @@ function missed() {
 export function startLive() {
 	effect(() => (page.value.page === 'review' ? untracked(() => listen('group', heard, missed)) : undefined));
 	effect(() => {
-		if (draft.value === null && outbox.value && document.value) untracked(catchUp);
+		if (draft.value === null && outbox.value && groupDocument.value) untracked(catchUp);
 	});
 }

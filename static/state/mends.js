@@ -6,7 +6,7 @@ import { computed, effect, signal, untracked } from '@preact/signals';
 import { ballOf } from '../geometry/preview.js';
 import { findingTitle } from './advice.js';
 import { editOfFix } from './edits.js';
-import { document, group, solution } from './group.js';
+import { group, groupDocument, solution } from './group.js';
 import { remedies } from './insight.js';
 import { fitPanel, returnLent } from './viewports.js';
 import { focused, maximised } from './workspace.js';
@@ -134,7 +134,7 @@ export function turnMend(step) {
 export function startMends() {
 	let at = { id: 0, etag: '' };
 	return effect(() => {
-		const { id = 0, etag = '' } = document.value ?? {};
+		const { id = 0, etag = '' } = groupDocument.value ?? {};
 		if (id !== at.id || etag !== at.etag) chosen.value = 0;
 		if (id !== at.id) untracked(focusMeant);
 		at = { id, etag };

@@ -11,7 +11,7 @@ import { ApiError } from '../api/problem.js';
 import { plural } from '../lib/format.js';
 import { page } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
-import { document, group, submit } from './group.js';
+import { group, groupDocument, submit } from './group.js';
 import { announce, complain } from './notice.js';
 import { acceptEdit, acceptEdits, marksOf, setNames, setToShow, surest } from './prediction_marks.js';
 import { wasRefused } from './sending.js';
@@ -70,8 +70,8 @@ let controller = new AbortController();
 
 /** Ask about whatever group is on screen, from now on; once. */
 export const startPredictions = once(() => {
-	const id = computed(() => (page.value.page === 'review' ? document.value?.id : undefined));
-	const saved = computed(() => ballsOf(document.value));
+	const id = computed(() => (page.value.page === 'review' ? groupDocument.value?.id : undefined));
+	const saved = computed(() => ballsOf(groupDocument.value));
 	effect(() => {
 		forgotten.value;
 		saved.value;
@@ -104,7 +104,7 @@ function follow() {
 	clearTimeout(timer);
 	controller.abort();
 	controller = new AbortController();
-	const at = document.value;
+	const at = groupDocument.value;
 	if (!at || page.value.page !== 'review') {
 		answered.value = null;
 		return;
@@ -127,7 +127,7 @@ async function ask(at, abort) {
 		kept.delete(at.id);
 		kept.set(at.id, { at: performance.now(), balls: ballsOf(at), found });
 		if (kept.size > MOST_KEPT) kept.delete(/** @type {number} */ (kept.keys().next().value));
-		if (document.value?.id === at.id) answered.value = { group: at.id, found };
+		if (groupDocument.value?.id === at.id) answered.value = { group: at.id, found };
 	} catch (error) {
 		// Another group came, or the server is away: the group can be reviewed without.
 		if (!abort.aborted && !(error instanceof ApiError)) throw error;

@@ -6,7 +6,7 @@ import { redoVerdicts, undoVerdicts } from '../api/queue.js';
 import { count, plural } from '../lib/format.js';
 import { page } from '../lib/router.js';
 import { dataset, loadDatasets } from './datasets.js';
-import { document, open } from './group.js';
+import { groupDocument, open } from './group.js';
 import { did, didAgain, forget, forgetUndone, tookBack, undone } from './last_action.js';
 import { complain, inform } from './notice.js';
 import { openQueue, queue } from './queue.js';
@@ -84,7 +84,7 @@ export async function readAgain() {
 	loadDatasets();
 	const one = dataset.value;
 	if (page.value.page === 'queue' && one) await openQueue(one, queue.value.q);
-	else if (document.value) await open(document.value.id);
+	else if (groupDocument.value) await open(groupDocument.value.id);
 }
 
 /** What a batch says: "3 groups deferred". @param {number} changed @param {string} state */

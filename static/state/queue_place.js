@@ -4,7 +4,7 @@
 import { signal } from '@preact/signals';
 
 import { stored } from '../lib/storage.js';
-import { document } from './group.js';
+import { groupDocument } from './group.js';
 import { neighbours } from './navigation.js';
 import { activeRow, queueKey } from './queue.js';
 
@@ -18,8 +18,8 @@ export const arrivals = signal(0);
 export function resume(dataset, q) {
 	const key = queueKey(dataset, q);
 	const left = neighbours.value;
-	const here = left !== null && left.q === q.trim() && document.value?.id === left.id
-		&& document.value.dataset.name === dataset;
+	const here = left !== null && left.q === q.trim() && groupDocument.value?.id === left.id
+		&& groupDocument.value.dataset.name === dataset;
 	activeRow.value = (here ? left.index : null) ?? leftAt(key).active;
 	arrivals.value += 1;
 }

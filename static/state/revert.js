@@ -3,7 +3,7 @@
 
 import { request } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
-import { document, group, submit } from './group.js';
+import { group, groupDocument, submit } from './group.js';
 import { announce, complain } from './notice.js';
 import { selected } from './workspace.js';
 
@@ -16,14 +16,14 @@ import { selected } from './workspace.js';
 /** The selected marking or ball as the dataset brought it. */
 export async function revertSelected() {
 	const object = selected.value;
-	const at = document.value;
+	const at = groupDocument.value;
 	if (!object || object.kind === 'prediction' || !at) {
 		announce('Select a point or a ball first.');
 		return;
 	}
 	try {
 		const { items } = await request(`/groups/${at.id}/history`);
-		if (document.value?.id === at.id) revert(object, items);
+		if (groupDocument.value?.id === at.id) revert(object, items);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		complain(`Cannot be reverted: ${error.message}`);

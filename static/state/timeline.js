@@ -10,7 +10,7 @@ import { latest } from '../lib/latest.js';
 import { navigate } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 import { known, load } from './documents.js';
-import { document, settle } from './group.js';
+import { groupDocument, settle } from './group.js';
 import { loadImage } from './images.js';
 import { currentId, reviewAddress } from './navigation.js';
 import { announce, dismiss } from './notice.js';
@@ -37,17 +37,17 @@ export const trouble = signal('');
 const loaded = signal(/** @type {Loaded | null} */ (null));
 
 /** Whether the group on screen was filmed by cameras that do not move. */
-export const isStatic = computed(() => Boolean(document.value?.views.some(({ station }) => station.shared)));
+export const isStatic = computed(() => Boolean(groupDocument.value?.views.some(({ station }) => station.shared)));
 
 /** The columns of the match on screen, with what is known newer of the group on screen. */
 export const columns = computed(() => {
-	const [present, at] = [loaded.value, document.value];
+	const [present, at] = [loaded.value, groupDocument.value];
 	if (!present || !at || present.dataset !== at.dataset.id || present.match !== at.match) return null;
 	return withGroup(present.columns, at);
 });
 
 /** Place of the group on screen; -1 when it is not there. */
-export const position = computed(() => (columns.value && document.value ? columns.value.id.indexOf(document.value.id) : -1));
+export const position = computed(() => (columns.value && groupDocument.value ? columns.value.id.indexOf(groupDocument.value.id) : -1));
 
 /** @param {TimelineJson} all @param {GroupDocument} group @returns {TimelineJson} */
 function withGroup(all, group) {
@@ -76,7 +76,7 @@ const fetching = latest(REFRESH, async (/** @type {{dataset: number, match: stri
 /** Keep the timeline of the match on screen in step. @returns {() => void} */
 export function startTimeline() {
 	const stop = effect(() => {
-		const at = document.value;
+		const at = groupDocument.value;
 		if (!at) return;
 		const present = untracked(() => loaded.value);
 		if (present?.dataset === at.dataset.id && present.match === at.match) return;
@@ -86,7 +86,7 @@ export function startTimeline() {
 	});
 	/** @param {string | null} name of the dataset in which something changed; null: any */
 	const again = (name) => {
-		const at = document.value;
+		const at = groupDocument.value;
 		if (at && (name === null || name === at.dataset.name)) fetching.run({ dataset: at.dataset.id, match: at.match });
 	};
 	const deaf = listen('group', (/** @type {{dataset: string}} */ event) => again(event.dataset), () => again(null));
@@ -183,7 +183,7 @@ async function ready(ids) {
 function shown(id) {
 	return new Promise((resolve) => {
 		const stop = effect(() => {
-			if (document.value?.id !== id && playing.value) return;
+			if (groupDocument.value?.id !== id && playing.value) return;
 			queueMicrotask(() => { stop(); resolve(null); });
 		});
 	});

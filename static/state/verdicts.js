@@ -6,7 +6,7 @@ import { signal } from '@preact/signals';
 import { navigate } from '../lib/router.js';
 import { doubt } from './advice.js';
 import { conflict } from './conflict.js';
-import { document, group, onRefused, open, settle, submit, submitVerdict } from './group.js';
+import { group, groupDocument, onRefused, open, settle, submit, submitVerdict } from './group.js';
 import { actions, did, didAgain, forget, tookBack } from './last_action.js';
 import { currentId, goNext, query, queueAddress, reviewAddress } from './navigation.js';
 import { announce, complain, inform } from './notice.js';
@@ -28,7 +28,7 @@ export function isBlind(group) {
 
 /** Accept and go on; a group that fails a gate, or that has no picture, needs a note that says why. */
 export function accept() {
-	const group = document.value;
+	const group = groupDocument.value;
 	if (!group) return;
 	if (!group.solution) {
 		announce('This group is not solved yet and cannot be accepted.');
@@ -40,7 +40,7 @@ export function accept() {
 
 /** Ask for the reason to reject. */
 export function askReason() {
-	if (document.value) asking.value = 'reason';
+	if (groupDocument.value) asking.value = 'reason';
 }
 
 /** The view in hand, if it is one of its group. */
@@ -103,7 +103,7 @@ export function cancelAsking() {
 
 /** @param {string} state @param {string | null} reason @param {string | null} note */
 function decide(state, reason, note) {
-	const group = document.value;
+	const group = groupDocument.value;
 	if (!group) return;
 	if (conflict.value) {
 		announce('First choose whose edit counts.');
@@ -144,7 +144,7 @@ export function addNote(text) {
 export async function takeVerdictBack(action) {
 	forget(action);
 	navigate(reviewAddress(action.group));
-	if (document.value?.id !== action.group) await open(action.group);
+	if (groupDocument.value?.id !== action.group) await open(action.group);
 	const present = group.value;
 	if (present?.id !== action.group) return;
 	const { state, reason } = present.verdict;
@@ -160,8 +160,8 @@ export async function takeVerdictBack(action) {
 /** Give a verdict again that was taken back, on its group. @param {VerdictDone} action */
 export async function giveVerdictAgain(action) {
 	navigate(reviewAddress(action.group));
-	if (document.value?.id !== action.group) await open(action.group);
-	if (document.value?.id !== action.group) return;
+	if (groupDocument.value?.id !== action.group) await open(action.group);
+	if (groupDocument.value?.id !== action.group) return;
 	didAgain();
 	submitVerdict(action.given);
 	announce(`Group ${action.number} ${action.given.state} again.`);

@@ -9,7 +9,7 @@ import { batch, computed, effect, signal } from '@preact/signals';
 import { ApiError } from '../api/problem.js';
 import { getGroupIds } from '../api/queue.js';
 import { stored } from '../lib/storage.js';
-import { document } from './group.js';
+import { groupDocument } from './group.js';
 import { neighbours, query, recount } from './navigation.js';
 import { outbox } from './outbox.js';
 import { withField, wordsOf } from './query.js';
@@ -78,7 +78,7 @@ function mark(id, is) {
 }
 
 effect(() => {
-	const [at, group] = [neighbours.value, document.value];
+	const [at, group] = [neighbours.value, groupDocument.value];
 	if (at && group?.id === at.id && at.q === query.value.trim()) arrive(group.dataset.name, at);
 });
 
@@ -87,7 +87,7 @@ effect(() => {
 	for (const { group, verdict } of outbox.value) if (verdict) mark(group, verdict.state !== 'unreviewed');
 });
 effect(() => {
-	const group = document.value;
+	const group = groupDocument.value;
 	const waits = outbox.value.some((item) => item.group === group?.id && item.verdict);
 	if (group && !waits && group.verdict.state === 'unreviewed') mark(group.id, false);
 });
@@ -104,7 +104,7 @@ effect(() => {
 });
 effect(() => {
 	const at = neighbours.value;
-	if (!outdated.value || !at || at.id !== document.value?.id) return;
+	if (!outdated.value || !at || at.id !== groupDocument.value?.id) return;
 	outdated.value = false;
 	if (isLeft(at.q)) recount();
 });
@@ -116,7 +116,7 @@ function isLeft(q) {
 
 /** Where the group on screen stands; null until it is known. */
 export const standing = computed(() => {
-	const [at, group] = [neighbours.value, document.value];
+	const [at, group] = [neighbours.value, groupDocument.value];
 	return at && group?.id === at.id ? standingOf(at, walk.value, judged.value, keyOf(group.dataset.name, at.q)) : null;
 });
 

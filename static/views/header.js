@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 
 import { dataset } from '../state/datasets.js';
-import { document as shownGroup } from '../state/group.js';
+import { groupDocument } from '../state/group.js';
 import { lastGroup, query, queueAddress, reviewAddress } from '../state/navigation.js';
 import { openHelp } from '../state/workspace.js';
 import { DatasetMenu, pageAddress } from './dataset_menu.js';
@@ -38,7 +38,7 @@ function Navigation({ current, name }) {
 
 /** @param {{current: string, children?: ComponentChildren}} props `current` names the page */
 export function Header({ current, children }) {
-	const group = current === 'review' || current === 'calibration' ? shownGroup.value : null;
+	const group = current === 'review' || current === 'calibration' ? groupDocument.value : null;
 	const name = group?.dataset.name ?? dataset.value?.name ?? '';
 	return html`
 		<header class="header">

@@ -11,7 +11,7 @@ import { Header } from './header.js';
 /** @type {{[page: string]: () => Promise<ComponentType>}} */
 const LOADERS = {
 	queue: async () => (await import('./queue_page.js')).QueuePage,
-	calibration: async () => (await import('./calibration/page.js')).CalibrationPage,
+	calibration: async () => (await import('./calibration/calibration_page.js')).CalibrationPage,
 	datasets: async () => (await import('./datasets_page.js')).DatasetsPage,
 	yield: async () => (await import('./yield_page.js')).YieldPage,
 	policy: async () => (await import('./policy_page.js')).PolicyPage,
@@ -20,7 +20,7 @@ const LOADERS = {
 	evaluation: async () => (await import('./evaluation/evaluation_page.js')).EvaluationPage,
 	exports: async () => (await import('./exports_page.js')).ExportsPage,
 	import: async () => (await import('./import_page.js')).ImportPage,
-	help: async () => (await import('./help/page.js')).HelpPage,
+	help: async () => (await import('./help/help_page.js')).HelpPage,
 	jobs: async () => (await import('./jobs_page.js')).JobsPage,
 };
 

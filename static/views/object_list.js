@@ -6,7 +6,7 @@ import { useLayoutEffect, useRef } from 'preact/hooks';
 
 import { ballOf } from '../geometry/preview.js';
 import { fixed, pixels, scoreText } from '../lib/format.js';
-import { objectsOf, sameObject } from '../state/selection.js';
+import { objectsOf, sameObject } from '../state/tab_order.js';
 import { boxes, editing, selected } from '../state/workspace.js';
 
 /** @import {ViewPicture} from '../overlays/scene.js' */

@@ -8,7 +8,7 @@ import { plural } from '../lib/format.js';
 import { latest } from '../lib/latest.js';
 import { navigate, page } from '../lib/router.js';
 import { dataset, datasets, loadDatasets, useDataset } from '../state/datasets.js';
-import { document as shownGroup } from '../state/group.js';
+import { groupDocument } from '../state/group.js';
 import { paletteOpen, takeTyped } from '../state/palette.js';
 import { actionItems, groupItems, helpItems, matching } from '../state/palette_items.js';
 import { DATASET_PAGES, pageAddress, PLAIN_PAGES } from './dataset_menu.js';
@@ -21,7 +21,7 @@ const KINDS = /** @type {const} */ (['Groups', 'Pages', 'Datasets', 'Actions']);
 
 /** The dataset that the page speaks of. */
 function present() {
-	const name = page.value.page === 'review' ? shownGroup.value?.dataset.name : dataset.value?.name;
+	const name = page.value.page === 'review' ? groupDocument.value?.dataset.name : dataset.value?.name;
 	return (datasets.value ?? []).find((one) => one.name === name) ?? dataset.value;
 }
 

@@ -7,7 +7,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { ago, count } from '../lib/format.js';
 import { useNow } from '../lib/hooks.js';
 import { held } from '../state/conflict.js';
-import { document as groupDocument, unsaved } from '../state/group.js';
+import { groupDocument, unsaved } from '../state/group.js';
 import { redo, redoable, undo, undoable } from '../state/history.js';
 import { goNext, goPrevious, neighbours, query, queueAddress, reviewAddress } from '../state/navigation.js';
 import { standing } from '../state/walk.js';

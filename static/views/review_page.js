@@ -10,7 +10,7 @@ import { withBestBall } from '../geometry/estimator.js';
 import { picturesOf } from '../overlays/scene.js';
 import { absent } from '../state/arrival.js';
 import { conflict } from '../state/conflict.js';
-import { document, group, isPreview, solution } from '../state/group.js';
+import { group, groupDocument, isPreview, solution } from '../state/group.js';
 import { sceneShown } from '../state/scene3d.js';
 import { estimator, focused, loupe, maximised } from '../state/workspace.js';
 import { NoticeBar } from './bars.js';
@@ -49,7 +49,7 @@ function Workspace() {
 	const found = solution.value;
 	// While something moves the browser computes the mean of pairs and nothing else.
 	const solved = useMemo(() => (best && shown && found ? withBestBall(shown, found) : found), [best, shown, found]);
-	const saved = document.value;
+	const saved = groupDocument.value;
 	const plain = useMemo(() => (shown ? picturesOf(shown, solved, saved) : []), [shown, solved, saved]);
 	const predicted = usePredictions(shown !== null);
 	const pictures = useMemo(() => withPredictions(plain, predicted), [plain, predicted]);
@@ -68,7 +68,7 @@ function Workspace() {
 export function ReviewPage() {
 	useKeys(REVIEW_KEYS);
 	useEffect(() => {
-		globalThis.document.title = group.value ? `${group.value.label} · Touchline` : 'Touchline';
+		document.title = group.value ? `${group.value.label} · Touchline` : 'Touchline';
 	}, [group.value?.label]);
 	return html`
 		<div class="review">

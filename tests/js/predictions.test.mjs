@@ -5,7 +5,7 @@ import { markAt, placeMarks } from '../../static/overlays/prediction_places.js';
 import { conflictOf } from '../../static/state/conflict.js';
 import { applyEdit, describe as inWords, requestOf } from '../../static/state/edits.js';
 import { acceptEdit, acceptEdits, distanceTo, marksOf, EVERY_SET, setNames, setToShow, surest } from '../../static/state/prediction_marks.js';
-import { objectsOf, sameObject } from '../../static/state/selection.js';
+import { objectsOf, sameObject } from '../../static/state/tab_order.js';
 import { hitTest } from '../../static/tools/hit.js';
 
 const station = { id: 1, shared: false };

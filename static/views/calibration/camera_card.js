@@ -7,7 +7,7 @@ import { useState } from 'preact/hooks';
 import { chooseCalibration } from '../../api/calibration.js';
 import { ApiError } from '../../api/problem.js';
 import { fixed } from '../../lib/format.js';
-import { document, takeOver, unsaved } from '../../state/group.js';
+import { groupDocument, takeOver, unsaved } from '../../state/group.js';
 import { announce, complain } from '../../state/notice.js';
 import { watchSolving } from '../../state/solving.js';
 import { cameraNumbers, oddities } from './camera_numbers.js';
@@ -19,7 +19,7 @@ import { cameraNumbers, oddities } from './camera_numbers.js';
 
 /** @param {ViewJson} view @param {Source} source */
 async function choose(view, source) {
-	const present = document.value;
+	const present = groupDocument.value;
 	if (!present || view.station.calibration === source) return;
 	try {
 		takeOver(await chooseCalibration(present, view, source));

@@ -4,7 +4,8 @@
 import { html } from 'htm/preact';
 
 import { colours } from '../../lib/colours.js';
-import { drawBall, drawEpipolars } from '../../overlays/ball.js';
+import { drawBall } from '../../overlays/ball.js';
+import { drawEpipolars } from '../../overlays/epipolars.js';
 import { drawExpected } from '../../overlays/expected_ball.js';
 import { drawGhosts } from '../../overlays/ghosts.js';
 import { drawStrip } from '../../overlays/line_strip.js';

@@ -9,7 +9,7 @@ import { Canvas } from '../../lib/canvas.js';
 import { colours } from '../../lib/colours.js';
 import { count, fixed, pixels } from '../../lib/format.js';
 import { useSize } from '../../lib/hooks.js';
-import { document as shownGroup } from '../../state/group.js';
+import { groupDocument } from '../../state/group.js';
 import {
 	columns, goToWorst, keepInSight, playing, position, scrubTo, span, startTimeline, togglePlaying, trouble, zoomSpan,
 } from '../../state/timeline.js';
@@ -123,7 +123,7 @@ export function Timeline() {
 	const all = columns.value;
 	const at = position.value;
 	useEffect(() => keepInSight(at), [at]);
-	const group = shownGroup.value;
+	const group = groupDocument.value;
 	const first = group?.views[0];
 	const limit = group && first ? (group.policy.tau_percent / 100) * diagonal(first) : 1;
 	return html`

@@ -14,7 +14,7 @@ import {
 	changed, resetForView, shown, shownSolution, startAsking, view,
 } from '../../state/calibration.js';
 import { editorAddress } from '../../state/editor_address.js';
-import { document, open, pending } from '../../state/group.js';
+import { groupDocument, open, pending } from '../../state/group.js';
 import { queueAddress, reviewAddress } from '../../state/navigation.js';
 import { complain } from '../../state/notice.js';
 import { watchSolving } from '../../state/solving.js';
@@ -84,7 +84,7 @@ function useTall() {
 /** @param {{group: GroupDocument, at: ViewJson}} props */
 function Workspace({ group, at }) {
 	const after = shownSolution.value;
-	const saved = document.value;
+	const saved = groupDocument.value;
 	const before = saved?.solution ?? null;
 	const picture = useMemo(() => picturesOf(group, after, saved).find(({ view: { key } }) => key === at.key), [group, after, saved, at.key]);
 	const solved = before?.views.find((one) => one.view === at.key)?.calibration ?? null;
@@ -133,7 +133,7 @@ export function CalibrationPage() {
 	const group = shown.value?.id === wanted ? shown.value : null;
 	const at = view.value;
 	useEffect(() => {
-		globalThis.document.title = at ? `Calibration of ${at.label} · Touchline` : 'Touchline';
+		document.title = at ? `Calibration of ${at.label} · Touchline` : 'Touchline';
 	}, [at?.label]);
 	return html`
 		<div class="editor">
