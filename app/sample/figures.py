@@ -201,36 +201,23 @@ class _Painter:
         for left, right in pairwise(_TURNS):
             middle = (left + right) / 2
             light = 0.80 + 0.24 * np.cos(middle - 0.6 * self.lit_from)
-            for a, b, colour in self._strip_colours(float(middle)):
-                ends = [top + a * (low - top), top + b * (low - top)]
-                reach = [chest + a * (waist - chest), chest + b * (waist - chest)]
-                quad = [
-                    ends[0] + (reach[0] * np.sin(left), -reach[0] * 0.25 * (1 - a)),
-                    ends[0] + (reach[0] * np.sin(right), -reach[0] * 0.25 * (1 - a)),
-                    ends[1] + (reach[1] * np.sin(right), 0.0),
-                    ends[1] + (reach[1] * np.sin(left), 0.0),
-                ]
-                self.patch.polygon(np.array(quad), _dim(colour, float(light)))
+            rim = np.array(
+                [[np.sin(left), np.sin(right), np.sin(right), np.sin(left)], [-0.25, -0.25, 0, 0]]
+            )
+            quad = np.array([top, top, low, low]) + rim.T * [[chest], [chest], [waist], [waist]]
+            colour = self._strip_colour(float(middle))
+            self.patch.polygon(quad, _dim(colour, float(light)))
 
     def _reach(self, side: float, front: float) -> float:
         return float(np.hypot(side * np.cos(self.person.turn), front * np.sin(self.person.turn)))
 
-    def _strip_colours(self, angle: float) -> list[tuple[float, float, Colour]]:
-        kit = self.kit
-        around = angle + self.person.turn
-        if kit.pattern == "stripes":
-            odd = int(np.floor(np.degrees(around) / 30.0)) % 2
-            return [(0.0, 1.0, kit.second if odd else kit.shirt)]
-        if kit.pattern == "halves":
-            return [(0.0, 1.0, kit.second if np.sin(around) > 0 else kit.shirt)]
-        if kit.pattern == "hoops":
-            edges = np.linspace(0, 1, 6)
-            pairs = pairwise(edges)
-            return [
-                (float(a), float(b), (kit.shirt, kit.second)[i % 2])
-                for i, (a, b) in enumerate(pairs)
-            ]
-        return [(0.0, 1.0, kit.shirt)]
+    def _strip_colour(self, angle: float) -> Colour:
+        kit, around = self.kit, angle + self.person.turn
+        second = {
+            "stripes": int(np.floor(np.degrees(around) / 30.0)) % 2 == 1,
+            "halves": np.sin(around) > 0,
+        }
+        return kit.second if second.get(kit.pattern) else kit.shirt
 
     def _number(self, number: int) -> None:
         """On the back, where it can be read."""

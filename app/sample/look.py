@@ -14,7 +14,7 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Kit:
-    """What a team, a goalkeeper or a referee wears. ``pattern``: plain, stripes, hoops, halves."""
+    """What a team, a goalkeeper or a referee wears. ``pattern``: plain, stripes, halves."""
 
     shirt: Colour
     second: Colour
@@ -52,17 +52,15 @@ class Light:
 
 @dataclass(frozen=True)
 class Grass:
-    """Grass of a match.
+    """Grass of a match, mown in bands across the pitch or along it.
 
-    ``mowing``: bands across the pitch, bands along it, or checks. ``band`` is the width of a band
-    in metres, ``contrast`` the relative difference of two bands.
+    ``band`` is the width of a band in metres, ``contrast`` the relative difference of two bands.
     """
 
     colour: Colour
-    mowing: str
+    across: bool
     band: float
     contrast: float
-    wear: float
 
 
 @dataclass(frozen=True)
@@ -114,8 +112,8 @@ _PAIRS = (
     (Kit(_WHITE, _NAVY, _NAVY, _WHITE), Kit(_ORANGE, _BLACK, _BLACK, _ORANGE)),
     (Kit(_BLUE, _RED, _BLUE, _BLUE, "stripes"), Kit(_YELLOW, _BLUE, _YELLOW, _YELLOW)),
     (Kit(_BLACK, _WHITE, _BLACK, _BLACK, "stripes"), Kit(_RED, _YELLOW, _RED, _RED)),
-    (Kit(_CLARET, _SKY, _WHITE, _SKY, "hoops"), Kit(_WHITE, _PURPLE, _WHITE, _WHITE)),
-    (Kit(_PURPLE, _WHITE, _PURPLE, _WHITE), Kit(_WHITE, _RED, _BLACK, _WHITE, "hoops")),
+    (Kit(_CLARET, _SKY, _WHITE, _SKY, "halves"), Kit(_WHITE, _PURPLE, _WHITE, _WHITE)),
+    (Kit(_PURPLE, _WHITE, _PURPLE, _WHITE), Kit(_WHITE, _RED, _BLACK, _WHITE, "stripes")),
     (Kit(_YELLOW, _BLACK, _BLACK, _YELLOW), Kit(_BLUE, _WHITE, _WHITE, _BLUE)),
 )
 _KEEPERS = (_LIME, _PINK, _TEAL, _GREY, _ORANGE)
@@ -187,10 +185,9 @@ def _grass(rng: np.random.Generator, index: int) -> Grass:
     colour = (48.0 + 20 * tone, 124.0 - 8 * tone, 92.0 - 24 * tone)
     return Grass(
         colour=colour,
-        mowing=("across", "checks", "across", "along")[index % 4],
+        across=index % 4 != 3,
         band=float(rng.choice([5.25, 5.5, 5.83, 6.6])),
         contrast=float(rng.uniform(0.17, 0.30)),
-        wear=float(rng.uniform(0.2, 1.0)),
     )
 
 

@@ -45,9 +45,9 @@ class Patch:
         local = (points - (self.left - 0.5, self.top - 0.5)) * self.fine - 0.5
         return np.asarray(np.round(local * _SUB), np.int32)
 
-    def polygon(self, points: FloatArray, colour: Colour, opacity: float = 1.0) -> None:
+    def polygon(self, points: FloatArray, colour: Colour) -> None:
         """Fill a convex polygon, image pixels, shape (N, 2)."""
-        cv2.fillConvexPoly(self.pixels, self.to_fine(points), _paint(colour, opacity), 8, _SHIFT)
+        cv2.fillConvexPoly(self.pixels, self.to_fine(points), _paint(colour, 1.0), 8, _SHIFT)
 
     def disc(self, center: FloatArray, radius: float, colour: Colour) -> None:
         """Fill a circle; centre and radius in image pixels."""

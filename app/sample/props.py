@@ -1,4 +1,4 @@
-"""Props: goals with their nets, corner flags, and the ball as a shaded sphere."""
+"""Props: goals with their nets, and the ball as a shaded sphere."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.sphere import tight_box
-from app.sample.instant import BALL_DIAMETER, HALF_LENGTH, HALF_WIDTH, Instant
+from app.sample.instant import BALL_DIAMETER, HALF_LENGTH, Instant
 from app.sample.look import Colour
 from app.sample.patch import Image, Patch
 from app.soccer.pitch import GOAL_HEIGHT, GOAL_WIDTH
@@ -99,22 +99,6 @@ def draw_frame(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
                     radius[i + 1] * share,
                     colour,
                 )
-    patch.lay(gain)
-
-
-def draw_flag(image: Image, camera: Camera, corner: tuple[float, float], gain: Colour) -> None:
-    """A corner flag; ``corner`` holds the signs of x and y."""
-    x, y = corner[0] * HALF_LENGTH, corner[1] * HALF_WIDTH
-    points = np.array([(x, y, 0), (x, y, -1.55), (x, y, -1.2), (x + 0.36, y + 0.25, -1.42)])
-    pixels = camera.project(points)
-    if np.isnan(pixels).any() or not _in_frame(pixels, image):
-        return
-    radius = 0.02 * camera.focal_length[0] / float(camera.pitch_to_camera(points)[:, 2].mean())
-    patch = Patch(pixels.min(axis=0) - 3, pixels.max(axis=0) + 3, 3, image)
-    if patch.is_empty:
-        return
-    patch.capsule(pixels[0], pixels[1], radius, radius, (60.0, 210.0, 235.0))
-    patch.polygon(pixels[1:4], (40.0, 60.0, 220.0))
     patch.lay(gain)
 
 

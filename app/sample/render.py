@@ -13,20 +13,18 @@ from app.errors import NotFoundError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.sample.figures import Person, draw_person, people_in_view
-from app.sample.film import develop
 from app.sample.instant import HALF_LENGTH, HALF_WIDTH, Instant
 from app.sample.look import Colour, Look
 from app.sample.pose import pose_people
-from app.sample.props import draw_ball, draw_flag, draw_frame, draw_net
+from app.sample.props import draw_ball, draw_frame, draw_net
 from app.sample.scene import Scene
 from app.sample.score_bug import draw_score_bug
 from app.sample.shadows import shadow_mask
-from app.sample.surface import shade
+from app.sample.surface import Bowl, Eye, Turf, shade
 from app.sample.textures import board_atlas, noise_tiles
 from app.sample.views import HEIGHT, WIDTH
 
 Image = npt.NDArray[np.uint8]
-MOWING = {"across": 0.0, "along": 1.0, "checks": 2.0}
 GRAIN = 2.2
 """Standard deviation of the sensor's noise, grey levels."""
 
@@ -57,14 +55,17 @@ def _empty_stadium(camera: Camera, instant: Instant, look: Look) -> Image:
     image = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     background = np.empty((HEIGHT, WIDTH), np.uint8)
     shadow = shadow_mask(camera, instant, pose_people(instant), look.light, HEIGHT, WIDTH)
-    atlas, levels = board_atlas(look.seed)
-    coarse, fine = noise_tiles()
-    stands = look.stands
+    exposure = np.array(look.light.exposure)
     shade(
-        image, background, shadow, _camera_numbers(camera), _look_numbers(look),
-        _sides(camera, look), stands.profile, np.array(stands.kinds), stands.crowd,
-        np.array(stands.seat), atlas, levels, coarse, fine,
-    )  # fmt: skip
+        image,
+        background,
+        shadow,
+        exposure,
+        _eye(camera),
+        _turf(look),
+        _bowl(camera, look),
+        *noise_tiles(),
+    )
     # A long lens that is focused on the play shows the crowd out of focus.
     sigma = float(np.clip(camera.focal_length[0] / 2600.0, 0.5, 2.4))
     blurred = cv2.GaussianBlur(image, (0, 0), sigma)
@@ -72,46 +73,39 @@ def _empty_stadium(camera: Camera, instant: Instant, look: Look) -> Image:
     return image
 
 
-def _camera_numbers(camera: Camera) -> FloatArray:
-    numbers = [*camera.position, camera.focal_length[0], *camera.principal_point]
-    return np.concatenate([camera.rotation.ravel(), numbers, camera.distortion[:1]])
+def _eye(camera: Camera) -> Eye:
+    lens = (camera.focal_length[0], *camera.principal_point, float(camera.distortion[0]))
+    return Eye(camera.rotation, camera.position, *lens)
 
 
-def _look_numbers(look: Look) -> FloatArray:
-    light, grass = look.light, look.grass
-    evening = len(light.lamps) > 1
-    y, slope, darkness = light.shade or (0.0, 0.0, 0.0)
-    return np.array(
-        [
-            *grass.colour, grass.band, grass.contrast, MOWING[grass.mowing], grass.wear,
-            *light.exposure, 0.58 if evening else 0.95, look.stands.empty,
-            *light.sky[0], *light.sky[1], y, slope, darkness, *look.stands.wall,
-        ]
-    )  # fmt: skip
+def _turf(look: Look) -> Turf:
+    grass, shadow = look.grass, look.light.shade or (0.0, 0.0, 0.0)
+    return Turf(*grass.colour, grass.across, grass.band, grass.contrast, *shadow)
 
 
-def _sides(camera: Camera, look: Look) -> FloatArray:
-    """Which sides have stands, as ``shade`` wants it."""
+def _bowl(camera: Camera, look: Look) -> Bowl:
+    stands, light = look.stands, look.light
+    atlas, levels = board_atlas(look.seed)
+    along, beyond = stands.board_distance
     x, y = (float(value) for value in camera.position[:2])
-    along, beyond = look.stands.board_distance
-    ends = [_side(sign * x - HALF_LENGTH, beyond - 1.0, camera, look) for sign in (1, -1)]
-    sides = [_side(sign * y - HALF_WIDTH, along - 2.0, camera, look) for sign in (1, -1)]
-    return np.array([*ends, *sides, beyond, beyond, along, along], dtype=np.float64)
-
-
-def _side(distance: float, limit: float, camera: Camera, look: Look) -> float:
-    """1 where the stand is seen from the pitch; 0 or 2 (from above) where the camera stands.
-
-    Args:
-        distance: Of the camera beyond the line of this side, metres.
-        limit: Distance from which on the side is the camera's own.
-    """
-    if distance < limit:
-        return 1.0
-    (front, low), (back, high) = look.stands.profile[1:3]
-    surface = low + (distance - front) * (high - low) / (back - front)
-    above = distance > front and -float(camera.position[2]) > surface + 1.5
-    return 2.0 if above else 0.0
+    # A camera beyond a line stands before the boards of that side, or among the crowd.
+    ends = [sign * x - HALF_LENGTH < beyond - 1.0 for sign in (1, -1)]
+    sides = [sign * y - HALF_WIDTH < along - 2.0 for sign in (1, -1)]
+    return Bowl(
+        seen=np.array([*ends, *sides]),
+        beyond=beyond,
+        along=along,
+        profile=stands.profile,
+        kinds=np.array(stands.kinds),
+        crowd=stands.crowd,
+        seat=np.array(stands.seat),
+        wall=np.array(stands.wall),
+        empty=stands.empty,
+        light=0.58 if len(light.lamps) > 1 else 0.95,
+        sky=np.array(light.sky),
+        atlas=atlas,
+        levels=levels,
+    )
 
 
 def _draw_movers(image: Image, camera: Camera, instant: Instant, look: Look) -> None:
@@ -131,29 +125,19 @@ def _draw_movers(image: Image, camera: Camera, instant: Instant, look: Look) -> 
 
 
 def _draw_play(image: Image, camera: Camera, instant: Instant, look: Look, lit_from: float) -> None:
-    """People, ball and corner flags, far ones first."""
+    """People and the ball, far ones first."""
     people = people_in_view(camera, instant, pose_people(instant), image)
-    corners = [(x, y) for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
-    flags = [(x * HALF_LENGTH, y * HALF_WIDTH, -0.8) for x, y in corners]
-    order: list[tuple[float, Person | tuple[float, float] | None]] = [
-        (_depth(camera, tuple(instant.ball)), None),
-        *((float(person.depths.mean()), person) for person in people),
-        *((_depth(camera, flag), corner) for flag, corner in zip(flags, corners, strict=True)),
-    ]
-    for depth, what in sorted(order, key=lambda item: -item[0]):
+    ball_depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])
+    order: list[tuple[float, Person | None]] = [(ball_depth, None)]
+    order += [(float(person.depths.mean()), person) for person in people]
+    for depth, person in sorted(order, key=lambda item: -item[0]):
         if depth < 0.5:
             continue
-        if what is None:
+        if person is None:
             draw_ball(image, camera, instant, _gain_at(look, instant.ball[:2]), lit_from)
-        elif isinstance(what, Person):
-            gain = _gain_at(look, instant.feet[what.index])
-            draw_person(image, what, look, instant.numbers[what.index], gain, lit_from)
         else:
-            draw_flag(image, camera, what, look.light.exposure)
-
-
-def _depth(camera: Camera, point: tuple[float, ...]) -> float:
-    return float(camera.pitch_to_camera(np.array([point]))[0, 2])
+            gain = _gain_at(look, instant.feet[person.index])
+            draw_person(image, person, look, instant.numbers[person.index], gain, lit_from)
 
 
 def _lit_from(camera: Camera, look: Look) -> float:
@@ -177,13 +161,20 @@ def _gain_at(look: Look, place: FloatArray) -> Colour:
 
 def _develop(image: Image, rng: np.random.Generator) -> Image:
     """What lens and sensor add: softness, a darker border, grain."""
-    soft = np.asarray(cv2.GaussianBlur(image, (0, 0), 0.6), np.uint8)
+    soft = cv2.GaussianBlur(image, (0, 0), 0.6)
     row, column = (int(v) for v in rng.integers(0, (HEIGHT, WIDTH)))
-    develop(soft, _grain(), row, column)
-    return soft
+    noise = np.roll(_grain(), (-row, -column), axis=(0, 1))
+    return np.asarray(np.clip(soft * _border() + noise + 0.5, 0, 255), np.uint8)
+
+
+@lru_cache(maxsize=1)
+def _border() -> npt.NDArray[np.float32]:
+    """How much of the light the lens lets through, shape (720, 1280, 1)."""
+    y, x = np.linspace(-1, 1, HEIGHT)[:, None], np.linspace(-1, 1, WIDTH)
+    return (1.03 - 0.09 * (x * x + y * y))[..., None].astype(np.float32)
 
 
 @lru_cache(maxsize=1)
 def _grain() -> npt.NDArray[np.float32]:
     rng = np.random.default_rng(7)
-    return rng.normal(0, GRAIN, (HEIGHT, WIDTH)).astype(np.float32)
+    return rng.normal(0, GRAIN, (HEIGHT, WIDTH, 1)).astype(np.float32)

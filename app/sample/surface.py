@@ -1,24 +1,82 @@
-"""Surface: grass, lines, boards, stands and sky, one ray for each pixel.
-
-Lines have their true width: each pixel takes the share of its footprint on the grass that is
-painted, so that a far line fades instead of growing to a whole pixel.
-"""
+"""Surface: grass, lines, boards, stands and sky, one ray for each pixel."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
-HALF_LENGTH, HALF_WIDTH = 52.5, 34.0
-HALF_LINE = 0.06
+from app.geometry.arrays import FloatArray
+from app.sample.paint import HALF_LENGTH, HALF_WIDTH, painted, step
+
 BOARD_HEIGHT = 0.95
 SEAT_WIDTH, ROW_DEPTH = 0.54, 0.86
 TILE = 512
 """Side of a noise tile; a power of two, so that wrapping is a mask."""
+_FAR = 1e9
+_GROUND, _BOARD = -1, 0
+"""Parts that a ray can meet; 1 + i is the i-th piece of the stands' profile."""
+_WALL, _CROWD = 0, 1
 
 _jit = numba.njit(cache=True, nogil=True, fastmath=False)
+
+
+class Eye(NamedTuple):
+    """The camera: R, position in the pitch frame, and lens (pixels; first radial coefficient)."""
+
+    rotation: FloatArray
+    position: FloatArray
+    focal: float
+    x0: float
+    y0: float
+    k1: float
+
+
+class Turf(NamedTuple):
+    """The grass: its colour, and how it is mown.
+
+    ``across``: in bands across the pitch, or along it; ``band`` is their width, metres. ``edge``
+    and ``slope`` are y at x = 0 and slope of the border of the stand's shadow, ``darkness`` is
+    how dark it is (0: no shadow).
+    """
+
+    blue: float
+    green: float
+    red: float
+    across: bool
+    band: float
+    contrast: float
+    edge: float
+    slope: float
+    darkness: float
+
+
+class Bowl(NamedTuple):
+    """What stands around the grass.
+
+    ``seen``: for +x, -x, +y, -y whether the side has boards and stands (it has none where the
+    camera stands). The boards are ``beyond`` the goal lines and ``along`` the side lines, metres.
+    ``profile`` is the cross section of the stands, shape (N, 2), ``kinds`` of its pieces,
+    shape (N - 1,). ``crowd`` holds colours of clothes, shape (M, 3), ``empty`` the share of empty
+    seats, ``light`` the light on it all, ``sky`` the colours at the horizon and higher up.
+    ``atlas`` and ``levels`` are the boards at all sizes, see ``board_atlas``.
+    """
+
+    seen: np.ndarray
+    beyond: float
+    along: float
+    profile: FloatArray
+    kinds: np.ndarray
+    crowd: FloatArray
+    seat: FloatArray
+    wall: FloatArray
+    empty: float
+    light: float
+    sky: FloatArray
+    atlas: np.ndarray
+    levels: FloatArray
 
 
 @_jit
@@ -42,71 +100,6 @@ def _tile(tile: np.ndarray, x: float, y: float) -> float:
     low = tile[j1, i0] + u * (tile[j1, i1] - tile[j1, i0])
     value: float = top + v * (low - top)
     return value
-
-
-@_jit
-def _stroke(distance: float, width: float, half: float) -> float:
-    """Share of a footprint of that width that a line of half width ``half`` covers."""
-    if abs(distance) > half + 0.5 * width:
-        return 0.0
-    low = max(distance - 0.5 * width, -half)
-    high = min(distance + 0.5 * width, half)
-    return max(high - low, 0.0) / width
-
-
-@_jit
-def _step(distance: float, width: float) -> float:
-    """Share of a footprint that lies on the positive side."""
-    if abs(distance) > 0.5 * width:
-        return 1.0 if distance > 0 else 0.0
-    return distance / width + 0.5
-
-
-@_jit
-def _paint(gx: float, gy: float, ax_x: float, ax_y: float, ay_x: float, ay_y: float) -> float:
-    """Share of a pixel that is painted white.
-
-    (ax_x, ax_y) is the step on the grass for one pixel to the right, (ay_x, ay_y) for one down.
-    """
-    x, y = abs(gx), abs(gy)
-    wx = abs(ax_x) + abs(ay_x) + 1e-6
-    wy = abs(ax_y) + abs(ay_y) + 1e-6
-    paint = 0.0
-    end_x, end_y = _step(HALF_LENGTH + HALF_LINE - x, wx), _step(HALF_WIDTH + HALF_LINE - y, wy)
-    paint = max(paint, _stroke(y - HALF_WIDTH, wy, HALF_LINE) * end_x)
-    paint = max(paint, _stroke(x - HALF_LENGTH, wx, HALF_LINE) * end_y)
-    paint = max(paint, _stroke(x, wx, HALF_LINE) * end_y)
-    for depth, half in ((16.5, 20.16), (5.5, 9.16)):
-        front = HALF_LENGTH - depth
-        end = _step(half + HALF_LINE - y, wy)
-        paint = max(paint, _stroke(x - front, wx, HALF_LINE) * end)
-        end = _step(x - front + HALF_LINE, wx) * end_x
-        paint = max(paint, _stroke(y - half, wy, HALF_LINE) * end)
-    paint = max(paint, _ring(gx, gy, 9.15, ax_x, ax_y, ay_x, ay_y))
-    sign = 1.0 if gx > 0 else -1.0
-    off = gx - sign * 41.5
-    outside = _step(36.0 - x + HALF_LINE, wx)
-    if outside > 0.0:
-        paint = max(paint, _ring(off, gy, 9.15, ax_x, ax_y, ay_x, ay_y) * outside)
-    if x < HALF_LENGTH + 0.06 and y < HALF_WIDTH + 0.06:
-        corner_x, corner_y = x - HALF_LENGTH, y - HALF_WIDTH
-        if corner_x > -1.5 and corner_y > -1.5:
-            # Footprints are symmetric, so the mirrored corner may use the same steps.
-            paint = max(paint, _ring(corner_x, corner_y, 1.0, ax_x, ax_y, ay_x, ay_y))
-    width = 0.5 * (wx + wy)
-    paint = max(paint, _step(0.12 - math.hypot(off, gy), width) * min(1.0, 0.24 / wy))
-    return max(paint, _step(0.13 - math.hypot(gx, gy), width) * min(1.0, 0.26 / wy))
-
-
-@_jit
-def _ring(
-    x: float, y: float, radius: float, ax_x: float, ax_y: float, ay_x: float, ay_y: float
-) -> float:
-    r = math.hypot(x, y)
-    if abs(r - radius) > 6.0 or r < 1e-6:
-        return 0.0
-    width = (abs(x * ax_x + y * ax_y) + abs(x * ay_x + y * ay_y)) / r + 1e-6
-    return _stroke(r - radius, width, HALF_LINE)
 
 
 @_jit
@@ -156,97 +149,6 @@ def _side_hit(
 
 
 @_jit
-def _tier_hit(
-    s0: float, ds: float, h0: float, dh: float, profile: np.ndarray
-) -> tuple[float, float]:
-    """Where a ray from above meets the first tier: its t (1e9: nowhere) and the place on it."""
-    ex, ey = profile[2, 0] - profile[1, 0], profile[2, 1] - profile[1, 1]
-    cross = ds * ey - dh * ex
-    if abs(cross) < 1e-12:
-        return 1e9, 0.0
-    t = ((profile[1, 0] - s0) * ey - (profile[1, 1] - h0) * ex) / cross
-    length = math.sqrt(ex * ex + ey * ey)
-    at = ((s0 + ds * t - profile[1, 0]) * ex + (h0 + dh * t - profile[1, 1]) * ey) / length
-    if t <= 0.0 or at < 0.0 or at > length:
-        return 1e9, 0.0
-    return t, at
-
-
-@_jit
-def _crowd(
-    out: np.ndarray, u: float, v: float, layer: int, foot: float,
-    crowd: np.ndarray, seat: np.ndarray, empty: float,
-) -> None:  # fmt: skip
-    """Colour of a place in a stand: people in rows, empty seats, stairs."""
-    column, row = math.floor(u / SEAT_WIDTH), math.floor(v / ROW_DEPTH)
-    lu, lv = u / SEAT_WIDTH - column, v / ROW_DEPTH - row
-    i, j = int(column), int(row)
-    if i % 24 == 0:
-        step = 0.8 + 0.25 * (1.0 if lv > 0.5 else 0.0)
-        out[0], out[1], out[2] = 96.0 * step, 98.0 * step, 100.0 * step
-        return
-    pick = _hash(i, j, layer)
-    if pick < empty:
-        shade = 0.55 + 0.45 * (1.0 if 0.15 < lv < 0.7 and 0.1 < lu < 0.9 else 0.0)
-        out[0], out[1], out[2] = seat[0] * shade, seat[1] * shade, seat[2] * shade
-        return
-    who = int(_hash(i, j, layer + 7) * crowd.shape[0])
-    light = 0.62 + 0.5 * _hash(i, j, layer + 13)
-    head_u, head_v = 0.5 + 0.24 * (_hash(i, j, layer + 3) - 0.5), 0.70 + 0.1 * (pick - 0.5)
-    du, dv = (lu - head_u) * SEAT_WIDTH, (lv - head_v) * ROW_DEPTH * 0.62
-    if du * du + dv * dv < 0.0125:
-        tone = 0.45 + 0.55 * _hash(i, j, layer + 5)
-        hair = 0.45 if lv > head_v + 0.06 else 1.0
-        out[0], out[1], out[2] = 126.0 * tone * hair, 158.0 * tone * hair, 208.0 * tone * hair
-    elif lv < head_v and abs(lu - 0.5) < 0.42:
-        dim = light * (0.62 + 0.38 * min(1.0, lv / 0.4))
-        out[0], out[1], out[2] = crowd[who, 0] * dim, crowd[who, 1] * dim, crowd[who, 2] * dim
-    else:
-        out[0], out[1], out[2] = 44.0, 42.0, 42.0
-    # Where a person is smaller than a pixel, only the mean of the crowd is left.
-    blur = min(max((foot - 0.25) / 0.6, 0.0), 0.8)
-    for c in range(3):
-        out[c] += blur * (crowd[who, c] * 0.35 + 52.0 - out[c])
-
-
-@_jit
-def _grass(
-    out: np.ndarray, gx: float, gy: float, distance: float, foot: float, wx: float, wy: float,
-    view_x: float, view_y: float, p: np.ndarray, coarse: np.ndarray, fine: np.ndarray,
-) -> None:  # fmt: skip
-    """Colour of the grass without lines and shadows."""
-    band, contrast, mowing = p[3], p[4], p[5]
-    # Mown grass bends: a band shines when one looks along the way the mower went.
-    tone = 0.0
-    if mowing != 1.0:
-        tone += _bands(gx, band, wx) * (0.3 + 0.7 * abs(view_y))
-    if mowing != 0.0:
-        tone += _bands(gy + 0.5 * band, band, wy) * (0.3 + 0.7 * abs(view_x))
-    if mowing == 2.0:
-        tone *= 0.6
-    if abs(gx) > HALF_LENGTH + 2.5 or abs(gy) > HALF_WIDTH + 2.2:
-        tone *= 0.15
-    patches = _tile(coarse, gx * 8.0, gy * 8.0)
-    broad = _tile(coarse, gx * 1.1 + 77.0, gy * 1.1 + 31.0)
-    blades = _tile(fine, gx * 60.0, gy * 60.0)
-    tufts = _tile(fine, gx * 11.0 + 9.0, gy * 11.0 + 5.0)
-    near = min(1.0, 0.03 / (foot + 1e-6))
-    middle = min(1.0, 0.16 / (foot + 1e-6))
-    light = 1.0 + 0.5 * contrast * tone + 0.055 * broad + 0.05 * patches * middle
-    light += 0.10 * blades * near + 0.065 * tufts * middle
-    brown = 0.0
-    if abs(gx) > 38.0 and abs(gy) < 12.0:
-        mouth = math.exp(-((abs(gx) - 50.5) ** 2) / 6.0 - gy * gy / 14.0)
-        spot = math.exp(-((abs(gx) - 41.5) ** 2) / 1.5 - gy * gy / 1.5)
-        brown = p[6] * min(0.55, (0.75 * mouth + 0.4 * spot) * max(0.0, 0.6 + 0.8 * patches))
-    # Grazing rays see the shiny side of the blades: paler and a little bluer.
-    sheen = 0.16 * distance / (distance + 80.0)
-    out[0] = (p[0] * (1 - brown) + 62.0 * brown) * light * (1 + 1.1 * sheen)
-    out[1] = (p[1] * (1 - brown) + 108.0 * brown) * light * (1 + 0.55 * sheen)
-    out[2] = (p[2] * (1 - brown) + 122.0 * brown) * light * (1 + 0.75 * sheen)
-
-
-@_jit
 def _board(
     out: np.ndarray, u: float, h: float, foot: float, atlas: np.ndarray, levels: np.ndarray
 ) -> None:
@@ -270,141 +172,211 @@ def _board(
 
 
 @_jit
+def _fill(out: np.ndarray, colour: np.ndarray, gain: float, more: float = 0.0) -> None:
+    """Set a colour: written out, for each pixel of a frame asks for several."""
+    for c in range(3):
+        out[c] = colour[c] * gain + more
+
+
+@_jit
+def _dim(out: np.ndarray, gain: float) -> None:
+    for c in range(3):
+        out[c] *= gain
+
+
+@_jit
+def _crowd(
+    out: np.ndarray, u: float, v: float, layer: int, foot: float,
+    crowd: np.ndarray, seat: np.ndarray, empty: float,
+) -> None:  # fmt: skip
+    """Colour of a place in a stand: people in rows, empty seats, stairs."""
+    column, row = math.floor(u / SEAT_WIDTH), math.floor(v / ROW_DEPTH)
+    lu, lv = u / SEAT_WIDTH - column, v / ROW_DEPTH - row
+    i, j = int(column), int(row)
+    if i % 24 == 0:
+        _fill(out, seat, 0.0, 106.0 if lv > 0.5 else 80.0)
+        return
+    if _hash(i, j, layer) < empty:
+        _fill(out, seat, 1.0 if 0.15 < lv < 0.7 else 0.55)
+        return
+    clothes = crowd[int(_hash(i, j, layer + 7) * crowd.shape[0])]
+    if lv < 0.68 and abs(lu - 0.5) < 0.42:
+        light = 0.62 + 0.5 * _hash(i, j, layer + 13)
+        _fill(out, clothes, light * (0.62 + 0.38 * min(1.0, lv / 0.4)))
+    elif 0.5 < lv < 0.92 and abs(lu - 0.5) < 0.2:
+        tone = 0.4 + 0.5 * _hash(i, j, layer + 5)
+        out[0], out[1], out[2] = 126.0 * tone, 158.0 * tone, 208.0 * tone
+    else:
+        _fill(out, clothes, 0.0, 43.0)
+    # Where a person is smaller than a pixel, only the mean of the crowd is left.
+    blur = min(max((foot - 0.25) / 0.6, 0.0), 0.8)
+    for c in range(3):
+        out[c] += blur * (clothes[c] * 0.35 + 52.0 - out[c])
+
+
+@_jit
+def _grass(
+    out: np.ndarray, gx: float, gy: float, distance: float, foot: float, wx: float, wy: float,
+    view_x: float, view_y: float, turf: Turf, coarse: np.ndarray, fine: np.ndarray,
+) -> None:  # fmt: skip
+    """Colour of the grass without lines and shadows."""
+    # Mown grass bends: a band shines when one looks along the way the mower went.
+    if turf.across:
+        tone = _bands(gx, turf.band, wx) * (0.3 + 0.7 * abs(view_y))
+    else:
+        tone = _bands(gy + 0.5 * turf.band, turf.band, wy) * (0.3 + 0.7 * abs(view_x))
+    if abs(gx) > HALF_LENGTH + 2.5 or abs(gy) > HALF_WIDTH + 2.2:
+        tone *= 0.15
+    patches = _tile(coarse, gx * 8.0, gy * 8.0)
+    broad = _tile(coarse, gx * 1.1 + 77.0, gy * 1.1 + 31.0)
+    blades = _tile(fine, gx * 60.0, gy * 60.0)
+    tufts = _tile(fine, gx * 11.0 + 9.0, gy * 11.0 + 5.0)
+    near, middle = min(1.0, 0.03 / (foot + 1e-6)), min(1.0, 0.16 / (foot + 1e-6))
+    light = 1.0 + 0.5 * turf.contrast * tone + 0.055 * broad + 0.05 * patches * middle
+    light += 0.10 * blades * near + 0.065 * tufts * middle
+    # Grazing rays see the shiny side of the blades: paler and a little bluer.
+    sheen = 0.16 * distance / (distance + 80.0)
+    out[0] = turf.blue * light * (1 + 1.1 * sheen)
+    out[1] = turf.green * light * (1 + 0.55 * sheen)
+    out[2] = turf.red * light * (1 + 0.75 * sheen)
+
+
+@_jit
+def _lawn(
+    out: np.ndarray, gx: float, gy: float, ray: np.ndarray, t: float,
+    R: np.ndarray, focal: float, turf: Turf, coarse: np.ndarray, fine: np.ndarray,
+) -> None:  # fmt: skip
+    """Colour of a place on the grass, with its lines and the shadow of the stand."""
+    dx, dy, dz = ray[0], ray[1], ray[2]
+    # One pixel to the right and one down, as steps on the grass.
+    pixel = t / focal
+    rx, ry = R[0, 2] / dz, R[1, 2] / dz
+    ax_x, ax_y = pixel * (R[0, 0] - dx * rx), pixel * (R[0, 1] - dy * rx)
+    ay_x, ay_y = pixel * (R[1, 0] - dx * ry), pixel * (R[1, 1] - dy * ry)
+    wx, wy = abs(ax_x) + abs(ay_x), abs(ax_y) + abs(ay_y)
+    foot = math.sqrt(abs(ax_x * ay_y - ax_y * ay_x))
+    flat = math.sqrt(dx * dx + dy * dy) + 1e-9
+    _grass(out, gx, gy, t * flat, foot, wx, wy, dx / flat, dy / flat, turf, coarse, fine)
+    if abs(gx) < HALF_LENGTH + 1.0 and abs(gy) < HALF_WIDTH + 1.0:
+        paint = painted(gx, gy, ax_x, ax_y, ay_x, ay_y)
+        if paint > 0.0:
+            paint *= min(1.0, 0.93 + 0.07 * _tile(fine, gx * 25.0, gy * 25.0))
+            out[0] += paint * (226.0 - out[0])
+            out[1] += paint * (234.0 - out[1])
+            out[2] += paint * (231.0 - out[2])
+    edge = gy - (turf.edge + turf.slope * gx)
+    _dim(out, 1.0 - turf.darkness * step(edge, max(0.5, wy)))
+
+
+@_jit
+def _first_hit(
+    C: np.ndarray, ray: np.ndarray, ground: float,
+    seen: np.ndarray, beyond: float, along: float, profile: np.ndarray,
+) -> tuple[float, int, float, int]:  # fmt: skip
+    """What a ray meets first: its t, its part, the place on the part, and its side."""
+    best, part, place, side = ground, _GROUND, 0.0, -1
+    for k in range(4):
+        axis, other = (0, 1) if k < 2 else (1, 0)
+        half, reach = (HALF_LENGTH, HALF_WIDTH) if k < 2 else (HALF_WIDTH, HALF_LENGTH)
+        sign = 1.0 if k % 2 == 0 else -1.0
+        ds, s0, board = sign * ray[axis], sign * C[axis] - half, beyond if k < 2 else along
+        if not seen[k] or ds <= 1e-9 or s0 + ds * best < board:
+            continue
+        reach += along if k < 2 else beyond
+        t, what, at = _side_hit(s0, ds, -C[2], -ray[2], board, C[other], ray[other], reach, profile)
+        if what >= 0 and t < best:
+            best, part, place, side = t, what, at, k
+    return best, part, place, side
+
+
+@_jit
+def _stand(
+    out: np.ndarray, part: int, place: float, u: float, side: int, foot: float,
+    profile: np.ndarray, kinds: np.ndarray, crowd: np.ndarray, seat: np.ndarray,
+    wall: np.ndarray, empty: float,
+) -> None:  # fmt: skip
+    """Colour of a place on a piece of the stands."""
+    run = profile[part, 0] - profile[part - 1, 0]
+    rise = profile[part, 1] - profile[part - 1, 1]
+    share, kind = place / math.hypot(run, rise), kinds[part - 1]
+    if kind == _CROWD:
+        _crowd(out, u, place, side * 31 + part * 101, foot, crowd, seat, empty)
+        _dim(out, 1.0 - 0.35 * share)
+    elif kind == _WALL:
+        if part > 1 and 0.35 < share < 0.6:
+            _fill(out, seat, 0.55, 50.0)
+        else:
+            _fill(out, wall, 0.8 + 0.2 * share)
+    else:
+        _fill(out, wall, 1.2 if u % 7.0 > 0.5 else 0.9)
+
+
+@_jit
+def _aim(ray: np.ndarray, R: np.ndarray, k1: float, a: float, b: float) -> None:
+    """Direction of the ray of a pixel, pitch frame; along the optical axis it has length 1."""
+    d2, s = a * a + b * b, 1.0
+    for _ in range(4):
+        s = 1.0 / (1.0 + k1 * d2 * s * s)
+    for k in range(3):
+        ray[k] = R[0, k] * a * s + R[1, k] * b * s + R[2, k]
+
+
+@_jit
+def _sky(out: np.ndarray, ray: np.ndarray, sky: np.ndarray) -> None:
+    up = min(1.0, -ray[2] / math.hypot(ray[0], ray[1]) * 3.0)
+    for c in range(3):
+        out[c] = sky[0, c] + up * (sky[1, c] - sky[0, c])
+
+
+@_jit
 def shade(
-    image: np.ndarray, background: np.ndarray, shadow: np.ndarray, camera: np.ndarray,
-    p: np.ndarray, sides: np.ndarray, profile: np.ndarray, kinds: np.ndarray, crowd: np.ndarray,
-    seat: np.ndarray, atlas: np.ndarray, levels: np.ndarray, coarse: np.ndarray, fine: np.ndarray,
+    image: np.ndarray, background: np.ndarray, shadow: np.ndarray, exposure: np.ndarray,
+    eye: Eye, turf: Turf, bowl: Bowl, coarse: np.ndarray, fine: np.ndarray,
 ) -> None:  # fmt: skip
     """Paint the whole frame.
 
     Args:
         image: Output, blue green red, uint8, shape (H, W, 3).
         background: Output, 255 where the pixel lies behind the boards, uint8, shape (H, W).
-        shadow: Light that figures leave on the grass, 255 is all, uint8, shape (H, W).
-        camera: R row by row, position, focal length, x0, y0, k1; shape (16,).
-        p: Grass colour 0-2, band, contrast, mowing, wear 3-6, exposure 7-9, light on the crowd
-            10, empty seats 11, sky 12-17, shade of the stand 18-20 (0 darkness: none), wall 21-23.
-        sides: For +x, -x, +y, -y: 1 where the side has boards and stands, 0 where the camera
-            stands, 2 where it stands above the first tier and sees that; then the distance of the
-            boards; shape (8,).
-        profile: Cross section of the stands, shape (N, 2); kinds: of its pieces, (N - 1,).
-        crowd: Colours of clothes, shape (M, 3); seat: colour of an empty seat, (3,).
-        atlas: Boards at all sizes, uint8; levels: where each size lies, see ``_board``.
+        shadow: Light that figures leave on the ground, 255 is all, uint8, shape (H, W).
+        exposure: Gain per channel, shape (3,).
         coarse: Noise tile of patches; fine: of blades; float32, shape (512, 512).
     """
-    rows, columns = image.shape[0], image.shape[1]
-    R, C = camera[:9].copy().reshape(3, 3), camera[9:12]
-    focal, x0, y0, k1 = camera[12], camera[13], camera[14], camera[15]
-    height = -C[2]
-    colour = np.zeros(3)
-    for row in range(rows):
-        for column in range(columns):
-            a, b = (column - x0) / focal, (row - y0) / focal
-            d2, s = a * a + b * b, 1.0
-            for _ in range(4):
-                s = 1.0 / (1.0 + k1 * d2 * s * s)
-            a, b = a * s, b * s
-            dx = R[0, 0] * a + R[1, 0] * b + R[2, 0]
-            dy = R[0, 1] * a + R[1, 1] * b + R[2, 1]
-            dz = R[0, 2] * a + R[1, 2] * b + R[2, 2]
-            ground = height / dz if dz > 1e-9 else 1e9
-            gx, gy = C[0] + ground * dx, C[1] + ground * dy
-            best, part, place, side = ground, -1, 0.0, -1
-            for k in range(4):
-                if sides[k] == 0.0:
-                    continue
-                sign = 1.0 if k % 2 == 0 else -1.0
-                half = HALF_LENGTH if k < 2 else HALF_WIDTH
-                ds = sign * (dx if k < 2 else dy)
-                s0 = sign * (C[0] if k < 2 else C[1]) - half
-                if sides[k] == 2.0:
-                    if ds < -1e-9:
-                        t, at = _tier_hit(s0, ds, height, -dz, profile)
-                        if t < best:
-                            best, part, place, side = t, 2, at, k
-                    continue
-                if ds <= 1e-9 or s0 + ds * best < sides[4 + k]:
-                    continue
-                along, dalong = (C[1], dy) if k < 2 else (C[0], dx)
-                reach = HALF_WIDTH + sides[6] if k < 2 else HALF_LENGTH + sides[4]
-                t, what, at = _side_hit(
-                    s0, ds, height, -dz, sides[4 + k], along, dalong, reach, profile
-                )
-                if what >= 0 and t < best:
-                    best, part, place, side = t, what, at, k
-            light = 1.0
-            behind = 255
-            if part == 0:
-                hx, hy = C[0] + best * dx, C[1] + best * dy
-                u = (hy if side == 0 else -hy) if side < 2 else (-hx if side == 2 else hx)
-                _board(colour, u, place, best / focal, atlas, levels)
-                light = 0.9
-                behind = 0
-            elif part > 0:
-                hx, hy = C[0] + best * dx, C[1] + best * dy
-                u = (hy if side == 0 else -hy) if side < 2 else (-hx if side == 2 else hx)
-                kind = kinds[part - 1]
-                length = math.hypot(
-                    profile[part, 0] - profile[part - 1, 0], profile[part, 1] - profile[part - 1, 1]
-                )
-                if kind == 1:
-                    _crowd(
-                        colour, u, place, side * 31 + part * 101, best / focal, crowd, seat, p[11]
-                    )
-                    light = p[10] * (1.0 - 0.35 * place / length)
-                elif kind == 0:
-                    rib = 1.12 if u % 4.0 < 0.12 else 1.0
-                    ribbon = 1.9 if part > 1 and 0.35 < place / length < 0.6 else 1.0
-                    for c in range(3):
-                        colour[c] = p[21 + c] * rib * (0.8 + 0.2 * place / length)
-                        colour[c] = colour[c] * ribbon if ribbon == 1.0 else 0.55 * seat[c] + 50.0
-                    light = p[10]
+    # Taken out of their tuples once: every access would count references again.
+    R, C = eye.rotation, eye.position
+    seen, profile, kinds, crowd = bowl.seen, bowl.profile, bowl.kinds, bowl.crowd
+    seat, wall, sky, atlas, levels = bowl.seat, bowl.wall, bowl.sky, bowl.atlas, bowl.levels
+    ray, colour = np.zeros(3), np.zeros(3)
+    for row in range(image.shape[0]):
+        for column in range(image.shape[1]):
+            _aim(ray, R, eye.k1, (column - eye.x0) / eye.focal, (row - eye.y0) / eye.focal)
+            ground = -C[2] / ray[2] if ray[2] > 1e-9 else _FAR
+            t, part, place, side = _first_hit(
+                C, ray, ground, seen, bowl.beyond, bowl.along, profile
+            )
+            x, y, foot, far = C[0] + t * ray[0], C[1] + t * ray[1], t / eye.focal, True
+            if part == _GROUND and ground < _FAR:
+                end, rim = abs(x) - HALF_LENGTH, abs(y) - HALF_WIDTH
+                far = end > bowl.beyond + 0.2 or rim > bowl.along + 0.2
+                if far:
+                    _fill(colour, wall, 0.9)
                 else:
-                    beam = 0.72 if u % 7.0 < 0.5 else 1.0
-                    for c in range(3):
-                        colour[c] = 88.0 * beam
-                    light = p[10]
-            elif dz <= 1e-9:
-                up = min(1.0, -dz / math.sqrt(dx * dx + dy * dy) * 3.0)
-                for c in range(3):
-                    colour[c] = p[12 + c] + up * (p[15 + c] - p[12 + c])
+                    _lawn(colour, x, y, ray, t, R, eye.focal, turf, coarse, fine)
+                _dim(colour, shadow[row, column] / 255.0)
+            elif part == _GROUND:
+                _sky(colour, ray, sky)
             else:
-                # One pixel to the right and one down, as steps on the grass.
-                step = ground / focal
-                rx, ry = R[0, 2] / dz, R[1, 2] / dz
-                ax_x, ax_y = step * (R[0, 0] - dx * rx), step * (R[0, 1] - dy * rx)
-                ay_x, ay_y = step * (R[1, 0] - dx * ry), step * (R[1, 1] - dy * ry)
-                wx, wy = abs(ax_x) + abs(ay_x), abs(ax_y) + abs(ay_y)
-                foot = math.sqrt(abs(ax_x * ay_y - ax_y * ay_x))
-                flat = math.sqrt(dx * dx + dy * dy) + 1e-9
-                on_grass = (
-                    abs(gx) < HALF_LENGTH + sides[4] + 0.2 and abs(gy) < HALF_WIDTH + sides[6] + 0.2
-                )
-                if on_grass:
-                    behind = 0
-                    _grass(
-                        colour, gx, gy, ground * flat, foot, wx, wy, dx / flat, dy / flat,
-                        p, coarse, fine,
+                u = (y if side < 2 else -x) * (1.0 if side % 2 == 0 else -1.0)
+                far = part != _BOARD
+                if far:
+                    _stand(
+                        colour, part, place, u, side, foot,
+                        profile, kinds, crowd, seat, wall, bowl.empty,
                     )  # fmt: skip
-                    if abs(gx) < HALF_LENGTH + 1.0 and abs(gy) < HALF_WIDTH + 1.0:
-                        paint = _paint(gx, gy, ax_x, ax_y, ay_x, ay_y)
-                        if paint > 0.0:
-                            worn = 0.93 + 0.07 * _tile(fine, gx * 25.0, gy * 25.0)
-                            paint *= min(1.0, worn)
-                            colour[0] += paint * (226.0 - colour[0])
-                            colour[1] += paint * (234.0 - colour[1])
-                            colour[2] += paint * (231.0 - colour[2])
+                    _dim(colour, bowl.light)
                 else:
-                    grit = 1.0 + 0.06 * _tile(fine, gx * 14.0, gy * 14.0) * min(1.0, 0.1 / foot)
-                    # Under the camera's own stand it is dark.
-                    far = max(abs(gx) - HALF_LENGTH, abs(gy) - HALF_WIDTH) - profile[0, 0]
-                    grit *= 1.0 - 0.68 * _step(far, 1.2)
-                    colour[0], colour[1], colour[2] = 92.0 * grit, 90.0 * grit, 88.0 * grit
-                light = shadow[row, column] / 255.0
-                if p[20] > 0.0:
-                    edge = gy - (p[18] + p[19] * gx)
-                    light *= 1.0 - p[20] * _step(edge, max(0.5, wy))
-            background[row, column] = behind
+                    _board(colour, u, place, foot, atlas, levels)
+                    _dim(colour, 0.9)
+            background[row, column] = 255 if far else 0
             for c in range(3):
-                value = colour[c] * light * p[7 + c]
-                image[row, column, c] = np.uint8(min(max(value, 0.0), 255.0))
+                image[row, column, c] = np.uint8(min(max(colour[c] * exposure[c], 0.0), 255.0))
