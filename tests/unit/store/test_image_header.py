@@ -23,14 +23,20 @@ def encoded(suffix: str, *options: int) -> bytes:
 
 def png(width: int, height: int) -> bytes:
     """The beginning of a PNG that declares a size."""
-    header = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n\x00\x00\x00\x0d" + header + struct.pack(">I", zlib.crc32(header))
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", header) + _chunk(b"IDAT", b"")
 
 
-def webp_extended(width: int, height: int) -> bytes:
-    body = b"VP8X\x0a\0\0\0" + bytes(4) + (width - 1).to_bytes(3, "little")
-    body += (height - 1).to_bytes(3, "little")
-    return b"RIFF" + struct.pack("<I", len(body) + 4) + b"WEBP" + body
+def _chunk(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+
+def webp_extended() -> bytes:
+    """A WebP with transparency: its size stands in a header before that of the picture."""
+    transparent = np.dstack([PICTURE, np.full(PICTURE.shape[:2], 9, np.uint8)])
+    data = cv2.imencode(".webp", transparent, [cv2.IMWRITE_WEBP_QUALITY, 50])[1].tobytes()
+    assert data[12:16] == b"VP8X"
+    return data
 
 
 class TestReadHeader:
@@ -48,7 +54,7 @@ class TestReadHeader:
         assert read_header(data) == ImageHeader(kind, 53, 37)
 
     def test_an_extended_webp_declares_its_canvas(self) -> None:
-        assert read_header(webp_extended(16000, 9)) == ImageHeader("image/webp", 16000, 9)
+        assert read_header(webp_extended()) == ImageHeader("image/webp", 53, 37)
 
     def test_a_comment_before_the_frame_of_a_jpeg_is_skipped(self) -> None:
         data = encoded(".jpg")
@@ -70,6 +76,7 @@ class TestReadHeader:
             encoded(".webp")[:16],
             b"\x89PNG\r\n\x1a\n" + bytes(40),
             b"RIFF\0\0\0\0WEBPJUNK" + bytes(20),
+            png(0, 5),
         ],
     )
     def test_what_is_no_image_is_refused_in_a_sentence(self, data: bytes) -> None:
@@ -87,16 +94,10 @@ class TestReadHeader:
 
 class TestCheckSize:
     @pytest.mark.parametrize(
-        ("width", "height", "error"),
-        [
-            (16_385, 1, TooLargeError),
-            (1, 16_385, TooLargeError),
-            (10_000, 5_001, TooLargeError),
-            (0, 5, ImageError),
-        ],
+        ("width", "height"), [(16_385, 1), (1, 16_385), (10_000, 5_001), (100_000, 100_000)]
     )
-    def test_refuses_what_is_too_large_or_nothing(self, width, height, error) -> None:
-        with pytest.raises(error, match=f"{width} x {height}"):
+    def test_refuses_what_is_too_large(self, width, height) -> None:
+        with pytest.raises(TooLargeError, match=f"{width} x {height}"):
             check_size(read_header(png(width, height)), Settings())
 
     def test_takes_the_largest_that_is_allowed(self) -> None:
