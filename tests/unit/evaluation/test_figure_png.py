@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+import sys
+
 import cv2
 import numpy as np
 import pytest
 
+from app.errors import InputError
 from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.figure_png import HEIGHT, PALETTE, WIDTH, figure_png
 
@@ -19,15 +22,21 @@ def figure(*series: Series, **more) -> Figure:
     return Figure("f", "Title", (panel,), "A note that says over what it was computed.")
 
 
-def count(picture: np.ndarray, color: tuple[int, int, int]) -> int:
-    return int((np.abs(picture.astype(int) - color).max(axis=2) < 12).sum())
+def like(picture: np.ndarray, color: str) -> np.ndarray:
+    """Where a picture has a colour (#rrggbb)."""
+    red_green_blue = np.frombuffer(bytes.fromhex(color[1:]), np.uint8).astype(int)
+    return np.abs(picture[:, :, ::-1].astype(int) - red_green_blue).max(axis=2) < 12
+
+
+def count(picture: np.ndarray, color: str) -> int:
+    return int(like(picture, color).sum())
 
 
 class TestFigurePng:
     def test_has_a_place_for_each_panel(self) -> None:
         two = Figure("f", "T", figure(LINE).panels * 2)
-        assert drawn(figure(LINE)).shape == (HEIGHT + 40, WIDTH, 3)
-        assert drawn(two).shape == (HEIGHT + 40, 2 * WIDTH, 3)
+        assert drawn(figure(LINE)).shape == (HEIGHT, WIDTH, 3)
+        assert drawn(two).shape == (HEIGHT, 2 * WIDTH, 3)
 
     def test_draws_the_curve_and_not_without_it(self) -> None:
         assert count(drawn(figure(LINE)), PALETTE[0]) > 400
@@ -41,8 +50,23 @@ class TestFigurePng:
 
     def test_a_mark_stands_where_it_should(self) -> None:
         picture = drawn(figure(LINE, marks=(Mark("x", 0.5, "half"),)))
-        columns = np.flatnonzero((np.abs(picture.astype(int) - PALETTE[4]).max(axis=2) < 12).any(0))
-        assert columns.min() == pytest.approx((84 + 696) / 2, abs=25)
+        columns = np.flatnonzero(like(picture, PALETTE[4]).any(axis=0))
+        curve = np.flatnonzero(like(picture, PALETTE[0]).any(axis=0))
+        assert columns.min() == pytest.approx((curve.min() + curve.max()) / 2, abs=12)
+
+    def test_a_few_stray_points_do_not_flatten_the_rest(self) -> None:
+        places = tuple(float(x) for x in range(100))
+        stray = Series("a", "A", places, (*places[:99], 1e6), "points")
+        # Half of the points lie in the left half of the picture, so they reach half way up.
+        left = drawn(figure(stray))[:, WIDTH // 4 : WIDTH // 2]
+        blue = (left[:, :, 0].astype(int) - left[:, :, 2]) > 60
+        assert np.ptp(np.flatnonzero(blue.any(axis=1))) > HEIGHT / 8
+
+    def test_without_matplotlib_the_extra_is_named(self, monkeypatch) -> None:
+        monkeypatch.setitem(sys.modules, "matplotlib", None)
+        with pytest.raises(InputError, match="matplotlib") as caught:
+            figure_png(figure(LINE))
+        assert "touchline[charts]" in (caught.value.hint or "")
 
     @pytest.mark.parametrize(
         "series",
@@ -55,13 +79,13 @@ class TestFigurePng:
         ],
     )
     def test_draws_whatever_there_is(self, series) -> None:
-        assert drawn(figure(series)).shape[0] == HEIGHT + 40
+        assert drawn(figure(series)).shape[0] == HEIGHT
 
     def test_colours_follow_the_value(self) -> None:
         near = Series("a", "A", (0.0, 1.0), (0.0, 1.0), color=10.0)
         far = Series("b", "B", (0.0, 1.0), (1.0, 0.0), color=90.0)
         picture = drawn(figure(near, far, color=Axis("Distance", "m"))).astype(int)
-        lower = picture[HEIGHT // 2 :, 100 : WIDTH // 2 - 20]
+        lower = picture[HEIGHT // 2 :, 100 : WIDTH // 2 - 60]
         # Near is blue and begins at the bottom left, far is red and begins at the top.
         assert ((lower[:, :, 0] - lower[:, :, 2]) > 80).sum() > 50
         assert ((lower[:, :, 2] - lower[:, :, 0]) > 80).sum() < 20
