@@ -1,4 +1,4 @@
-"""Speed of the kernels, as ratios to OpenCV and scipy in the same run."""
+"""Speed of the kernels, as ratios to OpenCV, scipy and numpy in the same run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from scipy.optimize import least_squares
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.geometry.damped_solve import solve_damped
 from app.geometry.rotation import rotation_looking
+from app.geometry.smallest_singular import smallest_singular_vectors
 from app.geometry.triangulation import triangulate_pairs
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize
@@ -25,11 +27,15 @@ from tests.bench.table import print_table
 SIZE = ImageSize(960, 540)
 PAIRS = 1_000_000
 REPEATS = 5
+TIMES = 1000
+"""Calls in one measurement of what takes microseconds."""
 
 
 def bench_geometry() -> None:
-    """Triangulation of many pairs, and one refinement of a camera."""
-    rows = [*_triangulation(), *_refinement()]
+    """Triangulation of many pairs, one refinement of a camera, and the compiled kernels alone."""
+    rows = [*_triangulation(), *_refinement(), *_damped_steps()]
+    # One pair is what an edit asks for, many are a dataset.
+    rows += [*_singular_vectors(1, TIMES), *_singular_vectors(100_000, 1)]
     print_table(
         "Speed against libraries, same run, best of five",
         ("what", "Touchline", "library", "unit", "ratio library / Touchline"),
@@ -72,6 +78,40 @@ def _refinement() -> list[list[object]]:
         )
     )
     return [["refine one camera (scipy)", 1e3 * ours, 1e3 * theirs, "ms", theirs / ours]]
+
+
+def _damped_steps() -> list[list[object]]:
+    """One step from each of 40 starts of a camera with 8 parameters, as resection asks for it."""
+    generator = np.random.default_rng(2)
+    jacobians = generator.normal(size=(40, 60, 8))
+    information = np.swapaxes(jacobians, 1, 2) @ jacobians
+    gradient, damping = generator.normal(size=(40, 8)), np.full(40, 1e-3)
+    step, diagonal = np.empty((40, 8)), np.arange(8)
+
+    def by_numpy() -> FloatArray:
+        damped = information.copy()
+        damped[:, diagonal, diagonal] *= 1 + damping[:, None]
+        return np.linalg.solve(damped, -gradient[..., None])[..., 0]
+
+    ours = _best(lambda: _often(lambda: solve_damped(gradient, information, damping, step)))
+    theirs = _best(lambda: _often(by_numpy))
+    np.testing.assert_allclose(step, by_numpy(), rtol=1e-6)
+    return [
+        ["40 damped steps (numpy)", 1e6 * ours / TIMES, 1e6 * theirs / TIMES, "us", theirs / ours]
+    ]
+
+
+def _singular_vectors(count: int, times: int) -> list[list[object]]:
+    matrices, found = np.random.default_rng(3).normal(size=(count, 4, 4)), np.empty((count, 4))
+    ours = _best(lambda: _often(lambda: smallest_singular_vectors(matrices, found), times))
+    theirs = _best(lambda: _often(lambda: np.linalg.svd(matrices), times))
+    name = f"{count} smallest singular vectors (numpy)"
+    return [[name, 1e6 * ours / times, 1e6 * theirs / times, "us", theirs / ours]]
+
+
+def _often(work: Callable[[], object], times: int = TIMES) -> None:
+    for _ in range(times):
+        work()
 
 
 def _camera(*position: float) -> Camera:
