@@ -8,6 +8,8 @@ from sqlalchemy import Connection, Engine, inspect, text
 
 from app.config import Settings
 from app.errors import StorageError
+from app.store.engine import WRITE, make_engine, reported
+from app.store.home import make_home
 
 KNOWN_REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007")
 """Every revision that this version can migrate, oldest first."""
@@ -36,11 +38,8 @@ def migrate(settings: Settings) -> str:
     from alembic import command
     from alembic.config import Config
 
-    from app.store.home import make_home
-    from app.store.session import make_engine, reported
-
     make_home(settings)
-    engine = make_engine(settings).execution_options(touchline_write=True)
+    engine = make_engine(settings).execution_options(**WRITE)
     config = Config()
     config.set_main_option("script_location", str(migrations_folder()).replace("%", "%%"))
     with reported(settings), engine.begin() as connection:

@@ -6,8 +6,9 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import text
 
+from app.store.engine import make_engine
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
-from app.store.session import Store, make_engine
+from app.store.session import Store
 from app.store.tables import Base
 
 

@@ -11,8 +11,9 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.errors import InputError, StorageError
+from app.store.engine import PRAGMAS
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
-from app.store.session import PRAGMAS, Store, ping
+from app.store.session import Store, ping
 
 INSERT = "INSERT INTO dataset (name, created, policy, policy_hash) VALUES ('{}', '', '', '')"
 

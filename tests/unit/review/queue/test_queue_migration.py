@@ -12,9 +12,10 @@ from sqlalchemy.exc import IntegrityError
 
 from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict
+from app.store.engine import make_engine
 from app.store.migrate import KNOWN_REVISIONS, migrate, schema_revision
 from app.store.queue import refresh_queue
-from app.store.session import Store, make_engine
+from app.store.session import Store
 
 PLACES = ("distance_m", "box_px", "x_m", "y_m")
 
