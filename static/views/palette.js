@@ -106,8 +106,8 @@ export function Palette() {
 		paletteOpen.value = 0;
 		item.run();
 	}
-	// A number means a group, which the server has to find first.
-	const settled = datasets.value !== null && (answered || (items.length > 0 && !/^\d/.test(text.trim())));
+	// What the server found for less than what is typed by now is not what is meant.
+	const settled = datasets.value !== null && answered;
 	useEffect(() => {
 		if (chosen && settled && items[at]) choose(items[at]);
 	}, [chosen, settled, items[at]?.id]);

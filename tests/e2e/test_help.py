@@ -81,6 +81,23 @@ class TestFound:
         page.keyboard.press("Enter")
         expect(page.get_by_role("tablist")).to_be_visible()
 
+    def test_enter_chooses_nothing_that_was_found_for_half_the_word(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/jobs")
+        page.wait_for_selector(".page__main > :nth-child(2)")
+        page.route(re.compile(r"/groups\?.*\bq=he"), lambda _held: None)
+        page.keyboard.press("Control+k")
+        page.keyboard.type("h")
+        expect(page.locator(".palette__item", has_text="Group 1").first).to_be_visible()
+        page.keyboard.type("elp")
+        page.keyboard.press("Enter")
+        expect(page.locator(".palette__field")).to_have_value("help")
+        page.wait_for_timeout(100)
+        # Only now the server hears of it.
+        page.unroute_all()
+        expect(page.get_by_role("tablist")).to_be_visible()
+
     def test_each_part_has_an_address(self, open_page: OpenPage) -> None:
         page = open_page("/help/words")
         expect(page.get_by_role("tab", name="Glossary")).to_have_attribute("aria-selected", "true")
