@@ -4,13 +4,14 @@
 import { html } from 'htm/preact';
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
 
+import { plainMarking } from '../geometry/marking_words.js';
 import { pitchMarkings } from '../geometry/pitch.js';
 import { chooseDrawing, endDrawing } from '../state/drawing.js';
 import { drawing } from '../state/workspace.js';
 
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
-/** @typedef {{marking: string | null, name: string, note: string}} Choice   null: the ball */
+/** @typedef {{marking: string | null, name: string, plain: string, note: string}} Choice   null: the ball */
 
 /** Every marking's name; their order does not depend on the size of the pitch. */
 const NAMES = [...pitchMarkings(105, 68).keys()].sort();
@@ -20,10 +21,10 @@ function choicesOf({ view, solved }) {
 	const seen = new Set(solved?.calibration.markings.filter(({ polyline }) => polyline.length > 1).map(({ marking }) => marking));
 	const rank = (/** @type {string} */ name) => (view.lines[name] ? 2 : seen.has(name) ? 0 : 1);
 	const markings = NAMES.toSorted((a, b) => rank(a) - rank(b)).map((name) => ({
-		marking: name, name,
+		marking: name, name, plain: plainMarking(name),
 		note: view.lines[name] ? `${view.lines[name].length} drawn` : seen.has(name) ? 'in sight, not drawn' : '',
 	}));
-	const ball = { marking: null, name: 'Ball', note: view.balls.length ? 'again' : 'missing' };
+	const ball = { marking: null, name: 'Ball', plain: '', note: view.balls.length ? 'again' : 'missing' };
 	return view.balls.length ? [...markings, ball] : [ball, ...markings];
 }
 
@@ -35,7 +36,7 @@ export function ClassChooser({ picture }) {
 	const [at, setAt] = useState(0);
 	const all = useMemo(() => choicesOf(picture), [picture.view.key, picture.view.lines]);
 	const wanted = text.toLowerCase().split(/\s+/);
-	const found = all.filter(({ name }) => wanted.every((word) => name.toLowerCase().includes(word)));
+	const found = all.filter(({ name, plain }) => wanted.every((word) => `${name} ${plain}`.toLowerCase().includes(word)));
 	const active = Math.min(at, found.length - 1);
 	const { letter } = picture.view;
 	// Before the next key: who types at once must not find the letters doing something else.
@@ -67,12 +68,12 @@ export function ClassChooser({ picture }) {
 				}}
 			/>
 			<ul class="chooser__list" id=${`draw-list-${letter}`} role="listbox" aria-label="Ball and markings" ref=${list}>
-				${found.map(({ marking, name, note }, i) => html`
+				${found.map(({ marking, name, plain, note }, i) => html`
 					<li
 						key=${name} id=${`draw-${letter}-${i}`} class="chooser__choice" role="option" aria-selected=${i === active}
 						onPointerDown=${(/** @type {Event} */ event) => event.preventDefault()}
 						onClick=${() => chooseDrawing(marking)}
-					><span>${name}</span><span class="chooser__note">${note}</span></li>`)}
+					><span>${name} <span class="chooser__plain">${plain}</span></span><span class="chooser__note">${note}</span></li>`)}
 				${found.length ? null : html`<li class="chooser__none" role="presentation">No marking has that name.</li>`}
 			</ul>
 		</div>

@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useCallback } from 'preact/hooks';
 
+import { plainMarking } from '../geometry/marking_words.js';
 import { Canvas } from '../lib/canvas.js';
 import { colours } from '../lib/colours.js';
 import { fixed, pixels, shortMarking } from '../lib/format.js';
@@ -57,7 +58,7 @@ function Strip({ row, width, pixels: data }) {
 		<li class="line-row">
 			<button type="button" onClick=${() => selectWorst(row)} title=${`Select the worst point of ${marking.marking}`}>
 				<${Letter} letter=${picture.view.letter} />
-				<span class="line-row__name" title=${marking.marking}>${shortMarking(marking.marking)}</span>
+				<span class="line-row__name" title=${`${marking.marking}: ${plainMarking(marking.marking)}`}>${shortMarking(marking.marking)}</span>
 				${marking.polyline.length > 1
 					? html`<${Canvas} class="line-row__strip" width=${width} height=${STRIP} draw=${draw} name="" />`
 					: html`<span class="line-row__none">not in sight</span>`}

@@ -66,6 +66,16 @@ class TestDrawing:
         assert [point["x"] for point in drawn] == pytest.approx([40, 60, 90], abs=2)
         undo(screen, before)
 
+    def test_a_marking_is_found_by_the_words_that_people_use(self, review: Review) -> None:
+        screen = review(1)
+        screen.press("n")
+        screen.page.keyboard.type("arc right")
+        choice = screen.page.locator(".chooser__choice")
+        expect(choice).to_have_count(1)
+        expect(choice).to_contain_text("Circle right")
+        expect(choice).to_contain_text("arc of the right penalty area")
+        screen.press("Escape")
+
     def test_a_point_is_put_on_a_line(self, review: Review) -> None:
         screen = review(1)
         before = first_view(screen)
