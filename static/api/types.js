@@ -262,6 +262,8 @@
  * @property {number} pictures views that have one
  * @property {string} split
  * @property {string | null} reviewer
+ * @property {string | null} reason why it was rejected
+ * @property {string | null} override gate that failed when it was accepted all the same
  * @property {boolean} fixed
  * @property {string[]} findings
  * @property {string | null} thumbnail

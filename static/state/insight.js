@@ -32,6 +32,9 @@ import { focused } from './workspace.js';
  */
 /** @template T @typedef {{key: string, items: T[]}} Known   key: what was asked about */
 
+/** Whether the solver is still trying out what would mend the group on screen. */
+export const isSearching = signal(false);
+
 /** People who go through easy groups stay shorter than this. */
 const STAY = 350;
 const KEPT = 40;
@@ -78,13 +81,16 @@ function needsHelp({ solution }) {
  * @template T
  * @param {'remedies' | 'influence'} what @param {string} path @param {string} key
  * @param {import('@preact/signals').Signal<Known<T> | null>} into
+ * @param {() => void} [answered] called when the answer is there, or that there is none
  */
-function askLater(what, path, key, into) {
+function askLater(what, path, key, into, answered) {
 	const controller = new AbortController();
 	if (into.value?.key !== key) into.value = kept.get(key) ?? null;
 	const timer = setTimeout(async () => {
 		const found = await ask(what, path, key, controller.signal);
-		if (found && !controller.signal.aborted) into.value = found;
+		if (controller.signal.aborted) return;
+		if (found) into.value = found;
+		answered?.();
 	}, STAY);
 	return () => {
 		clearTimeout(timer);
@@ -98,9 +104,14 @@ export function startInsight() {
 		const at = groupDocument.value;
 		if (!at || isPreview.value || !needsHelp(at)) {
 			remedies.value = null;
+			isSearching.value = false;
 			return undefined;
 		}
-		return untracked(() => askLater('remedies', `/groups/${at.id}/remedies`, `remedies ${at.id} ${at.etag}`, remedies));
+		return untracked(() => {
+			const key = `remedies ${at.id} ${at.etag}`;
+			isSearching.value = !kept.has(key);
+			return askLater('remedies', `/groups/${at.id}/remedies`, key, remedies, () => { isSearching.value = false; });
+		});
 	});
 	effect(() => {
 		const at = groupDocument.value;

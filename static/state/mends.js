@@ -9,7 +9,7 @@ import { editOfFix } from './edits.js';
 import { group, groupDocument, solution } from './group.js';
 import { remedies } from './insight.js';
 import { fitPanel, returnLent } from './viewports.js';
-import { focused, maximised } from './workspace.js';
+import { focused } from './workspace.js';
 
 /** @import {FindingJson, FixJson, GroupDocument, SolutionJson, ViewJson} from '../api/types.js' */
 /** @import {Remedy} from './insight.js' */
@@ -124,6 +124,14 @@ export const mendIndex = computed(() => Math.min(chosen.value, mends.value.lengt
 /** The one that the card shows and Enter carries out. */
 export const mend = computed(() => mends.value[mendIndex.value] ?? null);
 
+/** The finding that the card speaks about; null where it speaks of something else. */
+export const told = computed(() => {
+	const findings = solution.value?.findings ?? [];
+	const meant = mend.value;
+	if (!meant?.title) return findings[0] ?? null;
+	return findings.find(({ sentence, view }) => sentence === meant.sentence && view === meant.fix.view) ?? null;
+});
+
 /** Show another one. @param {number} step */
 export function turnMend(step) {
 	const count = mends.value.length;
@@ -148,5 +156,4 @@ function focusMeant() {
 	if (!meant) return;
 	focused.value = meant.letter;
 	fitPanel(meant.letter);
-	if (maximised.value !== meant.letter) maximised.value = null;
 }

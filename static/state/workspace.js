@@ -94,6 +94,7 @@ export function toggleMaximised(letter) {
 
 /** Drop what belongs to one group only. */
 export function resetForGroup() {
+	maximised.value = null;
 	selected.value = null;
 	editing.value = false;
 	asking.value = null;

@@ -1,10 +1,10 @@
 // @ts-check
-/** What a person should look at, each with its fix. */
+/** What a person should look at beside what the card on top says, each with its fix. */
 
 import { html } from 'htm/preact';
 
 import { findingTitle } from '../state/advice.js';
-import { mends } from '../state/mends.js';
+import { mends, told } from '../state/mends.js';
 import { focusView } from '../state/workspace.js';
 import { Letter } from './letter.js';
 import { carryOut } from './mend_actions.js';
@@ -33,11 +33,12 @@ function Finding({ group, finding }) {
 
 /** @param {{group: GroupDocument, solution: SolutionJson}} props */
 export function Findings({ group, solution }) {
-	const { findings } = solution;
+	const findings = solution.findings.filter((finding) => finding !== told.value);
 	if (findings.length === 0) return null;
+	const more = findings.length < solution.findings.length;
 	return html`
 		<section class="card" aria-label="Findings">
-			<h2>Findings · ${findings.length}</h2>
+			<h2>${more ? 'More findings' : 'Findings'} · ${findings.length}</h2>
 			<ul class="findings">
 				${findings.map((finding, i) => html`<${Finding} key=${i} group=${group} finding=${finding} />`)}
 			</ul>

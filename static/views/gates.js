@@ -3,6 +3,7 @@
 
 import { html } from 'htm/preact';
 
+import { ballOf } from '../geometry/preview.js';
 import { mends } from '../state/mends.js';
 import { focusView, gatesOpen, selected } from '../state/workspace.js';
 import { gateLabel, gateMargin } from './gate_names.js';
@@ -19,11 +20,22 @@ function unbroken(sentence) {
 	return sentence.replaceAll('–', '\u2060–\u2060');
 }
 
-/** @param {GateJson} gate */
-function stateOf(gate) {
+/** Gates that only count the views that those before them left over. */
+const COUNTING = new Set(['two_views', 'ball']);
+
+/** Whether a gate fails for no other reason than that views fell at one before it. @param {GroupDocument} group @param {GateJson} gate @param {GateJson[]} before */
+function follows(group, gate, before) {
+	if (!COUNTING.has(gate.name) || before.every(({ passed }) => passed)) return false;
+	const counted = gate.name === 'ball' ? group.views.filter((view) => view.included && ballOf(view)) : group.views;
+	return counted.length >= 2;
+}
+
+/** @param {GroupDocument} group @param {GateJson} gate @param {GateJson[]} before the gates above it */
+function stateOf(group, gate, before) {
 	if (!gate.active) return { state: 'off', glyph: '·', word: 'not asked' };
 	if (gate.value === null) return { state: 'off', glyph: '·', word: 'not judged' };
 	if (gate.passed) return { state: 'passed', glyph: '✓', word: 'passed' };
+	if (follows(group, gate, before)) return { state: 'follows', glyph: '↳', word: 'fails because of the gate above' };
 	return { state: 'failed', glyph: '✗', word: 'failed' };
 }
 
@@ -68,12 +80,12 @@ export function Gates({ group, solution }) {
 				<button class="card__more" type="button" aria-expanded=${gatesOpen.value} onClick=${() => { gatesOpen.value = !gatesOpen.value; }}>${gatesOpen.value ? 'less' : 'margins'}</button>
 			</h2>
 			<ol class="gates" data-open=${gatesOpen.value}>
-				${solution.gates.map((gate) => {
-					const { state, glyph, word } = stateOf(gate);
+				${solution.gates.map((gate, i) => {
+					const { state, glyph, word } = stateOf(group, gate, solution.gates.slice(0, i));
 					const margin = gateMargin(gate);
 					return html`
 						<li key=${gate.name} data-state=${state} data-gate=${gate.name}>
-							<span aria-hidden="true">${glyph}</span>
+							<span aria-hidden="true" title=${state === 'follows' ? word : undefined}>${glyph}</span>
 							<span class="gates__name term" tabindex="0" data-term=${`gate:${gate.name}`}>${gateLabel(gate, group.policy)}<span class="hidden-text">, ${word}:</span></span>
 							<span class="gates__value" title=${margin}>${unbroken(gate.sentence)}</span>
 							${gatesOpen.value && margin ? html`<span class="gates__margin">${margin}</span>` : null}

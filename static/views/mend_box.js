@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 
 import { suggestedReason } from '../state/advice.js';
+import { isSearching } from '../state/insight.js';
 import { mend, mendIndex, mends, turnMend } from '../state/mends.js';
 import { REASONS } from '../state/reasons.js';
 import { askReason } from '../state/verdicts.js';
@@ -32,7 +33,7 @@ export function MendBox({ solution }) {
 				${offered ? html`<button class="button button--fix" type="button" onClick=${mendNow}>${offered.label} <kbd>Enter</kbd></button>` : null}
 				${count > 1 ? html`
 					<button class="mend__more" type="button" title="Show another way to mend it (Shift+Enter)" onClick=${() => turnMend(1)}>
-						${mendIndex.value + 1} of ${count} <kbd>Shift Enter</kbd>
+						${mendIndex.value + 1} of ${count}${isSearching.value ? ' or more' : ''} <kbd>Shift Enter</kbd>
 					</button>` : null}
 			</p>
 			${reason ? html`

@@ -5,6 +5,7 @@ import { html } from 'htm/preact';
 
 import { GLYPHS } from '../geometry/residual.js';
 import { pixels } from '../lib/format.js';
+import { overlaysHidden } from '../state/workspace.js';
 import { errorOf, gradeOfView, jacOf } from './view_state.js';
 import { Letter } from './letter.js';
 
@@ -17,6 +18,8 @@ export function PanelCaption({ picture }) {
 	const { grade, sentence } = gradeOfView(picture);
 	// Of a view that is left out nothing counts but why.
 	const jac = view.included ? jacOf(solved) : null;
+	// With the overlays goes what may stand on a clock that is burnt into the picture.
+	if (overlaysHidden.value) return html`<figcaption class="caption caption--bare"><${Letter} letter=${view.letter} /></figcaption>`;
 	return html`
 		<figcaption class="caption">
 			<${Letter} letter=${view.letter} />

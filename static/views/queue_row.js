@@ -7,6 +7,7 @@ import { fixed, marginText, pixels, words } from '../lib/format.js';
 import { navigate } from '../lib/router.js';
 import { reviewAddress } from '../state/navigation.js';
 import { activeRow } from '../state/queue.js';
+import { reasonText } from '../state/reasons.js';
 import { isTicked, tickTo, ticks, turnTick } from '../state/queue_ticks.js';
 import { GATE_TITLES } from './gate_names.js';
 
@@ -31,10 +32,12 @@ function gateOf(row) {
 	return { title: GATE_TITLES[gate] ?? words(gate), detail: sentence };
 }
 
-/** Who decided, and why it was rejected. @param {GroupRow} row */
-function byWhom(row) {
+/** Why it was rejected, or accepted all the same, and who decided where that is not the only person. @param {GroupRow} row */
+function whyAndWho(row) {
 	if (row.status === 'unreviewed') return '';
-	return [row.reviewer, row.fixed ? 'fixed' : ''].filter(Boolean).join(' · ');
+	const override = row.override ? `although ${(GATE_TITLES[row.override] ?? words(row.override)).toLowerCase()}` : '';
+	const who = row.reviewer && row.reviewer !== 'local' ? row.reviewer : '';
+	return [reasonText(row.reason ? { reason: row.reason, note: null } : null), override, row.fixed ? 'fixed' : '', who].filter(Boolean).join(' · ');
 }
 
 /** @param {{row: GroupRow, index: number, active: boolean, ticked: boolean}} props */
@@ -71,7 +74,7 @@ function Cells({ row, index, q, active, ticked }) {
 		</div>
 		<div role="gridcell" class="queue-cell">
 			<span class="pill" data-status=${status}><span aria-hidden="true">${GLYPHS[status] ?? ''}</span> ${text}</span>
-			<span class="queue-cell__sub queue-cell__by">${byWhom(row)}</span>
+			<span class="queue-cell__sub queue-cell__by">${whyAndWho(row)}</span>
 		</div>
 		<div role="gridcell" class="queue-cell queue-cell--two" data-passes=${row.passes === true}>
 			<span>${title}</span><span class="queue-cell__sub">${detail}</span>

@@ -226,7 +226,7 @@ const VIEW = [
 	{ keys: ['0'], label: 'Leave the zoom, and show all views', group: 'View', run: showAll },
 	{ keys: ['Shift+z'], label: 'Crop the images to fill their panels, or show them whole', group: 'View', run: fillPanels },
 	{
-		keys: ['h'], label: 'Hide or show everything drawn; held: peek below', group: 'View',
+		keys: ['h'], label: 'Hide or show all that stands on the pictures; held: peek below', group: 'View',
 		run: flipOverlays, hold: { start: flipOverlays, end: flipOverlays },
 	},
 	{

@@ -6,7 +6,7 @@ import { html } from 'htm/preact';
 import { ballOf } from '../geometry/preview.js';
 import { capital, words } from '../lib/format.js';
 import { findingTitle } from '../state/advice.js';
-import { mend } from '../state/mends.js';
+import { mend, told } from '../state/mends.js';
 import { REASONS } from '../state/reasons.js';
 import { isBlind } from '../state/verdicts.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
@@ -55,7 +55,7 @@ export function headline(group, solution, offered) {
 		};
 	}
 	if (told) return { tone: 'warn', over: 'Passes, worth a look', title: told.title ?? '', text: told.sentence };
-	return { tone: 'ok', over: 'Passes every gate', title: all === 2 ? 'Both views agree' : `All ${all} views agree`, text: spread(solution) };
+	return { tone: 'ok', over: 'Passes every gate', title: all === 2 ? 'Both views agree' : `All ${all} views agree`, text: [spread(solution), unused(group, solution)].filter(Boolean).join(' ') };
 }
 
 /** @param {string} title */
@@ -80,6 +80,16 @@ function spread(solution) {
 	return errors.length ? `Every view sees the ball in the same place, within ${Math.max(...errors).toFixed(1)} px.` : '';
 }
 
+/** Drawn lines that the cameras do without, red in the pictures though nothing fails. @param {GroupDocument} group @param {SolutionJson} solution */
+function unused(group, solution) {
+	const told = group.views.flatMap((view) => {
+		const markings = solution.views.find((one) => one.view === view.key)?.calibration.markings ?? [];
+		const names = markings.filter(({ marking, used, outcome }) => view.lines[marking] && (!used || outcome !== 'tp')).map(({ marking }) => `“${marking}”`);
+		return names.length ? [`${names.join(' and ')} of ${view.letter} ${names.length > 1 ? 'do' : 'does'} not fit, which fails no gate.`] : [];
+	});
+	return told.join(' ');
+}
+
 /** @param {VerdictJson} verdict */
 function verdictText({ state, reason, note, by }) {
 	const named = REASONS.find(({ name }) => name === reason);
@@ -92,12 +102,13 @@ function verdictText({ state, reason, note, by }) {
 /** @param {{group: GroupDocument, solution: SolutionJson | null, live: boolean}} props */
 export function VerdictCard({ group, solution, live }) {
 	const { tone, over, title, text } = headline(group, solution, mend.value);
+	const sure = told.value?.confidence ?? null;
 	const { verdict } = group;
 	return html`
 		<section class="card verdict-card" data-tone=${tone === 'ok' && isBlind(group) ? 'warn' : tone} data-live=${live} aria-label="Result">
 			<p class="verdict-card__over">${over}</p>
 			<h1>${title}</h1>
-			<p class="verdict-card__text">${text}</p>
+			<p class="verdict-card__text">${text}${sure === null ? '' : html` <span class="verdict-card__sure">${Math.round(sure * 100)} % sure.</span>`}</p>
 			<${MendBox} solution=${solution} />
 			${isBlind(group) ? html`<p><span class="pill" data-status="no-picture">no picture</span> <span data-grade="warn">No view of this group has a picture to look at.</span></p>` : null}
 			${verdict.state === 'unreviewed' && !verdict.note ? null : html`

@@ -121,6 +121,29 @@ class TestHeadline:
         button = one.card.get_by_role("button", name="Swap left and right")
         expect(button).to_be_in_viewport(ratio=1)
 
+    def test_one_cause_is_red_once_and_what_the_card_says_is_not_said_again(
+        self, bench: Callable[..., Bench]
+    ) -> None:
+        one = bench(2)
+        lines = one.document()["views"][1]["lines"]
+        one.change(1, "/lines", {"lines": dict.fromkeys(lines)})
+        one.open()
+        gates = one.page.locator(".gates li")
+        expect(one.page.locator('.gates [data-gate="calibratable"]')).to_have_attribute(
+            "data-state", "failed"
+        )
+        for name in ("two_views", "ball"):
+            expect(one.page.locator(f'.gates [data-gate="{name}"]')).to_have_attribute(
+                "data-state", "follows"
+            )
+        assert gates.and_(one.page.locator('[data-state="failed"]')).count() == 1
+        one.undo_all()
+        one.swap(1)
+        one.open()
+        sentence = one.card.locator(".verdict-card__text").inner_text()
+        below = one.page.get_by_label("Findings", exact=True)
+        assert sentence[:40] not in "".join(below.all_inner_texts())
+
     def test_a_failing_group_that_nothing_mends_suggests_the_reason_to_reject(
         self, bench: Callable[..., Bench]
     ) -> None:

@@ -73,6 +73,19 @@ class TestFarKeys:
         stands(page, queue, 0)
 
 
+class TestNextGroup:
+    def test_shows_all_its_views_though_one_was_looked_at_alone(self, page: Page) -> None:
+        queue = ids(page, QUERY)
+        screen = at(page, queue[1], QUERY)
+        page.locator('.image-panel[data-view="A"] .image-panel__stage').dblclick()
+        expect(page.locator(".image-panel")).to_have_count(1)
+        screen.press("f")
+        stands(page, queue, 2)
+        views = screen.document()["views"]
+        assert len(views) > 1
+        expect(page.locator(".image-panel")).to_have_count(len(views))
+
+
 class TestFlaggedKeys:
     def test_r_and_e_go_from_finding_to_finding_in_the_order_of_the_queue(self, page: Page) -> None:
         queue, flagged = ids(page, QUERY), ids(page, f"{QUERY} -finding:none")

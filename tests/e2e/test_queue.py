@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Locator, Page, Request, expect
 
+from tests.e2e.screen import withdraw_verdict
 from tests.e2e.season import SEASON
 from tests.e2e.test_access import serious
 
@@ -62,6 +63,24 @@ class TestQueryBox:
         page.get_by_role("slider", name="min JaC 0.5 % from").focus()
         page.keyboard.press("ArrowRight")
         expect(page.locator(".field--query")).to_have_value("jac>=0.05 jac<=1")
+
+
+class TestVerdicts:
+    def test_a_rejected_group_says_why(self, open_page: OpenPage) -> None:
+        page = opened(open_page, "number<=1")
+        found = page.request.get("/api/v1/groups?dataset=sample&q=number<=1").json()
+        group = found["items"][0]["id"]
+        present = page.request.get(f"/api/v1/groups/{group}")
+        try:
+            page.request.put(
+                f"/api/v1/groups/{group}/verdict",
+                data={"state": "rejected", "reason": "not_same_instant"},
+                headers={"If-Match": present.headers["etag"]},
+            )
+            page.reload()
+            expect(page.locator(".queue-cell__by").first).to_have_text("not the same instant")
+        finally:
+            withdraw_verdict(page, group)
 
 
 class TestBulkVerdicts:
