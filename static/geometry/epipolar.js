@@ -13,13 +13,13 @@ const STEPS = 96;
 /**
  * The ray through a pixel of camera a, between the grass and 30 m above it, as camera b sees it.
  *
- * @param {Camera} a @param {ImagePoint} pixel @param {Camera} b
+ * @param {Camera} a @param {ImagePoint} pixel @param {Camera} b @param {number} [highest] metres above the grass
  * @returns {ImagePoint[]} a polyline, empty when b sees nothing of it
  */
-export function epipolarSegment(a, pixel, b) {
+export function epipolarSegment(a, pixel, b, highest = HIGHEST) {
 	const ray = rayThrough(a, pixel);
 	if (!ray) return [];
-	const range = heightRange(a.C, ray);
+	const range = heightRange(a.C, ray, highest);
 	if (!range) return [];
 	const points = [];
 	for (let i = 0; i <= STEPS; i++) {
@@ -32,19 +32,19 @@ export function epipolarSegment(a, pixel, b) {
 }
 
 /**
- * Where along `origin + t ray` the height is between 0 and 30 m.
+ * Where along `origin + t ray` the height is between 0 and so many metres.
  *
- * @param {PitchPoint} origin @param {PitchPoint} ray
+ * @param {PitchPoint} origin @param {PitchPoint} ray @param {number} [highest]
  * @returns {[number, number] | null}
  */
-export function heightRange(origin, ray) {
+export function heightRange(origin, ray, highest = HIGHEST) {
 	let near = 0.5;
 	let far = FARTHEST;
 	const height = -origin[2];
 	const climb = -ray[2];
-	if (Math.abs(climb) < 1e-9) return height >= LOWEST && height <= HIGHEST ? [near, far] : null;
+	if (Math.abs(climb) < 1e-9) return height >= LOWEST && height <= highest ? [near, far] : null;
 	const first = (LOWEST - height) / climb;
-	const second = (HIGHEST - height) / climb;
+	const second = (highest - height) / climb;
 	near = Math.max(near, Math.min(first, second));
 	far = Math.min(far, Math.max(first, second));
 	return near < far ? [near, far] : null;

@@ -91,6 +91,11 @@ export function widthOf(context) {
 	return context.canvas.width / devicePixelRatio;
 }
 
+/** Height of what is drawn on, CSS pixels. @param {CanvasRenderingContext2D} context */
+export function heightOf(context) {
+	return context.canvas.height / devicePixelRatio;
+}
+
 /** How large marks are drawn there. @param {CanvasRenderingContext2D} context @returns {number} a share */
 export function shareOf(context) {
 	return markShare(widthOf(context));

@@ -11,17 +11,22 @@ import { label, shareOf, strokeLine } from './pen.js';
 
 const RADIUS = 3.4;
 const SHORTEST_WHISKER = 2;
+/** Longer than this a whisker shows its residual as it is: it is seen well enough, CSS pixels. */
+const LONG_WHISKER = 40;
+/** Captions and tools stand there, CSS pixels. */
+const UPPER_BORDER = 48;
 
-/** From the projected line through the annotated point, `gain` times as long as it is. */
+/** From the projected line through the annotated point, `gain` times as long as it is where it would else be hard to see. */
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
 export function drawWhiskers(context, { picture, viewport, gain }) {
 	for (const { points } of picture.markings) {
 		for (const { point, nearest, distance } of points) {
 			if (!nearest || distance === null) continue;
 			if (distance * gain * viewport.scale < SHORTEST_WHISKER) continue;
+			const shown = Math.max(1, Math.min(gain, LONG_WHISKER / (distance * viewport.scale)));
 			const end = {
-				x: nearest.x + gain * (point.x - nearest.x),
-				y: nearest.y + gain * (point.y - nearest.y),
+				x: nearest.x + shown * (point.x - nearest.x),
+				y: nearest.y + shown * (point.y - nearest.y),
 			};
 			const grade = gradeOfResidual(distance, picture.gamma);
 			strokeLine(context, viewport, [nearest, end], {
@@ -64,5 +69,6 @@ export function drawSelectedPoint(context, { picture, viewport, selected }) {
 	context.stroke();
 	const number = residual.distance === null ? '' : ` · ${fixed(residual.distance, 1, ' px')}`;
 	const text = `${selected.marking} · point ${selected.index + 1}${number}`;
-	label(context, text, { x: x + 16, y: y - 14 }, colours.value.point);
+	const above = y - 18 > UPPER_BORDER;
+	label(context, text, { x: x + 16, y: above ? y - 18 : y + 18 }, colours.value.point);
 }

@@ -43,6 +43,7 @@ import { pinsOf } from '../lib/pins.js';
  * @property {boolean} projections
  * @property {boolean} boxes
  * @property {number} gain
+ * @property {boolean} [draws] whether a click draws in this view
  * @property {boolean} rays
  * @property {import('../state/conflict.js').Field[]} [ghosts] what a conflict keeps beside what is shown
  * @property {import('../api/types.js').FixJson | null} [meant] what the card speaks about, in this view
@@ -101,10 +102,11 @@ function apartOf(key, solution) {
  * Where the other views' rays run in a view, image points.
  *
  * @param {GroupDocument} group @param {SolutionJson | null} solution @param {ViewJson} view
+ * @param {number} highest metres above the grass up to which they are followed
  * @returns {ImagePoint[]}
  */
-export function raysInto(group, solution, view) {
-	return epipolarsInto(group, view, camerasOf(solution)).flatMap(({ points }) => points);
+export function raysInto(group, solution, view, highest) {
+	return epipolarsInto(group, view, camerasOf(solution), highest).flatMap(({ points }) => points);
 }
 
 /** @param {SolutionJson | null} solution */
@@ -116,16 +118,16 @@ function camerasOf(solution) {
 
 /**
  * @param {GroupDocument} group @param {ViewJson} into
- * @param {Map<string, import('../geometry/camera.js').Camera>} cameras
+ * @param {Map<string, import('../geometry/camera.js').Camera>} cameras @param {number} [highest]
  * @returns {Epipolar[]}
  */
-function epipolarsInto(group, into, cameras) {
+function epipolarsInto(group, into, cameras, highest) {
 	const target = cameras.get(into.key);
 	return group.views.flatMap((from) => {
 		const source = cameras.get(from.key);
 		const ball = ballOf(from);
 		const center = ball && ballCenter(ball);
 		if (from.key === into.key || !source || !target || !center) return [];
-		return [{ letter: from.letter, points: epipolarSegment(source, center, target) }];
+		return [{ letter: from.letter, points: epipolarSegment(source, center, target, highest) }];
 	});
 }

@@ -5,18 +5,22 @@ import { piecesOf } from '../geometry/polyline.js';
 import { toScreen } from '../geometry/viewport.js';
 import { colours } from '../lib/colours.js';
 import { shortMarking } from '../lib/format.js';
-import { label, strokeLines, widthOf } from './pen.js';
+import { heightOf, label, strokeLines, widthOf } from './pen.js';
 
 /** @import {Scene} from './scene.js' */
 
 /** Shorter ones get a ring, so that a stub at the border is found, CSS pixels. */
 const STUB = 24;
 const RING = 13;
+/** Of words from the line, CSS pixels. */
+const BESIDE = 22;
+/** Captions and tools stand there, CSS pixels. */
+const UPPER_BORDER = 48;
 /** Panels narrower than this have no room for names. */
 const ROOMY = 420;
 
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
-export function drawUndrawn(context, { picture, viewport, meant }) {
+export function drawUndrawn(context, { picture, viewport, meant, draws }) {
 	for (const { marking, points, polyline } of picture.markings) {
 		if (points.length > 0 || polyline.length < 2) continue;
 		const named = meant?.action === 'draw_marking' && meant.marking === marking;
@@ -26,7 +30,8 @@ export function drawUndrawn(context, { picture, viewport, meant }) {
 		strokeLines(context, viewport, pieces, {
 			colour: named ? colours.value.selected : colours.value.point, width: named ? 2.5 : 1.5, dash: [2, 7], halo: false,
 		});
-		if (named) point(context, marking, polyline.map((at) => toScreen(viewport, at)));
+		// While one draws, the words would stand in the way, and the chip below has them.
+		if (named && !draws) point(context, marking, polyline.map((at) => toScreen(viewport, at)));
 	}
 }
 
@@ -42,5 +47,9 @@ function point(context, marking, places) {
 		context.stroke();
 	}
 	const text = widthOf(context) < ROOMY ? shortMarking(marking) : `${marking}: not drawn`;
-	label(context, text, { x: middle.x + RING + 6, y: middle.y - RING - 6 }, colours.value.selected);
+	const ys = places.map(({ y }) => y);
+	// Above or below the line, never on it, and not under what stands along the upper border.
+	const above = Math.min(...ys) - BESIDE;
+	const y = above > UPPER_BORDER ? above : Math.min(Math.max(...ys) + BESIDE, heightOf(context) - BESIDE);
+	label(context, text, { x: middle.x, y }, colours.value.selected);
 }

@@ -35,11 +35,11 @@ export function startDrawing(letter) {
 	else drawing.value = { view: view.key, what: 'ask', marking: '' };
 }
 
-/** Draw the ball of a view. @param {ViewJson} view */
-export function startBall(view) {
+/** Draw the ball of a view. @param {ViewJson} view @param {PointJson} [at] where it may be, if more is known than the solution says */
+export function startBall(view, at) {
 	focused.value = view.letter;
 	drawing.value = { view: view.key, what: 'ball', marking: '' };
-	setCross(view, likelyPlace(view));
+	setCross(view, at ?? likelyPlace(view));
 	announce(`Click where the ball is. ${BY_KEYS}`);
 }
 

@@ -52,6 +52,9 @@ function fixesOf(shown, finding) {
 	return view.balls.flatMap((ball, index) => (ball.out_of_view || !finding.fix ? [] : [{ ...finding.fix, index }]));
 }
 
+/** Gates that one more view with a ball may meet. */
+const NEEDS_A_PAIR = new Set(['baseline', 'parallax', 'reprojection']);
+
 /** Views that could show the ball, and where nobody has said anything of it. @param {GroupDocument} shown @param {SolutionJson} solved */
 function blindViews(shown, solved) {
 	return shown.views.filter((view) => view.included && view.balls.length === 0
@@ -70,10 +73,11 @@ function missingBalls(shown, solved) {
 		// Where there is no 3D ball yet, another view's ball may bring it.
 		if (solved.ball ? !(place && inPicture(view, place)) : solved.passes) return [];
 		const fix = place ? fixOf('place_ball', view.key, { point: place }) : fixOf('draw_ball', view.key);
+		const why = NEEDS_A_PAIR.has(solved.first_failing?.gate ?? '') ? ` With it ${view.letter} may make the pair that is missing.` : '';
 		return [{
 			fix, title: `No ball is drawn in ${view.letter}`, label: labelOf(fix), passes: false,
-			sentence: place ? 'A green cross marks where the other views see it. If it is not visible there, press O.'
-				: 'The dotted line is the ray of another view: the ball lies on it. If it is not visible, press O.',
+			sentence: (place ? 'A green cross marks where the other views see it. If it is not visible there, press O.'
+				: 'The dotted line is the ray of another view: the ball lies on it. If it is not visible, press O.') + why,
 		}];
 	});
 }

@@ -13,7 +13,8 @@ export function DrawingChip({ view }) {
 	if (present?.view !== view || present.what === 'ask') return null;
 	return html`
 		<p class="drawing-chip">
-			<span>${present.what === 'ball' ? 'Click where the ball is' : html`<strong>${present.marking}</strong> <span class="drawing-chip__keys">(${plainMarking(present.marking)})</span> · click adds a point`}<span class="drawing-chip__keys"> · or <kbd>← ↑ → ↓</kbd> <kbd>Enter</kbd></span></span>
+			<span title=${present.what === 'ball' ? '' : plainMarking(present.marking)}>${present.what === 'ball' ? 'Click where the ball is' : html`Click adds a point to <strong>${present.marking}</strong>`}</span>
+			<span class="drawing-chip__keys">or <kbd>← ↑ → ↓</kbd> <kbd>Enter</kbd></span>
 			<button class="drawing-chip__end" type="button" onClick=${endDrawing}>Done <kbd>Esc</kbd></button>
 		</p>
 	`;

@@ -103,6 +103,7 @@ export function ImagePanel({ picture, area, sizes }) {
 	const { letter } = view;
 	const [ref, size] = useSize();
 	const stage = useRef(/** @type {ImageStage | null} */ (null));
+	const figure = useRef(/** @type {HTMLElement | null} */ (null));
 	const instant = otherInstant.value?.view === view.id ? otherInstant.value : null;
 	const frame = useFrame(instant ? instant.image : view.image);
 	const center = middleOf(picture);
@@ -155,13 +156,14 @@ export function ImagePanel({ picture, area, sizes }) {
 	// Where nobody has drawn the ball, the other views' rays say where to look.
 	const rays = draft.value?.kind === 'ball' || selected.value?.kind === 'ball' || view.balls.length === 0;
 	const meant = mend.value?.fix.view === view.key && !draft.value ? mend.value.fix : null;
+	const draws = drawing.value?.view === view.key && drawing.value.what !== 'ask';
 	const scene = useMemo(() => ({
 		picture, viewport, rays, selected: selected.value, hidden: overlaysHidden.value || instant !== null,
 		projections: projections.value, boxes: boxes.value, gain: gain.value,
-		ghosts: conflict.value?.fields ?? NO_GHOSTS, meant,
+		ghosts: conflict.value?.fields ?? NO_GHOSTS, meant, draws,
 	}), [
 		picture, viewport.scale, viewport.left, viewport.top, rays, selected.value,
-		overlaysHidden.value, instant, projections.value, boxes.value, gain.value, conflict.value, meant,
+		overlaysHidden.value, instant, projections.value, boxes.value, gain.value, conflict.value, meant, draws,
 	]);
 	const filter = filterOf(letter);
 	useLayoutEffect(() => stage.current?.adjust(filter), [filter]);
@@ -178,9 +180,14 @@ export function ImagePanel({ picture, area, sizes }) {
 	}
 
 	const isFocused = focused.value === letter;
+	// Two frames on screen would leave it open which view the keys mean.
+	useEffect(() => {
+		const held = document.activeElement;
+		if (isFocused && held?.matches('.image-panel') && held !== figure.current) figure.current?.focus({ preventScroll: true });
+	}, [isFocused]);
 	return html`
 		<figure
-			class="image-panel"
+			class="image-panel" ref=${figure}
 			data-view=${letter}
 			data-focused=${isFocused}
 			data-included=${view.included}

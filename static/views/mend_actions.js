@@ -23,6 +23,9 @@ const BALL_SCALE = 8;
 /** And for a marking at most, however short it is. */
 const LINE_SCALE = 12;
 
+/** Most balls are no higher, metres above the grass. */
+const LIKELY_HEIGHT = 3;
+
 /** Size of the panel of a view, CSS pixels. @param {string} letter */
 function panelOf(letter) {
 	const stage = document.querySelector(`.image-panel[data-view="${letter}"] .image-panel__stage`);
@@ -77,8 +80,9 @@ export function carryOut({ fix }) {
 	focusView(view.letter);
 	if (fix.action === 'place_ball') placeExpected(view);
 	else if (fix.action === 'draw_ball') {
-		startBall(view);
-		showPlace(view, raysInto(shown, solution.value, view).filter(({ x, y }) => x >= 0 && y >= 0 && x < view.width && y < view.height));
+		const along = raysInto(shown, solution.value, view, LIKELY_HEIGHT).filter(({ x, y }) => x >= 0 && y >= 0 && x < view.width && y < view.height);
+		startBall(view, along[Math.floor(along.length / 2)]);
+		showPlace(view, along);
 	}
 	else if (fix.action === 'draw_marking' && fix.marking) drawMissing(view, fix.marking);
 	else if (fix.action === 'resize_ball') fitBox(view);

@@ -11,13 +11,13 @@ import { askReason } from '../state/verdicts.js';
 import { drawing } from '../state/workspace.js';
 import { mendNow } from './mend_actions.js';
 
-/** @import {SolutionJson} from '../api/types.js' */
+/** @import {GroupDocument, SolutionJson} from '../api/types.js' */
 
-/** @param {{solution: SolutionJson | null}} props */
-export function MendBox({ solution }) {
+/** @param {{group: GroupDocument, solution: SolutionJson | null}} props */
+export function MendBox({ group, solution }) {
 	const offered = mend.value;
 	const count = mends.value.length;
-	const reason = REASONS.find(({ name }) => name === suggestedReason(solution));
+	const reason = group.verdict.state === 'rejected' ? undefined : REASONS.find(({ name }) => name === suggestedReason(solution));
 	if (!offered && !reason) return null;
 	if (drawing.value && drawing.value.what !== 'ask') {
 		const { what, marking } = drawing.value;
@@ -36,6 +36,8 @@ export function MendBox({ solution }) {
 						${mendIndex.value + 1} of ${count}${isSearching.value ? ' or more' : ''} <kbd>Shift Enter</kbd>
 					</button>` : null}
 			</p>
+			${reason?.name === 'not_same_instant' ? html`
+				<p class="mend__hint">To compare players and clock: <kbd>H</kbd> bares the pictures, <kbd>1</kbd> <kbd>1</kbd> and <kbd>2</kbd> show one alone, <kbd>0</kbd> all.</p>` : null}
 			${reason ? html`
 				<p class="mend__reject">
 					${offered ? 'If that is not it: ' : 'Nothing here mends it: '}

@@ -108,13 +108,15 @@ function HeaderButton({ label, keys, run, reason, path }) {
 export function ReviewHeader() {
 	const group = groupDocument.value;
 	const at = neighbours.value;
+	// Where there is little room the match is cut, not the moment, which tells the groups apart.
+	const [match, ...when] = (group?.label ?? '').split(' · ');
 	return html`
 		<${Header} current="review">
 			<div class="header__middle">
 				<${HeaderButton} label="Previous group" keys="D" run=${goPrevious} path="M10 3 5 8l5 5"
 					reason=${at && !at.previous.length ? 'This is the first group of the queue' : null} />
 				<span class="header__where">
-					<strong title=${group?.key ?? ''}>${group?.label ?? ''}</strong> ${group && isBlind(group) ? html`<span class="pill" data-status="no-picture">no picture</span> ` : null}<${Place} />
+					<strong class="header__group" title=${group ? `${group.label} (${group.key})` : ''}><span>${match}</span>${when.length ? html`<span class="header__when"> · ${when.join(' · ')}</span>` : null}</strong> ${group && isBlind(group) ? html`<span class="pill" data-status="no-picture">no picture</span> ` : null}<${Place} />
 				</span>
 				<${HeaderButton} label="Next group" keys="F" run=${goNext} path="m6 3 5 5-5 5"
 					reason=${at && !at.next.length ? 'This is the last group of the queue' : null} />

@@ -85,7 +85,7 @@ function unused(group, solution) {
 	const told = group.views.flatMap((view) => {
 		const markings = solution.views.find((one) => one.view === view.key)?.calibration.markings ?? [];
 		const names = markings.filter(({ marking, used, outcome }) => view.lines[marking] && (!used || outcome !== 'tp')).map(({ marking }) => `“${marking}”`);
-		return names.length ? [`${names.join(' and ')} of ${view.letter} ${names.length > 1 ? 'do' : 'does'} not fit, which fails no gate.`] : [];
+		return names.length ? [`${names.join(' and ')} of ${view.letter} ${names.length > 1 ? 'do' : 'does'} not fit, which fails no gate: its row under Lines leads to the point.`] : [];
 	});
 	return told.join(' ');
 }
@@ -109,7 +109,7 @@ export function VerdictCard({ group, solution, live }) {
 			<p class="verdict-card__over">${over}</p>
 			<h1>${title}</h1>
 			<p class="verdict-card__text">${text}${sure === null ? '' : html` <span class="verdict-card__sure">${Math.round(sure * 100)} % sure.</span>`}</p>
-			<${MendBox} solution=${solution} />
+			<${MendBox} group=${group} solution=${solution} />
 			${isBlind(group) ? html`<p><span class="pill" data-status="no-picture">no picture</span> <span data-grade="warn">No view of this group has a picture to look at.</span></p>` : null}
 			${verdict.state === 'unreviewed' && !verdict.note ? null : html`
 				<p class="verdict-card__verdict">

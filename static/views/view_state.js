@@ -10,7 +10,7 @@ import { leftOutText } from '../state/reasons.js';
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
 const FAILED = /** @type {Record<string, string>} */ ({
-	calibratable: 'no camera', jac: '', ball: 'no ball', reprojection: '', baseline: 'same place',
+	calibratable: 'no camera', jac: 'not counted', ball: 'no ball', reprojection: '', baseline: 'same place',
 });
 
 /** JaC at 0.5 %, or null when it was not measured. @param {ViewSolutionJson | null} solved */
@@ -31,8 +31,8 @@ export function gradeOfView(picture) {
 	// A ball that no other view confirms is not well, wherever the camera comes from.
 	const error = errorOf(picture).px;
 	if (error !== null && error >= tau) return { grade: 'bad', sentence: given };
-	// What is wrong is not to be seen in this view.
-	if (apart !== null || (solved.ball && !solved.included)) return { grade: 'warn', sentence: 'not counted' };
+	// What is wrong is not to be seen in this view: it has nobody to agree with.
+	if (apart !== null || (solved.ball && !solved.included)) return { grade: 'warn', sentence: 'no pair' };
 	return { grade: 'ok', sentence: given };
 }
 
