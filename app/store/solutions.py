@@ -17,7 +17,7 @@ from app.finite import json_text
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
 from app.store import value_codec
-from app.store.models import CalibrationModel, SolutionModel
+from app.store.models import CalibrationModel, GroupModel, SolutionModel
 from app.store.summary import Summary, summarize
 
 _ELSEWHERE = Calibration(source="", camera=None)
@@ -175,3 +175,24 @@ def read_calibration_bodies(session: Session, keys: Iterable[str]) -> dict[str, 
 def read_summary(text: str) -> Summary:
     """A stored summary."""
     return value_codec.from_json(Summary, json.loads(text))
+
+
+def known_calibrations(session: Session, keys: Iterable[str]) -> set[str]:
+    """Those of the keys under which a calibration is kept."""
+    statement = select(CalibrationModel.key).where(CalibrationModel.key.in_(list(keys)))
+    return set(session.scalars(statement))
+
+
+def present_bodies(session: Session, ids: Sequence[int], policy_hash: str) -> dict[int, bytes]:
+    """Encoded solutions that fit the groups as they are, by the group's id."""
+    statement = (
+        select(SolutionModel.group_id, SolutionModel.body)
+        .join(GroupModel, GroupModel.id == SolutionModel.group_id)
+        .where(
+            SolutionModel.group_id.in_(ids),
+            SolutionModel.inputs_hash == GroupModel.inputs_hash,
+            SolutionModel.policy_hash == policy_hash,
+            SolutionModel.solver_version == SOLVER_VERSION,
+        )
+    )
+    return {row.group_id: row.body for row in session.execute(statement)}

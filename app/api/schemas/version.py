@@ -10,9 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt
 from app.api.schemas.policy import PolicyDocument
 from app.review.versions.diff import VersionDiff
 from app.review.versions.freeze import MAX_LICENCE, MAX_NOTE, FreezePlan, FreezeRequest
-from app.review.versions.verification import Verification
 from app.review.versions.version import Version
 from app.soccer.split import TEST_CAMERAS, Split
+from app.store.verifications import Verification
 
 Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 SHOWN_DIFFERENCES = 40

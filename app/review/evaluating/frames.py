@@ -14,7 +14,7 @@ from app.evaluation.frame import Frame
 from app.review.datasets.dataset import Dataset
 from app.review.editing.state import read_states
 from app.review.versions.membership import RULES, read_candidates, require_solved
-from app.review.versions.version import BATCH, FrozenGroup, Version, read_rows, thaw
+from app.review.versions.version import FrozenGroup, Version, thaw
 from app.soccer.ball_boxes import ball_boxes, has_ball_3d
 from app.soccer.group import Group
 from app.soccer.policy import Policy
@@ -22,6 +22,7 @@ from app.soccer.solution import SOLVER_VERSION, Solution
 from app.store.codecs import Json, policy_to_json
 from app.store.digest import digest
 from app.store.models import GroupModel, ViewModel
+from app.store.versions import BATCH, read_rows
 
 LIVE_RULES = (*RULES, "all")
 """Which groups of a dataset that is not frozen take part."""

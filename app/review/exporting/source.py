@@ -14,10 +14,11 @@ from app.errors import InputError
 from app.review.datasets.dataset import Dataset
 from app.review.editing.state import GroupState, VerdictState, read_states
 from app.review.versions.manifest import policy_settings, version_settings, version_stamp
-from app.review.versions.version import BATCH, FrozenGroup, Version, VersionGroup, read_rows, thaw
+from app.review.versions.version import FrozenGroup, Version, thaw
 from app.soccer.solution import SOLVER_VERSION
 from app.store.codecs import Json
 from app.store.models import LogModel, QueueModel
+from app.store.versions import BATCH, VersionGroup, read_rows
 
 Facts = Mapping[str, Mapping[str, int]]
 """Size and checksum of frames by view, as they were when a version was frozen."""

@@ -9,14 +9,13 @@ from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.errors import InputError
 from app.review.versions.version import Version, read_version
 from app.store.codecs import Json, parse, policy_to_json
 from app.store.session import Store
-from app.store.version_models import VersionGroupModel
+from app.store.versions import said_rows
 
 NEW, GONE = "not in the dataset before", "no longer in the dataset"
 
@@ -101,7 +100,9 @@ def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
     """``diff_versions`` within a session."""
     if older.dataset_id != newer.dataset_id:
         raise InputError("the two versions belong to two datasets", pointer="/against")
-    before, after = _rows(session, older.id), _rows(session, newer.id)
+    before, after = (
+        {row.key: row for row in said_rows(session, item.id)} for item in (older, newer)
+    )
     both = [key for key, row in after.items() if row.member and _is_in(before, key)]
     changes = (_change(before[key], after[key]) for key in both)
     changed = [change for change in changes if change.what]
@@ -160,17 +161,6 @@ _CHANGES = {
     "split": "another split",
     "ball": "a 3D ball that is there now or is gone",
 }
-
-
-def _rows(session: Session, version_id: int) -> dict[str, Any]:
-    model = VersionGroupModel
-    names = ("key", "member", "why", "split", "splits", "verdict", "said", "ball")
-    statement = (
-        select(*(getattr(model, name) for name in names))
-        .where(model.version_id == version_id)
-        .order_by(model.position)
-    )
-    return {row.key: row for row in session.execute(statement)}
 
 
 def _is_in(rows: dict[str, Any], key: str) -> bool:

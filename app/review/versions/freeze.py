@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import insert, select
 from sqlalchemy.orm import Session
 
 from app.datasets.manifest import software_version
@@ -19,10 +18,9 @@ from app.errors import ConflictError, InputError
 from app.review.datasets.dataset import Dataset, read_dataset
 from app.review.datasets.licence import licence_text
 from app.review.versions.membership import RULES, Candidate, read_candidates, require_solved
-from app.review.versions.version import BATCH, Version, calibration_names, read_version
+from app.review.versions.version import Version, calibration_names, read_version
 from app.review.versions.version_hash import version_hash
 from app.soccer.group import Group
-from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION
 from app.soccer.split import Split, Splitter
 from app.store.clock import now
@@ -38,14 +36,12 @@ from app.store.frozen import (
     json_of,
     known_frozen,
 )
-from app.store.group_rows import next_id
 from app.store.groups import read_groups
 from app.store.log import Entry, append
 from app.store.media import media_facts
-from app.store.models import CalibrationModel, GroupModel, SolutionModel
 from app.store.session import Store
-from app.store.solutions import read_calibration_bodies
-from app.store.version_models import VersionGroupModel, VersionModel
+from app.store.solutions import known_calibrations, present_bodies, read_calibration_bodies
+from app.store.versions import BATCH, has_version, insert_version
 
 MAX_NOTE = 2000
 MAX_LICENCE = 100_000
@@ -224,7 +220,7 @@ class _Run:
         if not ids:
             return {}
         stored = read_groups(self._session, ids)
-        solutions = _solutions(self._session, ids, self._dataset.policy)
+        solutions = present_bodies(self._session, ids, self._dataset.policy.hash)
         if len(solutions) < len(ids):
             raise ConflictError("a group lost its solution", hint="Solve the dataset first.")
         texts: dict[str, str] = {}
@@ -273,8 +269,7 @@ class _Run:
     def _gone(self, session: Session, names: set[str]) -> dict[str, bytes]:
         """Calibrations that somebody deleted since the snapshot, as they are in it."""
         keys = {name.removeprefix(CALIBRATION) for name in names}
-        found = select(CalibrationModel.key).where(CalibrationModel.key.in_(keys))
-        gone = keys - set(session.scalars(found))
+        gone = keys - known_calibrations(session, keys)
         bodies = read_calibration_bodies(self._session, gone) if gone else {}
         return {CALIBRATION + key: body for key, body in bodies.items()}
 
@@ -311,21 +306,6 @@ class _Run:
         }
 
 
-def _solutions(session: Session, ids: Sequence[int], policy: Policy) -> dict[int, bytes]:
-    """Bodies of the solutions that fit the groups as they are."""
-    statement = (
-        select(SolutionModel.group_id, SolutionModel.body)
-        .join(GroupModel, GroupModel.id == SolutionModel.group_id)
-        .where(
-            SolutionModel.group_id.in_(ids),
-            SolutionModel.inputs_hash == GroupModel.inputs_hash,
-            SolutionModel.policy_hash == policy.hash,
-            SolutionModel.solver_version == SOLVER_VERSION,
-        )
-    )
-    return {row.group_id: row.body for row in session.execute(statement)}
-
-
 def _row(item: Candidate, position: int) -> dict[str, Any]:
     """What every row has; that of a member is completed."""
     nothing = dict.fromkeys(("splits", "said", "solution", "ball", "frames"))
@@ -354,10 +334,7 @@ def _reasons(candidates: Iterable[Candidate]) -> dict[str, int]:
 
 
 def _require_free(session: Session, dataset: Dataset, name: str) -> None:
-    statement = select(VersionModel.id).where(
-        VersionModel.dataset_id == dataset.id, VersionModel.name == name
-    )
-    if session.scalar(statement) is not None:
+    if has_version(session, dataset.id, name):
         raise ConflictError(
             f'"{dataset.name}" has a version "{name}" already',
             hint="A version never changes; choose another name.",
@@ -380,21 +357,7 @@ def _require_some(dataset: Dataset, candidates: Sequence[Candidate], rule: str) 
 def _save(
     session: Session, values: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]
 ) -> Version:
-    identity = next_id(session, VersionModel)
-    newest = (
-        select(VersionModel.id)
-        .where(VersionModel.dataset_id == values["dataset_id"])
-        .order_by(VersionModel.id.desc())
-        .limit(1)
-    )
-    previous = session.scalar(newest)
-    session.execute(
-        insert(VersionGroupModel),
-        [{**row, "version_id": identity} for row in rows],
-        execution_options={"render_nulls": True},
-    )
-    # Its own row comes last: from here on nothing can be added to the version.
-    session.execute(insert(VersionModel), [{**values, "id": identity, "previous": previous}])
+    identity = insert_version(session, values, rows)
     body = {"version": identity, "name": values["name"], "hash": values["hash"]}
     entry = Entry("freeze", values["actor"], values["created"], body, values["dataset_id"])
     append(session, [entry])

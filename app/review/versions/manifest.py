@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Any
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.review.versions.diff import read_changelog
 from app.review.versions.version import Version, read_version
 from app.soccer.policy import Policy
-from app.store.codecs import Json, parse, policy_to_json
+from app.store.codecs import Json, policy_to_json
 from app.store.session import Store
-from app.store.version_models import VersionGroupModel
+from app.store.versions import version_verdicts
 
 
 def version_manifest(store: Store, version_id: int) -> dict[str, Json]:
@@ -73,30 +71,19 @@ def version_stamp(session: Session, version: Version) -> dict[str, Json]:
 
 
 def _rejected(session: Session, version_id: int) -> Iterator[dict[str, Json]]:
-    for row in _rows(session, version_id, member=False):
-        verdict = {} if row.verdict is None else parse(row.verdict)
-        if verdict.get("state", "").startswith("rejected"):
-            yield {"group": row.key, "reason": verdict["reason"], "note": verdict["note"]}
+    for key, verdict in version_verdicts(session, version_id, member=False):
+        if verdict is not None and verdict["state"].startswith("rejected"):
+            yield {"group": key, "reason": verdict["reason"], "note": verdict["note"]}
 
 
 def _verdicts(session: Session, version_id: int) -> tuple[dict[str, int], list[Json]]:
     counts: Counter[str] = Counter()
     overrides: list[Json] = []
-    for row in _rows(session, version_id, member=True):
-        verdict = {"state": "unreviewed"} if row.verdict is None else parse(row.verdict)
+    for key, said in version_verdicts(session, version_id, member=True):
+        verdict = {"state": "unreviewed"} if said is None else said
         counts[verdict["state"]] += 1
         if verdict.get("override"):
             gate, note = verdict["override"], verdict["note"]
             reason = f"overrides {gate}: {note}"
-            overrides.append({"group": row.key, "gate": gate, "reason": reason})
+            overrides.append({"group": key, "gate": gate, "reason": reason})
     return dict(sorted(counts.items())), overrides
-
-
-def _rows(session: Session, version_id: int, *, member: bool) -> Iterator[Any]:
-    model = VersionGroupModel
-    statement = (
-        select(model.key, model.verdict)
-        .where(model.version_id == version_id, model.member.is_(member))
-        .order_by(model.position)
-    )
-    yield from session.execute(statement)

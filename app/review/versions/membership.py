@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError
 from app.store.codecs import Json
-from app.store.models import QueueModel, VerdictModel
+from app.store.versions import candidate_rows
 
 RULES = ("accepted", "passing")
 UNSOLVED = "not solved"
@@ -45,26 +44,7 @@ class Candidate:
 
 def read_candidates(session: Session, dataset_id: int, rule: str) -> list[Candidate]:
     """Every group of a dataset, by match and key: an order that no machine changes."""
-    newest = (
-        select(VerdictModel.group_id, func.max(VerdictModel.id).label("id"))
-        .join(QueueModel, QueueModel.group_id == VerdictModel.group_id)
-        .where(QueueModel.dataset_id == dataset_id)
-        .group_by(VerdictModel.group_id)
-        .subquery()
-    )
-    names = ("group_id", "key", "match", "split", "status", "stale", "solved", "passes", "gate")
-    statement = (
-        select(
-            *(getattr(QueueModel, name) for name in names),
-            VerdictModel.reason,
-            VerdictModel.note,
-            VerdictModel.override,
-        )
-        .outerjoin(newest, newest.c.group_id == QueueModel.group_id)
-        .outerjoin(VerdictModel, VerdictModel.id == newest.c.id)
-        .where(QueueModel.dataset_id == dataset_id)
-    )
-    found = [_candidate(row, rule) for row in session.execute(statement)]
+    found = [_candidate(row, rule) for row in candidate_rows(session, dataset_id)]
     return sorted(found, key=lambda item: (item.match, natural(item.key), item.key))
 
 

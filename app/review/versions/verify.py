@@ -10,18 +10,14 @@ from dataclasses import asdict, dataclass, field
 from itertools import islice
 from typing import Any
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.errors import JobCancelled, ReviewError, StorageError
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.solver import Solver
-from app.review.versions.verification import keep_verification
 from app.review.versions.version import (
     Version,
-    VersionGroup,
     calibration_names,
-    read_page,
     read_version,
 )
 from app.review.versions.version_hash import version_hash
@@ -46,7 +42,8 @@ from app.store.frozen import (
 )
 from app.store.session import Store
 from app.store.solutions import decode_calibration, encode_calibration, encode_solution
-from app.store.version_models import VersionGroupModel
+from app.store.verifications import keep_verification
+from app.store.versions import VersionGroup, read_page, said_rows, version_matches
 
 CHUNK = 40
 """Groups a task."""
@@ -164,7 +161,7 @@ def verify(
             version.name, version.hash, int(version.counts["groups"]), version.solver_version
         )
         report.add(list(_version_differences(session, version)))
-        matches = _matches(session, version.id)
+        matches = version_matches(session, version.id)
     done = 0
     for results in fan_out(verify_task, _Tasks(store, version, matches, solver), executor):
         for found in results:
@@ -212,23 +209,11 @@ def verify_task(task: VerifyTask) -> list[list[Difference]]:
 
 def _version_differences(session: Session, version: Version) -> Iterator[Difference]:
     """What of the version's own row does not follow from its groups."""
-    columns = VersionGroupModel.__table__.columns
     names = ("key", "member", "split", "splits", "verdict", "said")
-    statement = (
-        select(*(columns[name] for name in names))
-        .where(VersionGroupModel.version_id == version.id)
-        .order_by(VersionGroupModel.position)
-    )
-    rows = (dict(row._mapping) for row in session.execute(statement))
+    rows = ({name: getattr(row, name) for name in names} for row in said_rows(session, version.id))
     found = version_hash(version.policy, version.solver_version, rows)
     if found != version.hash:
         yield Difference(None, "hash", version.hash, found)
-
-
-def _matches(session: Session, version_id: int) -> set[str]:
-    model = VersionGroupModel
-    statement = select(model.match).where(model.version_id == version_id).distinct()
-    return set(session.scalars(statement))
 
 
 class _Tasks:

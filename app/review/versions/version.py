@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.errors import InputError, NotFoundError, StorageError
 from app.review.datasets.dataset import read_dataset
-from app.review.versions.verification import Verification, read_verifications
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
 from app.soccer.split import Split
-from app.store.codecs import Json, parse, policy_from_json, unpack
+from app.store.codecs import Json, parse, policy_from_json
 from app.store.frozen import CALIBRATION, json_of, read_frozen, station_keys, thaw_group
-from app.store.models import DatasetModel
 from app.store.session import Store
 from app.store.solutions import decode_calibration, decode_solution
-from app.store.version_models import VersionGroupModel, VersionModel
-
-BATCH = 200
+from app.store.verifications import Verification, read_verifications
+from app.store.versions import VersionGroup, dataset_versions, version_row
 
 
 @dataclass(frozen=True)
@@ -60,24 +56,6 @@ class Version:
 
 
 @dataclass(frozen=True)
-class VersionGroup:
-    """One row of a version: a group that is in it, or the reason why it is not."""
-
-    position: int
-    key: str
-    match: str
-    member: bool
-    why: str | None
-    split: str
-    splits: Mapping[str, str] | None
-    verdict: Json
-    said: str | None
-    solution: str | None
-    ball: tuple[float, float, float] | None
-    frames: Mapping[str, Mapping[str, Any]] | None
-
-
-@dataclass(frozen=True)
 class FrozenGroup:
     """A group of a version with its content: the group as it was said, and the solution."""
 
@@ -90,10 +68,7 @@ def list_versions(store: Store, dataset: str | int) -> list[Version]:
     """The versions of a dataset, newest first."""
     with store.read() as session:
         found = read_dataset(session, dataset)
-        rows = session.execute(
-            _VERSIONS.where(VersionModel.dataset_id == found.id).order_by(VersionModel.id.desc())
-        )
-        return _versions(session, rows.all())
+        return _versions(session, dataset_versions(session, found.id))
 
 
 def get_version(store: Store, version_id: int) -> Version:
@@ -137,35 +112,10 @@ def next_name(store: Store, dataset: str | int) -> str:
 
 def read_version(session: Session, version_id: int) -> Version:
     """``get_version`` within a session."""
-    row = session.execute(_VERSIONS.where(VersionModel.id == version_id)).one_or_none()
+    row = version_row(session, version_id)
     if row is None:
         raise NotFoundError(f"there is no version {version_id}")
     return _versions(session, [row])[0]
-
-
-def read_rows(
-    session: Session, version_id: int, *, members: bool = False
-) -> Iterator[VersionGroup]:
-    """The rows of a version in their order, in batches."""
-    rows = read_page(session, version_id, -1, BATCH, members=members)
-    while rows:
-        yield from rows
-        rows = read_page(session, version_id, rows[-1].position, BATCH, members=members)
-
-
-def read_page(
-    session: Session, version_id: int, after: int, limit: int, *, members: bool = False
-) -> list[VersionGroup]:
-    """The next rows of a version after a position."""
-    model = VersionGroupModel
-    where = [model.member.is_(True)] if members else []
-    statement = (
-        select(*model.__table__.columns)
-        .where(model.version_id == version_id, model.position > after, *where)
-        .order_by(model.position)
-        .limit(limit)
-    )
-    return [_row(row) for row in session.execute(statement)]
 
 
 def thaw(session: Session, version: Version, rows: Sequence[VersionGroup]) -> list[FrozenGroup]:
@@ -228,26 +178,3 @@ def _version(row: Any) -> Version:
             "counts": parse(row.counts),
         }
     )
-
-
-def _row(row: Any) -> VersionGroup:
-    ball = None if row.ball is None else parse(row.ball)
-    return VersionGroup(
-        position=row.position,
-        key=row.key,
-        match=row.match,
-        member=row.member,
-        why=row.why,
-        split=row.split,
-        splits=None if row.splits is None else parse(row.splits),
-        verdict=None if row.verdict is None else parse(row.verdict),
-        said=row.said,
-        solution=row.solution,
-        ball=None if ball is None else (ball[0], ball[1], ball[2]),
-        frames=None if row.frames is None else unpack(row.frames),
-    )
-
-
-_VERSIONS = select(*VersionModel.__table__.columns, DatasetModel.name.label("dataset")).join(
-    DatasetModel, DatasetModel.id == VersionModel.dataset_id
-)

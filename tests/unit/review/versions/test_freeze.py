@@ -15,7 +15,7 @@ from app.review.importing.ingest import ingest
 from app.review.queue.listing import list_groups
 from app.review.verdicts.verdict import set_verdict
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
-from app.review.versions.version import list_versions, read_rows, thaw
+from app.review.versions.version import list_versions, thaw
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Media
@@ -23,6 +23,7 @@ from app.soccer.policy import STRICT
 from app.soccer.split import Split
 from app.store.models import LogModel, SolutionModel
 from app.store.version_models import FrozenModel, VersionGroupModel, VersionModel
+from app.store.versions import read_rows
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 
