@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.geometry.camera import Camera
@@ -21,8 +20,8 @@ from app.store.groups import (
     refresh_inputs_hashes,
     save_station,
 )
+from app.store.imports import camera_places
 from app.store.log import Entry, append
-from app.store.models import GroupModel, StationModel, ViewModel
 from app.store.queue import refresh_queue
 from app.store.session import Store
 
@@ -86,23 +85,10 @@ def ingest_cameras(
 
 def _places(session: Session, dataset_id: int) -> dict[str, list[_Place]]:
     places: dict[str, list[_Place]] = {}
-    statement = (
-        select(
-            StationModel.id,
-            StationModel.key,
-            StationModel.shared,
-            GroupModel.id.label("group"),
-            GroupModel.match,
-            ViewModel.key.label("view"),
-        )
-        .join(ViewModel, ViewModel.station_id == StationModel.id)
-        .join(GroupModel, GroupModel.id == ViewModel.group_id)
-        .where(StationModel.dataset_id == dataset_id)
-    )
-    for row in session.execute(statement):
+    for row in camera_places(session, dataset_id):
         stem = str(PurePosixPath(row.view).with_suffix(""))
-        names = {row.key} if row.shared else {stem, f"{row.match}/{stem}"}
-        place = _Place(row.id, None if row.shared else row.group)
+        names = {row.station_key} if row.shared else {stem, f"{row.match}/{stem}"}
+        place = _Place(row.station, None if row.shared else row.group)
         for name in names:
             known = places.setdefault(name, [])
             if place not in known:

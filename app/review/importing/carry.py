@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.datasets.manifest import Manifest, write_manifest
@@ -32,26 +31,16 @@ from app.store.codecs import (
     unpack,
     view_to_json,
 )
-from app.store.groups import StoredGroup, read_groups, stored_station
+from app.store.groups import StoredGroup, read_groups
+from app.store.imports import group_verdicts, known_groups, newest_word, shared_stations
 from app.store.log import read_log
-from app.store.models import GroupModel, LogModel, SpareFrameModel, StationModel, VerdictModel
+from app.store.models import LogModel
 from app.store.session import Store
+from app.store.spare import sorted_spare_rows
 
 FORMAT = "touchline"
 FORMAT_VERSION = 1
 HEAD, STATIONS, GROUPS, SPARE = "touchline.json", "stations.jsonl", "groups.jsonl", "spare.jsonl"
-VERDICT = (
-    "actor",
-    "at",
-    "state",
-    "reason",
-    "note",
-    "inputs_hash",
-    "policy_hash",
-    "fixed",
-    "override",
-)
-"""What is carried of a verdict."""
 EDIT_KINDS = ("edit", "undo", "redo", "station_edit", "station_undo", "station_redo")
 _BATCH = 200
 
@@ -107,17 +96,11 @@ def _write_lines(path: Path, items: Iterator[Json]) -> int:
 
 
 def _stations(session: Session, dataset_id: int) -> Iterator[Json]:
-    statement = (
-        select(*StationModel.__table__.columns)
-        .where(StationModel.dataset_id == dataset_id, StationModel.shared)
-        .order_by(StationModel.key)
-    )
-    for row in session.execute(statement):
-        stored = stored_station(row)
+    for stored in shared_stations(session, dataset_id):
         lineage = station_lineage(session, stored)
         station, base = station_to_json(stored.station), station_to_json(lineage.base)
         yield {
-            "key": row.key,
+            "key": stored.station.key,
             "station": station,
             "base": None if base == station else base,
             "states": list(lineage.states),
@@ -127,16 +110,10 @@ def _stations(session: Session, dataset_id: int) -> Iterator[Json]:
 
 def _groups(session: Session, dataset: Dataset, progress: Progress | None) -> Iterator[Json]:
     lineages = Lineages(session, dataset.id)
-    ids = list(
-        session.scalars(
-            select(GroupModel.id)
-            .where(GroupModel.dataset_id == dataset.id)
-            .order_by(GroupModel.number)
-        )
-    )
+    ids = [group.id for group in known_groups(session, dataset.id)]
     for start in range(0, len(ids), _BATCH):
         stored = read_groups(session, ids[start : start + _BATCH])
-        known, verdicts = lineages.of(stored.values()), _verdicts(session, list(stored))
+        known, verdicts = lineages.of(stored.values()), group_verdicts(session, stored)
         for item in stored.values():
             yield _group(session, item, known[item.id], verdicts.get(item.id, []))
         if progress is not None:
@@ -174,45 +151,17 @@ def _log(session: Session, *where: Any) -> list[Json]:
     return entries
 
 
-def _verdicts(session: Session, ids: list[int]) -> dict[int, list[Json]]:
-    columns = [getattr(VerdictModel, name) for name in VERDICT]
-    statement = (
-        select(VerdictModel.group_id, *columns)
-        .where(VerdictModel.group_id.in_(ids))
-        .order_by(VerdictModel.id)
-    )
-    verdicts: dict[int, list[Json]] = {}
-    for row in session.execute(statement):
-        values = dict(row._mapping)
-        verdicts.setdefault(row.group_id, []).append({name: values[name] for name in VERDICT})
-    return verdicts
-
-
 def _spare(session: Session, dataset_id: int) -> Iterator[Json]:
-    model = SpareFrameModel
-    statement = (
-        select(model.camera, model.frame, model.extras)
-        .where(model.dataset_id == dataset_id)
-        .order_by(model.camera, model.frame)
-    )
-    for row in session.execute(statement.execution_options(yield_per=_BATCH)):
+    for row in sorted_spare_rows(session, dataset_id):
         yield {"camera": row.camera, "frame": row.frame, "extras": unpack(row.extras)}
 
 
 def _manifest(session: Session, dataset: Dataset, counts: Mapping[str, int]) -> Manifest:
-    matches = session.scalars(
-        select(GroupModel.match).where(GroupModel.dataset_id == dataset.id).distinct()
-    )
-    newest = session.scalar(
-        select(LogModel.at)
-        .where(LogModel.dataset_id == dataset.id, LogModel.kind != "freeze")
-        .order_by(LogModel.at.desc())
-        .limit(1)
-    )
+    matches = {group.match for group in known_groups(session, dataset.id)}
     return Manifest(
         dataset=dataset.name,
         format=FORMAT,
-        date=newest or dataset.created,
+        date=newest_word(session, dataset.id) or dataset.created,
         counts=counts,
         settings={
             "policy": policy_to_json(dataset.policy),

@@ -7,13 +7,12 @@ changes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import TypeVar
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.datasets.archive import FileTree, Limits, open_tree
@@ -39,8 +38,8 @@ from app.review.importing.ingest import IngestReport, Origin, attempt, ingest_ba
 from app.review.importing.spare import SpareFrame, ingest_spare
 from app.soccer.group import Group, Station
 from app.store.codecs import Json
-from app.store.groups import read_groups, stored_station
-from app.store.models import GroupModel, StationModel
+from app.store.groups import read_groups
+from app.store.imports import known_groups, shared_stations
 from app.store.queue import refresh_queue
 from app.store.session import Store
 
@@ -166,11 +165,11 @@ def _merge_batch(
         # A dry run took its stations back; the groups need them for a moment.
         merge_stations(session, origin, stations.values(), IngestReport())
     items = {item.group.key: item for item in batch}
-    known = _ids(session, origin.dataset_id, items)
+    known = {item.key: item.id for item in known_groups(session, origin.dataset_id, items)}
     upstream = _upstream(session, origin, items, known)
     ingest_batch(session, origin, upstream, run.report, run.counted)
     counted = {group.key for group in upstream}
-    ids = _ids(session, origin.dataset_id, items)
+    ids = {item.key: item.id for item in known_groups(session, origin.dataset_id, items)}
     stored = read_groups(session, list(ids.values()))
     lineages = Lineages(session, origin.dataset_id).of(stored.values())
     touched = []
@@ -226,18 +225,7 @@ def _with_media(group: Group, stored: Group) -> Group:
 
 def _shared(session: Session, dataset_id: int) -> dict[str, Station]:
     """The static cameras as the dataset last brought them, by key."""
-    statement = select(*StationModel.__table__.columns).where(
-        StationModel.dataset_id == dataset_id, StationModel.shared
-    )
-    found = [stored_station(row) for row in session.execute(statement)]
     return {
         item.station.key: station_lineage(session, item).base if item.edited else item.station
-        for item in found
+        for item in shared_stations(session, dataset_id)
     }
-
-
-def _ids(session: Session, dataset_id: int, keys: Iterable[str]) -> dict[str, int]:
-    statement = select(GroupModel.key, GroupModel.id).where(
-        GroupModel.dataset_id == dataset_id, GroupModel.key.in_(list(keys))
-    )
-    return {row.key: row.id for row in session.execute(statement.order_by(GroupModel.number))}

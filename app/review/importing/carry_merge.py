@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.review.editing.lineage import Lineage
@@ -16,9 +15,9 @@ from app.review.importing.ingest import IngestReport, Origin, note_kept
 from app.soccer.group import Group, View
 from app.store.clock import now
 from app.store.digest import station_digest, view_digest
+from app.store.findings import group_findings
 from app.store.groups import StoredGroup, read_groups, save_group
 from app.store.log import Entry, append
-from app.store.models import ImportFindingModel
 
 
 @dataclass(frozen=True)
@@ -157,7 +156,5 @@ def _not_noticed(session: Session, group_id: int, kept: list[Kept]) -> list[Kept
     """Those of the findings that are not there already."""
     if not kept:
         return []
-    model = ImportFindingModel
-    statement = select(model.view, model.sentence).where(model.group_id == group_id)
-    known = {(row.view, row.sentence) for row in session.execute(statement)}
+    known = set(group_findings(session, group_id))
     return [item for item in kept if (item.view, item.sentence) not in known]

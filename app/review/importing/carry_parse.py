@@ -12,7 +12,7 @@ from app.datasets.report import Report
 from app.errors import DatasetFormatError, InputError, ReviewError
 from app.review.editing.edit import CALIBRATIONS, MAX_POINTS
 from app.review.editing.lineage import logged_group
-from app.review.importing.carry import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD, VERDICT
+from app.review.importing.carry import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
 from app.review.verdicts.verdict import STATES
 from app.soccer.annotation import Extras
 from app.soccer.group import Group, Station, View
@@ -20,6 +20,7 @@ from app.soccer.pitch import canonical_marking
 from app.soccer.policy import Policy
 from app.soccer.reasons import MAX_NOTE, REASONS, left_out
 from app.store.codecs import Json, extras_from_json, policy_from_json, station_from_json
+from app.store.imports import VERDICT
 
 MAX_LINE = 32 * 1024 * 1024
 MAX_VIEWS, MAX_BALLS, MAX_SIDE, MAX_TEXT = 100, 100, 20_000, 1000

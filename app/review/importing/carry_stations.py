@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from sqlalchemy import delete, insert, select
 from sqlalchemy.orm import Session
 
 from app.review.editing.lineage import StationLineage, station_lineage
@@ -17,15 +16,15 @@ from app.review.importing.ingest import IngestReport, Origin
 from app.store.clock import now
 from app.store.codecs import station_to_json
 from app.store.digest import station_digest
+from app.store.findings import replace_station_finding, station_finding
 from app.store.groups import (
     StoredStation,
     groups_of_station,
     refresh_inputs_hashes,
     save_station,
-    stored_station,
 )
+from app.store.imports import shared_stations
 from app.store.log import Entry, append
-from app.store.models import ImportFindingModel, StationModel
 from app.store.queue import refresh_queue
 
 
@@ -98,7 +97,7 @@ def _follow(
         stored.station, lines=said.lines, given=said.given, calibration=said.calibration
     )
     save_station(session, stored, station)
-    _save_finding(session, stored.id, sentence)
+    replace_station_finding(session, stored.id, KIND, sentence)
     _log(session, origin, replace(stored, station=station), lineage, sentence, list(item.log))
     groups = groups_of_station(session, stored.id)
     refresh_inputs_hashes(session, groups)
@@ -114,24 +113,15 @@ def _note(
     report: IngestReport,
 ) -> bool:
     """Save a conflict, unless it is known; whether it was new."""
-    model = ImportFindingModel
-    if session.scalar(select(model.sentence).where(model.station_id == stored.id)) == sentence:
+    if station_finding(session, stored.id) == sentence:
         return False
     # A revision of its own, as every entry of the log about a station makes one.
     save_station(session, stored, stored.station)
-    _save_finding(session, stored.id, sentence)
+    replace_station_finding(session, stored.id, KIND, sentence)
     _log(session, origin, stored, lineage, sentence, [])
     refresh_queue(session, groups_of_station(session, stored.id))
     report.findings += 1
     return True
-
-
-def _save_finding(session: Session, station_id: int, sentence: str | None) -> None:
-    model = ImportFindingModel
-    session.execute(delete(model).where(model.station_id == station_id))
-    if sentence is not None:
-        values = {"station_id": station_id, "kind": KIND, "sentence": sentence}
-        session.execute(insert(model), [values])
 
 
 def _log(
@@ -155,9 +145,4 @@ def _log(
 
 
 def _stored(session: Session, dataset_id: int, key: str) -> StoredStation | None:
-    model = StationModel
-    statement = select(*model.__table__.columns).where(
-        model.dataset_id == dataset_id, model.shared, model.key == key
-    )
-    row = session.execute(statement).one_or_none()
-    return None if row is None else stored_station(row)
+    return next(iter(shared_stations(session, dataset_id, key)), None)

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import insert, select
 from sqlalchemy.orm import Session
 
-from app.review.importing.carry import VERDICT
 from app.review.importing.ingest import Origin
 from app.store.clock import now
-from app.store.group_rows import next_id
+from app.store.imports import VERDICT, add_verdicts, group_verdicts
 from app.store.log import Entry, append
-from app.store.models import VerdictModel
 
 
 def merge_verdicts(
@@ -26,7 +23,7 @@ def merge_verdicts(
     """
     if not carried:
         return False
-    known = _known(session, group_id)
+    known = group_verdicts(session, [group_id]).get(group_id, [])
     seen = {_identity(item) for item in known}
     fresh = [item for item in carried if _identity(item) not in seen]
     if not fresh:
@@ -34,21 +31,14 @@ def merge_verdicts(
     fresh = sorted(fresh, key=lambda item: str(item["at"]))
     if known and str(known[-1]["at"]) > str(fresh[-1]["at"]):
         fresh.append(known[-1])
-    first, at = next_id(session, VerdictModel), now()
-    rows = [{**item, "id": first + place, "group_id": group_id} for place, item in enumerate(fresh)]
-    session.execute(insert(VerdictModel), rows, execution_options={"render_nulls": True})
+    at = now()
+    add_verdicts(session, group_id, fresh)
     entries = [
         Entry("verdict", origin.actor, at, dict(item), origin.dataset_id, group_id)
         for item in fresh
     ]
     append(session, entries)
     return True
-
-
-def _known(session: Session, group_id: int) -> list[dict[str, Any]]:
-    columns = [getattr(VerdictModel, name) for name in VERDICT]
-    statement = select(*columns).where(VerdictModel.group_id == group_id).order_by(VerdictModel.id)
-    return [dict(row._mapping) for row in session.execute(statement)]
 
 
 def _identity(verdict: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -8,22 +8,22 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
-from sqlalchemy import delete, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.review.datasets.dataset import find_dataset, insert_dataset
 from app.review.editing.shared_stations import SharedStations
 from app.review.editing.upstream import KIND, Kept, follow_group
 from app.review.importing.body import import_body, places_of
-from app.review.importing.missing import gone_groups, note_gone, of_read_matches
+from app.review.importing.missing import GONE, note_gone, of_read_matches
 from app.soccer.group import Group, View
 from app.soccer.policy import PAPER
 from app.store.clock import now
 from app.store.digest import source_hash
+from app.store.findings import group_findings, groups_told, replace_group_findings
 from app.store.group_rows import NewRows
 from app.store.groups import StoredGroup, read_groups, save_group
-from app.store.log import Entry, append, read_log
-from app.store.models import GroupModel, ImportFindingModel, LogModel
+from app.store.imports import known_groups, newest_imports
+from app.store.log import Entry, append
 from app.store.queue import refresh_queue
 from app.store.session import Store
 
@@ -142,17 +142,10 @@ def _note_missing(
 ) -> set[int]:
     """Count the groups that the same source brought last and that did not come this time."""
     missing: set[int] = set()
-    statement = select(GroupModel.id, GroupModel.key).where(
-        GroupModel.dataset_id == origin.dataset_id
-    )
-    absent = [row.id for row in session.execute(statement) if row.key not in seen]
+    known = known_groups(session, origin.dataset_id)
+    absent = [group.id for group in known if group.key not in seen]
     for start in range(0, len(absent), BATCH):
-        newest = (
-            select(func.max(LogModel.id))
-            .where(LogModel.kind == "import", LogModel.group_id.in_(absent[start : start + BATCH]))
-            .group_by(LogModel.group_id)
-        )
-        entries = read_log(session, LogModel.id.in_(newest))
+        entries = newest_imports(session, absent[start : start + BATCH])
         missing |= {
             entry.group_id or 0 for entry in entries if entry.body["source"] == origin.source
         }
@@ -200,26 +193,20 @@ def ingest_batch(
     report.changed += len(set(shared.changed) - stations)
     report.findings += len(set(shared.kept) - stations)
     stations.update(shared.changed)
-    known = _known(session, origin.dataset_id, [group.key for group in batch])
-    gone = gone_groups(session, [number for number, _ in known.values()])
+    keys = [group.key for group in batch]
+    known = {item.key: item for item in known_groups(session, origin.dataset_id, keys)}
+    gone = groups_told(session, [item.id for item in known.values()], GONE)
     fresh: list[tuple[Group, str]] = []
     for group in batch:
         digest = source_hash(group)
         if group.key not in known:
             fresh.append((group, digest))
-        elif known[group.key][1] == digest and known[group.key][0] not in gone:
+        elif known[group.key].source_hash == digest and known[group.key].id not in gone:
             report.unchanged += 1
         else:
-            _follow(session, origin, known[group.key][0], group, digest, shared.ids, report)
+            _follow(session, origin, known[group.key].id, group, digest, shared.ids, report)
     _insert(session, origin, fresh, shared.ids)
     report.new += len(fresh)
-
-
-def _known(session: Session, dataset_id: int, keys: list[str]) -> dict[str, tuple[int, str]]:
-    statement = select(GroupModel.key, GroupModel.id, GroupModel.source_hash).where(
-        GroupModel.dataset_id == dataset_id, GroupModel.key.in_(keys)
-    )
-    return {row.key: (row.id, row.source_hash) for row in session.execute(statement)}
 
 
 def _insert(
@@ -270,22 +257,16 @@ def note_kept(session: Session, stored: StoredGroup, kept: Sequence[Kept]) -> li
 
     A finding goes when its view is as the dataset has it now. Returns what is noticed then.
     """
-    model = ImportFindingModel
     fresh = {item.view for item in kept}
-    earlier = session.execute(
-        select(model.view, model.sentence).where(model.group_id == stored.id).order_by(model.id)
-    )
     noticed = [
-        Kept(row.view, row.sentence)
-        for row in earlier
-        if row.view not in fresh and row.view in stored.view_ids and stored.is_edited(row.view)
+        Kept(view, sentence)
+        for view, sentence in group_findings(session, stored.id)
+        if view is not None
+        and view not in fresh
+        and view in stored.view_ids
+        and stored.is_edited(view)
     ]
     noticed.extend(kept)
-    session.execute(delete(model).where(model.group_id == stored.id))
-    rows = [
-        {"group_id": stored.id, "view": item.view, "kind": KIND, "sentence": item.sentence}
-        for item in noticed
-    ]
-    if rows:
-        session.execute(insert(model), rows)
+    told = ((item.view, item.sentence) for item in noticed)
+    replace_group_findings(session, stored.id, KIND, told)
     return noticed

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 
-from sqlalchemy import insert, select
 from sqlalchemy.orm import Session
 
 from app.review.editing.lineage import Lineages
@@ -17,21 +16,13 @@ from app.review.importing.body import import_body, places_of
 from app.soccer.group import Group
 from app.store.clock import now
 from app.store.codecs import Json
+from app.store.findings import add_group_findings, group_findings, groups_told
 from app.store.groups import StoredGroup, read_groups, save_group
+from app.store.imports import known_groups
 from app.store.log import Entry, append
-from app.store.models import GroupModel, ImportFindingModel
 from app.store.queue import refresh_queue
 
 GONE = "this group is gone from the dataset; it stays until a person rejects it"
-
-
-def gone_groups(session: Session, ids: Collection[int]) -> set[int]:
-    """Those of the groups that are told to be gone already."""
-    model = ImportFindingModel
-    statement = select(model.group_id).where(
-        model.group_id.in_(list(ids)), model.view.is_(None), model.sentence == GONE
-    )
-    return {int(number) for number in session.scalars(statement) if number is not None}
 
 
 def of_read_matches(
@@ -49,42 +40,29 @@ def of_read_matches(
     """
     if not missing:
         return []
-    rows = session.execute(
-        select(GroupModel.id, GroupModel.key, GroupModel.match).where(
-            GroupModel.dataset_id == dataset_id
-        )
-    ).all()
-    matches = {row.match for row in rows if row.key in seen}
-    return [row.id for row in rows if row.id in missing and row.match in matches]
+    groups = known_groups(session, dataset_id)
+    matches = {group.match for group in groups if group.key in seen}
+    return [group.id for group in groups if group.id in missing and group.match in matches]
 
 
 def note_gone(
     session: Session, dataset_id: int, ids: Sequence[int], *, source: str, actor: str
 ) -> int:
     """Save a finding for each group that has none of the kind yet; returns how many."""
-    fresh = sorted(set(ids) - gone_groups(session, ids))
+    fresh = sorted(set(ids) - groups_told(session, ids, GONE))
     stored = read_groups(session, fresh)
     lineages = Lineages(session, dataset_id).of(stored.values())
     at, entries = now(), []
     for number, item in stored.items():
         base = lineages[number].base
         save_group(session, item, item.group, at=at, source=base)
-        body = _body(item, base, source, _noticed(session, number))
+        body = _body(item, base, source, group_findings(session, number))
         entries.append(Entry("import", actor, at, body, dataset_id, number))
     if entries:
         append(session, entries)
-        rows = [
-            {"group_id": number, "view": None, "kind": KIND, "sentence": GONE} for number in stored
-        ]
-        session.execute(insert(ImportFindingModel), rows)
+        add_group_findings(session, KIND, ((number, None, GONE) for number in stored))
         refresh_queue(session, list(stored))
     return len(entries)
-
-
-def _noticed(session: Session, group_id: int) -> Iterable[tuple[str | None, str]]:
-    model = ImportFindingModel
-    statement = select(model.view, model.sentence).where(model.group_id == group_id)
-    return [(row.view, row.sentence) for row in session.execute(statement.order_by(model.id))]
 
 
 def _body(

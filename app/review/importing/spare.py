@@ -7,8 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
-from sqlalchemy import select
-from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
 from app.datasets.issia import FramePersons
@@ -18,8 +16,8 @@ from app.soccer.annotation import Extras
 from app.store.clock import now
 from app.store.codecs import extras_from_json, extras_to_json, pack, unpack
 from app.store.log import Entry, append
-from app.store.models import SpareFrameModel
 from app.store.session import Store
+from app.store.spare import known_spare, put_spare, spare_rows
 
 BATCH = 1000
 """Frames a transaction and a log entry."""
@@ -59,19 +57,8 @@ def read_spare(store: Store, dataset: str | int) -> Iterator[SpareFrame]:
 
 def spare_frames(session: Session, dataset_id: int) -> Iterator[SpareFrame]:
     """The same within a session's snapshot."""
-    model, after = SpareFrameModel, 0
-    while True:
-        rows = session.execute(
-            select(model.id, model.camera, model.frame, model.extras)
-            .where(model.dataset_id == dataset_id, model.id > after)
-            .order_by(model.id)
-            .limit(BATCH)
-        ).all()
-        for row in rows:
-            yield SpareFrame(row.camera, row.frame, extras_from_json(unpack(row.extras)))
-        if len(rows) < BATCH:
-            return
-        after = rows[-1].id
+    for row in spare_rows(session, dataset_id):
+        yield SpareFrame(row.camera, row.frame, extras_from_json(unpack(row.extras)))
 
 
 def spare_persons(session: Session, dataset: str | int) -> Iterator[FramePersons]:
@@ -89,15 +76,7 @@ def _keep(
     actor: str,
     report: IngestReport,
 ) -> None:
-    model = SpareFrameModel
-    known = {
-        (row.camera, row.frame): row.extras
-        for row in session.execute(
-            select(model.camera, model.frame, model.extras).where(
-                model.dataset_id == dataset_id, model.frame.in_({item.frame for item in batch})
-            )
-        )
-    }
+    known = known_spare(session, dataset_id, {item.frame for item in batch})
     fresh = {}
     for item in batch:
         place, body = (item.camera, item.frame), pack(extras_to_json(item.extras))
@@ -119,18 +98,7 @@ def _write(
 ) -> None:
     if not fresh:
         return
-    rows = [
-        {"dataset_id": dataset_id, "camera": camera, "frame": frame, "extras": body}
-        for (camera, frame), body in fresh.items()
-    ]
-    statement = insert(SpareFrameModel)
-    session.execute(
-        statement.on_conflict_do_update(
-            index_elements=["dataset_id", "camera", "frame"],
-            set_={"extras": statement.excluded.extras},
-        ),
-        rows,
-    )
+    put_spare(session, dataset_id, fresh)
     frames = [[camera, frame, unpack(body)] for (camera, frame), body in fresh.items()]
     body = {"source": source, "frames": frames}
     append(session, [Entry("spare", actor, now(), body, dataset_id)])

@@ -1,0 +1,66 @@
+"""Import findings in the database: what imports noticed, by group or by static camera."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+
+from sqlalchemy import delete, insert, select
+from sqlalchemy.orm import Session
+
+from app.store.models import ImportFindingModel
+
+Noticed = tuple[str | None, str]
+"""Key of a view, or None where the whole group is meant; and the sentence."""
+
+
+def group_findings(session: Session, group_id: int) -> list[Noticed]:
+    """What is noticed about a group, in the order in which it was."""
+    model = ImportFindingModel
+    statement = select(model.view, model.sentence).where(model.group_id == group_id)
+    return [(row.view, row.sentence) for row in session.execute(statement.order_by(model.id))]
+
+
+def groups_told(session: Session, ids: Collection[int], sentence: str) -> set[int]:
+    """Those of the groups of which a sentence is told as a whole."""
+    model = ImportFindingModel
+    statement = select(model.group_id).where(
+        model.group_id.in_(list(ids)), model.view.is_(None), model.sentence == sentence
+    )
+    return {number for number in session.scalars(statement) if number is not None}
+
+
+def add_group_findings(
+    session: Session, kind: str, noticed: Iterable[tuple[int, str | None, str]]
+) -> None:
+    """Insert findings: group, view and sentence of each."""
+    rows = [
+        {"group_id": group, "view": view, "kind": kind, "sentence": sentence}
+        for group, view, sentence in noticed
+    ]
+    if rows:
+        session.execute(insert(ImportFindingModel), rows)
+
+
+def replace_group_findings(
+    session: Session, group_id: int, kind: str, noticed: Iterable[Noticed]
+) -> None:
+    """Put findings in the place of all that a group has."""
+    session.execute(delete(ImportFindingModel).where(ImportFindingModel.group_id == group_id))
+    add_group_findings(session, kind, ((group_id, view, text) for view, text in noticed))
+
+
+def station_finding(session: Session, station_id: int) -> str | None:
+    """What is noticed about a static camera."""
+    model = ImportFindingModel
+    return session.scalar(select(model.sentence).where(model.station_id == station_id))
+
+
+def replace_station_finding(
+    session: Session, station_id: int, kind: str, sentence: str | None
+) -> None:
+    """Put a finding (or none) in the place of the one that a static camera has."""
+    model = ImportFindingModel
+    session.execute(delete(model).where(model.station_id == station_id))
+    if sentence is not None:
+        values = {"station_id": station_id, "kind": kind, "sentence": sentence}
+        session.execute(insert(model), [values])

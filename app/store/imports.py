@@ -1,0 +1,129 @@
+"""What imports ask of the database: which groups, cameras and verdicts are there already."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import func, insert, select
+from sqlalchemy.orm import Session
+
+from app.store.group_rows import next_id
+from app.store.groups import StoredStation, stored_station
+from app.store.log import LogEntry, read_log
+from app.store.models import GroupModel, LogModel, StationModel, VerdictModel, ViewModel
+
+VERDICT = (
+    "actor",
+    "at",
+    "state",
+    "reason",
+    "note",
+    "inputs_hash",
+    "policy_hash",
+    "fixed",
+    "override",
+)
+"""What is carried of a verdict."""
+
+
+@dataclass(frozen=True)
+class KnownGroup:
+    """A group that is there; ``source_hash`` is that of what its dataset last brought."""
+
+    id: int
+    key: str
+    match: str
+    source_hash: str
+
+
+@dataclass(frozen=True)
+class CameraPlace:
+    """A view and the camera that it is seen by; ``group`` is the id of the view's group."""
+
+    station: int
+    station_key: str
+    shared: bool
+    group: int
+    match: str
+    view: str
+
+
+def known_groups(
+    session: Session, dataset_id: int, keys: Iterable[str] | None = None
+) -> list[KnownGroup]:
+    """The groups of a dataset in their order, or those of some keys."""
+    model = GroupModel
+    statement = select(model.id, model.key, model.match, model.source_hash).where(
+        model.dataset_id == dataset_id
+    )
+    if keys is not None:
+        statement = statement.where(model.key.in_(list(keys)))
+    rows = session.execute(statement.order_by(model.number))
+    return [KnownGroup(*row) for row in rows]
+
+
+def newest_imports(session: Session, group_ids: Sequence[int]) -> list[LogEntry]:
+    """The last import of each group."""
+    newest = (
+        select(func.max(LogModel.id))
+        .where(LogModel.kind == "import", LogModel.group_id.in_(group_ids))
+        .group_by(LogModel.group_id)
+    )
+    return list(read_log(session, LogModel.id.in_(newest)))
+
+
+def newest_word(session: Session, dataset_id: int) -> str | None:
+    """Time of the newest thing that was said about a dataset; freezing it says nothing."""
+    statement = select(func.max(LogModel.at)).where(
+        LogModel.dataset_id == dataset_id, LogModel.kind != "freeze"
+    )
+    return session.scalar(statement)
+
+
+def shared_stations(
+    session: Session, dataset_id: int, key: str | None = None
+) -> list[StoredStation]:
+    """The static cameras of a dataset by key, or the one of a key."""
+    statement = select(*StationModel.__table__.columns).where(
+        StationModel.dataset_id == dataset_id, StationModel.shared
+    )
+    if key is not None:
+        statement = statement.where(StationModel.key == key)
+    return [stored_station(row) for row in session.execute(statement.order_by(StationModel.key))]
+
+
+def camera_places(session: Session, dataset_id: int) -> list[CameraPlace]:
+    """Every view of a dataset with its camera."""
+    station, group, view = StationModel, GroupModel, ViewModel
+    statement = (
+        select(station.id, station.key, station.shared, group.id, group.match, view.key)
+        .join(view, view.station_id == station.id)
+        .join(group, group.id == view.group_id)
+        .where(station.dataset_id == dataset_id)
+    )
+    return [CameraPlace(*row) for row in session.execute(statement)]
+
+
+def group_verdicts(session: Session, ids: Iterable[int]) -> dict[int, list[dict[str, Any]]]:
+    """What is carried of the verdicts of groups, by group, oldest first."""
+    columns = [getattr(VerdictModel, name) for name in VERDICT]
+    statement = (
+        select(VerdictModel.group_id, *columns)
+        .where(VerdictModel.group_id.in_(list(ids)))
+        .order_by(VerdictModel.id)
+    )
+    verdicts: dict[int, list[dict[str, Any]]] = {}
+    for group_id, *values in session.execute(statement):
+        verdicts.setdefault(group_id, []).append(dict(zip(VERDICT, values, strict=True)))
+    return verdicts
+
+
+def add_verdicts(session: Session, group_id: int, verdicts: Sequence[Mapping[str, Any]]) -> None:
+    """Insert verdicts of a group; the last one counts."""
+    first = next_id(session, VerdictModel)
+    rows = [
+        {**item, "id": first + place, "group_id": group_id} for place, item in enumerate(verdicts)
+    ]
+    session.execute(insert(VerdictModel), rows, execution_options={"render_nulls": True})
