@@ -74,14 +74,6 @@ def newest_imports(session: Session, group_ids: Sequence[int]) -> list[LogEntry]
     return list(read_log(session, LogModel.id.in_(newest)))
 
 
-def newest_word(session: Session, dataset_id: int) -> str | None:
-    """Time of the newest thing that was said about a dataset; freezing it says nothing."""
-    statement = select(func.max(LogModel.at)).where(
-        LogModel.dataset_id == dataset_id, LogModel.kind != "freeze"
-    )
-    return session.scalar(statement)
-
-
 def shared_stations(
     session: Session, dataset_id: int, key: str | None = None
 ) -> list[StoredStation]:

@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
@@ -26,10 +24,9 @@ from app.review.queue.query import parse_query
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
-from app.store.codecs import ball_from_json, parse
-from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
 from app.store.predictions import PredictedBox, PredictionSet, read_box, read_boxes
 from app.store.session import Store
+from app.store.views import StoredView, dataset_views, find_view
 
 SHOWN = 20
 """Views that a dry run shows."""
@@ -117,7 +114,7 @@ def plan_accept(store: Store, dataset: str | int, request: AcceptRequest) -> Acc
         if predictions.dataset_id != found.id:
             raise NotFoundError(f"dataset {found.name} has no set of predictions {request.set_id}")
         boxes = read_boxes(session, request.set_id)
-        rows = [row for row in session.execute(_views(found.id, request)) if row.id in boxes]
+        rows = [row for row in _views(session, found.id, request) if row.id in boxes]
     wanted = set(request.views or ())
     missing = wanted - {row.id for row in rows}
     if missing:
@@ -199,7 +196,9 @@ def accept_box(
         StaleRevisionError: Somebody else changed the group first.
     """
     with store.read() as session:
-        view = _view(session, view_id)
+        view = find_view(session, view_id)
+        if view is None:
+            raise NotFoundError(f"there is no view {view_id}")
         box = read_box(session, prediction_id)
         if box is None or box.view_id != view_id:
             # Whoever saw an older state is told so first.
@@ -215,18 +214,6 @@ def accept_box(
     return submit(
         store, view.group_id, edit, if_match=if_match, actor=actor, idempotency_key=idempotency_key
     )
-
-
-def _view(session: Session, view_id: int) -> Any:
-    statement = (
-        select(ViewModel.key, ViewModel.group_id, StationModel.width, StationModel.height)
-        .join(StationModel, StationModel.id == ViewModel.station_id)
-        .where(ViewModel.id == view_id)
-    )
-    row = session.execute(statement).one_or_none()
-    if row is None:
-        raise NotFoundError(f"there is no view {view_id}")
-    return row
 
 
 def _require_free(state: GroupState, edit: SetBall, if_match: str) -> None:
@@ -246,33 +233,16 @@ def accepted_ball(box: PredictedBox, name: str) -> BallAnnotation:
     return BallAnnotation(box=place, predicted_by=name)
 
 
-def _views(dataset_id: int, request: AcceptRequest) -> Any:
-    statement = (
-        select(
-            ViewModel.id,
-            ViewModel.key,
-            ViewModel.balls,
-            GroupModel.id.label("group_id"),
-            GroupModel.key.label("group"),
-            StationModel.width,
-            StationModel.height,
-        )
-        .join(GroupModel, GroupModel.id == ViewModel.group_id)
-        .join(StationModel, StationModel.id == ViewModel.station_id)
-        .join(QueueModel, QueueModel.group_id == GroupModel.id)
-        .where(GroupModel.dataset_id == dataset_id)
-        .order_by(GroupModel.number, ViewModel.position)
-    )
-    if request.query is not None:
-        statement = statement.where(*parse_query(request.query).conditions)
-    if request.views is not None:
-        statement = statement.where(ViewModel.id.in_(request.views))
-    return statement
+def _views(session: Session, dataset_id: int, request: AcceptRequest) -> list[StoredView]:
+    conditions = () if request.query is None else parse_query(request.query).conditions
+    return dataset_views(session, dataset_id, conditions, ids=request.views)
 
 
-def _judge(row: Any, boxes: Sequence[PredictedBox], name: str, request: AcceptRequest) -> Accepted:
+def _judge(
+    row: StoredView, boxes: Sequence[PredictedBox], name: str, request: AcceptRequest
+) -> Accepted:
     best = max(boxes, key=lambda box: (box.score, -box.id))
-    balls = [ball_from_json(value) for value in parse(row.balls)]
+    balls = row.balls
     why = None
     if best.score < request.min_score:
         why = "below_score"
@@ -285,7 +255,7 @@ def _judge(row: Any, boxes: Sequence[PredictedBox], name: str, request: AcceptRe
     return Accepted(row.id, row.key, row.group_id, row.group, best, why)
 
 
-def _problem(box: PredictedBox, view: Any) -> str | None:
+def _problem(box: PredictedBox, view: StoredView) -> str | None:
     """Why a box cannot be a ball in its view."""
     place = Box(box.x, box.y, box.width, box.height)
     return box_problem(place, ImageSize(view.width, view.height))

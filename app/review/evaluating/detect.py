@@ -8,7 +8,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-from sqlalchemy import select
+from sqlalchemy.orm import Session
 
 from app.config import Settings
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
@@ -24,11 +24,10 @@ from app.review.evaluating.predictions import (
 )
 from app.review.queue.query import parse_query
 from app.soccer.frames import Box
-from app.soccer.group import Media
 from app.store.media import read_frame
-from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
 from app.store.predictions import PredictionSet
 from app.store.session import Store
+from app.store.views import StoredView, dataset_views
 
 MIN_SCORE = 0.05
 MOST = 20
@@ -76,7 +75,7 @@ def detect(
     with store.read() as session:
         found = read_dataset(session, dataset)
         require_free(session, found.id, request.name)
-        rows = list(session.execute(_views(found.id, request)))
+        rows = _views(session, found.id, request)
     detections: dict[int, list[Detection]] = {}
     problems: list[dict[str, Any]] = []
     for number, row in enumerate(rows):
@@ -111,33 +110,15 @@ def detect(
     )
 
 
-def _views(dataset_id: int, request: DetectRequest) -> Any:
-    statement = (
-        select(
-            ViewModel.id,
-            ViewModel.key,
-            ViewModel.media_path,
-            ViewModel.media_member,
-            ViewModel.media_frame,
-            GroupModel.key.label("group"),
-            StationModel.width,
-            StationModel.height,
-            StationModel.flipped,
-        )
-        .join(GroupModel, GroupModel.id == ViewModel.group_id)
-        .join(QueueModel, QueueModel.group_id == GroupModel.id)
-        .join(StationModel, StationModel.id == ViewModel.station_id)
-        .where(GroupModel.dataset_id == dataset_id, *parse_query(request.query).conditions)
-        .order_by(GroupModel.number, ViewModel.position)
-    )
-    return statement.where(ViewModel.balls == "[]") if request.missing else statement
+def _views(session: Session, dataset_id: int, request: DetectRequest) -> list[StoredView]:
+    conditions = parse_query(request.query).conditions
+    return dataset_views(session, dataset_id, conditions, without_ball=request.missing)
 
 
-def _picture(row: Any, settings: Settings) -> Any:
-    if row.media_path is None:
+def _picture(row: StoredView, settings: Settings) -> Any:
+    if row.media is None:
         raise NotFoundError("this view has no frame that could be read")
-    media = Media(row.media_path, row.media_member, row.media_frame)
-    data = read_frame(media, None, row.flipped, settings)
+    data = read_frame(row.media, None, row.flipped, settings)
     picture = cv2.imdecode(
         np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
     )
@@ -147,7 +128,7 @@ def _picture(row: Any, settings: Settings) -> Any:
 
 
 def _in_annotated(
-    row: Any, picture: Any, model: OnnxModel, request: DetectRequest
+    row: StoredView, picture: Any, model: OnnxModel, request: DetectRequest
 ) -> list[Detection]:
     """Detections in pixels of the annotated size, which need not be the frame's own."""
     height, width = picture.shape[:2]
@@ -161,11 +142,11 @@ def _in_annotated(
     ]
 
 
-def _problem(row: Any, problem: str) -> dict[str, Any]:
+def _problem(row: StoredView, problem: str) -> dict[str, Any]:
     return {"file": row.group, "record": row.key, "field": None, "problem": problem}
 
 
-def _nothing_seen(rows: list[Any], problems: list[dict[str, Any]]) -> InputError:
+def _nothing_seen(rows: list[StoredView], problems: list[dict[str, Any]]) -> InputError:
     if not rows:
         return InputError("no view has a camera that fits, so there is nothing to triangulate")
     return InputError(

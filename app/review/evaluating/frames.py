@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.datasets.manifest import software_version
@@ -21,8 +20,8 @@ from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Solution
 from app.store.codecs import Json, policy_to_json
 from app.store.digest import digest
-from app.store.models import GroupModel, ViewModel
 from app.store.versions import BATCH, read_rows
+from app.store.views import present_ids
 
 LIVE_RULES = (*RULES, "all")
 """Which groups of a dataset that is not frozen take part."""
@@ -51,7 +50,7 @@ def version_truth(session: Session, version: Version, split: str | None) -> Trut
     gone = 0
     for start in range(0, len(rows), BATCH):
         frozen = thaw(session, version, rows[start : start + BATCH])
-        ids = _present_ids(session, version.dataset_id, [item.group.key for item in frozen])
+        ids = present_ids(session, version.dataset_id, [item.group.key for item in frozen])
         for item in frozen:
             for frame in _frozen_frames(item, ids.get(item.group.key, (0, {})), len(frames)):
                 if split is None or frame.split == split:
@@ -150,23 +149,6 @@ def _frozen_frames(
     }
     splits = {view.key: item.row.split for view in item.group.views} | dict(item.row.splits or {})
     yield from group_frames(item.group, item.solution, group_id, ids, splits)
-
-
-def _present_ids(
-    session: Session, dataset_id: int, keys: list[str]
-) -> dict[str, tuple[int, dict[str, int]]]:
-    """Id of each group and of its views, by their keys."""
-    statement = (
-        select(
-            GroupModel.key, GroupModel.id, ViewModel.key.label("view"), ViewModel.id.label("vid")
-        )
-        .join(ViewModel, ViewModel.group_id == GroupModel.id)
-        .where(GroupModel.dataset_id == dataset_id, GroupModel.key.in_(keys))
-    )
-    found: dict[str, tuple[int, dict[str, int]]] = {}
-    for row in session.execute(statement):
-        found.setdefault(row.key, (row.id, {}))[1][row.view] = row.vid
-    return found
 
 
 def _pins(policy: Policy, solver_version: str) -> dict[str, Json]:

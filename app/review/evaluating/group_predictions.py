@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.errors import NotFoundError
 from app.soccer.annotation import BallAnnotation
-from app.store.codecs import ball_from_json, parse
+from app.store.codecs import ball_from_json
 from app.store.log import LogEntry, read_log
-from app.store.models import GroupModel, LogModel, ViewModel
+from app.store.models import LogModel
 from app.store.prediction_models import PredictionSetModel
 from app.store.predictions import (
     PredictedBox,
@@ -23,6 +21,7 @@ from app.store.predictions import (
     read_prediction_sets,
 )
 from app.store.session import Store
+from app.store.views import StoredView, group_dataset, group_views
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ def group_predictions(store: Store, group_id: int) -> GroupPredictions:
         NotFoundError: There is no such group.
     """
     with store.read() as session:
-        dataset = session.scalar(select(GroupModel.dataset_id).where(GroupModel.id == group_id))
+        dataset = group_dataset(session, group_id)
         if dataset is None:
             raise NotFoundError(f"there is no group {group_id}")
         boxes = _with_sets(session, read_group_boxes(session, group_id))
@@ -86,19 +85,13 @@ def _with_sets(
     return tuple((sets[box.set_id], box) for box in boxes)
 
 
-def _taken(session: Session, group_id: int) -> Iterator[tuple[Any, BallAnnotation]]:
-    statement = (
-        select(ViewModel.id, ViewModel.key, ViewModel.balls)
-        .where(ViewModel.group_id == group_id)
-        .order_by(ViewModel.position)
-    )
-    for row in session.execute(statement):
-        balls = [ball_from_json(value) for value in parse(row.balls)]
-        yield from ((row, ball) for ball in balls if ball.predicted_by)
+def _taken(session: Session, group_id: int) -> Iterator[tuple[StoredView, BallAnnotation]]:
+    for view in group_views(session, group_id):
+        yield from ((view, ball) for ball in view.balls if ball.predicted_by)
 
 
 def _accepted(
-    row: Any,
+    row: StoredView,
     ball: BallAnnotation,
     boxes: Iterable[tuple[PredictionSet, PredictedBox]],
     said: Sequence[LogEntry],

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Protocol
 
-from sqlalchemy import ColumnElement, func, not_, or_, select
 from sqlalchemy.orm import Session
 
 from app.datasets.export_record import ExportRecord
@@ -17,7 +16,7 @@ from app.review.versions.manifest import policy_settings, version_settings, vers
 from app.review.versions.version import FrozenGroup, Version, thaw
 from app.soccer.solution import SOLVER_VERSION
 from app.store.codecs import Json
-from app.store.models import LogModel, QueueModel
+from app.store.exports import exported_groups, left_out_groups, newest_word
 from app.store.versions import BATCH, VersionGroup, read_rows
 
 Facts = Mapping[str, Mapping[str, int]]
@@ -67,17 +66,14 @@ class LiveSource:
 
     def __init__(self, session: Session, dataset: Dataset, everything: bool):
         self._session, self._found, self._everything = session, dataset, everything
-        self._ids = _ids(session, dataset.id, everything)
+        self._ids = exported_groups(session, dataset.id, everything)
         self.dataset, self.count = dataset.name, len(self._ids)
-        self.left_out = {} if everything else _left_out(session, dataset.id)
+        self.left_out = {} if everything else left_out_groups(session, dataset.id)
 
     @property
     def date(self) -> str:
         """Time of the newest thing that was said about the dataset; freezing it says nothing."""
-        statement = select(func.max(LogModel.at)).where(
-            LogModel.dataset_id == self._found.id, LogModel.kind != "freeze"
-        )
-        return str(self._session.execute(statement).scalar_one())
+        return str(newest_word(self._session, self._found.id))
 
     def settings(self) -> dict[str, Any]:
         """Policy, solver, and which groups."""
@@ -180,35 +176,6 @@ def verdict_reason(
     return None
 
 
-def _ids(session: Session, dataset_id: int, everything: bool) -> list[int]:
-    where = [QueueModel.dataset_id == dataset_id]
-    if not everything:
-        where += [
-            QueueModel.status == "accepted",
-            _CURRENT,
-            QueueModel.solved.is_(True),
-            _QUALIFIES,
-        ]
-    statement = select(QueueModel.group_id).where(*where).order_by(QueueModel.number)
-    return list(session.scalars(statement))
-
-
-def _left_out(session: Session, dataset_id: int) -> dict[str, int]:
-    """Accepted groups that are not exported, counted by the first reason that holds."""
-    reasons: dict[str, list[ColumnElement[bool]]] = {
-        "stale": [not_(_CURRENT)],
-        "unsolved": [_CURRENT, not_(QueueModel.solved)],
-        "failing": [_CURRENT, QueueModel.solved.is_(True), not_(_QUALIFIES)],
-    }
-    counts = {}
-    for reason, where in reasons.items():
-        statement = select(func.count()).where(
-            QueueModel.dataset_id == dataset_id, QueueModel.status == "accepted", *where
-        )
-        counts[reason] = int(session.execute(statement).scalar_one())
-    return {reason: count for reason, count in counts.items() if count}
-
-
 def _nothing(dataset: Dataset, left_out: Mapping[str, int], everything: bool) -> InputError:
     if everything:
         return InputError(
@@ -220,8 +187,3 @@ def _nothing(dataset: Dataset, left_out: Mapping[str, int], everything: bool) ->
     return InputError(
         f'nobody has accepted a group of "{dataset.name}" yet, so there is nothing to export'
     )
-
-
-_CURRENT = not_(QueueModel.stale)
-_QUALIFIES = or_(QueueModel.passes.is_(True), QueueModel.override == QueueModel.gate)
-"""An override speaks of the gate that failed then, of no other that fails now."""

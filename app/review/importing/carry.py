@@ -31,8 +31,9 @@ from app.store.codecs import (
     unpack,
     view_to_json,
 )
+from app.store.exports import newest_word
 from app.store.groups import StoredGroup, read_groups
-from app.store.imports import group_verdicts, known_groups, newest_word, shared_stations
+from app.store.imports import group_verdicts, known_groups, shared_stations
 from app.store.log import read_log
 from app.store.models import LogModel
 from app.store.session import Store

@@ -4,26 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.review.datasets.dataset import read_dataset, save_policy
 from app.review.editing.state import require_etag
 from app.soccer.policy import Policy
-from app.store.codecs import policy_from_json, unpack
 from app.store.digest import digest
-from app.store.models import LogModel
+from app.store.policies import PolicyVersion, policy_history
 from app.store.session import Store
-
-
-@dataclass(frozen=True)
-class PolicyVersion:
-    """A policy that judged a dataset from some time on."""
-
-    version: int
-    at: str
-    actor: str
-    policy: Policy
 
 
 @dataclass(frozen=True)
@@ -87,17 +75,4 @@ def change_policy(
 
 def _read(session: Session, dataset: str | int) -> PolicyState:
     found = read_dataset(session, dataset)
-    return PolicyState(found.id, found.name, found.policy, _history(session, found.id))
-
-
-def _history(session: Session, dataset_id: int) -> tuple[PolicyVersion, ...]:
-    statement = (
-        select(LogModel.at, LogModel.actor, LogModel.body)
-        # Word for word the condition of the index, which holds a few of a million entries.
-        .where(LogModel.dataset_id == dataset_id, text("kind IN ('dataset', 'policy')"))
-        .order_by(LogModel.id)
-    )
-    return tuple(
-        PolicyVersion(number, row.at, row.actor, policy_from_json(unpack(row.body)["policy"]))
-        for number, row in enumerate(session.execute(statement), 1)
-    )
+    return PolicyState(found.id, found.name, found.policy, policy_history(session, found.id))

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from sqlalchemy import select
-
 from app.config import Settings
 from app.datasets.match_frames import ARCHIVE
 from app.errors import ConflictError, NotFoundError
@@ -25,8 +23,8 @@ from app.sample.practice import LESSONS, write_practice
 from app.sample.scene import SceneTruth
 from app.sample.truth import TRUTH, read_truth
 from app.store.codecs import Json
+from app.store.imports import known_groups
 from app.store.jobs import Job
-from app.store.models import GroupModel
 from app.store.session import Store
 
 KIND = "practice"
@@ -176,8 +174,7 @@ def _group_ids(store: Store) -> list[int]:
         row = find_dataset(session, DATASET)
         if row is None:
             return []
-        statement = select(GroupModel.id).where(GroupModel.dataset_id == row.id)
-        return list(session.scalars(statement.order_by(GroupModel.number)))
+        return [group.id for group in known_groups(session, row.id)]
 
 
 def _require_own(store: Store, settings: Settings) -> None:
@@ -186,8 +183,7 @@ def _require_own(store: Store, settings: Settings) -> None:
         row = find_dataset(session, DATASET)
         if row is None:
             return
-        statement = select(GroupModel.key).where(GroupModel.dataset_id == row.id)
-        keys = set(session.scalars(statement))
+        keys = {group.key for group in known_groups(session, row.id)}
     known = _truths(settings)
     if keys and not keys <= set(known or ()):
         raise ConflictError(

@@ -1,0 +1,36 @@
+"""Policies in the database: every one that judged a dataset, out of the log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy import select, text
+from sqlalchemy.orm import Session
+
+from app.soccer.policy import Policy
+from app.store.codecs import policy_from_json, unpack
+from app.store.models import LogModel
+
+
+@dataclass(frozen=True)
+class PolicyVersion:
+    """A policy that judged a dataset from some time on."""
+
+    version: int
+    at: str
+    actor: str
+    policy: Policy
+
+
+def policy_history(session: Session, dataset_id: int) -> tuple[PolicyVersion, ...]:
+    """The policies of a dataset, oldest first."""
+    statement = (
+        select(LogModel.at, LogModel.actor, LogModel.body)
+        # Word for word the condition of the index, which holds a few of a million entries.
+        .where(LogModel.dataset_id == dataset_id, text("kind IN ('dataset', 'policy')"))
+        .order_by(LogModel.id)
+    )
+    return tuple(
+        PolicyVersion(number, row.at, row.actor, policy_from_json(unpack(row.body)["policy"]))
+        for number, row in enumerate(session.execute(statement), 1)
+    )

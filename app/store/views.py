@@ -1,0 +1,114 @@
+"""Views in the database, one by one: what predictions and detectors ask of them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+from sqlalchemy import ColumnElement, select
+from sqlalchemy.orm import Session
+
+from app.soccer.annotation import BallAnnotation
+from app.soccer.group import Media
+from app.store.codecs import ball_from_json, parse
+from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
+
+
+@dataclass(frozen=True)
+class StoredView:
+    """A view with its annotated size in pixels, its frame, and its balls as they are stored."""
+
+    id: int
+    key: str
+    group_id: int
+    group: str
+    width: int
+    height: int
+    flipped: bool
+    media_path: str | None
+    media_member: str | None
+    media_frame: int | None
+    said: str
+
+    @property
+    def media(self) -> Media | None:
+        """Its frame, where it has one."""
+        if self.media_path is None:
+            return None
+        return Media(self.media_path, self.media_member, self.media_frame)
+
+    @property
+    def balls(self) -> list[BallAnnotation]:
+        """The balls that were annotated in it."""
+        return [ball_from_json(value) for value in parse(self.said)]
+
+
+def dataset_views(
+    session: Session,
+    dataset_id: int,
+    conditions: Iterable[ColumnElement[bool]] = (),
+    *,
+    ids: Collection[int] | None = None,
+    without_ball: bool = False,
+) -> list[StoredView]:
+    """The views of a dataset in its order.
+
+    Args:
+        session: Any session.
+        dataset_id: The dataset.
+        conditions: Of a query, on the group's row in the queue.
+        ids: Only these views; None: all.
+        without_ball: Only those in which nobody annotated a ball.
+    """
+    where = [GroupModel.dataset_id == dataset_id, *conditions]
+    if ids is not None:
+        where.append(ViewModel.id.in_(ids))
+    if without_ball:
+        where.append(ViewModel.balls == "[]")
+    return _views(session, *where)
+
+
+def group_views(session: Session, group_id: int) -> list[StoredView]:
+    """The views of a group in their order."""
+    return _views(session, ViewModel.group_id == group_id)
+
+
+def find_view(session: Session, view_id: int) -> StoredView | None:
+    """One view by its id."""
+    return next(iter(_views(session, ViewModel.id == view_id)), None)
+
+
+def group_dataset(session: Session, group_id: int) -> int | None:
+    """Id of the dataset of a group."""
+    return session.scalar(select(GroupModel.dataset_id).where(GroupModel.id == group_id))
+
+
+def present_ids(
+    session: Session, dataset_id: int, keys: Collection[str]
+) -> dict[str, tuple[int, dict[str, int]]]:
+    """Id of each group and of its views, by their keys."""
+    statement = (
+        select(GroupModel.key, GroupModel.id, ViewModel.key, ViewModel.id)
+        .join(ViewModel, ViewModel.group_id == GroupModel.id)
+        .where(GroupModel.dataset_id == dataset_id, GroupModel.key.in_(keys))
+    )
+    found: dict[str, tuple[int, dict[str, int]]] = {}
+    for group, group_id, view, view_id in session.execute(statement):
+        found.setdefault(group, (group_id, {}))[1][view] = view_id
+    return found
+
+
+def _views(session: Session, *where: ColumnElement[bool]) -> list[StoredView]:
+    view, group, station = ViewModel, GroupModel, StationModel
+    statement = (
+        select(
+            view.id, view.key, group.id, group.key, station.width, station.height,
+            station.flipped, view.media_path, view.media_member, view.media_frame, view.balls,
+        )
+        .join(group, group.id == view.group_id)
+        .join(station, station.id == view.station_id)
+        .join(QueueModel, QueueModel.group_id == group.id)
+        .where(*where)
+        .order_by(group.number, view.position)
+    )  # fmt: skip
+    return [StoredView(*row) for row in session.execute(statement)]
