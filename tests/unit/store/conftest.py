@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sqlalchemy import insert
 
 from app.config import Settings
 from app.geometry.camera import Camera
@@ -16,6 +17,11 @@ from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch
+from app.soccer.policy import PAPER
+from app.store.codecs import canonical, policy_to_json
+from app.store.group_rows import NewRows
+from app.store.models import DatasetModel
+from app.store.queue import refresh_queue
 from app.store.session import Store
 
 
@@ -78,3 +84,17 @@ def group(camera: Camera) -> Group:
         split="test",
         label="Alder 3 – 1 Birch",
     )
+
+
+@pytest.fixture
+def filled(store: Store, group: Group) -> Store:
+    """A store with the dataset 1, and in it the group 1 with the views 1 to 3."""
+    with store.write() as session:
+        policy = canonical(policy_to_json(PAPER))
+        values = {"id": 1, "name": "demo", "created": "t", "policy": policy, "policy_hash": "p"}
+        session.execute(insert(DatasetModel), [values])
+        rows = NewRows(session, 1)
+        rows.add_group(group, "source", "t", {"cam1": rows.add_station(group.views[1].station)})
+        rows.insert()
+        refresh_queue(session, [1])
+    return store

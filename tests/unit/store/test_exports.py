@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+import pytest
+from sqlalchemy import update
+
+from app.store.exports import exported_groups, left_out_groups, newest_word
+from app.store.log import Entry, append
+from app.store.models import QueueModel
+
+ACCEPTED = {"status": "accepted", "solved": True, "passes": True}
+
+
+class TestExportedGroups:
+    @pytest.mark.parametrize(
+        ("values", "left_out"),
+        [
+            ({}, {}),
+            ({"stale": True}, {"stale": 1}),
+            ({"solved": False}, {"unsolved": 1}),
+            ({"passes": False, "gate": "jac", "override": "jac"}, {}),
+            ({"passes": False, "gate": "jac", "override": "tau"}, {"failing": 1}),
+        ],
+    )
+    def test_an_accepted_group_goes_out_or_says_why_not(self, filled, values, left_out) -> None:
+        with filled.write() as session:
+            session.execute(update(QueueModel).values(**{**ACCEPTED, **values}))
+            assert left_out_groups(session, 1) == left_out
+            assert exported_groups(session, 1, everything=False) == ([] if left_out else [1])
+
+    def test_everything_is_everything(self, filled) -> None:
+        with filled.read() as session:
+            assert exported_groups(session, 1, everything=True) == [1]
+            assert exported_groups(session, 1, everything=False) == []
+
+
+class TestNewestWord:
+    def test_freezing_says_nothing(self, filled) -> None:
+        with filled.write() as session:
+            assert newest_word(session, 1) is None
+            append(session, [Entry("edit", "ann", "2026-01-02", {}, 1)])
+            append(session, [Entry("freeze", "ann", "2026-01-03", {}, 1)])
+            assert newest_word(session, 1) == "2026-01-02"

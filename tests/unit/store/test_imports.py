@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+from app.store.imports import (
+    VERDICT,
+    CameraPlace,
+    KnownGroup,
+    add_verdicts,
+    camera_places,
+    group_verdicts,
+    known_groups,
+    newest_imports,
+    shared_stations,
+)
+from app.store.log import Entry, append
+
+VALUES = ("ann", "t", "rejected", "bad", None, "i", "p", False, None)
+
+
+class TestKnownGroups:
+    def test_all_or_those_of_some_keys(self, filled) -> None:
+        expected = [KnownGroup(1, "m/7.png", "m", "source")]
+        with filled.read() as session:
+            assert known_groups(session, 1) == known_groups(session, 1, ["m/7.png"]) == expected
+            assert known_groups(session, 1, []) == known_groups(session, 2) == []
+
+
+class TestNewestImports:
+    def test_of_each_group_the_last_one(self, filled) -> None:
+        with filled.write() as session:
+            for source in ("old", "new"):
+                append(session, [Entry("import", "ann", "t", {"source": source}, 1, 1)])
+            append(session, [Entry("edit", "ann", "t", {}, 1, 1)])
+            found = newest_imports(session, [1, 2])
+        assert [(entry.group_id, entry.body["source"]) for entry in found] == [(1, "new")]
+
+
+class TestSharedStations:
+    def test_a_camera_of_one_view_is_none(self, filled, group) -> None:
+        with filled.read() as session:
+            (found,) = shared_stations(session, 1)
+            assert found.station == group.views[1].station
+            assert shared_stations(session, 1, "cam1") == [found]
+            assert shared_stations(session, 1, "m/7.png") == []
+
+
+class TestCameraPlaces:
+    def test_every_view_is_one(self, filled) -> None:
+        with filled.read() as session:
+            found = {place.view: place for place in camera_places(session, 1)}
+        assert list(found) == ["7.png", "cam1", "cam2"]
+        assert found["cam2"] == CameraPlace(1, "cam1", True, 1, "m", "cam2")
+        assert (found["7.png"].station_key, found["7.png"].shared) == ("m/7.png", False)
+
+
+class TestGroupVerdicts:
+    def test_they_come_back_as_they_were_added(self, filled) -> None:
+        first = dict(zip(VERDICT, VALUES, strict=True))
+        second = first | {"state": "accepted", "reason": None, "fixed": True}
+        with filled.write() as session:
+            add_verdicts(session, 1, [first])
+            add_verdicts(session, 1, [second])
+            assert group_verdicts(session, [1, 2]) == {1: [first, second]}
