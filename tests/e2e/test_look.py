@@ -88,7 +88,7 @@ def opened(open_page: OpenPage, views: int, size: str = "1440", **more: Any) -> 
 
 
 def at_rest(page: Page, measure: str) -> Any:
-    """What a script measures once two frames in a row give the same."""
+    """What a script measures once it stays the same for a while."""
     return page.evaluate(
         f"""async () => {{
           const measure = {measure};
