@@ -23,7 +23,7 @@ COLUMNS = (
     Column("error_median_px", "Median error", "px", "lower"),
     Column("error_p95_px", "95 % error", "px", "lower"),
 )
-THRESHOLDS = np.arange(0, 101) / 100
+JAC_LIMITS = np.arange(0, 101) / 100
 Scores = dict[int, FrameScore | None]
 """By id of the frame; None: annotated lines, and no camera."""
 Step = Callable[[int], None]
@@ -120,13 +120,13 @@ def _panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
     ).reshape(-1, len(GAMMAS_PERCENT))
     series = []
     for place, gamma in enumerate(GAMMAS_PERCENT):
-        above = (values[:, place, None] > THRESHOLDS).sum(axis=0)
+        above = (values[:, place, None] > JAC_LIMITS).sum(axis=0)
         share = above / max(len(values), 1)
         series.append(
             Series(
                 f"gamma_{gamma:g}",
                 f"γ = {gamma:g} %",
-                tuple(THRESHOLDS.tolist()),
+                tuple(JAC_LIMITS.tolist()),
                 tuple(share.tolist()),
                 count=tuple(above.tolist()),
                 frames=_above() if name == "predicted" and place == 0 else (),
@@ -143,5 +143,5 @@ def _panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
 
 def _above() -> tuple[Frames, ...]:
     """The frames above each threshold itself, which a lower bound alone would take in."""
-    bounds = (math.nextafter(threshold, math.inf) for threshold in THRESHOLDS.tolist())
+    bounds = (math.nextafter(threshold, math.inf) for threshold in JAC_LIMITS.tolist())
     return tuple(Frames("predicted_jac", low=bound) for bound in bounds)

@@ -4,21 +4,58 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, fields
+from typing import Any, get_args, get_type_hints
+
+from app.soccer.solution import GAMMAS_PERCENT, GATES
+
+CALIBRATION = "calibration"
+"""Name of the policy's part that calibrations depend on; its thresholds are dotted."""
+BOXES, FINDINGS, NOISE, PITCH = "boxes", "findings", "noise", "pitch"
+SUBJECTS = (*GATES, BOXES, FINDINGS, NOISE, PITCH, CALIBRATION)
+"""What a threshold can be about, in the order in which people read a policy."""
+
+
+def _threshold(
+    default: float | bool | None,
+    subject: str,
+    label: str,
+    unit: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    choices: tuple[float, ...] = (),
+) -> Any:
+    """A field of a policy with what ``Threshold`` says of it."""
+    known = {
+        "subject": subject,
+        "label": label,
+        "unit": unit,
+        "minimum": minimum,
+        "maximum": maximum,
+        "choices": choices,
+    }
+    return field(default=default, metadata=known)
 
 
 @dataclass(frozen=True)
 class CalibrationPolicy:
     """The part of the policy that a view's calibration depends on."""
 
-    robust_scale_px: float = 2.0
+    robust_scale_px: float = _threshold(
+        2.0, CALIBRATION, "Scale of the robust loss", "px at 960x540", 0.2, 20.0
+    )
     """Scale of the soft-L1 loss at 960 x 540; grows with the diagonal."""
-    distortion_mean: float = 0.025
+    distortion_mean: float = _threshold(
+        0.025, CALIBRATION, "Distortion that is expected", "", -0.3, 0.3
+    )
     """Mean of the prior on kappa, the displacement at the image's corner as a share of half the
     diagonal: broadcast lenses show pincushion."""
-    distortion_sigma: float = 0.03
+    distortion_sigma: float = _threshold(
+        0.03, CALIBRATION, "Its standard deviation", "", 0.001, 0.5
+    )
     """Standard deviation of that prior."""
-    check_labels: bool = True
+    check_labels: bool = _threshold(True, CALIBRATION, "Leave out markings found mislabelled")
     """Leave out markings that are found mislabelled."""
 
 
@@ -31,25 +68,53 @@ class Policy:
 
     name: str = "paper"
     calibration: CalibrationPolicy = field(default_factory=CalibrationPolicy)
-    jac_gamma_percent: float = 0.5
-    min_jac: float = 0.75
+    jac_gamma_percent: float = _threshold(
+        0.5,
+        "jac",
+        "Tolerance of the field lines",
+        "% of diagonal",
+        0.1,
+        5.0,
+        choices=GAMMAS_PERCENT,
+    )
+    min_jac: float = _threshold(0.75, "jac", "Share of field lines that fit", "", 0.0, 1.0)
     """A view qualifies strictly above."""
-    tau_percent: float = 1.0
-    min_baseline_m: float = 1.0
-    ball_diameter_m: float = 0.226
-    min_parallax_degrees: float | None = None
-    max_sigma_m: float | None = None
-    low_parallax_degrees: float = 5.0
+    tau_percent: float = _threshold(
+        1.0, "reprojection", "Largest reprojection error", "% of diagonal", 0.05, 5.0
+    )
+    min_baseline_m: float = _threshold(1.0, "baseline", "Smallest baseline", "m", 0.0, 50.0)
+    ball_diameter_m: float = _threshold(0.226, BOXES, "Diameter of the ball", "m", 0.2, 0.25)
+    min_parallax_degrees: float | None = _threshold(
+        None, "parallax", "Smallest parallax", "degrees", 0.0, 45.0
+    )
+    max_sigma_m: float | None = _threshold(
+        None, "sigma", "Largest sigma of the position", "m", 0.01, 5.0
+    )
+    low_parallax_degrees: float = _threshold(
+        5.0, FINDINGS, "Finding: parallax below", "degrees", 0.0, 45.0
+    )
     """Below: the finding ``low_parallax``; it is no gate of the policy ``paper``."""
-    click_sigma_px: float = 1.0
+    click_sigma_px: float = _threshold(
+        1.0, NOISE, "Sigma of a clicked ball", "px at 1920x1080", 0.1, 10.0
+    )
     """Standard deviation of an annotated ball centre at 1920 x 1080; grows with the diagonal."""
-    box_sigma_share: float = 0.04
+    box_sigma_share: float = _threshold(
+        0.04, NOISE, "Sigma of a ball, of its diameter", "share", 0.0, 0.5
+    )
     """What the diameter of a ball's box adds to that standard deviation, as a share of it."""
-    below_grass_m: float = 0.5
-    max_height_m: float = 40.0
-    outside_pitch_m: float = 10.0
-    pitch_length_m: float = 105.0
-    pitch_width_m: float = 68.0
+    below_grass_m: float = _threshold(
+        0.5, FINDINGS, "Finding: below the grass by more than", "m", 0.0, 5.0
+    )
+    max_height_m: float = _threshold(40.0, FINDINGS, "Finding: higher than", "m", 1.0, 100.0)
+    outside_pitch_m: float = _threshold(
+        10.0, FINDINGS, "Finding: outside the pitch by more than", "m", 0.0, 50.0
+    )
+    pitch_length_m: float = _threshold(
+        105.0, PITCH, "Length of the pitch, where none is known", "m", 90.0, 120.0
+    )
+    pitch_width_m: float = _threshold(
+        68.0, PITCH, "Width of the pitch, where none is known", "m", 45.0, 90.0
+    )
 
     @property
     def hash(self) -> str:
@@ -67,7 +132,74 @@ class Policy:
 PAPER = Policy()
 STRICT = Policy(name="strict", min_parallax_degrees=5.0, max_sigma_m=0.5)
 POLICIES = {policy.name: policy for policy in (PAPER, STRICT)}
-THRESHOLDS = tuple(item.name for item in fields(Policy) if item.name not in ("name", "calibration"))
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """What one threshold is called, measured in, about, and between which ends it makes sense.
+
+    Attributes:
+        name: As in the policy; those of the calibration's part as ``calibration.name``.
+        hint: Type of its values.
+        subject: One of ``SUBJECTS``: the gate that it decides, or what else it is about.
+        minimum: None, as ``maximum`` is, for a switch.
+        choices: The values that forms offer where a range would promise too much.
+    """
+
+    name: str
+    hint: Any
+    subject: str
+    label: str
+    unit: str
+    minimum: float | None
+    maximum: float | None
+    choices: tuple[float, ...]
+
+    @property
+    def default(self) -> float | bool | None:
+        """Its value in the policy ``paper``."""
+        value: float | bool | None = self.value(PAPER)
+        return value
+
+    @property
+    def gate(self) -> str | None:
+        """The gate that it decides, or None."""
+        return self.subject if self.subject in GATES else None
+
+    @property
+    def text(self) -> str:
+        """What it is, in a line."""
+        return f"{self.label}, {self.unit}" if self.unit else self.label
+
+    @property
+    def optional(self) -> bool:
+        """Whether it can be None, which asks for nothing."""
+        return type(None) in get_args(self.hint)
+
+    def value(self, policy: Policy) -> Any:
+        """What a policy says."""
+        value: Any = policy
+        for part in self.name.split("."):
+            value = getattr(value, part)
+        return value
+
+
+def thresholds_of(part: type[Policy | CalibrationPolicy], prefix: str = "") -> Iterator[Threshold]:
+    """The thresholds of a policy or of its part for calibrations, as they are declared."""
+    hints = get_type_hints(part)
+    for item in fields(part):
+        if item.metadata:
+            name = f"{prefix}{item.name}"
+            yield Threshold(name, hints[item.name], **item.metadata)
+
+
+THRESHOLDS = tuple(
+    sorted(
+        (*thresholds_of(Policy), *thresholds_of(CalibrationPolicy, f"{CALIBRATION}.")),
+        key=lambda threshold: SUBJECTS.index(threshold.subject),
+    )
+)
+"""Every threshold, those of the gates first and in their order."""
 
 
 def _digest(values: object) -> str:

@@ -5,9 +5,6 @@ import { html } from 'htm/preact';
 
 /** @import {PolicyField, Threshold as Value} from '../api/policies.js' */
 
-/** JaC is measured at these tolerances alone. */
-const GAMMAS = [0.5, 1, 2];
-
 const OFF = 'Not asked: tick the box to ask it';
 
 /** Units that stand beside a number in few characters. */
@@ -56,10 +53,9 @@ function Slider({ field, value, id, change }) {
 
 /** @param {{field: PolicyField, id: string, value: Value, change: (value: Value) => void}} props */
 function Choice({ field, id, value, change }) {
-	const options = field.name === 'jac_gamma_percent' ? GAMMAS : [];
 	return html`
 		<select class="field threshold__number" id=${id} value=${String(value)} onChange=${(/** @type {Event} */ event) => change(Number(/** @type {HTMLSelectElement} */ (event.target).value))}>
-			${options.map((option) => html`<option key=${option} value=${String(option)}>${option}</option>`)}
+			${field.choices.map((option) => html`<option key=${option} value=${String(option)}>${option}</option>`)}
 		</select>
 		<${Unit} unit=${field.unit} />
 	`;
@@ -90,7 +86,7 @@ export function Threshold({ field, value, present, switched, change, idle }) {
 					<input type="checkbox" checked=${value !== null} onChange=${(/** @type {Event} */ event) => change(checked(event) ? switched : null)} />
 					<span class="hidden-text">${field.label} is asked</span>
 				</label>` : null}
-			${field.name === 'jac_gamma_percent'
+			${field.choices.length
 				? html`<${Choice} field=${field} id=${id} value=${value} change=${change} />`
 				: html`<${Slider} field=${field} id=${id} value=${value} change=${change} />`}
 		</div>

@@ -7,8 +7,6 @@ import { Threshold } from './threshold.js';
 
 /** @import {PolicyField, ShippedPolicy, Threshold as Value, Values} from '../api/policies.js' */
 
-const OF_JAC = new Set(['jac_gamma_percent', 'min_jac']);
-
 /** What is asked when an optional threshold is switched on: what a shipped policy asks, or the middle. @param {PolicyField} field @param {ShippedPolicy[]} shipped @returns {Value} */
 function switchedOn(field, shipped) {
 	const asked = shipped.map(({ values }) => values[field.name]).find((value) => value !== null && value !== undefined);
@@ -27,7 +25,7 @@ export function ThresholdForm({ fields, shipped, present, values, change, idle =
 		<${Threshold}
 			key=${field.name} field=${field} present=${present[field.name] ?? null}
 			value=${field.name in values ? values[field.name] : present[field.name] ?? null}
-			idle=${OF_JAC.has(field.name) ? idle : ''} switched=${switchedOn(field, shipped)} change=${(/** @type {Value} */ value) => change(field.name, value)}
+			idle=${field.gate === 'jac' ? idle : ''} switched=${switchedOn(field, shipped)} change=${(/** @type {Value} */ value) => change(field.name, value)}
 		/>`;
 	return html`
 		${fields.filter(({ gate }) => gate).map(one)}

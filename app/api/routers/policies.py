@@ -12,17 +12,15 @@ from app.api.schemas.job import JobDocument
 from app.api.schemas.policy import (
     PolicyCatalogue,
     PolicyChange,
-    PolicyFieldDocument,
     PolicyStateDocument,
     ShippedPolicyDocument,
 )
 from app.errors import InputError
 from app.review.datasets.dataset import get_dataset
 from app.review.jobs.solve import request_solve
-from app.review.policies.fields import FIELDS
 from app.review.policies.policy import change_policy, read_policy
 from app.review.policies.text import CUSTOM, policy_from_yaml, policy_with
-from app.soccer.policy import POLICIES, Policy
+from app.soccer.policy import POLICIES, THRESHOLDS, Policy
 
 router = APIRouter(tags=["policies"])
 
@@ -41,12 +39,7 @@ def list_policies() -> PolicyCatalogue:
     """The policies that come with the software, and what can be set in one."""
     return PolicyCatalogue(
         items=[ShippedPolicyDocument.of(policy) for policy in POLICIES.values()],
-        fields=[
-            PolicyFieldDocument.model_validate(
-                {name: getattr(field, name) for name in PolicyFieldDocument.model_fields}
-            )
-            for field in FIELDS
-        ],
+        fields=THRESHOLDS,
     )
 
 

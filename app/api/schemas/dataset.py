@@ -29,7 +29,7 @@ class DatasetDocument(BaseModel):
     @staticmethod
     def of(dataset: Dataset) -> DatasetDocument:
         """The document of a dataset."""
-        values = {**vars(dataset), "policy": PolicyDocument.of(dataset.policy)}
+        values = {**vars(dataset), "policy": PolicyDocument.model_validate(dataset.policy)}
         return DatasetDocument.model_validate(values)
 
 

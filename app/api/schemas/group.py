@@ -144,7 +144,7 @@ class GroupDocument(BaseModel):
             can_redo=state.can_redo,
             verdict=VerdictDocument.of(state.verdict),
             verdicts=[VerdictDocument.of(verdict) for verdict in state.verdicts],
-            policy=PolicyDocument.of(state.policy),
+            policy=PolicyDocument.model_validate(state.policy),
             views=[
                 _view(state, view, index, label)
                 for index, (view, label) in enumerate(

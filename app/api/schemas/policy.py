@@ -5,45 +5,28 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AliasPath, BaseModel, ConfigDict, Field, create_model
 
+from app.api.schemas.document import Document
 from app.review.policies.policy import PolicyState
 from app.review.policies.text import MAX_CHARACTERS, policy_to_yaml, policy_values
-from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy
+from app.soccer.policy import CalibrationPolicy, Policy, thresholds_of
 
 
-class PolicyDocument(BaseModel):
-    """All thresholds; per cent are of the image diagonal."""
-
+class _PolicyHead(Document):
     name: str
     hash: str = Field(description="Digest of every value but the name.")
     calibration: CalibrationPolicy = Field(description="What a view's calibration depends on.")
-    jac_gamma_percent: float
-    min_jac: float
-    tau_percent: float
-    min_baseline_m: float
-    ball_diameter_m: float
-    min_parallax_degrees: float | None
-    max_sigma_m: float | None
-    low_parallax_degrees: float
-    click_sigma_px: float
-    box_sigma_share: float
-    below_grass_m: float
-    max_height_m: float
-    outside_pitch_m: float
-    pitch_length_m: float
-    pitch_width_m: float
 
-    @staticmethod
-    def of(policy: Policy) -> PolicyDocument:
-        """The document of a policy."""
-        values = {name: getattr(policy, name) for name in THRESHOLDS}
-        return PolicyDocument.model_construct(
-            name=policy.name,
-            hash=policy.hash,
-            calibration=policy.calibration,
-            **values,
-        )
+
+_thresholds: dict[str, Any] = {
+    item.name: (item.hint, Field(description=item.text)) for item in thresholds_of(Policy)
+}
+_PolicyFields: Any = create_model("_PolicyFields", __base__=_PolicyHead, **_thresholds)
+
+
+class PolicyDocument(_PolicyFields):
+    """All thresholds; per cent are of the image diagonal."""
 
 
 class PolicyChange(BaseModel):
@@ -79,17 +62,17 @@ class PolicyChange(BaseModel):
     )
 
 
-class PolicyVersionDocument(BaseModel):
+class PolicyVersionDocument(Document):
     """A policy that judged the dataset from some time on."""
 
     version: int
-    name: str
-    hash: str
+    name: str = Field(validation_alias=AliasPath("policy", "name"))
+    hash: str = Field(validation_alias=AliasPath("policy", "hash"))
     at: datetime
     actor: str
 
 
-class PolicyStateDocument(BaseModel):
+class PolicyStateDocument(Document):
     """What judges a dataset, and what did before; the newest version last."""
 
     dataset: str
@@ -110,17 +93,12 @@ class PolicyStateDocument(BaseModel):
             dataset=state.dataset,
             etag=state.etag,
             version=state.version,
-            history=[
-                PolicyVersionDocument.model_validate(
-                    {**vars(item), "name": item.policy.name, "hash": item.policy.hash}
-                )
-                for item in state.history
-            ],
+            history=state.history,
             **_described(state.policy),
         )
 
 
-class ShippedPolicyDocument(BaseModel):
+class ShippedPolicyDocument(Document):
     """A policy that comes with the software."""
 
     name: str
@@ -134,7 +112,7 @@ class ShippedPolicyDocument(BaseModel):
         return ShippedPolicyDocument(**_described(policy))
 
 
-class PolicyFieldDocument(BaseModel):
+class PolicyFieldDocument(Document):
     """What a threshold is called and between which ends it lies, for forms."""
 
     name: str = Field(description="Those of the calibration's part are dotted.")
@@ -143,11 +121,12 @@ class PolicyFieldDocument(BaseModel):
     default: float | bool | None = Field(description="In `paper`; null asks for nothing.")
     minimum: float | None
     maximum: float | None
+    choices: list[float] = Field(description="Values to offer; empty: any between the ends.")
     gate: str | None = Field(description="The gate that it decides.")
     optional: bool = Field(description="Whether it can be null.")
 
 
-class PolicyCatalogue(BaseModel):
+class PolicyCatalogue(Document):
     """The policies that come with the software, and every threshold there is."""
 
     items: list[ShippedPolicyDocument]

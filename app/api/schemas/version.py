@@ -157,7 +157,7 @@ class VersionDocument(BaseModel):
         values = {name: getattr(version, name) for name in VersionDocument.model_fields}
         changed = {
             "split": version.split.values(),
-            "policy": PolicyDocument.of(version.policy),
+            "policy": PolicyDocument.model_validate(version.policy),
             "verified": version.verified and VerificationDocument.of(version.verified),
         }
         return VersionDocument.model_validate({**values, **changed})

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from app.api.schemas.policy import PolicyDocument
-from app.review.yields.funnel import THRESHOLDS, UNSOLVED, Yield
+from app.review.yields.funnel import JAC_STEPS, UNSOLVED, Yield
+from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy, thresholds_of
 
 Number = Annotated[float, Field(ge=-1e6, le=1e6)]
 
@@ -25,44 +26,31 @@ LABELS = {
 """What a step of the funnel asks, for people."""
 
 
-class CalibrationValues(BaseModel):
+def _tried(part: type[Policy | CalibrationPolicy]) -> Any:
+    """A model in which every threshold of a part of the policy can stand or be absent."""
+    hints = {bool: bool | None}
+    fields: dict[str, Any] = {
+        item.name: (hints.get(item.hint, Number | None), Field(default=None, description=item.text))
+        for item in thresholds_of(part)
+    }
+    return create_model(f"_{part.__name__}", __config__=ConfigDict(extra="forbid"), **fields)
+
+
+class CalibrationValues(_tried(CalibrationPolicy)):  # type: ignore[misc]
     """What a view's calibration depends on; only solving again tells what another value does."""
 
-    model_config = ConfigDict(extra="forbid")
 
-    robust_scale_px: Number | None = None
-    distortion_mean: Number | None = None
-    distortion_sigma: Number | None = None
-    check_labels: bool | None = None
-
-
-class WhatIf(BaseModel):
+class WhatIf(_tried(Policy)):  # type: ignore[misc]
     """Thresholds to try; those that are absent stay as they are.
 
     `null` switches a gate off (`min_parallax_degrees`, `max_sigma_m`) and says nothing elsewhere.
     """
 
     model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"min_jac": 0.8, "min_parallax_degrees": 5.0}]},
+        json_schema_extra={"examples": [{"min_jac": 0.8, "min_parallax_degrees": 5.0}]}
     )
 
     calibration: CalibrationValues | None = None
-    jac_gamma_percent: Number | None = None
-    min_jac: Number | None = None
-    tau_percent: Number | None = None
-    min_baseline_m: Number | None = None
-    ball_diameter_m: Number | None = None
-    min_parallax_degrees: Number | None = None
-    max_sigma_m: Number | None = None
-    low_parallax_degrees: Number | None = None
-    click_sigma_px: Number | None = None
-    box_sigma_share: Number | None = None
-    below_grass_m: Number | None = None
-    max_height_m: Number | None = None
-    outside_pitch_m: Number | None = None
-    pitch_length_m: Number | None = None
-    pitch_width_m: Number | None = None
 
     def values(self) -> dict[str, Any]:
         """The fields of a policy that shall differ."""
@@ -75,7 +63,7 @@ class WhatIf(BaseModel):
         return {**kept, "calibration": known}
 
 
-OPTIONAL = frozenset({"min_parallax_degrees", "max_sigma_m"})
+OPTIONAL = frozenset(item.name for item in THRESHOLDS if item.optional)
 """Gates that a policy need not ask for."""
 
 
@@ -169,12 +157,12 @@ class YieldDocument(BaseModel):
         same = {name: getattr(found, name) for name in _SAME}
         return YieldDocument(
             **same,
-            policy=PolicyDocument.of(found.policy),
+            policy=PolicyDocument.model_validate(found.policy),
             funnel=[FunnelStep(label=LABELS[step.gate], **vars(step)) for step in found.funnel],
             curves=[
                 CurveDocument(
                     gamma_percent=curve.gamma_percent,
-                    thresholds=list(THRESHOLDS),
+                    thresholds=list(JAC_STEPS),
                     groups=list(curve.groups),
                 )
                 for curve in found.curves

@@ -11,14 +11,14 @@ from typing import Any
 import yaml
 
 from app.errors import InputError
-from app.review.policies.fields import BY_NAME, CALIBRATION, FIELDS, PolicyField, value_of
-from app.soccer.policy import PAPER, POLICIES, Policy
+from app.soccer.policy import CALIBRATION, PAPER, POLICIES, THRESHOLDS, Policy, Threshold
 from app.store.codecs import Json
 
 MAX_CHARACTERS = 20_000
 MAX_DEPTH = 4
 CUSTOM = "custom"
 """Name of a policy that has none."""
+_BY_NAME = {threshold.name: threshold for threshold in THRESHOLDS}
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._+-]{0,79}")
 
 
@@ -48,24 +48,23 @@ def policy_to_yaml(policy: Policy) -> str:
     """A policy as YAML with every threshold, each with a comment that says what it is."""
     lines = [f"name: {_scalar(policy.name)}", ""]
     inner = [""]
-    for field in FIELDS:
-        unit = f", {field.unit}" if field.unit else ""
-        name = field.name.removeprefix(f"{CALIBRATION}.")
-        line = f"{name}: {_scalar(value_of(policy, field.name))}"
-        if name == field.name:
-            lines.append(f"{line:30}  # {field.label}{unit}")
+    for threshold in THRESHOLDS:
+        name = threshold.name.removeprefix(f"{CALIBRATION}.")
+        line = f"{name}: {_scalar(threshold.value(policy))}"
+        if name == threshold.name:
+            lines.append(f"{line:30}  # {threshold.text}")
         else:
-            inner.append(f"  {line:28}  # {field.label}{unit}")
+            inner.append(f"  {line:28}  # {threshold.text}")
     return "\n".join([*lines, "", f"{CALIBRATION}:", *inner[1:], ""])
 
 
 def policy_values(policy: Policy) -> dict[str, Json]:
     """Every threshold by name; those of the calibration's part in a mapping of their own."""
     values: dict[str, Json] = {CALIBRATION: {}}
-    for field in FIELDS:
-        inner = field.name.removeprefix(f"{CALIBRATION}.")
-        place = values if inner == field.name else values[CALIBRATION]
-        place[inner] = value_of(policy, field.name)
+    for threshold in THRESHOLDS:
+        inner = threshold.name.removeprefix(f"{CALIBRATION}.")
+        place = values if inner == threshold.name else values[CALIBRATION]
+        place[inner] = threshold.value(policy)
     return values
 
 
@@ -85,7 +84,7 @@ def policy_with(
     """
     flat = dict(_flat(values, pointer))
     for key, value in flat.items():
-        flat[key] = _checked(BY_NAME[key], value, pointer)
+        flat[key] = _checked(_BY_NAME[key], value, pointer)
     inner = {key.partition(".")[2]: flat.pop(key) for key in list(flat) if "." in key}
     calibration = replace(policy.calibration, **inner)
     chosen = policy.name if name is None else _checked_name(name)
@@ -104,33 +103,33 @@ def _flat(values: Mapping[str, Any], pointer: str) -> Iterator[tuple[str, Any]]:
             yield from _flat(
                 {f"{CALIBRATION}.{inner}": item for inner, item in value.items()}, pointer
             )
-        elif key not in BY_NAME:
+        elif key not in _BY_NAME:
             place = str(key).replace("~", "~0").replace("/", "~1").replace(".", "/")
             raise InputError(
                 f'a policy has no threshold "{key}"',
-                hint=f"It has {', '.join(BY_NAME)}.",
+                hint=f"It has {', '.join(_BY_NAME)}.",
                 pointer=f"{pointer}/{place}",
             )
         else:
             yield key, value
 
 
-def _checked(field: PolicyField, value: object, pointer: str) -> float | bool | None:
-    place = f"{pointer}/{field.name.replace('.', '/')}"
-    if isinstance(field.default, bool):
+def _checked(threshold: Threshold, value: object, pointer: str) -> float | bool | None:
+    name, place = threshold.name, f"{pointer}/{threshold.name.replace('.', '/')}"
+    if isinstance(threshold.default, bool):
         if not isinstance(value, bool):
-            raise InputError(f"{field.name} is true or false", pointer=place)
+            raise InputError(f"{name} is true or false", pointer=place)
         return value
-    if value is None and field.optional:
+    if value is None and threshold.optional:
         return None
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not number or not math.isfinite(float(value)):  # type: ignore[arg-type]
-        raise InputError(f"{field.name} is a number", pointer=place)
+        raise InputError(f"{name} is a number", pointer=place)
     found = float(value)  # type: ignore[arg-type]
-    low, high = field.minimum, field.maximum
+    low, high = threshold.minimum, threshold.maximum
     if (low is not None and found < low) or (high is not None and found > high):
-        unit = f" {field.unit}" if field.unit else ""
-        raise InputError(f"{field.name} lies between {low:g} and {high:g}{unit}", pointer=place)
+        unit = f" {threshold.unit}" if threshold.unit else ""
+        raise InputError(f"{name} lies between {low:g} and {high:g}{unit}", pointer=place)
     return found
 
 

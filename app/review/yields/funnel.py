@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,30 +11,19 @@ import numpy as np
 from app.geometry.arrays import BoolArray, IntArray
 from app.review.yields.gates import Judged, judge_table
 from app.review.yields.store import Snapshot, YieldStore
-from app.soccer.policy import CalibrationPolicy, Policy
+from app.soccer.policy import BOXES, CALIBRATION, PITCH, THRESHOLDS, Policy
 from app.soccer.solution import GAMMAS_PERCENT, GATES
 
 UNSOLVED = "unsolved"
 """Step of the funnel before the gates: groups that nobody has solved yet."""
-ANSWERED = (
-    "jac_gamma_percent",
-    "min_jac",
-    "tau_percent",
-    "min_baseline_m",
-    "min_parallax_degrees",
-    "max_sigma_m",
-    "click_sigma_px",
-    "box_sigma_share",
-    "low_parallax_degrees",
-    "below_grass_m",
-    "max_height_m",
-    "outside_pitch_m",
+WITHOUT_EFFECT = frozenset({BOXES, PITCH})
+"""Subjects of thresholds that decide about boxes and new imports, and about no gate."""
+ANSWERED = tuple(
+    threshold for threshold in THRESHOLDS if threshold.subject not in WITHOUT_EFFECT | {CALIBRATION}
 )
 """Thresholds that the table answers for: gates and the findings about the ball."""
-WITHOUT_EFFECT = ("name", "ball_diameter_m", "pitch_length_m", "pitch_width_m")
-"""Fields that decide about boxes and new imports, and about no gate."""
-THRESHOLDS = tuple((np.arange(101) / 100).tolist())
-"""Of the curves: JaC from 0 to 1."""
+JAC_STEPS = tuple((np.arange(101) / 100).tolist())
+"""Where the curves are counted: JaC from 0 to 1."""
 DISTANCES = (0.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
 """Where the bins of distance begin, metres; the last one has no end."""
 
@@ -118,22 +107,18 @@ def get_yield(
     snapshot = yields.snapshot(dataset_id)
     policy = _changed(snapshot.policy, values or {})
     unanswered = needs_solving(snapshot.policy, policy)
-    same = all(getattr(policy, name) == getattr(snapshot.policy, name) for name in ANSWERED)
+    same = all(item.value(policy) == item.value(snapshot.policy) for item in ANSWERED)
     judged = snapshot.present if same else judge_table(snapshot.table, policy, snapshot.memo)
     return _answer(snapshot, policy, judged, unanswered)
 
 
 def needs_solving(present: Policy, asked: Policy) -> tuple[str, ...]:
-    """Fields that differ and that the table cannot answer for, those of the calibration dotted."""
-    names = [item.name for item in fields(Policy) if item.name != "calibration"]
-    told = {*ANSWERED, *WITHOUT_EFFECT}
-    calibration = [
-        f"calibration.{item.name}"
-        for item in fields(CalibrationPolicy)
-        if getattr(present.calibration, item.name) != getattr(asked.calibration, item.name)
-    ]
-    different = [name for name in names if getattr(present, name) != getattr(asked, name)]
-    return (*calibration, *(name for name in different if name not in told))
+    """Names of thresholds that differ and that the table cannot answer for."""
+    return tuple(
+        item.name
+        for item in THRESHOLDS
+        if item.subject == CALIBRATION and item.value(present) != item.value(asked)
+    )
 
 
 def _changed(policy: Policy, values: Mapping[str, Any]) -> Policy:
@@ -184,7 +169,7 @@ def _funnel(snapshot: Snapshot, first: IntArray, policy: Policy) -> tuple[Step, 
 def _curves(snapshot: Snapshot) -> tuple[Curve, ...]:
     """A group qualifies at every threshold strictly below the JaC of its second best view."""
     return tuple(
-        Curve(gamma, tuple((len(jac) - np.searchsorted(jac, THRESHOLDS, "right")).tolist()))
+        Curve(gamma, tuple((len(jac) - np.searchsorted(jac, JAC_STEPS, "right")).tolist()))
         for gamma, jac in zip(GAMMAS_PERCENT, snapshot.qualifying, strict=True)
     )
 

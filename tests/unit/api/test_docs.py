@@ -40,7 +40,7 @@ class TestGroup:
 
     def test_its_policy_is_the_one_that_is_in_force(self) -> None:
         shown = json.loads(GROUP)
-        assert shown["policy"] == PolicyDocument.of(PAPER).model_dump(mode="json")
+        assert shown["policy"] == PolicyDocument.model_validate(PAPER).model_dump(mode="json")
         assert shown["policy"]["hash"] == shown["solution"]["policy_hash"] == PAPER.hash
 
 

@@ -1,6 +1,18 @@
-from dataclasses import replace
+from dataclasses import fields, replace
 
-from app.soccer.policy import PAPER, STRICT, CalibrationPolicy
+import pytest
+
+from app.soccer.policy import (
+    CALIBRATION,
+    PAPER,
+    POLICIES,
+    STRICT,
+    SUBJECTS,
+    THRESHOLDS,
+    CalibrationPolicy,
+    Policy,
+)
+from app.soccer.solution import GATES
 
 
 class TestHash:
@@ -21,3 +33,25 @@ class TestPaper:
     def test_holds_the_values_recovered_from_the_published_dataset(self):
         assert (PAPER.tau_percent, PAPER.ball_diameter_m) == (1.0, 0.226)
         assert (PAPER.jac_gamma_percent, PAPER.min_jac, PAPER.min_baseline_m) == (0.5, 0.75, 1.0)
+
+
+class TestThresholds:
+    def test_name_every_value_of_a_policy_and_nothing_else(self):
+        own = {item.name for item in fields(Policy)} - {"name", CALIBRATION}
+        inner = {f"{CALIBRATION}.{item.name}" for item in fields(CalibrationPolicy)}
+        assert {threshold.name for threshold in THRESHOLDS} == own | inner
+
+    def test_those_of_the_gates_come_first_and_in_their_order(self):
+        subjects = list(dict.fromkeys(threshold.subject for threshold in THRESHOLDS))
+        assert subjects == [subject for subject in SUBJECTS if subject in subjects]
+        gates = list(dict.fromkeys(item.gate for item in THRESHOLDS if item.gate))
+        assert gates == [gate for gate in GATES if gate in gates]
+
+    @pytest.mark.parametrize("policy", POLICIES.values(), ids=lambda policy: policy.name)
+    def test_the_shipped_policies_lie_between_the_ends(self, policy):
+        for threshold in THRESHOLDS:
+            value = threshold.value(policy)
+            if value is None:
+                assert threshold.optional, threshold.name
+            elif not isinstance(value, bool):
+                assert threshold.minimum <= value <= threshold.maximum, threshold.name

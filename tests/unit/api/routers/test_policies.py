@@ -31,6 +31,7 @@ class TestListPolicies:
             "default": 1.0,
             "minimum": 0.05,
             "maximum": 5.0,
+            "choices": [],
             "gate": "reprojection",
             "optional": False,
         }

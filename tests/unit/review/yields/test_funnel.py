@@ -15,14 +15,14 @@ from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
 from app.review.importing.ingest import ingest
 from app.review.queue.listing import list_groups
-from app.review.yields.funnel import Yield, get_yield
+from app.review.yields.funnel import WITHOUT_EFFECT, Yield, get_yield
 from app.review.yields.gates import PASSES, judge_table, view_jac
 from app.review.yields.store import YieldStore
 from app.sample.scenes import make_scenes
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Group
-from app.soccer.policy import PAPER, STRICT, CalibrationPolicy, Policy
+from app.soccer.policy import PAPER, STRICT, THRESHOLDS, CalibrationPolicy, Policy
 from app.soccer.solution import GATES, Solution
 from app.solving.solve import solve
 from app.store.session import Store
@@ -236,11 +236,16 @@ class TestGetYield:
         assert found.needs_solving == ("calibration.check_labels",)
         assert found.passing == get_yield(yields, 1, {"min_jac": 0.5}).passing
 
-    def test_every_threshold_of_a_policy_is_answered_or_named(self, filled) -> None:
-        from app.review.yields.funnel import ANSWERED, WITHOUT_EFFECT
-        from app.soccer.policy import THRESHOLDS
-
-        assert set(THRESHOLDS) - {*ANSWERED, *WITHOUT_EFFECT} == set()
+    @pytest.mark.parametrize("name", ["ball_diameter_m", "pitch_length_m", "pitch_width_m"])
+    def test_what_the_table_passes_over_changes_no_gate_of_a_solve(
+        self, solutions, name: str
+    ) -> None:
+        (threshold,) = (item for item in THRESHOLDS if item.name == name)
+        assert threshold.subject in WITHOUT_EFFECT
+        other = replace(PAPER, **{name: threshold.maximum})
+        for group, old in solutions[:10]:
+            again = solved_again(group, old, other)
+            assert [gate.passed for gate in again.gates] == [gate.passed for gate in old.gates]
 
     def test_an_empty_dataset_yields_nothing(self, store) -> None:
         create_dataset(store, "demo")
