@@ -211,4 +211,4 @@ def _change_event(change: Change) -> ServerSentEvent:
 
 
 def _job_event(job: Job) -> ServerSentEvent:
-    return ServerSentEvent(event="job", data=JobDocument.of(job))
+    return ServerSentEvent(event="job", data=JobDocument.model_validate(job))

@@ -20,4 +20,4 @@ def accepted(job: Job, response: Response) -> JobDocument:
     """The document of a job that was started, its address in the header."""
     response.status_code = 202
     response.headers["Location"] = f"/api/v1/jobs/{job.id}"
-    return JobDocument.of(job)
+    return JobDocument.model_validate(job)

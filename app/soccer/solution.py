@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from app.geometry.camera import Camera
-from app.soccer.frames import Box, ImagePoint
+from app.soccer.frames import Box, ImagePoint, height_above_grass
 
 SOLVER_VERSION = "2"
 """Part of every solution's key; raised by one whenever a number changes."""
@@ -162,6 +162,11 @@ class Ball3D:
     views: tuple[str, ...]
     """Views in a valid pair."""
 
+    @property
+    def height_m(self) -> float:
+        """Above the grass, metres."""
+        return height_above_grass(self.point[2])
+
 
 @dataclass(frozen=True)
 class BestBall:
@@ -178,6 +183,11 @@ class BestBall:
     """Views left out because they contradict the others."""
     influence_m: tuple[tuple[str, float], ...] = ()
     """How far the point moves when that view is left out; empty with two views."""
+
+    @property
+    def height_m(self) -> float:
+        """Above the grass, metres."""
+        return height_above_grass(self.point[2])
 
 
 @dataclass(frozen=True)

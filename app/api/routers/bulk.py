@@ -9,7 +9,6 @@ from fastapi import APIRouter, Query
 from app.api.deps import Actor, AppStore, DatasetPath, Id, IdempotencyKey
 from app.api.problem import responses
 from app.api.schemas.bulk import (
-    BatchDocument,
     BatchList,
     BulkResult,
     BulkVerdict,
@@ -63,31 +62,33 @@ def list_batches(
 ) -> BatchList:
     """The newest bulk verdicts of a dataset."""
     batches = bulk.list_batches(store, dataset_id(store, dataset), limit)
-    return BatchList(items=[BatchDocument.of(item) for item in batches])
+    return BatchList(items=batches)
 
 
 @router.post(
     "/verdict-batches/{batch}/redo",
     operation_id="redoVerdictBatch",
+    response_model=RedoDocument,
     responses=responses(404, 409),
 )
-def redo_batch(batch: Id, store: AppStore, actor: Actor) -> RedoDocument:
+def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_redo.RedoReport:
     """Give the verdicts of a batch again that was taken back, as a new batch.
 
     Groups that somebody has judged or edited since stay as they are. 409 when the batch was not
     taken back, or was given again already.
     """
-    return RedoDocument.of(bulk_redo.redo_batch(store, batch, actor=actor))
+    return bulk_redo.redo_batch(store, batch, actor=actor)
 
 
 @router.post(
     "/verdict-batches/{batch}/undo",
     operation_id="undoVerdictBatch",
+    response_model=UndoDocument,
     responses=responses(404, 409),
 )
-def undo_batch(batch: Id, store: AppStore, actor: Actor) -> UndoDocument:
+def undo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
     """Give each group of a batch the verdict back that it had before; 409 the second time.
 
     Groups that somebody has judged since keep that verdict.
     """
-    return UndoDocument(**vars(bulk_undo.undo_batch(store, batch, actor=actor)))
+    return bulk_undo.undo_batch(store, batch, actor=actor)

@@ -26,20 +26,26 @@ router = APIRouter(prefix="/datasets", tags=["datasets"])
 @router.get("", operation_id="listDatasets", responses=responses())
 def list_datasets(store: AppStore) -> DatasetList:
     """Every dataset with its progress."""
-    return DatasetList(items=[DatasetDocument.of(item) for item in review.list_datasets(store)])
+    return DatasetList(items=review.list_datasets(store))
 
 
-@router.get("/{dataset}", operation_id="getDataset", responses=responses(404))
-def get_dataset(dataset: DatasetPath, store: AppStore) -> DatasetDocument:
+@router.get(
+    "/{dataset}",
+    operation_id="getDataset",
+    response_model=DatasetDocument,
+    responses=responses(404),
+)
+def get_dataset(dataset: DatasetPath, store: AppStore) -> review.Dataset:
     """One dataset by name or id."""
-    return DatasetDocument.of(review.get_dataset(store, dataset))
+    return review.get_dataset(store, dataset)
 
 
 @router.get("/{dataset}/summary", operation_id="getSummary", responses=responses(404))
 def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") -> SummaryDocument:
     """Progress and histograms over the groups that a query matches."""
     found = review.get_dataset(store, dataset)
-    return SummaryDocument.of(summary(store, found.id, query))
+    counted = summary(store, found.id, query)
+    return SummaryDocument(progress=counted, histograms=counted.histograms)
 
 
 @router.delete("/{dataset}", operation_id="deleteDataset", responses=responses(404, 409, 413, 415))

@@ -15,7 +15,6 @@ from app.api.schemas.evaluation import (
     EvaluationBody,
     EvaluationDocument,
     EvaluationList,
-    EvaluationRow,
     FigureDocument,
     FrameList,
     TableDocument,
@@ -30,6 +29,7 @@ from app.evaluation.result import NUMBERS
 from app.evaluation.table import TABLES
 from app.review.evaluating import evaluation as review
 from app.review.jobs.evaluations import request_evaluation
+from app.store.evaluations import StoredEvaluation
 
 router = APIRouter(tags=["evaluations"])
 
@@ -70,7 +70,7 @@ TABLE_FILES: Responses = {
 def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
     """The evaluations of a dataset, the newest first."""
     found = review.list_evaluations(store, dataset)
-    return EvaluationList(items=[EvaluationRow.of(item) for item in found])
+    return EvaluationList(items=found)
 
 
 @router.post(
@@ -95,10 +95,15 @@ def start_evaluation(
     return accepted(job, response)
 
 
-@router.get("/evaluations/{evaluation}", operation_id="getEvaluation", responses=responses(404))
-def get_evaluation(evaluation: Id, store: AppStore) -> EvaluationDocument:
+@router.get(
+    "/evaluations/{evaluation}",
+    operation_id="getEvaluation",
+    response_model=EvaluationDocument,
+    responses=responses(404),
+)
+def get_evaluation(evaluation: Id, store: AppStore) -> StoredEvaluation:
     """One evaluation: what it pins, its tables, and the names of its figures."""
-    return EvaluationDocument.of(review.get_evaluation(store, evaluation))
+    return review.get_evaluation(store, evaluation)
 
 
 @router.delete(
@@ -127,7 +132,8 @@ def get_figure(
     """One figure of an evaluation; 404 where the evaluation has no such figure."""
     found = review.get_figure(store, evaluation, str(figure))
     if ending == "json":
-        return Response(FigureDocument.of(found).model_dump_json(), media_type="application/json")
+        document = FigureDocument.model_validate(found)
+        return Response(document.model_dump_json(), media_type="application/json")
     name = f'attachment; filename="touchline-{evaluation}-{figure}.{ending}"'
     if ending == "csv":
         headers = {"Content-Disposition": name}
@@ -155,7 +161,8 @@ def get_table(
             f'evaluation {evaluation} has no table "{table}"', hint=f"It has {', '.join(tables)}."
         )
     if ending == "json":
-        return Response(TableDocument.of(found).model_dump_json(), media_type="application/json")
+        document = TableDocument.model_validate(found)
+        return Response(document.model_dump_json(), media_type="application/json")
     name = f'attachment; filename="touchline-{evaluation}-{table}.csv"'
     headers = {"Content-Disposition": name}
     return Response(table_csv(found), media_type="text/csv; charset=utf-8", headers=headers)
@@ -164,6 +171,7 @@ def get_table(
 @router.get(
     "/evaluations/{evaluation}/frames",
     operation_id="listEvaluationFrames",
+    response_model=FrameList,
     responses=responses(404),
 )
 def list_frames(
@@ -181,12 +189,12 @@ def list_frames(
     sort: Annotated[SortField | None, Query()] = None,
     limit: Limit = 50,
     cursor: Cursor = None,
-) -> FrameList:
+) -> review.FramePage:
     """The frames behind a number: a row's `frames` are parameters of this address."""
     query = review.FrameQuery(
         None if field is None else str(field), low, high, missing, match, str(sort or "")
     )
-    return FrameList.of(review.list_frames(store, evaluation, query, limit, _place(cursor)))
+    return review.list_frames(store, evaluation, query, limit, _place(cursor))
 
 
 @router.get(

@@ -39,6 +39,7 @@ from app.review.editing import submit
 from app.review.editing.state import GroupState
 from app.review.queue import listing as queue
 from app.review.verdicts.verdict import set_verdict
+from app.soccer.solution import Solution
 from app.store.session import Store
 
 router = APIRouter(prefix="/groups", tags=["groups"])
@@ -139,22 +140,29 @@ def get_group(
     return answer(with_solution(store, state), response)
 
 
-@router.get("/{group}/solution", operation_id="getSolution", responses=responses(404))
-def get_solution(group: Id, store: AppStore) -> SolutionDocument:
+@router.get(
+    "/{group}/solution",
+    operation_id="getSolution",
+    response_model=SolutionDocument,
+    responses=responses(404),
+)
+def get_solution(group: Id, store: AppStore) -> Solution:
     """The solution of a group."""
     solution = with_solution(store, submit.load(store, group)).solution
     if solution is None:
         raise NotFoundError(f"group {group} has no solution")
-    return SolutionDocument.of(solution)
+    return solution
 
 
-@router.get("/{group}/neighbours", operation_id="getNeighbours", responses=responses(404))
-def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> Neighbours:
+@router.get(
+    "/{group}/neighbours",
+    operation_id="getNeighbours",
+    response_model=Neighbours,
+    responses=responses(404),
+)
+def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.Neighbours:
     """Where the group stands among those that match, and up to five before and after."""
-    found = queue.neighbours(store, group, query)
-    return Neighbours(
-        index=found.index, total=found.total, previous=list(found.previous), next=list(found.next)
-    )
+    return queue.neighbours(store, group, query)
 
 
 @router.get("/{group}/history", operation_id="getHistory", responses=responses(404))
@@ -170,7 +178,7 @@ def preview_group(group: Id, changes: PreviewRequest, store: AppStore) -> Previe
     """What the solution would be; nothing is saved."""
     state = submit.load(store, group)
     solution = submit.preview(store, group, preview_edits(state, changes))
-    return PreviewDocument(solution=SolutionDocument.of(solution))
+    return PreviewDocument(solution=solution)
 
 
 @router.post("/{group}/undo", operation_id="undo", responses={**responses(*CONFLICTS), **CHANGED})

@@ -11,7 +11,7 @@ from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import responses
 from app.api.schemas.imports import FolderDocument, ImportBody
 from app.api.schemas.job import JobDocument
-from app.review.importing.folders import list_folder
+from app.review.importing.folders import FolderListing, list_folder
 from app.review.jobs.imports import request_import
 
 router = APIRouter(prefix="/imports", tags=["imports"])
@@ -21,10 +21,15 @@ FolderPath = Annotated[
 ]
 
 
-@router.get("/folders", operation_id="listImportFolders", responses=responses(404))
-def get_folders(services: AppServices, path: FolderPath = "") -> FolderDocument:
+@router.get(
+    "/folders",
+    operation_id="listImportFolders",
+    response_model=FolderDocument,
+    responses=responses(404),
+)
+def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
     """What may be imported from: the operator names folders in TOUCHLINE_IMPORT_FOLDERS."""
-    return FolderDocument.of(list_folder(services.settings, path))
+    return list_folder(services.settings, path)
 
 
 @router.post(

@@ -8,7 +8,7 @@ from app.api.deps import AppStore, Id
 from app.api.lookup import find_view
 from app.api.problem import responses
 from app.api.routers.groups import with_solution
-from app.api.schemas.insight import InfluenceDocument, Influences, Remedies, RemedyDocument
+from app.api.schemas.insight import Influences, Remedies, RemedyDocument
 from app.review.editing import submit
 from app.review.editing.influence import influences
 from app.review.editing.remedies import find_remedies
@@ -33,4 +33,4 @@ def get_influence(view: Id, store: AppStore) -> Influences:
     state = submit.load(store, found.group_id)
     seen = next(item for item in state.group.views if state.view_ids[item.key] == view)
     items = influences(seen.station, state.group.pitch, state.policy.calibration)
-    return Influences(items=[InfluenceDocument.of(item) for item in items])
+    return Influences(items=items)

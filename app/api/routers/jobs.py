@@ -11,6 +11,7 @@ from app.api.problem import responses
 from app.api.schemas.job import JobDocument, JobKind, JobPage, JobState
 from app.errors import InputError
 from app.review.datasets.dataset import get_dataset
+from app.store.jobs import Job
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
@@ -40,19 +41,21 @@ def list_jobs(
         limit=limit + 1,
     )
     more = str(jobs[limit - 1].id) if len(jobs) > limit else None
-    return JobPage(items=[JobDocument.of(job) for job in jobs[:limit]], next=more)
+    return JobPage(items=jobs[:limit], next=more)
 
 
-@router.get("/{job}", operation_id="getJob", responses=responses(404))
-def get_job(job: Id, services: AppServices) -> JobDocument:
+@router.get("/{job}", operation_id="getJob", response_model=JobDocument, responses=responses(404))
+def get_job(job: Id, services: AppServices) -> Job:
     """A job as it stands."""
-    return JobDocument.of(services.jobs.get(job))
+    return services.jobs.get(job)
 
 
-@router.delete("/{job}", operation_id="cancelJob", responses=responses(404, 409))
-def cancel_job(job: Id, services: AppServices) -> JobDocument:
+@router.delete(
+    "/{job}", operation_id="cancelJob", response_model=JobDocument, responses=responses(404, 409)
+)
+def cancel_job(job: Id, services: AppServices) -> Job:
     """End a job: one that waits at once, one that runs at its next step; 409 when it is over."""
-    return JobDocument.of(services.jobs.cancel(job))
+    return services.jobs.cancel(job)
 
 
 def parse_cursor(cursor: str | None) -> int | None:

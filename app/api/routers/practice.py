@@ -10,15 +10,26 @@ from app.api.problem import responses
 from app.api.schemas.job import JobDocument
 from app.api.schemas.practice import LessonDocument, PracticeBody, PracticeDocument
 from app.review.editing.submit import load
-from app.review.practice.practice import read_lesson, read_practice, request_practice
+from app.review.practice.practice import (
+    Practice,
+    PracticeLesson,
+    read_lesson,
+    read_practice,
+    request_practice,
+)
 
 router = APIRouter(tags=["practice"])
 
 
-@router.get("/practice", operation_id="getPractice", responses=responses())
-def get_practice(services: AppServices) -> PracticeDocument:
+@router.get(
+    "/practice",
+    operation_id="getPractice",
+    response_model=PracticeDocument,
+    responses=responses(),
+)
+def get_practice(services: AppServices) -> Practice:
     """Every lesson and what has come of it; none until the practice is made."""
-    return PracticeDocument.of(read_practice(services.store, services.settings))
+    return read_practice(services.store, services.settings)
 
 
 @router.post(
@@ -40,7 +51,12 @@ def start_practice(
     return accepted(job, response)
 
 
-@router.get("/groups/{group}/lesson", operation_id="getLesson", responses=responses(404))
-def get_lesson(group: Id, services: AppServices) -> LessonDocument:
+@router.get(
+    "/groups/{group}/lesson",
+    operation_id="getLesson",
+    response_model=LessonDocument,
+    responses=responses(404),
+)
+def get_lesson(group: Id, services: AppServices) -> PracticeLesson:
     """What a practice group asks, and whether it was answered rightly; 404 for other groups."""
-    return LessonDocument.of(read_lesson(services.settings, load(services.store, group)))
+    return read_lesson(services.settings, load(services.store, group))

@@ -30,6 +30,7 @@ from app.review.evaluating import predictions as review
 from app.review.evaluating.accept import accept, accept_box, plan_accept
 from app.review.evaluating.group_predictions import group_predictions
 from app.review.jobs.evaluations import request_accept
+from app.store.predictions import PredictionSet
 from app.store.uploads import upload_path
 
 router = APIRouter(tags=["predictions"])
@@ -43,12 +44,13 @@ LOCATION = {"Location": {"description": "Of the set.", "schema": {"type": "strin
 def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList:
     """The sets of predictions of a dataset, the newest first."""
     found = review.list_predictions(store, dataset)
-    return PredictionSetList(items=[PredictionSetDocument.of(item) for item in found])
+    return PredictionSetList(items=found)
 
 
 @router.post(
     "/datasets/{dataset}/predictions",
     operation_id="addPredictions",
+    response_model=PredictionSetDocument,
     status_code=201,
     responses={
         **responses(404, 409, 413, 415),
@@ -62,7 +64,7 @@ def add_predictions(
     actor: Actor,
     _key: IdempotencyKey,
     response: Response,
-) -> PredictionSetDocument:
+) -> PredictionSet:
     """Read uploaded files into a new set of predictions.
 
     What is wrong is left out and listed with file, record and field; frames that the dataset does
@@ -76,7 +78,7 @@ def add_predictions(
         actor=actor,
     )
     response.headers["Location"] = f"/api/v1/predictions/{found.id}"
-    return PredictionSetDocument.of(found)
+    return found
 
 
 @router.post(
@@ -117,10 +119,15 @@ def accept_predictions(
     )
 
 
-@router.get("/predictions/{predictions}", operation_id="getPredictions", responses=responses(404))
-def get_predictions(predictions: Id, store: AppStore) -> PredictionSetDocument:
+@router.get(
+    "/predictions/{predictions}",
+    operation_id="getPredictions",
+    response_model=PredictionSetDocument,
+    responses=responses(404),
+)
+def get_predictions(predictions: Id, store: AppStore) -> PredictionSet:
     """One set of predictions."""
-    return PredictionSetDocument.of(review.get_predictions(store, predictions))
+    return review.get_predictions(store, predictions)
 
 
 @router.delete(

@@ -8,7 +8,6 @@ from app.api.deps import Actor, AppStore, DatasetPath, Id
 from app.api.problem import responses
 from app.api.schemas.saved_view import (
     NewSavedView,
-    ReviewerDocument,
     ReviewerList,
     SavedViewDocument,
     SavedViewList,
@@ -26,12 +25,13 @@ router = APIRouter(tags=["queue"])
 def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
     """Queries under names, each with the number of groups that match it now."""
     found = saved_views.list_saved_views(store, dataset_id(store, dataset))
-    return SavedViewList(items=[SavedViewDocument.of(item) for item in found])
+    return SavedViewList(items=found)
 
 
 @router.post(
     "/datasets/{dataset}/saved-views",
     operation_id="saveView",
+    response_model=SavedViewDocument,
     status_code=201,
     responses={
         **responses(404, 409, 413, 415),
@@ -43,27 +43,37 @@ def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
 )
 def save_view(
     dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor, response: Response
-) -> SavedViewDocument:
+) -> saved_views.SavedView:
     """Keep a query under a name; 409 when the name is taken."""
     saved = saved_views.save_view(store, dataset_id(store, dataset), view.name, view.q, actor=actor)
     response.headers["Location"] = f"/api/v1/saved-views/{saved.id}"
-    return SavedViewDocument.of(saved)
+    return saved
 
 
-@router.get("/saved-views/{view}", operation_id="getSavedView", responses=responses(404))
-def get_saved_view(view: Id, store: AppStore) -> SavedViewDocument:
+@router.get(
+    "/saved-views/{view}",
+    operation_id="getSavedView",
+    response_model=SavedViewDocument,
+    responses=responses(404),
+)
+def get_saved_view(view: Id, store: AppStore) -> saved_views.SavedView:
     """One saved view."""
-    return SavedViewDocument.of(saved_views.get_view(store, view))
+    return saved_views.get_view(store, view)
 
 
-@router.delete("/saved-views/{view}", operation_id="deleteSavedView", responses=responses(404))
-def delete_saved_view(view: Id, store: AppStore) -> SavedViewDocument:
+@router.delete(
+    "/saved-views/{view}",
+    operation_id="deleteSavedView",
+    response_model=SavedViewDocument,
+    responses=responses(404),
+)
+def delete_saved_view(view: Id, store: AppStore) -> saved_views.SavedView:
     """Forget a saved view; the answer is what it was, so that it can be saved again."""
-    return SavedViewDocument.of(saved_views.delete_view(store, view))
+    return saved_views.delete_view(store, view)
 
 
 @router.get("/datasets/{dataset}/reviewers", operation_id="listReviewers", responses=responses(404))
 def list_reviewers(dataset: DatasetPath, store: AppStore) -> ReviewerList:
     """Who has judged how many groups."""
     found = reviewers.list_reviewers(store, dataset_id(store, dataset))
-    return ReviewerList(items=[ReviewerDocument.of(item) for item in found])
+    return ReviewerList(items=found)

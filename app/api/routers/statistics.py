@@ -8,17 +8,20 @@ from app.api.deps import AppStore, DatasetPath, QueryText
 from app.api.problem import responses
 from app.api.schemas.statistics import StatisticsDocument
 from app.review.datasets.dataset import dataset_id
-from app.review.queue.statistics import statistics
+from app.review.queue.statistics import Statistics, statistics
 
 router = APIRouter(prefix="/datasets/{dataset}/statistics", tags=["datasets"])
 
 
-@router.get("", operation_id="getStatistics", responses=responses(404))
-def get_statistics(
-    dataset: DatasetPath, store: AppStore, query: QueryText = ""
-) -> StatisticsDocument:
+@router.get(
+    "",
+    operation_id="getStatistics",
+    response_model=StatisticsDocument,
+    responses=responses(404),
+)
+def get_statistics(dataset: DatasetPath, store: AppStore, query: QueryText = "") -> Statistics:
     """Distances, parallax, uncertainty, sizes, heights and positions, per match and split.
 
     Every bar carries the query that opens the queue with the groups that it counts.
     """
-    return StatisticsDocument.of(statistics(store, dataset_id(store, dataset), query))
+    return statistics(store, dataset_id(store, dataset), query)

@@ -32,7 +32,7 @@ router = APIRouter(tags=["versions"])
 def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
     """The frozen versions of a dataset, newest first."""
     found = versions.list_versions(store, dataset)
-    return VersionList(items=[VersionDocument.of(item) for item in found])
+    return VersionList(items=found)
 
 
 @router.post(
@@ -60,7 +60,7 @@ def freeze_version(
     """
     if request.dry_run:
         plan = plan_freeze(services.store, dataset, request.value())
-        document = FreezePlanDocument.of(plan)
+        document = FreezePlanDocument.model_validate(plan)
         return Response(document.model_dump_json(), media_type="application/json")
     job = version_jobs.request_freeze(
         services.jobs, services.store, dataset, request.value(), actor=actor
@@ -68,10 +68,15 @@ def freeze_version(
     return accepted(job, response)
 
 
-@router.get("/versions/{version}", operation_id="getVersion", responses=responses(404))
-def get_version(version: Id, store: AppStore) -> VersionDocument:
+@router.get(
+    "/versions/{version}",
+    operation_id="getVersion",
+    response_model=VersionDocument,
+    responses=responses(404),
+)
+def get_version(version: Id, store: AppStore) -> versions.Version:
     """One version."""
-    return VersionDocument.of(versions.get_version(store, version))
+    return versions.get_version(store, version)
 
 
 @router.get(

@@ -8,28 +8,30 @@ from app.api.deps import AppServices, DatasetPath
 from app.api.problem import responses
 from app.api.schemas.yields import WhatIf, YieldDocument
 from app.review.datasets.dataset import dataset_id
-from app.review.yields.funnel import get_yield
+from app.review.yields.funnel import Yield, get_yield
 
 router = APIRouter(prefix="/datasets/{dataset}/yield", tags=["yield"])
 
 
-@router.get("", operation_id="getYield", responses=responses(404))
-def read_yield(dataset: DatasetPath, services: AppServices) -> YieldDocument:
+@router.get("", operation_id="getYield", response_model=YieldDocument, responses=responses(404))
+def read_yield(dataset: DatasetPath, services: AppServices) -> Yield:
     """What the policy lets through: funnel, curves, splits, distances, leakage.
 
     The first call after a start reads all solutions, which takes seconds for ten thousand
     groups; from then on the answer follows every change within milliseconds.
     """
     found = dataset_id(services.store, dataset)
-    return YieldDocument.of(get_yield(services.yields, found))
+    return get_yield(services.yields, found)
 
 
-@router.post("", operation_id="tryPolicy", responses=responses(404, 413, 415))
-def try_policy(dataset: DatasetPath, values: WhatIf, services: AppServices) -> YieldDocument:
+@router.post(
+    "", operation_id="tryPolicy", response_model=YieldDocument, responses=responses(404, 413, 415)
+)
+def try_policy(dataset: DatasetPath, values: WhatIf, services: AppServices) -> Yield:
     """What other thresholds would let through; nothing is saved and nothing solved.
 
     The numbers are those that solving under these thresholds would give. `needs_solving` names
     the fields for which that cannot be known before.
     """
     found = dataset_id(services.store, dataset)
-    return YieldDocument.of(get_yield(services.yields, found, values.values()))
+    return get_yield(services.yields, found, values.values())

@@ -7,10 +7,10 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.api.schemas.document import Document
 from app.api.schemas.group import State
 from app.review.queue.query import MAX_LISTED_LENGTH
-from app.review.verdicts.bulk import Batch, BatchReport, BulkPlan, Refusal
-from app.review.verdicts.bulk_redo import RedoReport
+from app.review.verdicts.bulk import BatchReport, BulkPlan
 from app.soccer.reasons import Reason
 
 
@@ -44,19 +44,14 @@ class BulkVerdict(BaseModel):
     )
 
 
-class RefusalDocument(BaseModel):
+class RefusalDocument(Document):
     """Groups that are left alone: `unsolved`, `needs_note` (they fail a gate), `no_picture`."""
 
     reason: str
     groups: int
 
-    @staticmethod
-    def of(refusal: Refusal) -> RefusalDocument:
-        """The document of a refusal."""
-        return RefusalDocument(**vars(refusal))
 
-
-class SampleDocument(BaseModel):
+class SampleDocument(Document):
     """One of the groups that would change, with the number and label that the queue shows."""
 
     id: int
@@ -65,7 +60,7 @@ class SampleDocument(BaseModel):
     label: str
 
 
-class BulkResult(BaseModel):
+class BulkResult(Document):
     """What a bulk verdict would do (`dry_run=true`), or did."""
 
     dry_run: bool
@@ -86,10 +81,10 @@ class BulkResult(BaseModel):
             dry_run=True,
             matches=plan.matches,
             would_change=plan.would_change,
-            sample=[SampleDocument(**vars(group)) for group in plan.sample],
+            sample=plan.sample,
             batch=None,
             changed=0,
-            refused=[RefusalDocument.of(item) for item in plan.refused],
+            refused=plan.refused,
         )
 
     @staticmethod
@@ -102,17 +97,17 @@ class BulkResult(BaseModel):
             sample=None,
             batch=report.batch,
             changed=report.changed,
-            refused=[RefusalDocument.of(item) for item in report.refused],
+            refused=report.refused,
         )
 
 
-class BatchDocument(BaseModel):
+class BatchDocument(Document):
     """A bulk verdict as it is remembered."""
 
     id: int
     at: datetime
     actor: str
-    q: str
+    q: str = Field(validation_alias="query")
     state: State
     reason: Reason | None
     note: str | None
@@ -122,20 +117,14 @@ class BatchDocument(BaseModel):
     undone_by: str | None
     redone: int | None = Field(description="The batch that gave it again after it was undone.")
 
-    @staticmethod
-    def of(batch: Batch) -> BatchDocument:
-        """The document of a batch."""
-        values = {name: value for name, value in vars(batch).items() if name != "query"}
-        return BatchDocument.model_validate({**values, "q": batch.query})
 
-
-class BatchList(BaseModel):
+class BatchList(Document):
     """Bulk verdicts, the newest first."""
 
     items: list[BatchDocument]
 
 
-class UndoDocument(BaseModel):
+class UndoDocument(Document):
     """What taking a batch back did."""
 
     batch: int
@@ -143,7 +132,7 @@ class UndoDocument(BaseModel):
     kept: int = Field(description="Groups that somebody has judged since.")
 
 
-class RedoDocument(BaseModel):
+class RedoDocument(Document):
     """What giving a batch again did."""
 
     batch: int | None = Field(
@@ -152,9 +141,3 @@ class RedoDocument(BaseModel):
     changed: int = Field(description="Groups that have the verdict again.")
     kept: int = Field(description="Groups that somebody has judged or edited since.")
     refused: list[RefusalDocument]
-
-    @staticmethod
-    def of(report: RedoReport) -> RedoDocument:
-        """The document of what was done."""
-        refused = [RefusalDocument.of(item) for item in report.refused]
-        return RedoDocument(**{**vars(report), "refused": refused})

@@ -5,14 +5,13 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
+from app.api.schemas.document import Document
 from app.api.schemas.policy import PolicyDocument
-from app.review.datasets.dataset import Dataset
-from app.review.queue.progress import Summary
 
 
-class DatasetDocument(BaseModel):
+class DatasetDocument(Document):
     """A dataset, its progress and its policy."""
 
     id: int
@@ -26,20 +25,14 @@ class DatasetDocument(BaseModel):
     policy: PolicyDocument
     created: datetime
 
-    @staticmethod
-    def of(dataset: Dataset) -> DatasetDocument:
-        """The document of a dataset."""
-        values = {**vars(dataset), "policy": PolicyDocument.model_validate(dataset.policy)}
-        return DatasetDocument.model_validate(values)
 
-
-class DatasetList(BaseModel):
+class DatasetList(Document):
     """Every dataset, by name."""
 
     items: list[DatasetDocument]
 
 
-class Progress(BaseModel):
+class Progress(Document):
     """How many groups match, and how far they are."""
 
     groups: int
@@ -51,51 +44,42 @@ class Progress(BaseModel):
     stale: int = Field(description="Changed after their verdict.")
 
 
-class Histogram(BaseModel):
+class Histogram(Document):
     """Counts of one number over the groups that match.
 
     A bin holds what is at least its left edge and below its right one; the first one also what
     is smaller, the last one its right edge.
     """
 
-    low: float = Field(description="Left end of the first bin.")
-    high: float = Field(description="Right end of the last bin.")
-    edges: list[float] = Field(description="One more than there are bins.")
-    open_high: bool = Field(description="The last bin also holds what lies beyond.")
+    low: float = Field(
+        validation_alias=AliasPath("column", "edges", 0), description="Left end of the first bin."
+    )
+    high: float = Field(
+        validation_alias=AliasPath("column", "edges", -1), description="Right end of the last bin."
+    )
+    edges: list[float] = Field(
+        validation_alias=AliasPath("column", "edges"), description="One more than there are bins."
+    )
+    open_high: bool = Field(
+        validation_alias=AliasPath("column", "open_high"),
+        description="The last bin also holds what lies beyond.",
+    )
     log: bool = Field(
+        validation_alias=AliasPath("column", "log"),
         description="The bins are equally wide on a logarithmic scale, but the first: it holds 0 "
-        "and all that is smaller than the second edge."
+        "and all that is smaller than the second edge.",
     )
     counts: list[int]
     unknown: int = Field(description="Groups that have no such number.")
 
 
-class SummaryDocument(BaseModel):
+class SummaryDocument(Document):
     """Counts and histograms over the groups that a query matches."""
 
     progress: Progress
     histograms: dict[str, Histogram] = Field(
         description="By column: jac, error_percent, sigma, parallax, size_ratio."
     )
-
-    @staticmethod
-    def of(summary: Summary) -> SummaryDocument:
-        """The document of a summary."""
-        return SummaryDocument(
-            progress=Progress(**{name: getattr(summary, name) for name in Progress.model_fields}),
-            histograms={
-                name: Histogram(
-                    low=item.column.edges[0],
-                    high=item.column.edges[-1],
-                    edges=list(item.column.edges),
-                    open_high=item.column.open_high,
-                    log=item.column.log,
-                    counts=list(item.counts),
-                    unknown=item.unknown,
-                )
-                for name, item in summary.histograms.items()
-            },
-        )
 
 
 class DatasetDeletion(BaseModel):

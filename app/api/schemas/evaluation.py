@@ -5,20 +5,15 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from app.evaluation.comparison import Difference, FrameDifference
-from app.evaluation.figure import Figure
-from app.evaluation.result import FrameResult
+from app.api.schemas.document import Document
 from app.evaluation.table import Cell, Table
 from app.review.evaluating.evaluation import (
     Comparison,
     EvaluationRequest,
-    FramePage,
-    tables_of,
 )
-from app.store.evaluations import StoredEvaluation
-from app.store.value_codec import to_json
+from app.store.value_codec import from_json
 
 SetId = Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
 
@@ -63,7 +58,7 @@ class EvaluationBody(BaseModel):
         return EvaluationRequest(**self.model_dump())
 
 
-class CellDocument(BaseModel):
+class CellDocument(Document):
     """One number with its 95 % interval, computed from `count` of `of` items."""
 
     value: float | None
@@ -72,13 +67,8 @@ class CellDocument(BaseModel):
     count: int
     of: int
 
-    @staticmethod
-    def maybe(cell: Cell | None) -> CellDocument | None:
-        """The document of a cell that may not be there."""
-        return None if cell is None else CellDocument(**vars(cell))
 
-
-class ColumnDocument(BaseModel):
+class ColumnDocument(Document):
     """What a column holds; `better` is `higher`, `lower` or empty."""
 
     name: str
@@ -87,7 +77,7 @@ class ColumnDocument(BaseModel):
     better: str
 
 
-class FramesLink(BaseModel):
+class FramesLink(Document):
     """The frames behind a number, as parameters of `/evaluations/{id}/frames`."""
 
     field: str
@@ -95,7 +85,7 @@ class FramesLink(BaseModel):
     high: float | None
 
 
-class RowDocument(BaseModel):
+class RowDocument(Document):
     """One line of a table, its cells in the order of the columns."""
 
     name: str
@@ -104,7 +94,7 @@ class RowDocument(BaseModel):
     frames: FramesLink | None
 
 
-class TableDocument(BaseModel):
+class TableDocument(Document):
     """A table; `note` says over what it was computed."""
 
     name: str
@@ -113,13 +103,23 @@ class TableDocument(BaseModel):
     columns: list[ColumnDocument]
     rows: list[RowDocument]
 
-    @staticmethod
-    def of(table: Table) -> TableDocument:
-        """The document of a table."""
-        return TableDocument.model_validate(to_json(table))
+
+_HEADLINE = (
+    ("detection", "all", "ap_50"),
+    ("localization", "oracle", "mae_m"),
+    ("localization", "oracle", "mae_percent"),
+    ("localization", "oracle", "p_2m"),
+)
 
 
-class EvaluationRow(BaseModel):
+def _headline(tables: list[Any]) -> dict[str, Cell | None]:
+    found = {table.name: table for table in (from_json(Table, value) for value in tables)}
+    return {
+        column: found[name].cell(row, column) for name, row, column in _HEADLINE if name in found
+    }
+
+
+class EvaluationRow(Document):
     """A run in a list, with its headline numbers."""
 
     id: int
@@ -127,35 +127,17 @@ class EvaluationRow(BaseModel):
     dataset: str
     created: datetime
     actor: str
-    predictions: int | None
-    careful: int | None
-    version: int | None
+    predictions: int | None = Field(validation_alias="prediction_set_id")
+    careful: int | None = Field(validation_alias="careful_set_id")
+    version: int | None = Field(validation_alias="version_id")
     counts: dict[str, int]
-    headline: dict[str, CellDocument] = Field(
-        description="ap_50, mae_m, mae_percent and p_2m, those that the run has."
+    headline: Annotated[dict[str, CellDocument], BeforeValidator(_headline)] = Field(
+        validation_alias="tables",
+        description="ap_50, mae_m, mae_percent and p_2m, those that the run has.",
     )
 
-    @staticmethod
-    def values(found: StoredEvaluation) -> dict[str, Any]:
-        """What a row and a whole document share."""
-        return {
-            **{
-                name: getattr(found, name) for name in ("id", "name", "dataset", "created", "actor")
-            },
-            "predictions": found.prediction_set_id,
-            "careful": found.careful_set_id,
-            "version": found.version_id,
-            "counts": found.counts,
-            "headline": _headline(tables_of(found)),
-        }
 
-    @staticmethod
-    def of(found: StoredEvaluation) -> EvaluationRow:
-        """The row of a run."""
-        return EvaluationRow.model_validate(EvaluationRow.values(found))
-
-
-class EvaluationList(BaseModel):
+class EvaluationList(Document):
     """The runs of a dataset, the newest first."""
 
     items: list[EvaluationRow]
@@ -171,20 +153,8 @@ class EvaluationDocument(EvaluationRow):
     tables: list[TableDocument]
     figures: list[str] = Field(description="Names for `/evaluations/{id}/figures/{name}.json`.")
 
-    @staticmethod
-    def of(found: StoredEvaluation) -> EvaluationDocument:
-        """The document of a run."""
-        return EvaluationDocument.model_validate(
-            {
-                **EvaluationRow.values(found),
-                "pins": found.pins,
-                "tables": found.tables,
-                "figures": list(found.figures),
-            }
-        )
 
-
-class AxisDocument(BaseModel):
+class AxisDocument(Document):
     """What an axis shows; `low` and `high` fix its ends where they are not null."""
 
     label: str
@@ -193,7 +163,7 @@ class AxisDocument(BaseModel):
     high: float | None
 
 
-class SeriesDocument(BaseModel):
+class SeriesDocument(Document):
     """One curve, or one set of points; `low`, `high` and `count` are empty where there are none."""
 
     name: str
@@ -211,7 +181,7 @@ class SeriesDocument(BaseModel):
     )
 
 
-class MarkDocument(BaseModel):
+class MarkDocument(Document):
     """A dashed line across a panel."""
 
     axis: Literal["x", "y"]
@@ -219,7 +189,7 @@ class MarkDocument(BaseModel):
     label: str
 
 
-class PanelDocument(BaseModel):
+class PanelDocument(Document):
     """One pair of axes with its curves."""
 
     title: str
@@ -230,7 +200,7 @@ class PanelDocument(BaseModel):
     color: AxisDocument | None
 
 
-class FigureDocument(BaseModel):
+class FigureDocument(Document):
     """A figure: panels side by side."""
 
     name: str
@@ -238,13 +208,8 @@ class FigureDocument(BaseModel):
     note: str
     panels: list[PanelDocument]
 
-    @staticmethod
-    def of(figure: Figure) -> FigureDocument:
-        """The document of a figure."""
-        return FigureDocument.model_validate(to_json(figure))
 
-
-class FrameDocument(BaseModel):
+class FrameDocument(Document):
     """One judged frame; null where a number does not exist."""
 
     frame_id: int = Field(description="Id of the view, below 0 where it is gone.")
@@ -271,30 +236,16 @@ class FrameDocument(BaseModel):
     predicted_jac: float | None
     box_iou: float | None
 
-    @staticmethod
-    def of(frame: FrameResult) -> FrameDocument:
-        """The document of a frame."""
-        return FrameDocument.model_construct(**vars(frame))
 
-
-class FrameList(BaseModel):
+class FrameList(Document):
     """Frames behind a number; `next` is the cursor of the page after this one."""
 
     items: list[FrameDocument]
-    next: str | None
+    next: Annotated[str, Field(coerce_numbers_to_str=True)] | None
     total: int
 
-    @staticmethod
-    def of(page: FramePage) -> FrameList:
-        """The document of a page."""
-        return FrameList(
-            items=[FrameDocument.of(frame) for frame in page.items],
-            next=None if page.next is None else str(page.next),
-            total=page.total,
-        )
 
-
-class DifferenceDocument(BaseModel):
+class DifferenceDocument(Document):
     """One number of both runs; `change` is the second minus the first."""
 
     table: str
@@ -305,38 +256,16 @@ class DifferenceDocument(BaseModel):
     second: CellDocument | None
     change: float | None
 
-    @staticmethod
-    def of(found: Difference) -> DifferenceDocument:
-        """The document of a difference."""
-        return DifferenceDocument(
-            table=found.table,
-            row=found.row,
-            column=found.column,
-            label=found.label,
-            first=CellDocument.maybe(found.first),
-            second=CellDocument.maybe(found.second),
-            change=found.change,
-        )
 
-
-class FrameDifferenceDocument(BaseModel):
+class FrameDifferenceDocument(Document):
     """One frame of both runs."""
 
     first: FrameDocument
     second: FrameDocument
     change: float | None
 
-    @staticmethod
-    def of(found: FrameDifference) -> FrameDifferenceDocument:
-        """The document of a frame's difference."""
-        return FrameDifferenceDocument(
-            first=FrameDocument.of(found.first),
-            second=FrameDocument.of(found.second),
-            change=found.change,
-        )
 
-
-class ComparisonDocument(BaseModel):
+class ComparisonDocument(Document):
     """Two runs of one dataset, number by number and frame by frame."""
 
     first: EvaluationRow
@@ -370,30 +299,13 @@ class ComparisonDocument(BaseModel):
         more = offset + len(shown) < len(frames)
         counts = ("field", "shared", "better", "worse", "gained", "lost", "mean_change")
         return ComparisonDocument(
-            first=EvaluationRow.of(found.first),
-            second=EvaluationRow.of(found.second),
+            first=found.first,
+            second=found.second,
             same_truth=found.same_truth,
-            differs=list(found.differs),
-            numbers=[DifferenceDocument.of(item) for item in found.numbers],
+            differs=found.differs,
+            numbers=found.numbers,
             **{name: getattr(found.frames, name) for name in counts},
-            frames=[FrameDifferenceDocument.of(item) for item in shown],
+            frames=shown,
             next=str(offset + len(shown)) if more else None,
             total=len(frames),
         )
-
-
-_HEADLINE = (
-    ("detection", "all", "ap_50"),
-    ("localization", "oracle", "mae_m"),
-    ("localization", "oracle", "mae_percent"),
-    ("localization", "oracle", "p_2m"),
-)
-
-
-def _headline(tables: list[Table]) -> dict[str, dict[str, Any]]:
-    found = {table.name: table for table in tables}
-    return {
-        column: vars(found[name].cell(row, column))
-        for name, row, column in _HEADLINE
-        if name in found
-    }

@@ -6,62 +6,47 @@ from datetime import datetime
 from string import ascii_uppercase
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from app.api.schemas.annotation import Ball, LineDocuments, lines_document
+from app.api.schemas.document import Document
 from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.solution import SolutionDocument
-from app.review.editing.state import GroupState, VerdictState
+from app.review.editing.state import GroupState
 from app.soccer.group import Group, View
 from app.store.neighbours import counts_time
 
 State = Literal["unreviewed", "accepted", "rejected", "deferred"]
 
 
-class DatasetName(BaseModel):
+class DatasetName(Document):
     """The dataset that a group belongs to."""
 
     id: int
     name: str
 
 
-class PitchSize(BaseModel):
+class PitchSize(Document):
     """Length and width of the pitch, metres."""
 
     length: float
     width: float
 
 
-class VerdictDocument(BaseModel):
+class VerdictDocument(Document):
     """What people decided; `stale` when the group changed afterwards."""
 
     state: State
     reason: str | None
     note: str | None
-    by: str | None
+    by: str | None = Field(validation_alias="actor")
     at: datetime | None
     stale: bool
     fixed: bool = Field(description="Mended: edited, accepted as such, and it fails no gate.")
     override: str | None = Field(description="The gate that it was accepted against.")
 
-    @staticmethod
-    def of(verdict: VerdictState) -> VerdictDocument:
-        """The document of a verdict."""
-        return VerdictDocument.model_validate(
-            {
-                "state": verdict.state,
-                "reason": verdict.reason,
-                "note": verdict.note,
-                "by": verdict.actor,
-                "at": verdict.at,
-                "stale": verdict.stale,
-                "fixed": verdict.fixed,
-                "override": verdict.override,
-            }
-        )
 
-
-class StationDocument(BaseModel):
+class StationDocument(Document):
     """The camera station of a view; a shared one is a static camera."""
 
     id: int
@@ -74,14 +59,14 @@ class StationDocument(BaseModel):
     etag: str = Field(description="For If-Match on `/stations/{id}/lines`.")
 
 
-class LeftOutDocument(BaseModel):
+class LeftOutDocument(Document):
     """Why a person left a view out of its group."""
 
     reason: str
     note: str | None
 
 
-class ViewDocument(BaseModel):
+class ViewDocument(Document):
     """One image of the instant, as annotated."""
 
     id: int
@@ -104,7 +89,7 @@ class ViewDocument(BaseModel):
     )
 
 
-class GroupDocument(BaseModel):
+class GroupDocument(Document):
     """A group, complete: what people said and what follows from it."""
 
     id: int
@@ -137,13 +122,13 @@ class GroupDocument(BaseModel):
             label=group.label or group.key,
             match=group.match,
             split=group.split,
-            pitch=PitchSize(length=group.pitch.length, width=group.pitch.width),
+            pitch=PitchSize.model_validate(group.pitch),
             revision=state.revision,
             etag=state.etag,
             can_undo=state.can_undo,
             can_redo=state.can_redo,
-            verdict=VerdictDocument.of(state.verdict),
-            verdicts=[VerdictDocument.of(verdict) for verdict in state.verdicts],
+            verdict=VerdictDocument.model_validate(state.verdict),
+            verdicts=[VerdictDocument.model_validate(verdict) for verdict in state.verdicts],
             policy=PolicyDocument.model_validate(state.policy),
             views=[
                 _view(state, view, index, label)
@@ -151,7 +136,9 @@ class GroupDocument(BaseModel):
                     zip(group.views, view_labels(group), strict=True)
                 )
             ],
-            solution=None if state.solution is None else SolutionDocument.of(state.solution),
+            solution=None
+            if state.solution is None
+            else SolutionDocument.model_validate(state.solution),
         )
 
 
@@ -180,7 +167,7 @@ def image_address(view_id: int) -> str:
 
 
 def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument:
-    view_id = state.view_ids[view.key]
+    view_id, why = state.view_ids[view.key], view.left_out
     return ViewDocument.model_construct(
         id=view_id,
         key=view.key,
@@ -189,7 +176,7 @@ def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument
         width=view.size.width,
         height=view.size.height,
         included=view.included,
-        left_out=_left_out(view),
+        left_out=None if why is None else LeftOutDocument.model_validate(why),
         station=_station(state, view),
         lines=lines_document(view.station.lines),
         balls=[Ball.of(ball, edited=view.key in state.stored.edited_views) for ball in view.balls],
@@ -203,11 +190,6 @@ def _neighbours(group: str, view: View, view_id: int) -> str | None:
     if media is None or not counts_time(media, group, view.station.shared):
         return None
     return f"/api/v1/views/{view_id}/neighbours"
-
-
-def _left_out(view: View) -> LeftOutDocument | None:
-    why = view.left_out
-    return None if why is None else LeftOutDocument(reason=why.reason, note=why.note)
 
 
 def _station(state: GroupState, view: View) -> StationDocument:

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
+from app.api.schemas.document import Document
 from app.datasets.format_names import ImportFormat
-from app.review.importing.folders import FolderListing
 from app.review.jobs.imports import ImportRequest
 
 Camera = Annotated[int, Field(ge=0, le=999)]
@@ -95,7 +95,7 @@ class ImportBody(BaseModel):
         )
 
 
-class FolderEntry(BaseModel):
+class FolderEntry(Document):
     """A folder or a file that an import can name."""
 
     path: str
@@ -103,16 +103,10 @@ class FolderEntry(BaseModel):
     folder: bool
 
 
-class FolderDocument(BaseModel):
+class FolderDocument(Document):
     """What is in a folder that the operator allows; without a path, the folders themselves."""
 
     path: str
     format: str | None = Field(description="What it most likely holds.")
     items: list[FolderEntry]
     more: bool = Field(description="Whether there is more than is listed.")
-
-    @staticmethod
-    def of(listing: FolderListing) -> FolderDocument:
-        """The document of a listing."""
-        items = [FolderEntry.model_validate(vars(item)) for item in listing.items]
-        return FolderDocument.model_validate({**vars(listing), "items": items})

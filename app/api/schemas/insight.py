@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from app.api.schemas.solution import XY, FixDocument
-from app.review.editing.influence import Influence
+from app.api.schemas.document import Document
+from app.api.schemas.solution import XY, FixDocument, Jac
 from app.review.editing.remedies import Remedy
-from app.soccer.solution import GAMMAS_PERCENT
-
-Jac = dict[str, float]
 
 
 class RemedyEdit(FixDocument):
@@ -20,7 +17,7 @@ class RemedyEdit(FixDocument):
     )
 
 
-class RemedyDocument(BaseModel):
+class RemedyDocument(Document):
     """What the solver has tried out: an edit, or where a person should look and draw."""
 
     gate: str = Field(description="The gate that fails now.")
@@ -44,13 +41,13 @@ class RemedyDocument(BaseModel):
         )
 
 
-class Remedies(BaseModel):
+class Remedies(Document):
     """What would make a group pass, the gentlest first; empty when it passes."""
 
     items: list[RemedyDocument]
 
 
-class InfluenceDocument(BaseModel):
+class InfluenceDocument(Document):
     """What the camera would be without one marking."""
 
     marking: str
@@ -63,25 +60,8 @@ class InfluenceDocument(BaseModel):
         description="Distance of its points from a camera that never saw them."
     )
 
-    @staticmethod
-    def of(found: Influence) -> InfluenceDocument:
-        """The document of an influence."""
-        return InfluenceDocument(
-            marking=found.marking,
-            jac=_jac(found.jac),
-            jac_without=_jac(found.jac_without),
-            largest_px=found.largest_px,
-            largest_px_without=found.largest_px_without,
-        )
 
-
-class Influences(BaseModel):
+class Influences(Document):
     """The influence of every annotated marking of a view."""
 
     items: list[InfluenceDocument]
-
-
-def _jac(values: tuple[float, ...] | None) -> Jac | None:
-    if values is None:
-        return None
-    return {f"{gamma:g}": value for gamma, value in zip(GAMMAS_PERCENT, values, strict=True)}

@@ -5,9 +5,9 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from app.store.jobs import Job
+from app.api.schemas.document import Document
 
 JobKind = Literal[
     "solve", "import", "export", "freeze", "verify", "evaluate", "detect", "bulk", "practice"
@@ -15,7 +15,7 @@ JobKind = Literal[
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 
 
-class JobProblem(BaseModel):
+class JobProblem(Document):
     """Why a job failed."""
 
     detail: str
@@ -23,7 +23,7 @@ class JobProblem(BaseModel):
     pointer: str | None
 
 
-class JobDocument(BaseModel):
+class JobDocument(Document):
     """A job as it stands."""
 
     id: int
@@ -41,14 +41,8 @@ class JobDocument(BaseModel):
     ended: datetime | None
     actor: str
 
-    @staticmethod
-    def of(job: Job) -> JobDocument:
-        """The document of a job."""
-        names = JobDocument.model_fields
-        return JobDocument.model_validate({name: getattr(job, name) for name in names})
 
-
-class JobPage(BaseModel):
+class JobPage(Document):
     """Jobs, the newest first; ``next`` is the cursor of the next page."""
 
     items: list[JobDocument]

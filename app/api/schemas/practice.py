@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, Field
+from pydantic import AliasPath, BaseModel, Field
 
-from app.review.practice.practice import Practice, PracticeLesson
+from app.api.schemas.document import Document
 
 LessonState = Literal["open", "mended", "right", "almost", "wrong"]
 
@@ -19,7 +19,7 @@ class PracticeBody(BaseModel):
     )
 
 
-class LessonDocument(BaseModel):
+class LessonDocument(Document):
     """One practice group as a lesson."""
 
     group: int
@@ -30,37 +30,22 @@ class LessonDocument(BaseModel):
     hint: str = Field(description="Where to look, for somebody who is stuck.")
     verdict: str
     state: LessonState = Field(
+        validation_alias=AliasPath("feedback", "state"),
         description="`mended`: edited rightly and not judged yet. Weighed against what the "
-        "generator planted, never against what the solver found."
+        "generator planted, never against what the solver found.",
     )
-    feedback: str | None = Field(description="Whether the answer was right, and why.")
-    best: str | None = Field(description="What would have been best, once the group is judged.")
-
-    @staticmethod
-    def of(lesson: PracticeLesson) -> LessonDocument:
-        """The document of a lesson."""
-        return LessonDocument(
-            group=lesson.group,
-            number=lesson.number,
-            total=lesson.total,
-            title=f"Lesson {lesson.number} of {lesson.total}",
-            question=lesson.question,
-            hint=lesson.hint,
-            verdict=lesson.verdict,
-            state=lesson.feedback.state,
-            feedback=lesson.feedback.sentence,
-            best=lesson.feedback.best,
-        )
+    feedback: str | None = Field(
+        validation_alias=AliasPath("feedback", "sentence"),
+        description="Whether the answer was right, and why.",
+    )
+    best: str | None = Field(
+        validation_alias=AliasPath("feedback", "best"),
+        description="What would have been best, once the group is judged.",
+    )
 
 
-class PracticeDocument(BaseModel):
+class PracticeDocument(Document):
     """The practice dataset; no lessons until it is made."""
 
     dataset: str
     lessons: list[LessonDocument]
-
-    @staticmethod
-    def of(practice: Practice) -> PracticeDocument:
-        """The document of the whole practice."""
-        lessons = [LessonDocument.of(lesson) for lesson in practice.lessons]
-        return PracticeDocument(dataset=practice.dataset, lessons=lessons)

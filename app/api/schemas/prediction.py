@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, model_validator
 
+from app.api.schemas.document import Document
 from app.review.evaluating.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
 from app.review.evaluating.group_predictions import GroupPredictions
 from app.soccer.frames import ImageSize
@@ -89,7 +90,7 @@ class PredictionReport(BaseModel):
     model: str | None = Field(default=None, description="SHA-256 of a detector's model.")
 
 
-class PredictionSetDocument(BaseModel):
+class PredictionSetDocument(Document):
     """A set of predictions."""
 
     id: int
@@ -105,21 +106,14 @@ class PredictionSetDocument(BaseModel):
     unknown: int = Field(description="Frames that the dataset does not have.")
     report: PredictionReport
 
-    @staticmethod
-    def of(found: PredictionSet) -> PredictionSetDocument:
-        """The document of a set."""
-        values = {name: getattr(found, name) for name in PredictionSetDocument.model_fields}
-        report = {k: v for k, v in found.report.items() if k in PredictionReport.model_fields}
-        return PredictionSetDocument.model_validate({**values, "report": report})
 
-
-class PredictionSetList(BaseModel):
+class PredictionSetList(Document):
     """The sets of a dataset, the newest first."""
 
     items: list[PredictionSetDocument]
 
 
-class ViewPrediction(BaseModel):
+class ViewPrediction(Document):
     """A ball that was predicted in a view: no annotation until a person accepts it."""
 
     id: int
@@ -142,7 +136,7 @@ class ViewPrediction(BaseModel):
         )
 
 
-class ViewPredictions(BaseModel):
+class ViewPredictions(Document):
     """What was predicted for a view, the newest set first, the surest box first."""
 
     items: list[ViewPrediction]
@@ -154,17 +148,19 @@ class GroupPrediction(ViewPrediction):
     view: int = Field(description="Id of the view.")
 
 
-class AcceptedPrediction(BaseModel):
+class AcceptedPrediction(Document):
     """Where a ball of the group comes from that a person took over from a prediction."""
 
-    view: int = Field(description="Id of the view.")
+    view: int = Field(validation_alias="view_id", description="Id of the view.")
     name: str = Field(description="Name of the set.")
     score: float | None = Field(description="As predicted; null where the set is gone.")
-    by: str | None = Field(description="Who accepted it; null where it was imported so.")
+    by: str | None = Field(
+        validation_alias="actor", description="Who accepted it; null where it was imported so."
+    )
     at: datetime | None
 
 
-class GroupPredictionsDocument(BaseModel):
+class GroupPredictionsDocument(Document):
     """What was predicted for a group: by view, the newest set first, the surest box first."""
 
     sets: int = Field(description="Sets that the dataset has; 0: no group has predictions.")
@@ -180,18 +176,7 @@ class GroupPredictionsDocument(BaseModel):
                 GroupPrediction(view=box.view_id, **ViewPrediction.of(item, box).model_dump())
                 for item, box in found.boxes
             ],
-            accepted=[
-                AcceptedPrediction.model_validate(
-                    {
-                        "view": ball.view_id,
-                        "name": ball.name,
-                        "score": ball.score,
-                        "by": ball.actor,
-                        "at": ball.at,
-                    }
-                )
-                for ball in found.accepted
-            ],
+            accepted=found.accepted,
         )
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.api.schemas.annotation import BallEdit, LineEdits
+from app.api.schemas.document import Document
 from app.api.schemas.solution import SolutionDocument
 
 
@@ -33,7 +34,7 @@ class PreviewRequest(BaseModel):
     views: Annotated[dict[str, ViewPreview], Field(max_length=64)]
 
 
-class PreviewDocument(BaseModel):
+class PreviewDocument(Document):
     """The solution as it would be."""
 
     solution: SolutionDocument

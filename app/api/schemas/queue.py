@@ -5,8 +5,9 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
+from app.api.schemas.document import Document
 from app.api.schemas.group import State, image_address
 from app.api.schemas.solution import FailingGate, FixDocument
 from app.review.queue.listing import GroupRow as QueueRow
@@ -23,7 +24,7 @@ def thumbnail_address(view_id: int | None) -> str | None:
     return f"{image_address(view_id)}?width={THUMBNAIL_WIDTH}"
 
 
-class GroupRow(BaseModel):
+class GroupRow(Document):
     """One group in a list."""
 
     id: int
@@ -92,7 +93,7 @@ _SAME = tuple(
 )
 
 
-class GroupPage(BaseModel):
+class GroupPage(Document):
     """Groups that match, in order; `next` is the cursor of the page after this one."""
 
     items: list[GroupRow]
@@ -100,14 +101,14 @@ class GroupPage(BaseModel):
     total: int = Field(description="How many match in all.")
 
 
-class GroupIds(BaseModel):
+class GroupIds(Document):
     """Ids of groups that match, in order."""
 
     ids: list[int]
     total: int = Field(description="How many match in all.")
 
 
-class Neighbours(BaseModel):
+class Neighbours(Document):
     """Where a group stands among those that match, and what comes before and after it."""
 
     index: int | None = Field(description="From 0; null when the group does not match.")
@@ -116,7 +117,7 @@ class Neighbours(BaseModel):
     next: list[int]
 
 
-class FindingRow(BaseModel):
+class FindingRow(Document):
     """A finding and where it was found; `group` is the group's key."""
 
     kind: str
@@ -137,7 +138,7 @@ class FindingRow(BaseModel):
         return FindingRow.model_validate({**values, "group_id": group_id})
 
 
-class FindingList(BaseModel):
+class FindingList(Document):
     """Findings of a dataset, by number of the group."""
 
     items: list[FindingRow]
@@ -145,7 +146,7 @@ class FindingList(BaseModel):
     total: int = Field(description="How many groups have findings.")
 
 
-class LogEntryDocument(BaseModel):
+class LogEntryDocument(Document):
     """One entry of a group's history."""
 
     id: int
@@ -164,7 +165,7 @@ class LogEntryDocument(BaseModel):
         return LogEntryDocument.model_validate({**values, "body": entry.body if told else None})
 
 
-class History(BaseModel):
+class History(Document):
     """What people and imports did to a group, oldest first."""
 
     items: list[LogEntryDocument]

@@ -7,8 +7,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.review.queue.saved_views import MAX_NAME, SavedView
-from app.review.verdicts.reviewers import Reviewer
+from app.api.schemas.document import Document
+from app.review.queue.saved_views import MAX_NAME
 
 
 class NewSavedView(BaseModel):
@@ -23,30 +23,24 @@ class NewSavedView(BaseModel):
     q: Annotated[str, Field(max_length=1000)]
 
 
-class SavedViewDocument(BaseModel):
+class SavedViewDocument(Document):
     """A query under a name that everybody on the dataset sees."""
 
     id: int
     name: str
-    q: str
-    by: str
+    q: str = Field(validation_alias="query")
+    by: str = Field(validation_alias="actor")
     created: datetime
     groups: int = Field(description="How many match now.")
 
-    @staticmethod
-    def of(view: SavedView) -> SavedViewDocument:
-        """The document of a saved view."""
-        same = {name: getattr(view, name) for name in ("id", "name", "created", "groups")}
-        return SavedViewDocument.model_validate({**same, "q": view.query, "by": view.actor})
 
-
-class SavedViewList(BaseModel):
+class SavedViewList(Document):
     """Saved views, by name."""
 
     items: list[SavedViewDocument]
 
 
-class ReviewerDocument(BaseModel):
+class ReviewerDocument(Document):
     """One person's verdicts."""
 
     name: str
@@ -56,13 +50,8 @@ class ReviewerDocument(BaseModel):
     today: int = Field(description="Groups judged since midnight UTC.")
     last: datetime = Field(description="Time of the last verdict.")
 
-    @staticmethod
-    def of(reviewer: Reviewer) -> ReviewerDocument:
-        """The document of a reviewer."""
-        return ReviewerDocument.model_validate(vars(reviewer))
 
-
-class ReviewerList(BaseModel):
+class ReviewerList(Document):
     """Everybody who has judged a group, the most active first."""
 
     items: list[ReviewerDocument]

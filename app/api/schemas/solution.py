@@ -2,52 +2,52 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
-from pydantic import BaseModel, Field
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
+from app.api.schemas.document import Document
 from app.datasets.camera_json import camera_to_json
-from app.soccer.camera_sigma import CameraSigma, camera_sigma
-from app.soccer.frames import Box, ImagePoint, height_above_grass
-from app.soccer.solution import (
-    GAMMAS_PERCENT,
-    Ball3D,
-    BallFit,
-    BestBall,
-    Calibration,
-    ExpectedBall,
-    Finding,
-    Gate,
-    MarkingFit,
-    Pair,
-    Solution,
-    Suspect,
-    ViewSolution,
-)
+from app.geometry.camera import Camera
+from app.soccer.camera_sigma import camera_sigma
+from app.soccer.frames import Box
+from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration
+
+DRAWN_DECIMALS = 3
+"""What is only drawn travels to a thousandth of a pixel; what is edited or judged, exactly."""
+
+
+def _drawn(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    return [(round(x, DRAWN_DECIMALS), round(y, DRAWN_DECIMALS)) for x, y in points]
+
+
+def _numbers(box: Any) -> Any:
+    return (box.x, box.y, box.width, box.height) if isinstance(box, Box) else box
+
+
+def _by_gamma(values: Any) -> Any:
+    if not isinstance(values, tuple):
+        return values
+    return {f"{gamma:g}": value for gamma, value in zip(GAMMAS_PERCENT, values, strict=True)}
+
+
+def _camera(camera: Any) -> Any:
+    return camera_to_json(camera) if isinstance(camera, Camera) else camera
+
 
 Measured = float | None
 """A number that may have no end (the sigma of parallel rays): it travels as null."""
 XY = tuple[float, float]
 XYZ = tuple[float, float, float]
-XYWH = tuple[float, float, float, float]
-DRAWN_DECIMALS = 3
-"""What is only drawn travels to a thousandth of a pixel; what is edited or judged, exactly."""
+XYWH = Annotated[tuple[float, float, float, float], BeforeValidator(_numbers)]
+Drawn = Annotated[list[XY], BeforeValidator(_drawn)]
+Jac = Annotated[dict[str, float], BeforeValidator(_by_gamma)]
+"""By gamma in per cent of the diagonal."""
 
 
-def _drawn(points: tuple[ImagePoint, ...]) -> list[XY]:
-    return [(round(x, DRAWN_DECIMALS), round(y, DRAWN_DECIMALS)) for x, y in points]
-
-
-def _xywh(box: Box | None) -> XYWH | None:
-    return None if box is None else (box.x, box.y, box.width, box.height)
-
-
-def _xy(point: ImagePoint | None) -> XY | None:
-    return None if point is None else (point.x, point.y)
-
-
-class CameraDocument(BaseModel):
+class CameraDocument(Document):
     """SoccerNet's camera JSON; metres, degrees, pixels of the annotated size."""
 
     pan_degrees: float
@@ -64,7 +64,7 @@ class CameraDocument(BaseModel):
     skew: float = 0.0
 
 
-class MarkingDocument(BaseModel):
+class MarkingDocument(Document):
     """Where the camera puts a marking, and how far its annotated points are off."""
 
     marking: str
@@ -72,24 +72,11 @@ class MarkingDocument(BaseModel):
     used: bool
     largest_px: float | None
     distances_px: list[Measured]
-    nearest: list[XY]
-    polyline: list[XY]
-
-    @staticmethod
-    def of(fit: MarkingFit) -> MarkingDocument:
-        """The document of a fit."""
-        return MarkingDocument.model_construct(
-            marking=fit.marking,
-            outcome=fit.outcome,
-            used=fit.used,
-            largest_px=fit.largest_px,
-            distances_px=list(fit.distances_px),
-            nearest=_drawn(fit.nearest),
-            polyline=_drawn(fit.polyline),
-        )
+    nearest: Drawn
+    polyline: Drawn
 
 
-class SuspectDocument(BaseModel):
+class SuspectDocument(Document):
     """A marking whose label looks wrong, and what would fit."""
 
     marking: str
@@ -98,13 +85,8 @@ class SuspectDocument(BaseModel):
     error_px: Measured
     suggested_error_px: Measured
 
-    @staticmethod
-    def of(suspect: Suspect) -> SuspectDocument:
-        """The document of a suspect."""
-        return SuspectDocument.model_construct(**vars(suspect))
 
-
-class CameraSigmaDocument(BaseModel):
+class CameraSigmaDocument(Document):
     """One standard deviation of each number of a camera."""
 
     pan_degrees: float
@@ -114,22 +96,17 @@ class CameraSigmaDocument(BaseModel):
     focal_px: float
     k1: float
 
-    @staticmethod
-    def of(sigma: CameraSigma) -> CameraSigmaDocument:
-        """The document of a camera's standard deviations."""
-        return CameraSigmaDocument.model_construct(**vars(sigma))
 
-
-class CalibrationDocument(BaseModel):
+class CalibrationDocument(Document):
     """The camera of a view and how well it is known."""
 
     source: str = Field(description="`given` or `lines`.")
-    camera: CameraDocument | None
+    camera: Annotated[CameraDocument, BeforeValidator(_camera)] | None
     sigma: CameraSigmaDocument | None = Field(
         description="How well the lines determine the camera; null for a given one."
     )
     reason: str | None = Field(description="Why there is no camera.")
-    jac: dict[str, float] | None = Field(
+    jac: Jac | None = Field(
         description="JaC at 0.5, 1 and 2 % of the diagonal.", examples=[{"0.5": 0.94, "1": 1.0}]
     )
     error_px: float | None
@@ -137,32 +114,15 @@ class CalibrationDocument(BaseModel):
     markings: list[MarkingDocument]
     suspects: list[SuspectDocument]
 
-    @staticmethod
-    def of(calibration: Calibration) -> CalibrationDocument:
-        """The document of a calibration."""
-        camera = calibration.camera
-        jac = calibration.jac
-        sigma = camera_sigma(calibration)
-        return CalibrationDocument.model_construct(
-            source=calibration.source,
-            camera=None if camera is None else _camera(camera_to_json(camera)),
-            sigma=None if sigma is None else CameraSigmaDocument.of(sigma),
-            reason=calibration.reason,
-            jac=None
-            if jac is None
-            else {f"{gamma:g}": value for gamma, value in zip(GAMMAS_PERCENT, jac, strict=True)},
-            error_px=calibration.error_px,
-            unobservable=list(calibration.unobservable),
-            markings=[MarkingDocument.of(fit) for fit in calibration.markings],
-            suspects=[SuspectDocument.of(suspect) for suspect in calibration.suspects],
-        )
+    @model_validator(mode="before")
+    @classmethod
+    def _with_sigma(cls, value: Any) -> Any:
+        if isinstance(value, Calibration):
+            return {**vars(value), "sigma": camera_sigma(value)}
+        return value
 
 
-def _camera(values: dict[str, Any]) -> CameraDocument:
-    return CameraDocument.model_validate(values)
-
-
-class BallFitDocument(BaseModel):
+class BallFitDocument(Document):
     """The 3D ball seen again in one view."""
 
     reprojected: XY | None
@@ -180,51 +140,16 @@ class BallFitDocument(BaseModel):
         description="Metres of depth of the monocular ball for a pixel of diameter."
     )
 
-    @staticmethod
-    def of(fit: BallFit, *, included: bool) -> BallFitDocument:
-        """The document of a fit; a view outside every valid pair has its errors alone."""
-        if not included:
-            fit = replace(
-                fit,
-                optimized_diameter_px=None,
-                optimized_box=None,
-                exact_box=None,
-                size_ratio=None,
-            )
-        return BallFitDocument.model_construct(
-            reprojected=_xy(fit.reprojected),
-            error_px=fit.error_px,
-            error_percent=fit.error_percent,
-            optimized_diameter_px=fit.optimized_diameter_px,
-            optimized_box=_xywh(fit.optimized_box),
-            optimized_error_m=fit.optimized_error_m,
-            exact_box=_xywh(fit.exact_box),
-            size_ratio=fit.size_ratio,
-            depth_m=fit.depth_m,
-            monocular=fit.monocular,
-            monocular_error_m=fit.monocular_error_m,
-            depth_per_px_m=fit.depth_per_px_m,
-        )
 
-
-class ExpectedBallDocument(BaseModel):
+class ExpectedBallDocument(Document):
     """Where a view should show the 3D ball, whether or not anybody annotated it there."""
 
     place: XY
     covariance: list[Measured] = Field(description="2 x 2, row by row, square pixels.")
     box: XYWH | None = Field(description="Tight box of the ball's outline.")
 
-    @staticmethod
-    def of(ball: ExpectedBall) -> ExpectedBallDocument:
-        """The document of an expected ball."""
-        return ExpectedBallDocument.model_construct(
-            place=(ball.place.x, ball.place.y),
-            covariance=list(ball.covariance),
-            box=_xywh(ball.box),
-        )
 
-
-class ViewSolutionDocument(BaseModel):
+class ViewSolutionDocument(Document):
     """What was computed for one view."""
 
     view: str
@@ -234,22 +159,18 @@ class ViewSolutionDocument(BaseModel):
     ball: BallFitDocument | None
     expected: ExpectedBallDocument | None
 
-    @staticmethod
-    def of(view: ViewSolution) -> ViewSolutionDocument:
-        """The document of a view's solution."""
-        return ViewSolutionDocument.model_construct(
-            view=view.view,
-            included=view.included,
-            failed=view.failed,
-            calibration=CalibrationDocument.of(view.calibration),
-            ball=None
-            if view.ball is None
-            else BallFitDocument.of(view.ball, included=view.included),
-            expected=None if view.expected is None else ExpectedBallDocument.of(view.expected),
+    @field_validator("ball", mode="before")
+    @classmethod
+    def _errors_alone(cls, fit: Any, info: ValidationInfo) -> Any:
+        """What a view outside every valid pair says of the ball: its errors, and no size."""
+        if not isinstance(fit, BallFit) or info.data["included"]:
+            return fit
+        return replace(
+            fit, optimized_diameter_px=None, optimized_box=None, exact_box=None, size_ratio=None
         )
 
 
-class PairDocument(BaseModel):
+class PairDocument(Document):
     """The ball triangulated from two views; pitch frame, metres, z down."""
 
     a: str
@@ -261,13 +182,8 @@ class PairDocument(BaseModel):
     valid: bool
     failed: str | None
 
-    @staticmethod
-    def of(pair: Pair) -> PairDocument:
-        """The document of a pair."""
-        return PairDocument.model_construct(**vars(pair))
 
-
-class Ball3DDocument(BaseModel):
+class Ball3DDocument(Document):
     """The triangulated ball; pitch frame, metres, z down."""
 
     point: XYZ
@@ -277,20 +193,8 @@ class Ball3DDocument(BaseModel):
     parallax_degrees: Measured
     views: list[str]
 
-    @staticmethod
-    def of(ball: Ball3D) -> Ball3DDocument:
-        """The document of a 3D ball."""
-        return Ball3DDocument.model_construct(
-            point=ball.point,
-            height_m=height_above_grass(ball.point[2]),
-            sigma_m=ball.sigma_m,
-            covariance=list(ball.covariance),
-            parallax_degrees=ball.parallax_degrees,
-            views=list(ball.views),
-        )
 
-
-class BestBallDocument(BaseModel):
+class BestBallDocument(Document):
     """The maximum-likelihood ball over all views; pitch frame, metres, z down."""
 
     point: XYZ
@@ -299,25 +203,12 @@ class BestBallDocument(BaseModel):
     covariance: list[Measured] = Field(description="3 x 3, row by row, square metres.")
     views: list[str]
     contradicting: list[str] = Field(description="Views left out because they contradict.")
-    influence_m: dict[str, float] = Field(
+    influence_m: Annotated[dict[str, float], BeforeValidator(dict)] = Field(
         description="How far the point moves without that view; empty with two views."
     )
 
-    @staticmethod
-    def of(ball: BestBall) -> BestBallDocument:
-        """The document of a best ball."""
-        return BestBallDocument.model_construct(
-            point=ball.point,
-            height_m=height_above_grass(ball.point[2]),
-            sigma_m=ball.sigma_m,
-            covariance=list(ball.covariance),
-            views=list(ball.views),
-            contradicting=list(ball.contradicting),
-            influence_m=dict(ball.influence_m),
-        )
 
-
-class GateDocument(BaseModel):
+class GateDocument(Document):
     """One gate as judged for the group."""
 
     name: str
@@ -333,21 +224,16 @@ class GateDocument(BaseModel):
     sentence: str
     view: str | None
 
-    @staticmethod
-    def of(gate: Gate) -> GateDocument:
-        """The document of a gate."""
-        return GateDocument.model_construct(**vars(gate))
 
-
-class FailingGate(BaseModel):
+class FailingGate(Document):
     """The gate to name to a person."""
 
-    gate: str
+    gate: str = Field(validation_alias="name")
     view: str | None
     sentence: str
 
 
-class FixDocument(BaseModel):
+class FixDocument(Document):
     """An edit that a finding proposes."""
 
     action: str
@@ -357,7 +243,7 @@ class FixDocument(BaseModel):
     index: int | None
 
 
-class FindingDocument(BaseModel):
+class FindingDocument(Document):
     """Something that a person should look at."""
 
     kind: str
@@ -370,18 +256,8 @@ class FindingDocument(BaseModel):
     confidence: float | None
     fix: FixDocument | None
 
-    @staticmethod
-    def of(finding: Finding) -> FindingDocument:
-        """The document of a finding."""
-        fix = finding.fix
-        values = {
-            **vars(finding),
-            "fix": None if fix is None else FixDocument.model_construct(**vars(fix)),
-        }
-        return FindingDocument.model_construct(**values)
 
-
-class SolutionDocument(BaseModel):
+class SolutionDocument(Document):
     """Everything computed for one group under one policy."""
 
     solver_version: str
@@ -394,28 +270,3 @@ class SolutionDocument(BaseModel):
     ball: Ball3DDocument | None = Field(description="Mean of the valid pairs; exported.")
     best_ball: BestBallDocument | None
     findings: list[FindingDocument]
-
-    @staticmethod
-    def of(solution: Solution) -> SolutionDocument:
-        """The document of a solution."""
-        return SolutionDocument.model_construct(
-            solver_version=solution.solver_version,
-            policy_hash=solution.policy_hash,
-            passes=solution.passes,
-            first_failing=failing_gate(solution.first_failing),
-            gates=[GateDocument.of(gate) for gate in solution.gates],
-            views=[ViewSolutionDocument.of(view) for view in solution.views],
-            pairs=[PairDocument.of(pair) for pair in solution.pairs],
-            ball=None if solution.ball is None else Ball3DDocument.of(solution.ball),
-            best_ball=None
-            if solution.best_ball is None
-            else BestBallDocument.of(solution.best_ball),
-            findings=[FindingDocument.of(finding) for finding in solution.findings],
-        )
-
-
-def failing_gate(gate: Gate | None) -> FailingGate | None:
-    """The short form of a gate that failed."""
-    if gate is None:
-        return None
-    return FailingGate.model_construct(gate=gate.name, view=gate.view, sentence=gate.sentence)

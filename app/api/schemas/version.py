@@ -5,12 +5,20 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictInt,
+    model_validator,
+)
 
+from app.api.schemas.document import Document
 from app.api.schemas.policy import PolicyDocument
 from app.review.versions.diff import VersionDiff
-from app.review.versions.freeze import MAX_LICENCE, MAX_NOTE, FreezePlan, FreezeRequest
-from app.review.versions.version import Version
+from app.review.versions.freeze import MAX_LICENCE, MAX_NOTE, FreezeRequest
 from app.soccer.split import TEST_CAMERAS, Split
 from app.store.verifications import Verification
 
@@ -66,20 +74,15 @@ class VersionRequest(BaseModel):
         return FreezeRequest(self.name, self.note, self.licence, self.split.value(), self.groups)
 
 
-class FreezePlanDocument(BaseModel):
+class FreezePlanDocument(Document):
     """What a freeze would do."""
 
     groups: int
     left_out: dict[str, int] = Field(description="Why the other groups do not enter.")
     unsolved: int = Field(description="Of those, how many have to be solved first.")
 
-    @staticmethod
-    def of(plan: FreezePlan) -> FreezePlanDocument:
-        """The document of a plan."""
-        return FreezePlanDocument.model_validate(vars(plan))
 
-
-class FrozenDifferenceDocument(BaseModel):
+class FrozenDifferenceDocument(Document):
     """Something that did not come out as it was frozen; `group` null: the version itself."""
 
     group: str | None
@@ -88,7 +91,7 @@ class FrozenDifferenceDocument(BaseModel):
     now: Any
 
 
-class VerificationDocument(BaseModel):
+class VerificationDocument(Document):
     """What came of computing a version once more, the last time that somebody asked for it."""
 
     at: datetime
@@ -102,29 +105,28 @@ class VerificationDocument(BaseModel):
     different: int | None = Field(description="Values that did not.")
     differences: list[FrozenDifferenceDocument] = Field(description="The first of them.")
 
-    @staticmethod
-    def of(found: Verification) -> VerificationDocument:
-        """The document of a verification."""
+    @model_validator(mode="before")
+    @classmethod
+    def _with_report(cls, found: Any) -> Any:
+        if not isinstance(found, Verification):
+            return found
         report = found.report or {}
-        sentence = f"The version could not be verified: {found.problem}."
-        return VerificationDocument(
-            at=datetime.fromisoformat(found.at),
-            actor=found.actor,
-            solver_version=found.solver_version,
-            ok=bool(report.get("ok")),
-            problem=found.problem,
-            sentence=report.get("sentence", sentence),
-            groups=report.get("groups"),
-            equal=report.get("equal"),
-            different=report.get("different"),
-            differences=[
-                FrozenDifferenceDocument.model_validate(item)
-                for item in report.get("differences", ())[:SHOWN_DIFFERENCES]
-            ],
-        )
+        return {
+            **vars(found),
+            "ok": bool(report.get("ok")),
+            "sentence": report.get(
+                "sentence", f"The version could not be verified: {found.problem}."
+            ),
+            **{name: report.get(name) for name in ("groups", "equal", "different")},
+            "differences": report.get("differences", ())[:SHOWN_DIFFERENCES],
+        }
 
 
-class VersionDocument(BaseModel):
+def _split_values(split: Any) -> Any:
+    return split.values() if isinstance(split, Split) else split
+
+
+class VersionDocument(Document):
     """A frozen version."""
 
     id: int
@@ -142,7 +144,7 @@ class VersionDocument(BaseModel):
     counts: dict[str, Any] = Field(
         description="Groups, views, balls, overrides; by split; why groups are not in it."
     )
-    split: dict[str, Any]
+    split: Annotated[dict[str, Any], BeforeValidator(_split_values)]
     policy: PolicyDocument
     solver_version: str
     software_version: str
@@ -151,19 +153,8 @@ class VersionDocument(BaseModel):
         description="What came of verifying it the last time; null: nobody has."
     )
 
-    @staticmethod
-    def of(version: Version) -> VersionDocument:
-        """The document of a version."""
-        values = {name: getattr(version, name) for name in VersionDocument.model_fields}
-        changed = {
-            "split": version.split.values(),
-            "policy": PolicyDocument.model_validate(version.policy),
-            "verified": version.verified and VerificationDocument.of(version.verified),
-        }
-        return VersionDocument.model_validate({**values, **changed})
 
-
-class VersionList(BaseModel):
+class VersionList(Document):
     """The versions of a dataset, newest first."""
 
     items: list[VersionDocument]

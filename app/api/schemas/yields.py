@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import BeforeValidator, ConfigDict, Field, create_model
 
+from app.api.schemas.document import Document
 from app.api.schemas.policy import PolicyDocument
-from app.review.yields.funnel import JAC_STEPS, UNSOLVED, Yield
+from app.review.yields.funnel import UNSOLVED
 from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy, thresholds_of
 
 Number = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -67,16 +69,16 @@ OPTIONAL = frozenset(item.name for item in THRESHOLDS if item.optional)
 """Gates that a policy need not ask for."""
 
 
-class FunnelStep(BaseModel):
+class FunnelStep(Document):
     """A gate: how many groups are left after it, and for how many it is the first that fails."""
 
     gate: str
-    label: str
+    label: Annotated[str, BeforeValidator(LABELS.__getitem__)] = Field(validation_alias="gate")
     left: int
     dropped: int
 
 
-class CurveDocument(BaseModel):
+class CurveDocument(Document):
     """Groups with the ball in two or more views that qualify, against the JaC threshold."""
 
     gamma_percent: float
@@ -84,50 +86,55 @@ class CurveDocument(BaseModel):
     groups: list[int]
 
 
-class SplitYield(BaseModel):
+class SplitYield(Document):
     """Groups of one split."""
 
-    split: str
+    split: str = Field(validation_alias="name")
     groups: int
     passing: int
 
 
-class DistanceYield(BaseModel):
+class DistanceYield(Document):
     """Groups by distance of the ball from the camera of the first view that it comes from."""
 
     model_config = ConfigDict(serialize_by_alias=True)
 
     low: float | None = Field(
-        alias="from", description="Metres; null, as `to` is, for groups without a ball."
+        serialization_alias="from",
+        description="Metres; null, as `to` is, for groups without a ball.",
     )
-    high: float | None = Field(alias="to", description="null: without an end.")
+    high: float | None = Field(serialization_alias="to", description="null: without an end.")
     groups: int
     passing: int
 
 
-class FindingYield(BaseModel):
+class FindingYield(Document):
     """Groups with a finding that follows from a threshold, though it is no gate."""
 
-    kind: str
+    kind: str = Field(validation_alias="name")
     groups: int
     passing: int
 
 
-class SplitCount(BaseModel):
+class SplitCount(Document):
     """Groups of a match in one split."""
 
     split: str
     groups: int
 
 
-class Leakage(BaseModel):
+def _split_counts(splits: Iterable[tuple[str, int]]) -> list[SplitCount]:
+    return [SplitCount(split=name, groups=groups) for name, groups in splits]
+
+
+class Leakage(Document):
     """A match that lies in several splits."""
 
     match: str
-    splits: list[SplitCount]
+    splits: Annotated[list[SplitCount], BeforeValidator(_split_counts)]
 
 
-class YieldDocument(BaseModel):
+class YieldDocument(Document):
     """What a policy lets through, gate by gate."""
 
     policy: PolicyDocument = Field(description="The policy that is judged by here.")
@@ -150,48 +157,3 @@ class YieldDocument(BaseModel):
     needs_solving: list[str] = Field(
         description="Fields that were asked for and whose effect only solving again can tell."
     )
-
-    @staticmethod
-    def of(found: Yield) -> YieldDocument:
-        """The document of a yield."""
-        same = {name: getattr(found, name) for name in _SAME}
-        return YieldDocument(
-            **same,
-            policy=PolicyDocument.model_validate(found.policy),
-            funnel=[FunnelStep(label=LABELS[step.gate], **vars(step)) for step in found.funnel],
-            curves=[
-                CurveDocument(
-                    gamma_percent=curve.gamma_percent,
-                    thresholds=list(JAC_STEPS),
-                    groups=list(curve.groups),
-                )
-                for curve in found.curves
-            ],
-            splits=[
-                SplitYield(split=part.name, groups=part.groups, passing=part.passing)
-                for part in found.splits
-            ],
-            distances=[
-                DistanceYield(
-                    **{"from": part.low, "to": part.high},
-                    groups=part.groups,
-                    passing=part.passing,
-                )
-                for part in found.distances
-            ],
-            findings=[
-                FindingYield(kind=part.name, groups=part.groups, passing=part.passing)
-                for part in found.findings
-            ],
-            leakage=[
-                Leakage(
-                    match=leak.match,
-                    splits=[SplitCount(split=name, groups=count) for name, count in leak.splits],
-                )
-                for leak in found.leakage
-            ],
-            needs_solving=list(found.needs_solving),
-        )
-
-
-_SAME = ("groups", "passing", "unsolved", "given_not_measured", "gained", "lost")

@@ -54,6 +54,11 @@ class PracticeLesson:
     verdict: str
     feedback: Feedback
 
+    @property
+    def title(self) -> str:
+        """What it is called, for people."""
+        return f"Lesson {self.number} of {self.total}"
+
 
 @dataclass(frozen=True)
 class Practice:

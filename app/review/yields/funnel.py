@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -43,6 +43,7 @@ class Curve:
 
     gamma_percent: float
     groups: tuple[int, ...]
+    thresholds: ClassVar = JAC_STEPS
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ def solution(group: Group) -> Solution:
 
 class TestSolutionDocument:
     def test_what_travels_is_what_was_computed(self, solution: Solution) -> None:
-        document = json.loads(SolutionDocument.of(solution).model_dump_json())
+        document = json.loads(SolutionDocument.model_validate(solution).model_dump_json())
         assert document["passes"] is True
         assert document["first_failing"] is None
         assert document["ball"]["point"] == list(solution.ball.point)
@@ -31,7 +31,7 @@ class TestSolutionDocument:
         assert document["pairs"][0]["errors_px"] == list(solution.pairs[0].errors_px)
 
     def test_jac_is_named_by_its_threshold(self, solution: Solution) -> None:
-        view = SolutionDocument.of(solution).views[0]
+        view = SolutionDocument.model_validate(solution).views[0]
         assert list(view.calibration.jac) == ["0.5", "1", "2"]
 
     def test_a_camera_says_how_well_it_is_known_where_that_is_known(
@@ -41,7 +41,7 @@ class TestSolutionDocument:
         spread = tuple((np.eye(8) * 1e-4).ravel().tolist())
         known = replace(first, calibration=replace(first.calibration, covariance=spread))
         open_ = replace(first, calibration=replace(first.calibration, covariance=None))
-        documents = SolutionDocument.of(replace(solution, views=(known, open_))).views
+        documents = SolutionDocument.model_validate(replace(solution, views=(known, open_))).views
         sigma = documents[0].calibration.sigma
         assert sigma is not None
         assert sigma.position_meters == pytest.approx((0.01, 0.01, 0.01))
@@ -49,12 +49,12 @@ class TestSolutionDocument:
         assert documents[1].calibration.sigma is None
 
     def test_the_document_fits_its_own_schema(self, solution: Solution) -> None:
-        text = SolutionDocument.of(solution).model_dump_json()
+        text = SolutionDocument.model_validate(solution).model_dump_json()
         again = SolutionDocument.model_validate_json(text)
         assert again.model_dump_json() == text
 
     def test_a_number_that_is_not_finite_travels_as_null(self, solution: Solution) -> None:
         endless = replace(solution, ball=replace(solution.ball, sigma_m=float("inf")))
-        text = SolutionDocument.of(endless).model_dump_json()
+        text = SolutionDocument.model_validate(endless).model_dump_json()
         assert json.loads(text)["ball"]["sigma_m"] is None
         assert SolutionDocument.model_validate_json(text).ball.sigma_m is None

@@ -1,0 +1,49 @@
+"""Documents are read off the values that they show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import pytest
+from pydantic import ValidationError
+
+from app.api.schemas.evaluation import FrameList
+from app.api.schemas.policy import PolicyDocument
+from app.api.schemas.solution import FailingGate
+from app.soccer.policy import PAPER
+from app.soccer.solution import Gate
+
+GATE = Gate("jac", False, 0.5, 0.75, -0.33, "too little fits", "7.png")
+
+
+class TestDocument:
+    def test_a_field_is_the_attribute_of_its_name_or_of_its_alias(self) -> None:
+        document = FailingGate.model_validate(GATE)
+        assert document.model_dump() == {
+            "gate": "jac",
+            "view": "7.png",
+            "sentence": "too little fits",
+        }
+
+    def test_can_be_written_out_by_the_names_of_its_fields(self) -> None:
+        written = FailingGate(gate="jac", view="7.png", sentence="too little fits")
+        assert written == FailingGate.model_validate(GATE)
+
+    def test_a_property_of_the_value_is_a_field_like_any_other(self) -> None:
+        strict = replace(PAPER, tau_percent=0.5)
+        assert PolicyDocument.model_validate(strict).hash == strict.hash != PAPER.hash
+
+    def test_a_value_that_lacks_a_field_is_refused(self) -> None:
+        with pytest.raises(ValidationError, match="sentence"):
+            FailingGate.model_validate(Nameless())
+
+    def test_a_page_names_the_next_one_by_text(self) -> None:
+        assert FrameList(items=[], next=50, total=51).next == "50"
+
+
+@dataclass(frozen=True)
+class Nameless:
+    """A gate without its sentence."""
+
+    name: str = "jac"
+    view: str = "7.png"
