@@ -10,6 +10,7 @@ from sqlalchemy import ColumnElement, func, select
 
 from app.review.datasets.dataset import get_dataset
 from app.review.editing.state import GroupState, read_states
+from app.soccer.group import Group
 from app.soccer.solution import Finding
 from app.store.models import QueueModel
 from app.store.session import Store
@@ -23,14 +24,14 @@ class GroupFindings:
 
     group_id: int
     number: int
-    group: str
+    group: Group
     findings: tuple[Finding, ...]
 
     @property
     def values(self) -> list[dict[str, Any]]:
         """The findings as plain values, each with the key of the group."""
         return [
-            {"kind": finding.kind, "group": self.group, **asdict(finding)}
+            {"kind": finding.kind, "group": self.group.key, **asdict(finding)}
             for finding in self.findings
         ]
 
@@ -78,4 +79,4 @@ def _where(dataset_id: int, kind: str | None) -> list[ColumnElement[bool]]:
 def _group_findings(state: GroupState, kind: str | None) -> GroupFindings:
     found = state.solution.findings if state.solution is not None else ()
     chosen = tuple(item for item in found if kind is None or item.kind == kind)
-    return GroupFindings(state.id, state.number, state.key, chosen)
+    return GroupFindings(state.id, state.number, state.group, chosen)

@@ -158,6 +158,13 @@
  */
 
 /**
+ * @typedef {{edit: 'set_lines', view: string, lines: {[marking: string]: PairJson[] | null}}
+ *   | {edit: 'set_balls', view: string, balls: BallJson[]}
+ *   | {edit: 'include_view', view: string, included: boolean}} EditJson   as the history writes edits
+ */
+/** @typedef {{label: string, edit: EditJson}} OfferJson   label: of its button */
+
+/**
  * @typedef {object} FindingJson
  * @property {string} kind
  * @property {string} sentence
@@ -168,6 +175,7 @@
  * @property {number | null} threshold
  * @property {number | null} confidence
  * @property {FixJson | null} fix
+ * @property {OfferJson[]} offers edits that carry the fix out
  */
 
 /**

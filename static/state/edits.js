@@ -3,7 +3,7 @@
 
 import { leftOutText } from './reasons.js';
 
-/** @import {BallJson, FixJson, GroupDocument, LeftOutJson, PointJson, ViewJson} from '../api/types.js' */
+/** @import {BallJson, EditJson, GroupDocument, LeftOutJson, PointJson, ViewJson} from '../api/types.js' */
 
 /** @typedef {{kind: 'lines', view: string, lines: Record<string, PointJson[] | null>}} LinesEdit */
 /** @typedef {{kind: 'ball', view: string, ball: BallJson | null, prediction?: {id: number, replace: boolean}}} BallEdit   prediction: that this ball is accepted from */
@@ -155,40 +155,13 @@ export function twinMarking(marking) {
 	return parts.map((word) => SIDES[word] ?? word).join(' ');
 }
 
-/**
- * The edit that carries out what a finding proposes.
- *
- * @param {GroupDocument} group @param {FixJson} fix
- * @returns {Edit | null} null when only a person can do it
- */
-export function editOfFix(group, fix) {
-	const view = group.views.find((candidate) => candidate.key === fix.view);
-	if (!view) return null;
-	if (fix.action === 'exclude_view' || fix.action === 'include_view') {
-		return { kind: 'include', view: view.key, included: fix.action === 'include_view' };
-	}
-	if (fix.action === 'swap_sides') return swapSides(view);
-	const points = fix.marking ? view.lines[fix.marking] : undefined;
-	if (fix.action === 'pick_ball' && fix.index !== null) return pickBall(view, fix.index);
-	if (!fix.marking || !points) return null;
-	if (fix.action === 'move_point' && fix.index !== null && fix.point) {
-		return movePoint(view, fix.marking, fix.index, { x: fix.point[0], y: fix.point[1] });
-	}
-	if (fix.action === 'drop_marking') {
-		return { kind: 'lines', view: view.key, lines: { [fix.marking]: null } };
-	}
-	if (fix.action === 'drop_point' && fix.index !== null) {
-		return movePoint(view, fix.marking, fix.index, null);
-	}
-	if (fix.action !== 'relabel' || !fix.to) return null;
-	const merged = [...(view.lines[fix.to] ?? []), ...points];
-	return { kind: 'lines', view: view.key, lines: { [fix.marking]: null, [fix.to]: merged } };
-}
-
-/** @param {ViewJson} view @param {number} index @returns {BallEdit | null} */
-function pickBall(view, index) {
-	const ball = view.balls[index];
-	return ball ? { kind: 'ball', view: view.key, ball } : null;
+/** An edit as the server writes it. @param {EditJson} said @returns {Edit} */
+export function editOf(said) {
+	const { view } = said;
+	if (said.edit === 'include_view') return { kind: 'include', view, included: said.included };
+	if (said.edit === 'set_balls') return { kind: 'ball', view, ball: said.balls[0] ?? null };
+	const lines = Object.entries(said.lines).map(([marking, points]) => [marking, points?.length ? points.map(([x, y]) => ({ x, y })) : null]);
+	return { kind: 'lines', view, lines: Object.fromEntries(lines) };
 }
 
 /** Every marking of a view under its twin's name. @param {ViewJson} view @returns {LinesEdit} */

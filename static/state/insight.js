@@ -11,14 +11,15 @@ import { ApiError } from '../api/problem.js';
 import { groupDocument, isPreview } from './group.js';
 import { focused } from './workspace.js';
 
-/** @import {FixJson, GroupDocument} from '../api/types.js' */
+/** @import {FixJson, GroupDocument, OfferJson} from '../api/types.js' */
 
 /**
  * @typedef {object} Remedy
  * @property {string} gate
  * @property {string | null} view
  * @property {string} sentence
- * @property {FixJson} edit
+ * @property {FixJson} edit what it is about
+ * @property {OfferJson[]} offers edits that carry it out; none where a person has to look or draw
  * @property {number | null} value of the gate with the edit
  * @property {boolean} passes whether the whole group would pass
  */

@@ -3,20 +3,21 @@
 
 import { computed, effect, signal, untracked } from '@preact/signals';
 
-import { ballOf } from '../geometry/preview.js';
 import { findingTitle } from './advice.js';
-import { editOfFix } from './edits.js';
+import { editOf } from './edits.js';
 import { group, groupDocument, solution } from './group.js';
 import { remedies } from './insight.js';
 import { fitPanel, returnLent } from './viewports.js';
 import { focused } from './workspace.js';
 
-/** @import {FindingJson, FixJson, GroupDocument, SolutionJson, ViewJson} from '../api/types.js' */
+/** @import {FindingJson, FixJson, GroupDocument, OfferJson, SolutionJson, ViewJson} from '../api/types.js' */
+/** @import {Edit} from './edits.js' */
 /** @import {Remedy} from './insight.js' */
 
 /**
  * @typedef {object} Mend one thing that a person can do about a group
- * @property {FixJson} fix what to do; beside the server's actions `place_ball` and `draw_ball`
+ * @property {FixJson} fix what it is about; beside the server's actions `place_ball`, `draw_ball` and `resize_ball`
+ * @property {Edit | null} edit null: it leads the person to the place and leaves the drawing to them
  * @property {string | null} title null: that of the gate that fails
  * @property {string} sentence
  * @property {string} label of its button
@@ -26,30 +27,28 @@ import { focused } from './workspace.js';
 /** Which of them the card shows. */
 const chosen = signal(0);
 
-/** @param {FixJson} fix */
-function labelOf({ action, to, index }) {
-	if (action === 'relabel') return `Relabel as ${to}`;
-	if (action === 'pick_ball') return `Keep ball ${(index ?? 0) + 1}`;
-	return {
-		swap_sides: 'Swap left and right', move_point: 'Move the point', drop_point: 'Drop the point', drop_marking: 'Drop the line',
-		draw_marking: 'Draw it', look_ball: 'Show the place', include_view: 'Use it again', exclude_view: 'Leave it out',
-		place_ball: 'Place it there', draw_ball: 'Draw it', resize_ball: 'Fit the box',
-	}[action] ?? action;
+/** Buttons of what leads a person to the place. */
+const GUIDES = /** @type {Record<string, string>} */ ({
+	draw_marking: 'Draw it', look_ball: 'Show the place', place_ball: 'Place it there', draw_ball: 'Draw it', resize_ball: 'Fit the box',
+});
+
+/** @typedef {Pick<Mend, 'fix' | 'edit' | 'label'>} Way */
+
+/** @param {string} action @param {string | null} view @param {Partial<FixJson>} [more] @returns {Way} */
+function guide(action, view, more = {}) {
+	return { fix: { action, view, marking: null, to: null, index: null, ...more }, edit: null, label: GUIDES[action] };
 }
 
-/** @param {string} action @param {string | null} view @param {Partial<FixJson>} [more] @returns {FixJson} */
-function fixOf(action, view, more = {}) {
-	return { action, view, marking: null, to: null, index: null, ...more };
+/** @param {FixJson} fix @param {OfferJson[]} offers @returns {Way[]} */
+function offered(fix, offers) {
+	return offers.map(({ label, edit }) => ({ fix, edit: editOf(edit), label }));
 }
 
-/** @param {GroupDocument} shown @param {FindingJson} finding @returns {FixJson[]} */
-function fixesOf(shown, finding) {
-	const view = shown.views.find(({ key }) => key === finding.view);
-	if (finding.kind === 'visible_not_annotated') return [fixOf('draw_marking', finding.view, { marking: finding.marking })];
-	if (finding.kind === 'ball_size') return [fixOf('resize_ball', finding.view)];
-	if (!finding.fix) return [];
-	if (finding.fix.action !== 'pick_ball' || !view || ballOf(view)) return [finding.fix];
-	return view.balls.flatMap((ball, index) => (ball.out_of_view || !finding.fix ? [] : [{ ...finding.fix, index }]));
+/** @param {FindingJson} finding @returns {Way[]} */
+function waysOf({ kind, view, marking, fix, offers }) {
+	if (kind === 'visible_not_annotated') return [guide('draw_marking', view, { marking })];
+	if (kind === 'ball_size') return [guide('resize_ball', view)];
+	return fix ? offered(fix, offers) : [];
 }
 
 /** Gates that one more view with a ball may meet. */
@@ -72,19 +71,20 @@ function missingBalls(shown, solved) {
 		const place = solved.views.find((one) => one.view === view.key)?.expected?.place;
 		// Where there is no 3D ball yet, another view's ball may bring it.
 		if (solved.ball ? !(place && inPicture(view, place)) : solved.passes) return [];
-		const fix = place ? fixOf('place_ball', view.key, { point: place }) : fixOf('draw_ball', view.key);
 		const why = NEEDS_A_PAIR.has(solved.first_failing?.gate ?? '') ? ` With it ${view.letter} may make the pair that is missing.` : '';
 		return [{
-			fix, title: `No ball is drawn in ${view.letter}`, label: labelOf(fix), passes: false,
+			...(place ? guide('place_ball', view.key, { point: place }) : guide('draw_ball', view.key)),
+			title: `No ball is drawn in ${view.letter}`, passes: false,
 			sentence: (place ? 'A green cross marks where the other views see it. If it is not visible there, press O.'
 				: 'The dotted line is the ray of another view: the ball lies on it. If it is not visible, press O.') + why,
 		}];
 	});
 }
 
-/** @param {Remedy} remedy @returns {Mend} */
-function ofRemedy({ edit, sentence, passes }) {
-	return { fix: edit, title: null, sentence: `${passes ? 'It would pass' : 'It would come closer'} if ${sentence}.`, label: labelOf(edit), passes };
+/** @param {Remedy} remedy @returns {Mend[]} */
+function ofRemedy({ edit: fix, offers, sentence, passes }) {
+	const ways = fix.action in GUIDES ? [guide(fix.action, fix.view, fix)] : offered(fix, offers);
+	return ways.map((way) => ({ ...way, title: null, sentence: `${passes ? 'It would pass' : 'It would come closer'} if ${sentence}.`, passes }));
 }
 
 /** @param {FixJson} a @param {FixJson} b */
@@ -102,18 +102,14 @@ export function mendsOf(shown, solved, helping) {
 	if (!solved) return [];
 	const missing = missingBalls(shown, solved);
 	const short = solved.first_failing?.gate === 'ball';
-	const found = solved.findings.flatMap((finding) => fixesOf(shown, finding).map((fix) => ({
-		fix, title: findingTitle(shown, finding), sentence: finding.sentence, label: labelOf(fix),
-		passes: helping.some((remedy) => remedy.passes && isSame(remedy.edit, fix)),
+	const found = solved.findings.flatMap((finding) => waysOf(finding).map((way) => ({
+		...way, title: findingTitle(shown, finding), sentence: finding.sentence,
+		passes: helping.some((remedy) => remedy.passes && isSame(remedy.edit, way.fix)),
 	})));
 	const known = short ? [...missing, ...found] : [...found, ...missing];
-	const more = helping.map(ofRemedy).filter(({ fix }) => !known.some((mend) => isSame(mend.fix, fix)));
-	// What only a person can do is no edit; any other that cannot be carried out is not offered.
-	return [...known, ...more].filter(({ fix }) => GUIDED.has(fix.action) || editOfFix(shown, fix) !== null);
+	const more = helping.flatMap(ofRemedy).filter(({ fix }) => !known.some((mend) => isSame(mend.fix, fix)));
+	return [...known, ...more];
 }
-
-/** Actions that lead a person to the place and leave the drawing to them. */
-const GUIDED = new Set(['draw_marking', 'look_ball', 'draw_ball', 'place_ball', 'resize_ball']);
 
 /** Everything that would mend the group on screen. */
 export const mends = computed(() => {

@@ -7,8 +7,7 @@ import { ballCenter, ballOf } from '../geometry/preview.js';
 import { raysInto } from '../overlays/scene.js';
 import { placeBall } from '../state/ball_edits.js';
 import { startBall, startMarking } from '../state/drawing.js';
-import { editOfFix } from '../state/edits.js';
-import { group, solution, submit } from '../state/group.js';
+import { group, pending, solution, submit } from '../state/group.js';
 import { mend } from '../state/mends.js';
 import { announce } from '../state/notice.js';
 import { zoomTo } from '../state/viewports.js';
@@ -16,6 +15,7 @@ import { focusView, selected } from '../state/workspace.js';
 
 /** @import {ViewJson} from '../api/types.js' */
 /** @import {ImagePoint} from '../geometry/viewport.js' */
+/** @import {Edit} from '../state/edits.js' */
 /** @import {Mend} from '../state/mends.js' */
 
 /** Screen pixels per image pixel where a ball is looked for. */
@@ -72,13 +72,21 @@ function fitBox(view) {
 	submit({ kind: 'ball', view: view.key, ball: { ...ball, box: squareBox(center, diameter) } });
 }
 
+/** An edit of the server builds on what it has: not on a change of the same lines or ball that is still on its way. @param {Edit} edit */
+function submitOffered(edit) {
+	const waits = edit.kind !== 'include' && pending.value.some(({ kind, view }) => kind === edit.kind && view === edit.view);
+	if (waits) announce('Your last change here is not saved yet. Try again in a moment.');
+	else submit(edit);
+}
+
 /** @param {Mend} wanted */
-export function carryOut({ fix }) {
+export function carryOut({ fix, edit }) {
 	const shown = group.value;
 	const view = shown?.views.find(({ key }) => key === fix.view);
 	if (!shown || !view) return;
 	focusView(view.letter);
-	if (fix.action === 'place_ball') placeExpected(view);
+	if (edit) submitOffered(edit);
+	else if (fix.action === 'place_ball') placeExpected(view);
 	else if (fix.action === 'draw_ball') {
 		const along = raysInto(shown, solution.value, view, LIKELY_HEIGHT).filter(({ x, y }) => x >= 0 && y >= 0 && x < view.width && y < view.height);
 		startBall(view, along[Math.floor(along.length / 2)]);
@@ -90,9 +98,6 @@ export function carryOut({ fix }) {
 		showPlace(view, [{ x: fix.point[0], y: fix.point[1] }]);
 		selected.value = { kind: 'ball', view: view.key };
 		announce('The ring is where the ball would have to be. If you see the ball there, move its box.');
-	} else {
-		const edit = editOfFix(shown, fix);
-		if (edit) submit(edit);
 	}
 }
 

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
 import {
-	applyEdit, describe as describe_, editOfFix, movePoint, previewBody, requestOf, sameTarget,
+	applyEdit, describe as describe_, editOf, movePoint, previewBody, requestOf, sameTarget,
 } from '../../static/state/edits.js';
 import { leftOutText } from '../../static/state/reasons.js';
 
@@ -78,28 +78,26 @@ describe('previewBody', () => {
 	});
 });
 
-describe('editOfFix', () => {
-	const fix = { action: 'relabel', view: '7.png', marking: 'Middle line', to: 'Side line top', index: null };
-
-	it('moves the points of a relabelled marking to the other name', () => {
-		const next = applyEdit(group, editOfFix(group, fix));
-		assert.equal(next.views[0].lines['Side line top'].length, 2);
-		assert.ok(!('Middle line' in next.views[0].lines));
+describe('editOf', () => {
+	it('draws and deletes the markings that the server names', () => {
+		const lines = { 'Middle line': null, 'Side line top': [[1, 2], [3, 4]], 'Goal left post left': [] };
+		const next = applyEdit(group, editOf({ edit: 'set_lines', view: '7.png', lines }));
+		assert.deepEqual(next.views[0].lines, { 'Side line top': [{ x: 1, y: 2 }, { x: 3, y: 4 }] });
 	});
 
-	it('swaps all sides, posts by goal', () => {
-		const next = applyEdit(group, editOfFix(group, { ...fix, action: 'swap_sides' }));
-		assert.deepEqual(Object.keys(next.views[0].lines).sort(), ['Goal right post left', 'Middle line']);
+	it('keeps the one ball of several', () => {
+		const kept = { box: [1, 1, 2, 2], point: null, occluded: false, out_of_view: false };
+		const two = { ...group, views: [{ ...view, balls: [view.balls[0], kept] }] };
+		const edit = editOf({ edit: 'set_balls', view: '7.png', balls: [kept] });
+		assert.deepEqual(applyEdit(two, edit).views[0].balls, [kept]);
+		assert.equal(editOf({ edit: 'set_balls', view: '7.png', balls: [] }).ball, null);
 	});
 
-	it('keeps the ball that was picked', () => {
-		const two = { ...group, views: [{ ...view, balls: [view.balls[0], { ...view.balls[0], box: [1, 1, 2, 2] }] }] };
-		const edit = editOfFix(two, { ...fix, action: 'pick_ball', index: 1 });
-		assert.deepEqual(applyEdit(two, edit).views[0].balls.map(({ box }) => box), [[1, 1, 2, 2]]);
-	});
-
-	it('has nothing to offer for a marking that is gone', () => {
-		assert.equal(editOfFix(group, { ...fix, marking: 'Circle left' }), null);
+	it('leaves a view out and takes it in again', () => {
+		for (const included of [false, true]) {
+			const edit = editOf({ edit: 'include_view', view: '7.png', included });
+			assert.deepEqual(requestOf(group, edit).body, { included });
+		}
 	});
 });
 

@@ -165,7 +165,7 @@ def _boxes(name: str, camera: Camera, points: FloatArray) -> list[dict[str, Any]
 def _solved(scene: Scene) -> dict[str, Any]:
     """A whole group as the API shows it, without what is only drawn."""
     group = scene.group
-    document = SolutionDocument.model_validate(solve(group, PAPER)).model_dump(mode="json")
+    document = SolutionDocument.of(solve(group, PAPER), group).model_dump(mode="json")
     for view in document["views"]:
         view["calibration"]["markings"] = []
     kept = ("views", "pairs", "ball")

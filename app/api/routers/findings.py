@@ -34,7 +34,7 @@ def list_findings(
     found = get_dataset(store, dataset)
     after = _number(cursor)
     groups = read_findings(store, found.id, after=after, limit=limit, kind=kind)
-    rows = [FindingRow.of(group.group_id, values) for group in groups for values in group.values]
+    rows = [FindingRow.of(group, finding) for group in groups for finding in group.findings]
     following = str(groups[-1].number) if len(groups) == limit else None
     return FindingList(items=rows, next=following, total=count_groups(store, found.id, kind))
 

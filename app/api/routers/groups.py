@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -39,7 +40,6 @@ from app.review.editing import submit
 from app.review.editing.state import GroupState
 from app.review.queue import listing as queue
 from app.review.verdicts.verdict import set_verdict
-from app.soccer.solution import Solution
 from app.store.session import Store
 
 router = APIRouter(prefix="/groups", tags=["groups"])
@@ -140,18 +140,13 @@ def get_group(
     return answer(with_solution(store, state), response)
 
 
-@router.get(
-    "/{group}/solution",
-    operation_id="getSolution",
-    response_model=SolutionDocument,
-    responses=responses(404),
-)
-def get_solution(group: Id, store: AppStore) -> Solution:
+@router.get("/{group}/solution", operation_id="getSolution", responses=responses(404))
+def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     """The solution of a group."""
-    solution = with_solution(store, submit.load(store, group)).solution
-    if solution is None:
+    state = with_solution(store, submit.load(store, group))
+    if state.solution is None:
         raise NotFoundError(f"group {group} has no solution")
-    return solution
+    return SolutionDocument.of(state.solution, state.group)
 
 
 @router.get(
@@ -177,8 +172,10 @@ def get_history(group: Id, store: AppStore) -> History:
 def preview_group(group: Id, changes: PreviewRequest, store: AppStore) -> PreviewDocument:
     """What the solution would be; nothing is saved."""
     state = submit.load(store, group)
-    solution = submit.preview(store, group, preview_edits(state, changes))
-    return PreviewDocument(solution=solution)
+    edits = preview_edits(state, changes)
+    solution = submit.preview(store, group, edits)
+    edited = reduce(lambda before, edit: edit.apply(before), edits, state.group)
+    return PreviewDocument(solution=SolutionDocument.of(solution, edited))
 
 
 @router.post("/{group}/undo", operation_id="undo", responses={**responses(*CONFLICTS), **CHANGED})

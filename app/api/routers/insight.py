@@ -8,7 +8,7 @@ from app.api.deps import AppStore, Id
 from app.api.lookup import find_view
 from app.api.problem import responses
 from app.api.routers.groups import with_solution
-from app.api.schemas.insight import Influences, Remedies, RemedyDocument
+from app.api.schemas.insight import Influences, Remedies
 from app.review.editing import submit
 from app.review.editing.influence import influences
 from app.review.editing.remedies import find_remedies
@@ -23,7 +23,7 @@ def get_remedies(group: Id, store: AppStore) -> Remedies:
     if state.solution is None:
         return Remedies(items=[])
     found = find_remedies(state.group, state.policy, state.solution)
-    return Remedies(items=[RemedyDocument.of(remedy) for remedy in found])
+    return Remedies(items=found)
 
 
 @router.get("/views/{view}/influence", operation_id="getInfluence", responses=responses(404))

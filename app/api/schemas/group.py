@@ -136,9 +136,7 @@ class GroupDocument(Document):
                     zip(group.views, view_labels(group), strict=True)
                 )
             ],
-            solution=None
-            if state.solution is None
-            else SolutionDocument.model_validate(state.solution),
+            solution=None if state.solution is None else SolutionDocument.of(state.solution, group),
         )
 
 

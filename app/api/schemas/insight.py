@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from typing import Any
+
+from pydantic import Field, model_validator
 
 from app.api.schemas.document import Document
-from app.api.schemas.solution import XY, FixDocument, Jac
+from app.api.schemas.solution import XY, FixDocument, Jac, OfferDocument
 from app.review.editing.remedies import Remedy
 
 
@@ -24,21 +26,18 @@ class RemedyDocument(Document):
     view: str | None
     sentence: str = Field(description='Reads on after "would pass if".')
     edit: RemedyEdit
+    offers: list[OfferDocument] = Field(
+        description="Edits that carry it out; none where a person has to look or draw."
+    )
     value: float | None = Field(description="What the gate would measure.")
     passes: bool = Field(description="Whether the whole group would pass.")
 
-    @staticmethod
-    def of(remedy: Remedy) -> RemedyDocument:
-        """The document of a remedy."""
-        edit = RemedyEdit(**vars(remedy.fix), point=remedy.point)
-        return RemedyDocument(
-            gate=remedy.gate,
-            view=remedy.view,
-            sentence=remedy.sentence,
-            edit=edit,
-            value=remedy.value,
-            passes=remedy.passes,
-        )
+    @model_validator(mode="before")
+    @classmethod
+    def _with_point(cls, value: Any) -> Any:
+        if isinstance(value, Remedy):
+            return {**vars(value), "edit": {**vars(value.fix), "point": value.point}}
+        return value
 
 
 class Remedies(Document):

@@ -7,10 +7,12 @@ from typing import Any
 
 from pydantic import Field
 
+from app.api.findings import GroupFindings
 from app.api.schemas.document import Document
 from app.api.schemas.group import State, image_address
-from app.api.schemas.solution import FailingGate, FixDocument
+from app.api.schemas.solution import FailingGate, FindingDocument, FixDocument, OfferDocument
 from app.review.queue.listing import GroupRow as QueueRow
+from app.soccer.solution import Finding
 from app.store.log import LogEntry
 
 THUMBNAIL_WIDTH = 208
@@ -131,11 +133,13 @@ class FindingRow(Document):
     confidence: float | None
     sentence: str
     fix: FixDocument | None
+    offers: list[OfferDocument] = Field(description="Edits that carry the fix out.")
 
     @staticmethod
-    def of(group_id: int, values: dict[str, Any]) -> FindingRow:
+    def of(found: GroupFindings, finding: Finding) -> FindingRow:
         """The row of a finding in a group."""
-        return FindingRow.model_validate({**values, "group_id": group_id})
+        said = FindingDocument.model_validate(finding, context=found.group)
+        return FindingRow(group=found.group.key, group_id=found.group_id, **dict(said))
 
 
 class FindingList(Document):

@@ -11,9 +11,12 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 from app.api.schemas.document import Document
 from app.datasets.camera_json import camera_to_json
 from app.geometry.camera import Camera
+from app.review.editing.codec import edit_to_json
+from app.review.editing.fixes import offers
 from app.soccer.camera_sigma import camera_sigma
 from app.soccer.frames import Box
-from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration
+from app.soccer.group import Group
+from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Finding, Solution
 
 DRAWN_DECIMALS = 3
 """What is only drawn travels to a thousandth of a pixel; what is edited or judged, exactly."""
@@ -243,6 +246,19 @@ class FixDocument(Document):
     index: int | None
 
 
+def _said(edit: Any) -> Any:
+    return edit if isinstance(edit, dict) else edit_to_json(edit)
+
+
+class OfferDocument(Document):
+    """An edit that carries a fix out."""
+
+    label: str = Field(description="What a button for it says.")
+    edit: Annotated[dict[str, Any], BeforeValidator(_said)] = Field(
+        description="As the history writes edits: `set_lines`, `set_balls` or `include_view`."
+    )
+
+
 class FindingDocument(Document):
     """Something that a person should look at."""
 
@@ -255,6 +271,18 @@ class FindingDocument(Document):
     threshold: float | None
     confidence: float | None
     fix: FixDocument | None
+    offers: list[OfferDocument] = Field(
+        description="Edits that carry the fix out: none when only a person can, several to choose "
+        "from."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_offers(cls, value: Any, info: ValidationInfo) -> Any:
+        group: Any = info.context
+        if isinstance(value, Finding):
+            return {**vars(value), "offers": offers(group, value.fix)}
+        return value
 
 
 class SolutionDocument(Document):
@@ -270,3 +298,8 @@ class SolutionDocument(Document):
     ball: Ball3DDocument | None = Field(description="Mean of the valid pairs; exported.")
     best_ball: BestBallDocument | None
     findings: list[FindingDocument]
+
+    @staticmethod
+    def of(solution: Solution, group: Group) -> SolutionDocument:
+        """The document of a solution; what its findings offer are edits of the group."""
+        return SolutionDocument.model_validate(solution, context=group)

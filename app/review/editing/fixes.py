@@ -1,10 +1,11 @@
-"""Fixes: what a finding or a remedy proposes, as the edit that carries it out."""
+"""Fixes: what a finding or a remedy proposes, as the edit that carries it out and in words."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
-from app.review.editing.edit import Edit, IncludeView, LineChanges, SetBall, SetLines
+from app.review.editing.edit import Edit, IncludeView, SetBall, SetLines
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View
@@ -12,24 +13,45 @@ from app.soccer.pitch import twin_marking
 from app.soccer.solution import Fix
 
 
-def edit_of_fix(group: Group, fix: Fix, point: ImagePoint | None = None) -> Edit | None:
-    """The edit that carries out a fix; None when only a person can.
+@dataclass(frozen=True)
+class Offer:
+    """An edit that carries a fix out, and the words on its button."""
+
+    label: str
+    edit: Edit
+
+
+def offers(group: Group, fix: Fix | None, point: ImagePoint | None = None) -> tuple[Offer, ...]:
+    """The edits that carry out a fix: none when only a person can, several to choose from.
 
     Args:
         group: The group that the fix is about.
-        fix: What to do.
+        fix: What to do; None: nothing is proposed.
         point: Where ``move_point`` puts its point, pixels of the annotated size.
     """
-    view = None if fix.view is None else group.view(fix.view)
-    if view is None:
-        return None
-    if fix.action in ("exclude_view", "include_view"):
-        return IncludeView(view.key, fix.action == "include_view")
-    if fix.action == "pick_ball":
-        chosen = fix.index is not None and fix.index < len(view.balls)
-        return SetBall(view.key, view.balls[fix.index or 0]) if chosen else None
-    changes = _swapped(view) if fix.action == "swap_sides" else _line_changes(view, fix, point)
-    return SetLines(view.key, changes) if changes else None
+    view = None if fix is None or fix.view is None else group.view(fix.view)
+    if fix is None or view is None:
+        return ()
+    action = _ACTIONS[fix.action]
+    found = ((one, action.edit(view, one, point)) for one in _choices(view, fix))
+    return tuple(Offer(_words(action.label, one), edit) for one, edit in found if edit)
+
+
+def edit_of_fix(group: Group, fix: Fix, point: ImagePoint | None = None) -> Edit | None:
+    """The one edit that carries out a fix; None when only a person can, or has to choose."""
+    found = offers(group, fix, point)
+    return found[0].edit if len(found) == 1 else None
+
+
+def rank(fix: Fix) -> int:
+    """Grows with what a fix takes away: mending what is wrong comes before leaving it out."""
+    return _ACTIONS[fix.action].rank
+
+
+def sentence(group: Group, fix: Fix, moved_px: float = 0.0) -> str:
+    """What would have to be so, to be read after "would pass if"."""
+    letter = chr(ord("A") + [view.key for view in group.views].index(fix.view or ""))
+    return _words(_ACTIONS[fix.action].sentence, fix, letter=letter, px=moved_px)
 
 
 def ball_at(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBall:
@@ -41,29 +63,111 @@ def ball_at(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBall:
     return SetBall(view, replace(ball, box=moved))
 
 
-def _line_changes(view: View, fix: Fix, point: ImagePoint | None) -> LineChanges | None:
-    lines = view.station.lines
-    if fix.marking is None or fix.marking not in lines:
-        return None
-    points = tuple(lines[fix.marking])
-    if fix.action == "drop_marking":
-        return {fix.marking: None}
-    if fix.action == "relabel" and fix.to is not None:
-        return {fix.marking: None, fix.to: (*lines.get(fix.to, ()), *points)}
-    if fix.index is None or not fix.index < len(points):
-        return None
-    before, after = points[: fix.index], points[fix.index + 1 :]
-    if fix.action == "drop_point":
-        return {fix.marking: (*before, *after) or None}
-    if fix.action == "move_point" and point is not None:
-        return {fix.marking: (*before, point, *after)}
+def _words(text: str, fix: Fix, **more: str | float) -> str:
+    number = None if fix.index is None else fix.index + 1
+    return text.format(marking=fix.marking, to=fix.to, number=number, **more)
+
+
+def _choices(view: View, fix: Fix) -> list[Fix]:
+    """The fix, or one for each ball of which one has to be picked."""
+    if fix.action != "pick_ball" or fix.index is not None:
+        return [fix]
+    seen = [index for index, ball in enumerate(view.balls) if not ball.out_of_view]
+    return [replace(fix, index=index) for index in seen] if len(seen) > 1 else []
+
+
+def _nothing(_view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
     return None
 
 
-def _swapped(view: View) -> LineChanges:
+def _include(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+    return IncludeView(view.key, fix.action == "include_view")
+
+
+def _pick_ball(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+    there = fix.index is not None and fix.index < len(view.balls)
+    return SetBall(view.key, view.balls[fix.index or 0]) if there else None
+
+
+def _swap_sides(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
     """Every marking under the name that it has when the pitch turns by 180 degrees."""
     lines = view.station.lines
     changes: dict[str, tuple[ImagePoint, ...] | None] = dict.fromkeys(lines)
     for marking, points in lines.items():
         changes[twin_marking(marking)] = tuple(points)
-    return changes
+    return SetLines(view.key, changes) if changes else None
+
+
+def _relabel(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+    lines = view.station.lines
+    if fix.to is None or fix.marking is None or fix.marking not in lines:
+        return None
+    merged = (*lines.get(fix.to, ()), *lines[fix.marking])
+    return SetLines(view.key, {fix.marking: None, fix.to: merged})
+
+
+def _drop_marking(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+    if fix.marking is None or fix.marking not in view.station.lines:
+        return None
+    return SetLines(view.key, {fix.marking: None})
+
+
+def _move_point(view: View, fix: Fix, point: ImagePoint | None) -> Edit | None:
+    return None if point is None else _with_point(view, fix, (point,))
+
+
+def _drop_point(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+    return _with_point(view, fix, ())
+
+
+def _with_point(view: View, fix: Fix, instead: tuple[ImagePoint, ...]) -> Edit | None:
+    points = tuple(view.station.lines.get(fix.marking or "", ()))
+    if fix.marking is None or fix.index is None or not fix.index < len(points):
+        return None
+    left = (*points[: fix.index], *instead, *points[fix.index + 1 :])
+    return SetLines(view.key, {fix.marking: left or None})
+
+
+@dataclass(frozen=True)
+class _Action:
+    """What an action of fixes means.
+
+    Attributes:
+        sentence: What would have to be so; empty where whoever proposes it says more.
+        label: On the button of its edit.
+        edit: Makes the edit of a view; None where the fix does not fit it.
+    """
+
+    rank: int
+    sentence: str = ""
+    label: str = ""
+    edit: Callable[[View, Fix, ImagePoint | None], Edit | None] = _nothing
+
+
+_ACTIONS = {
+    "relabel": _Action(
+        0, "{marking} in {letter} was relabelled as {to}", "Relabel as {to}", _relabel
+    ),
+    "swap_sides": _Action(
+        0, "left and right were swapped in {letter}", "Swap left and right", _swap_sides
+    ),
+    "pick_ball": _Action(
+        0, "ball {number} was the one in play in {letter}", "Keep ball {number}", _pick_ball
+    ),
+    "move_point": _Action(
+        1,
+        "point {number} of {marking} in {letter} moved {px:.1f} px",
+        "Move the point",
+        _move_point,
+    ),
+    "look_ball": _Action(
+        1, "the ball of {letter} was really {px:.1f} px away, on the ray of the other view"
+    ),
+    "draw_marking": _Action(2),
+    "include_view": _Action(2, "{letter} was used again", "Use it again", _include),
+    "drop_point": _Action(
+        3, "point {number} of {marking} in {letter} was dropped", "Drop the point", _drop_point
+    ),
+    "drop_marking": _Action(4, "{marking} in {letter} was dropped", "Drop the line", _drop_marking),
+    "exclude_view": _Action(5, "{letter} was left out", "Leave it out", _include),
+}

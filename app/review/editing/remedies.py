@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.review.editing.edit import Edit, SetLines
-from app.review.editing.fixes import ball_at, edit_of_fix
+from app.review.editing.fixes import Offer, ball_at, edit_of_fix, offers, rank, sentence
 from app.review.editing.solver import Solver
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View
@@ -47,6 +47,7 @@ class Remedy:
         fix: The edit, or (``draw_marking``, ``look_ball``) where a person should look and draw.
         point: Where ``move_point`` puts its point and ``look_ball`` would see the ball, pixels;
             None for other actions.
+        offers: The edits that carry it out; none where only a person can.
         value: What the gate would measure.
         passes: Whether the whole group would pass.
     """
@@ -56,15 +57,15 @@ class Remedy:
     sentence: str
     fix: Fix
     point: ImagePoint | None
+    offers: tuple[Offer, ...]
     value: float | None
     passes: bool
 
 
 @dataclass(frozen=True)
 class _Idea:
-    """A remedy before it is tried; ``rank`` grows with what it takes away."""
+    """A remedy before it is tried."""
 
-    rank: int
     sentence: str
     fix: Fix
     point: ImagePoint | None = None
@@ -91,7 +92,7 @@ def find_remedies(
     for idea in _distinct(group, solution, failing)[:MOST_TRIALS]:
         remedy = _try(group, policy, solution, failing, idea, known, solver)
         if remedy is not None:
-            found.append((not remedy.passes, idea.rank, remedy))
+            found.append((not remedy.passes, rank(idea.fix), remedy))
     return [remedy for *_, remedy in sorted(found, key=lambda item: item[:2])]
 
 
@@ -113,7 +114,14 @@ def _try(
     if not then.passes and not _is_nearer(failing, gate, solution, then, idea.fix.view):
         return None
     return Remedy(
-        failing.name, idea.fix.view, idea.sentence, idea.fix, idea.point, gate.value, then.passes
+        gate=failing.name,
+        view=idea.fix.view,
+        sentence=idea.sentence,
+        fix=idea.fix,
+        point=idea.point,
+        offers=offers(group, idea.fix, idea.point),
+        value=gate.value,
+        passes=then.passes,
     )
 
 
@@ -134,7 +142,7 @@ def _distinct(group: Group, solution: Solution, failing: Gate) -> list[_Idea]:
     ideas: dict[Fix, _Idea] = {}
     for idea in (*_of_findings(group, solution), *_of_gate(group, solution, failing)):
         ideas.setdefault(idea.fix, idea)
-    return sorted(ideas.values(), key=lambda idea: idea.rank)
+    return sorted(ideas.values(), key=lambda idea: rank(idea.fix))
 
 
 def _of_findings(group: Group, solution: Solution) -> Iterator[_Idea]:
@@ -142,7 +150,7 @@ def _of_findings(group: Group, solution: Solution) -> Iterator[_Idea]:
         fix = finding.fix
         view = None if fix is None or fix.view is None else group.view(fix.view)
         if fix is not None and view is not None:
-            yield _Idea(_RANKS[fix.action], _sentence(group, view, fix), fix)
+            yield _Idea(sentence(group, fix), fix)
 
 
 def _of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Idea]:
@@ -152,7 +160,7 @@ def _of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Idea]
             continue
         if not view.included:
             fix = Fix("include_view", view.key)
-            yield _Idea(_RANKS[fix.action], _sentence(group, view, fix), fix)
+            yield _Idea(sentence(group, fix), fix)
         elif solved.failed == "jac":
             yield from _of_undrawn(group, view, solved)
             yield from _of_lines(group, view, solved)
@@ -179,10 +187,10 @@ def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Ide
     letter = chr(ord("A") + group.views.index(view))
     names = [f"{fit.marking} (visible over {max(fit.length_px, 1):.0f} px)" for fit in undrawn]
     verb = "were" if len(names) > 1 else "was"
-    sentence = f"{' and '.join(names)} {verb} drawn in {letter}"
+    said = f"{' and '.join(names)} {verb} drawn in {letter}"
     drawn = {fit.marking: fit.polyline[:: len(fit.polyline) // _CLICKS + 1] for fit in undrawn}
     fix = Fix("draw_marking", view.key, undrawn[0].marking)
-    yield _Idea(_RANKS[fix.action], sentence, fix, trial=SetLines(view.key, drawn))
+    yield _Idea(said, fix, trial=SetLines(view.key, drawn))
 
 
 def _is_undrawn(fit: MarkingFit) -> bool:
@@ -204,8 +212,7 @@ def _of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]
             if action == "move_point" and fit.distances_px[index] > slip:
                 continue
             point = fit.nearest[index] if action == "move_point" else None
-            sentence = _sentence(group, view, fix, fit.distances_px[index])
-            yield _Idea(_RANKS[action], sentence, fix, point)
+            yield _Idea(sentence(group, fix, fit.distances_px[index]), fix, point)
 
 
 def _of_balls(group: Group, solution: Solution) -> Iterator[_Idea]:
@@ -224,8 +231,7 @@ def _of_balls(group: Group, solution: Solution) -> Iterator[_Idea]:
                 continue
             fix = Fix("look_ball", moved, to=other)
             trial = ball_at(moved, view.ball, point)
-            sentence = _sentence(group, view, fix, apart)
-            yield _Idea(_RANKS[fix.action], sentence, fix, point, trial)
+            yield _Idea(sentence(group, fix, apart), fix, point, trial)
 
 
 def _beside_ray(group: Group, solution: Solution, moved: str, other: str) -> ImagePoint | None:
@@ -251,35 +257,3 @@ def _beside_ray(group: Group, solution: Solution, moved: str, other: str) -> Ima
 
 def _largest(fit: MarkingFit) -> float:
     return max(fit.distances_px, default=0.0)
-
-
-_RANKS = {
-    "relabel": 0,
-    "swap_sides": 0,
-    "pick_ball": 0,
-    "move_point": 1,
-    "look_ball": 1,
-    "draw_marking": 2,
-    "include_view": 2,
-    "drop_point": 3,
-    "drop_marking": 4,
-    "exclude_view": 5,
-}
-"""Mending what is wrong comes before leaving it out."""
-
-
-def _sentence(group: Group, view: View, fix: Fix, moved_px: float = 0.0) -> str:
-    letter = chr(ord("A") + group.views.index(view))
-    number = None if fix.index is None else fix.index + 1
-    return {
-        "relabel": f"{fix.marking} in {letter} was relabelled as {fix.to}",
-        "swap_sides": f"left and right were swapped in {letter}",
-        "pick_ball": f"ball {number} was the one in play in {letter}",
-        "move_point": f"point {number} of {fix.marking} in {letter} moved {moved_px:.1f} px",
-        "look_ball": f"the ball of {letter} was really {moved_px:.1f} px away, on the ray of the "
-        "other view",
-        "drop_point": f"point {number} of {fix.marking} in {letter} was dropped",
-        "drop_marking": f"{fix.marking} in {letter} was dropped",
-        "include_view": f"{letter} was used again",
-        "exclude_view": f"{letter} was left out",
-    }[fix.action]

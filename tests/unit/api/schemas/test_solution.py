@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from app.api.schemas.solution import SolutionDocument
+from app.review.editing.codec import edit_from_json
 from app.soccer.group import Group
 from app.soccer.policy import PAPER
-from app.soccer.solution import Solution
+from app.soccer.solution import Finding, Fix, Solution
 from app.solving.solve import solve
 
 
@@ -21,8 +22,8 @@ def solution(group: Group) -> Solution:
 
 
 class TestSolutionDocument:
-    def test_what_travels_is_what_was_computed(self, solution: Solution) -> None:
-        document = json.loads(SolutionDocument.model_validate(solution).model_dump_json())
+    def test_what_travels_is_what_was_computed(self, solution: Solution, group: Group) -> None:
+        document = json.loads(SolutionDocument.of(solution, group).model_dump_json())
         assert document["passes"] is True
         assert document["first_failing"] is None
         assert document["ball"]["point"] == list(solution.ball.point)
@@ -30,31 +31,55 @@ class TestSolutionDocument:
         assert [gate["name"] for gate in document["gates"]] == [g.name for g in solution.gates]
         assert document["pairs"][0]["errors_px"] == list(solution.pairs[0].errors_px)
 
-    def test_jac_is_named_by_its_threshold(self, solution: Solution) -> None:
-        view = SolutionDocument.model_validate(solution).views[0]
+    def test_jac_is_named_by_its_threshold(self, solution: Solution, group: Group) -> None:
+        view = SolutionDocument.of(solution, group).views[0]
         assert list(view.calibration.jac) == ["0.5", "1", "2"]
 
     def test_a_camera_says_how_well_it_is_known_where_that_is_known(
-        self, solution: Solution
+        self, solution: Solution, group: Group
     ) -> None:
         first = solution.views[0]
         spread = tuple((np.eye(8) * 1e-4).ravel().tolist())
         known = replace(first, calibration=replace(first.calibration, covariance=spread))
         open_ = replace(first, calibration=replace(first.calibration, covariance=None))
-        documents = SolutionDocument.model_validate(replace(solution, views=(known, open_))).views
+        documents = SolutionDocument.of(replace(solution, views=(known, open_)), group).views
         sigma = documents[0].calibration.sigma
         assert sigma is not None
         assert sigma.position_meters == pytest.approx((0.01, 0.01, 0.01))
         assert sigma.pan_degrees == pytest.approx(0.5729577951)
         assert documents[1].calibration.sigma is None
 
-    def test_the_document_fits_its_own_schema(self, solution: Solution) -> None:
-        text = SolutionDocument.model_validate(solution).model_dump_json()
+    def test_the_document_fits_its_own_schema(self, solution: Solution, group: Group) -> None:
+        text = SolutionDocument.of(solution, group).model_dump_json()
         again = SolutionDocument.model_validate_json(text)
         assert again.model_dump_json() == text
 
-    def test_a_number_that_is_not_finite_travels_as_null(self, solution: Solution) -> None:
+    def test_a_number_that_is_not_finite_travels_as_null(
+        self, solution: Solution, group: Group
+    ) -> None:
         endless = replace(solution, ball=replace(solution.ball, sigma_m=float("inf")))
-        text = SolutionDocument.model_validate(endless).model_dump_json()
+        text = SolutionDocument.of(endless, group).model_dump_json()
         assert json.loads(text)["ball"]["sigma_m"] is None
         assert SolutionDocument.model_validate_json(text).ball.sigma_m is None
+
+    def test_a_finding_offers_the_edit_that_the_history_would_keep(
+        self, solution: Solution, group: Group
+    ) -> None:
+        view = group.views[0]
+        marking = next(iter(view.station.lines))
+        found = Finding("bad_point", "?", view.key, fix=Fix("drop_marking", view.key, marking))
+        document = SolutionDocument.of(replace(solution, findings=(found,)), group).findings[0]
+        edit = {"edit": "set_lines", "view": view.key, "lines": {marking: None}}
+        assert [offer.model_dump() for offer in document.offers] == [
+            {"label": "Drop the line", "edit": edit}
+        ]
+        assert edit_from_json(edit).apply(group).view(view.key).station.lines.keys() == (
+            view.station.lines.keys() - {marking}
+        )
+
+    def test_a_finding_that_only_a_person_can_mend_offers_nothing(
+        self, solution: Solution, group: Group
+    ) -> None:
+        found = Finding("low_parallax", "?")
+        document = SolutionDocument.of(replace(solution, findings=(found,)), group)
+        assert document.findings[0].offers == []

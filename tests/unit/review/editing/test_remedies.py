@@ -1,7 +1,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from app.review.editing.fixes import edit_of_fix
 from app.review.editing.influence import influences
@@ -134,43 +133,6 @@ class TestFindRemedies:
         (remedy,) = find_remedies(bad, PAPER, solution)
         assert (remedy.fix, remedy.passes) == (Fix("include_view", "b"), True)
         assert "B left out by a person" in solution.first_failing.sentence
-
-
-class TestEditOfFix:
-    GROUP = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
-
-    def lines(self, fix, point=None):
-        return edit_of_fix(self.GROUP, fix, point).apply(self.GROUP).views[0].station.lines
-
-    def test_a_relabelled_marking_joins_the_points_that_are_there(self):
-        before = self.GROUP.views[0].station.lines
-        first, second = sorted(before)[:2]
-        after = self.lines(Fix("relabel", "a", first, second))
-        assert first not in after
-        assert len(after[second]) == len(before[first]) + len(before[second])
-
-    def test_a_dropped_point_leaves_the_others(self):
-        name = sorted(self.GROUP.views[0].station.lines)[0]
-        before = self.GROUP.views[0].station.lines[name]
-        assert list(self.lines(Fix("drop_point", "a", name, index=1))[name]) == [
-            point for index, point in enumerate(before) if index != 1
-        ]
-
-    def test_swapping_sides_twice_changes_nothing(self):
-        fix = Fix("swap_sides", "a")
-        once = edit_of_fix(self.GROUP, fix).apply(self.GROUP)
-        assert edit_of_fix(once, fix).apply(once) == self.GROUP
-
-    @pytest.mark.parametrize(
-        "fix",
-        [
-            Fix("drop_point", "a", "Circle left", index=900),
-            Fix("drop_marking", "nowhere", "Circle left"),
-            Fix("pick_ball", "a", index=4),
-        ],
-    )
-    def test_what_is_not_there_cannot_be_mended(self, fix):
-        assert edit_of_fix(self.GROUP, fix) is None
 
 
 class TestInfluences:
