@@ -342,3 +342,12 @@ def projection_derivatives(camera, dx, dy, dz, derivatives):
             share = rho2 * unit * (1 + kappa * rho2)
             jx, jy = px * share, py * share
         derivatives[0, k], derivatives[1, k] = jx, jy
+
+
+@compiled
+def point_rows(parameters, points, half_diagonals, derivatives):
+    """Writes ``projection_derivatives`` of a point in each of many cameras, shape (N, 2, 8)."""
+    for n in range(len(parameters)):
+        camera = unpack(parameters[n], half_diagonals[n])
+        dx, dy, dz = points[n] - parameters[n, 3:6]
+        projection_derivatives(camera, dx, dy, dz, derivatives[n])

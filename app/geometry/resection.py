@@ -25,9 +25,8 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.curve_residuals import (
     accumulate,
-    projection_derivatives,
+    point_rows,
     residual_rows,
-    unpack,
 )
 from app.geometry.rotation import pan_tilt_roll_from_rotation, rotation_from_pan_tilt_roll
 
@@ -177,17 +176,16 @@ def distances(
     return np.hypot(offsets[:, 0], offsets[:, 1])
 
 
-def projection_jacobian(
-    parameters: FloatArray, point: FloatArray, half_diagonal: float
+def projection_jacobians(
+    parameters: FloatArray, points: FloatArray, half_diagonals: FloatArray
 ) -> FloatArray:
-    """Derivative of a point's pixel by the parameters of its camera, shape (2, 8).
+    """Derivatives of points' pixels by the parameters of their cameras, shape (N, 2, 8).
 
     Args:
-        parameters: One camera, shape (8,).
-        point: Pitch frame, metres, in front of the camera, shape (3,).
-        half_diagonal: Half the image diagonal, pixels.
+        parameters: A camera for each point, shape (N, 8).
+        points: Pitch frame, metres, in front of the cameras, shape (N, 3).
+        half_diagonals: Half the image diagonals, pixels, shape (N,).
     """
-    derivatives = np.empty((2, PARAMETERS))
-    x, y, z = point - parameters[X : Z + 1]
-    projection_derivatives(unpack(parameters, half_diagonal), x, y, z, derivatives)
+    derivatives = np.empty((len(points), 2, PARAMETERS))
+    point_rows(parameters, points, half_diagonals, derivatives)
     return derivatives

@@ -10,6 +10,9 @@ from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, require_shape
 from app.geometry.smallest_singular import smallest_singular_vectors
 
+_PARALLEL = 1e-12
+"""Fourth coordinate of a unit vector below which it is no place but a direction."""
+
 
 def triangulate_pairs(
     P_a: FloatArray, P_b: FloatArray, pixels_a: FloatArray, pixels_b: FloatArray
@@ -26,10 +29,7 @@ def triangulate_pairs(
         pixels_b: In the second views, shape (N, 2).
 
     Returns:
-        Points in the pitch frame, metres, shape (N, 3).
-
-    Raises:
-        DegenerateGeometryError: Two rays are parallel: the point lies at infinity.
+        Points in the pitch frame, metres, infinite where two rays are parallel, shape (N, 3).
 
     Source: Hartley & Zisserman, sec. 12.2.
     """
@@ -48,10 +48,33 @@ def triangulate_pairs(
     rows[:, 3] = pixels_b[:, 1:] * P_b[:, 2] - P_b[:, 1]
     homogeneous = np.empty((count, 4))
     smallest_singular_vectors(rows, homogeneous)
-    if np.any(np.abs(homogeneous[:, 3]) < 1e-12):
-        raise DegenerateGeometryError("two rays are parallel, they meet nowhere")
+    homogeneous[np.abs(homogeneous[:, 3]) < _PARALLEL] = (np.inf, np.inf, np.inf, 1.0)
     points: FloatArray = homogeneous[:, :3] / homogeneous[:, 3:]
     return points
+
+
+def moved_points(
+    P_a: FloatArray, P_b: FloatArray, pixels_a: FloatArray, pixels_b: FloatArray, step_px: float
+) -> FloatArray:
+    """Where ``triangulate_pairs`` puts its points when one pixel of a view is moved.
+
+    Args:
+        P_a: As ``triangulate_pairs`` takes them, like ``P_b``, ``pixels_a`` and ``pixels_b``.
+        step_px: How far the pixel is moved.
+
+    Returns:
+        Pitch frame, metres, shape (N, 2, 2, 2, 3): view a or b, pixel axis, forwards or back.
+    """
+    ways = np.array([step_px, -step_px])[:, None, None]
+    # By view and axis, then way: what is added to the pixels of both views.
+    steps = (ways * np.eye(4).reshape(4, 1, 2, 2)).reshape(8, 2, 2)
+    moved = triangulate_pairs(
+        np.repeat(P_a, 8, axis=0),
+        np.repeat(P_b, 8, axis=0),
+        (pixels_a[:, None] + steps[:, 0]).reshape(-1, 2),
+        (pixels_b[:, None] + steps[:, 1]).reshape(-1, 2),
+    )
+    return moved.reshape(-1, 2, 2, 2, 3)
 
 
 def parallax_angle(
@@ -62,34 +85,30 @@ def parallax_angle(
     A small angle means that depth is poorly constrained.
 
     Args:
-        position_a: Position of camera A in the pitch frame, metres, shape (3,).
-        position_b: Position of camera B in the pitch frame, metres, shape (3,).
+        position_a: Of the cameras A in the pitch frame, metres, shape (N, 3).
+        position_b: Of the cameras B in the pitch frame, metres, shape (N, 3).
         points: Points in the pitch frame, metres, shape (N, 3).
 
     Returns:
-        Angles in [0, pi], shape (N,).
+        Angles in [0, pi], NaN where a point coincides with a camera position, shape (N,).
 
     Raises:
         ShapeError: An argument has another shape.
-        DegenerateGeometryError: A point coincides with a camera position.
 
     Example:
-        >>> origin, east = np.zeros(3), np.array([2.0, 0.0, 0.0])
+        >>> origin, east = np.zeros((1, 3)), np.array([[2.0, 0.0, 0.0]])
         >>> np.degrees(parallax_angle(origin, east, np.array([[1.0, 1.0, 0.0]]))).round(9)
         array([90.])
     """
-    require_shape(position_a, (3,), "position_a")
-    require_shape(position_b, (3,), "position_b")
     points = require_shape(points, (None, 3), "points")
-    to_a, to_b = position_a - points, position_b - points
+    to_a = require_shape(position_a, (len(points), 3), "position_a") - points
+    to_b = require_shape(position_b, (len(points), 3), "position_b") - points
     sine = np.linalg.norm(np.cross(to_a, to_b), axis=1)
     cosine = (to_a * to_b).sum(axis=1)
-    if np.any((to_a == 0).all(axis=1) | (to_b == 0).all(axis=1)):
-        raise DegenerateGeometryError("a point coincides with a camera position")
+    nowhere = (to_a == 0).all(axis=1) | (to_b == 0).all(axis=1)
     # atan2 of (sine, cosine): arccos loses half the digits near zero, which
     # is exactly where small-baseline pairs live.
-    angles: FloatArray = np.arctan2(sine, cosine)
-    return angles
+    return np.where(nowhere, np.nan, np.arctan2(sine, cosine))
 
 
 def point_covariance(

@@ -11,7 +11,7 @@ from app.geometry.sphere import optimal_diameter, position_from_diameter, tight_
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.solution import Ball3D, BallFit, Calibration, ExpectedBall
-from app.solving.triangulate import calibration_spread
+from app.solving.spread import calibration_spread
 
 
 def fit_ball(

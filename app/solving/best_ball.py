@@ -13,7 +13,8 @@ from app.geometry.arrays import FloatArray
 from app.geometry.triangulation import point_covariance
 from app.soccer.policy import Policy
 from app.soccer.solution import BestBall, Pair
-from app.solving.triangulate import Sight, pixel_spread
+from app.solving.spread import pixel_spread
+from app.solving.triangulate import Sight
 
 MAX_MAHALANOBIS = 13.8
 """Squared, of two coordinates: one honest view in a thousand lies beyond."""
@@ -36,22 +37,26 @@ class _Estimate:
         return bool((self.distances <= MAX_MAHALANOBIS).all())
 
 
-def best_ball(pairs: Sequence[Pair], sights: Sequence[Sight], policy: Policy) -> BestBall | None:
+def best_ball(pairs: Sequence[Pair], usable: Sequence[Sight], policy: Policy) -> BestBall | None:
     """The point that explains the most views best; None where no two views see the ball.
 
     All views count, weighted by the uncertainty of click and calibration. Where they contradict
     each other the largest set of views that does not is taken, so that one bad view does no
     harm; two views that contradict each other stay, with their covariance widened accordingly.
 
+    Args:
+        pairs: Of the group.
+        usable: Of the views that no gate drops.
+        policy: How noisy a click is.
+
     Source: Hartley & Zisserman, sec. 12.5 (minimum reprojection error), with covariances.
     """
-    usable = tuple(sight for sight in sights if sight.failed is None)
     starts = {
         frozenset((pair.a, pair.b)): np.array(pair.point)
         for pair in pairs
         if pair.failed in (None, "reprojection") and not _is_behind(pair, usable)
     }
-    estimate = _most_consistent(usable, starts, policy)
+    estimate = _most_consistent(tuple(usable), starts, policy)
     if estimate is None:
         return None
     freedom = 2 * len(estimate.sights) - 3

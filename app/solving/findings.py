@@ -44,8 +44,7 @@ def find(
     policy: Policy,
 ) -> tuple[Finding, ...]:
     """All findings of a group, those that explain most first, then by view."""
-    main = group.views[0].key if group.views else ""
-    swaps = {swap.view: swap for swap in find_swaps(sights, main, group.pitch, policy)}
+    swaps = {swap.view: swap for swap in _swaps(group, views, sights, policy)}
     found: list[Finding] = []
     for view, solved in zip(group.views, views, strict=True):
         said = calibration_findings(solved.calibration, view.size, view.key)
@@ -68,6 +67,15 @@ def find(
         found.extend(_high_uncertainty(ball))
         found.extend(_implausible_ball(ball, group.pitch, policy))
     return tuple(sorted(found, key=lambda finding: _BY_WEIGHT.index(finding.kind)))
+
+
+def _swaps(
+    group: Group, views: Sequence[ViewSolution], sights: Sequence[Sight], policy: Policy
+) -> tuple[Swap, ...]:
+    left = {solved.view for solved in views if solved.failed is None}
+    first = next((sight for sight in sights if sight.view == group.views[0].key), None)
+    usable = [sight for sight in sights if sight.view in left]
+    return find_swaps(first, usable, group.pitch, policy)
 
 
 def _several_balls(view: View) -> Iterator[Finding]:

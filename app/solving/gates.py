@@ -1,4 +1,4 @@
-"""Gates: what a group must pass to enter the dataset, in order.
+"""Gates: what a group must pass to enter the dataset, in order and in words.
 
 The first two drop views; the others judge the group from the views that are left.
 """
@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isnan
 
 from app.soccer.policy import Policy
-from app.soccer.solution import Ball3D, Calibration, Gate, Pair, margin_of
-
-MIN_VIEWS = 2
+from app.soccer.solution import GATES, Ball3D, Calibration, Gate, Pair, margin_of
+from app.solving.verdict import MIN_VIEWS, Verdict
 
 
 @dataclass(frozen=True)
@@ -37,20 +37,36 @@ class JudgedView:
     failed: str | None
 
 
-def view_failure(calibration: Calibration, jac: float | None, policy: Policy) -> str | None:
-    """The first gate that drops a view, or None."""
-    if calibration.camera is None:
-        return "calibratable"
-    if jac is not None and not jac > policy.min_jac:
-        return "jac"
-    return None
+@dataclass(frozen=True)
+class _Group:
+    """What the sentences are written from.
+
+    Attributes:
+        views: The included ones.
+        left_out: Letters of the views that a person left out.
+        failed: Names of the gates that the group fails.
+    """
+
+    views: Sequence[JudgedView]
+    left_out: Sequence[str]
+    failed: frozenset[str]
+
+    @property
+    def left(self) -> list[JudgedView]:
+        """The views that no gate drops."""
+        return [view for view in self.views if view.failed is None]
+
+    def fallen(self, gate: str) -> list[JudgedView]:
+        """The views that a gate drops."""
+        return [view for view in self.views if view.failed == gate]
 
 
-def judge(
+def describe(
     views: Sequence[JudgedView],
     left_out: Sequence[str],
     pairs: Sequence[Pair],
     ball: Ball3D | None,
+    verdict: Verdict,
     policy: Policy,
 ) -> tuple[Gate, ...]:
     """All gates in order, those that the policy does not ask for as not active.
@@ -60,26 +76,27 @@ def judge(
         left_out: Letters of the views that a person left out.
         pairs: Their pairs.
         ball: The triangulated ball, or None.
+        verdict: Of the one group.
         policy: The thresholds.
     """
-    left = [view for view in views if view.failed is None]
-    short = len(left) < MIN_VIEWS
+    failed = zip(GATES, verdict.failed[:, 0].tolist(), strict=True)
+    group = _Group(views, left_out, frozenset(name for name, fails in failed if fails))
     return (
-        _calibratable(views, short),
-        _jac(views, short, policy),
-        _two_views(views, left, left_out),
-        _ball(views, left),
-        _baseline(left, pairs, policy),
-        _reprojection(left, pairs),
-        _parallax(ball, policy),
-        _sigma(ball, policy),
+        _calibratable(group),
+        _jac(group, policy),
+        _two_views(group),
+        _ball(group),
+        _baseline(group, float(verdict.baseline[0]), policy),
+        _reprojection(group, pairs),
+        _parallax(group, ball, policy),
+        _sigma(group, ball, policy),
     )
 
 
-def _calibratable(views: Sequence[JudgedView], short: bool) -> Gate:
-    fallen = [view for view in views if view.failed == "calibratable"]
+def _calibratable(group: _Group) -> Gate:
+    fallen, views = group.fallen("calibratable"), group.views
     count = len(views) - len(fallen)
-    blamed = short and bool(fallen) and count < MIN_VIEWS
+    blamed = "calibratable" in group.failed
     sentence = f"in {count} of {len(views)} views"
     if blamed:
         sentence = f"{fallen[0].letter} has no camera: {fallen[0].calibration.reason}"
@@ -93,13 +110,12 @@ def _calibratable(views: Sequence[JudgedView], short: bool) -> Gate:
     )
 
 
-def _jac(views: Sequence[JudgedView], short: bool, policy: Policy) -> Gate:
-    measured = [(view.jac, view) for view in views if view.jac is not None]
+def _jac(group: _Group, policy: Policy) -> Gate:
+    measured = [(view.jac, view) for view in group.views if view.jac is not None]
     fallen = [(jac, view) for jac, view in measured if view.failed == "jac"]
-    calibrated = sum(view.failed != "calibratable" for view in views)
-    blamed = short and bool(fallen) and calibrated >= MIN_VIEWS
+    blamed = "jac" in group.failed
     if not measured:
-        given = any(view.calibration.source == "given" for view in views)
+        given = any(view.calibration.source == "given" for view in group.views)
         sentence = "not measured, the cameras were given" if given else "nothing to measure"
         return Gate("jac", True, None, policy.min_jac, None, sentence)
     shown = fallen if blamed else [item for item in measured if item[1].failed is None] or measured
@@ -122,27 +138,26 @@ def _beside(value: float, limit: float) -> str:
     return f"{value:.2f}" if f"{value:.2f}" != f"{limit:.2f}" else f"{value:.4f}"
 
 
-def _two_views(
-    views: Sequence[JudgedView], left: Sequence[JudgedView], left_out: Sequence[str]
-) -> Gate:
-    sentence = f"{len(left)} of {len(views) + len(left_out)}"
-    if len(left) < MIN_VIEWS:
-        why = [*_fallen(views)]
-        if left_out:
-            why.append(f"{', '.join(left_out)} left out by a person")
+def _two_views(group: _Group) -> Gate:
+    count, passed = len(group.left), "two_views" not in group.failed
+    sentence = f"{count} of {len(group.views) + len(group.left_out)}"
+    if not passed:
+        why = _fallen(group.views)
+        if group.left_out:
+            why.append(f"{', '.join(group.left_out)} left out by a person")
         sentence = ", ".join([sentence, *why])
-    return _gate("two_views", len(left) >= MIN_VIEWS, len(left), MIN_VIEWS, sentence)
+    return _gate("two_views", passed, count, MIN_VIEWS, sentence)
 
 
-def _ball(views: Sequence[JudgedView], left: Sequence[JudgedView]) -> Gate:
-    without = [view for view in left if not view.has_ball]
-    count = len(left) - len(without)
-    passed = count >= MIN_VIEWS
+def _ball(group: _Group) -> Gate:
+    without = [view for view in group.left if not view.has_ball]
+    count = len(group.left) - len(without)
+    passed = "ball" not in group.failed
     sentence = f"in {count} {'view' if count == 1 else 'views'}"
     if without:
         sentence += f", none in {_letters(without)}"
     if not passed:
-        idle = _fallen([view for view in views if view.has_ball])
+        idle = _fallen([view for view in group.views if view.has_ball])
         sentence = ", ".join([sentence, *idle])
     view = without[0].key if without and not passed else None
     return _gate("ball", passed, count, MIN_VIEWS, sentence, view=view)
@@ -160,17 +175,11 @@ def _fallen(views: Sequence[JudgedView]) -> list[str]:
     ]
 
 
-def _baseline(left: Sequence[JudgedView], pairs: Sequence[Pair], policy: Policy) -> Gate:
-    names = {view.key for view in left}
-    apart = [pair.baseline_m for pair in pairs if pair.a in names and pair.b in names]
-    if not apart and sum(view.has_ball for view in left) >= MIN_VIEWS:
-        # One camera twice: there is nothing to triangulate.
-        apart = [0.0]
-    if not apart:
+def _baseline(group: _Group, widest: float, policy: Policy) -> Gate:
+    if isnan(widest):
         return _unjudged("baseline", policy.min_baseline_m)
-    widest = max(apart)
-    passed = widest >= policy.min_baseline_m
-    letters = "–".join(view.letter for view in left if view.has_ball)
+    passed = "baseline" not in group.failed
+    letters = "–".join(view.letter for view in group.left if view.has_ball)
     return _gate(
         "baseline",
         passed,
@@ -180,13 +189,13 @@ def _baseline(left: Sequence[JudgedView], pairs: Sequence[Pair], policy: Policy)
     )
 
 
-def _reprojection(left: Sequence[JudgedView], pairs: Sequence[Pair]) -> Gate:
+def _reprojection(group: _Group, pairs: Sequence[Pair]) -> Gate:
     """Judged by the best pair: its error that is larger in units of tau."""
-    views = {view.key: view for view in left}
+    views = {view.key: view for view in group.left}
     judged = [
         (max(_shares(pair, views), key=lambda share: share[0]), pair)
         for pair in pairs
-        if pair.failed in (None, "reprojection") and pair.a in views and pair.b in views
+        if pair.failed in (None, "reprojection")
     ]
     if not judged:
         return _unjudged("reprojection", None)
@@ -214,22 +223,20 @@ def _name(pair: Pair, views: Mapping[str, JudgedView]) -> str:
     return f"{views[pair.a].letter}–{views[pair.b].letter}"
 
 
-def _parallax(ball: Ball3D | None, policy: Policy) -> Gate:
+def _parallax(group: _Group, ball: Ball3D | None, policy: Policy) -> Gate:
     threshold, active = policy.min_parallax_degrees, policy.min_parallax_degrees is not None
     if ball is None:
         return _unjudged("parallax", threshold, active=active)
-    value = ball.parallax_degrees
-    passed = threshold is None or value >= threshold
+    value, passed = ball.parallax_degrees, "parallax" not in group.failed
     return _gate("parallax", passed, value, threshold, f"{value:.1f}°", active=active)
 
 
-def _sigma(ball: Ball3D | None, policy: Policy) -> Gate:
+def _sigma(group: _Group, ball: Ball3D | None, policy: Policy) -> Gate:
     threshold, active = policy.max_sigma_m, policy.max_sigma_m is not None
     if ball is None:
         return _unjudged("sigma", threshold, active=active)
-    value = ball.sigma_m
+    value, passed = ball.sigma_m, "sigma" not in group.failed
     margin = margin_of(value, threshold, at_most=True)
-    passed = threshold is None or threshold - value >= 0
     return Gate("sigma", passed, value, threshold, margin, f"{value:.2f} m", active=active)
 
 

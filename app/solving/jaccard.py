@@ -17,7 +17,6 @@ from app.geometry.polyline import clip_polyline, distance_to_polyline, inside_im
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS, Pitch, twin_marking
-from app.soccer.solution import Calibration
 
 SPACING_M = 0.9
 CIRCLE_SPACING_M = 0.2
@@ -83,15 +82,6 @@ def jaccard(found: dict[str, str]) -> float:
     if not found:
         return 0.0
     return sum(outcome == TRUE_POSITIVE for outcome in found.values()) / len(found)
-
-
-def jac_at(calibration: Calibration, gamma_px: float) -> float | None:
-    """JaC of a measured calibration at any threshold, or None without lines."""
-    if calibration.jac is None:
-        return None
-    largest = [fit.largest_px for fit in calibration.markings]
-    close = sum(apart is not None and apart < gamma_px for apart in largest)
-    return close / len(calibration.markings) if calibration.markings else 0.0
 
 
 def camera_jaccard(

@@ -16,7 +16,7 @@ from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.plausible import is_plausible
-from app.solving.triangulate import Sight, triangulate
+from app.solving.triangulate import Meeting, Sight, meet
 
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 
@@ -48,7 +48,7 @@ def turned_camera(camera: Camera) -> Camera:
 
 
 def find_swaps(
-    sights: Sequence[Sight], main: str, pitch: Pitch, policy: Policy
+    first: Sight | None, usable: Sequence[Sight], pitch: Pitch, policy: Policy
 ) -> tuple[Swap, ...]:
     """Views whose ball meets that of the others only after a half turn.
 
@@ -57,22 +57,20 @@ def find_swaps(
     labelled from the same wrong end. A given camera rests on no labels and is never turned.
 
     Args:
-        sights: Views with camera and ball.
-        main: Key of the main camera.
+        first: Of the main camera, or None.
+        usable: Of the views that no gate drops.
         pitch: Tells which meeting points are plausible.
         policy: Holds tau.
     """
-    usable = [sight for sight in sights if sight.failed is None]
-    first = next((sight for sight in sights if sight.view == main), None)
     if first is not None and first.camera.position[1] < 0 and _from_lines(first):
-        swap = _swap(first, _others(first, usable), pitch, policy) if len(usable) > 1 else None
+        swap = _swap(first, _others(first, usable), pitch, policy) if first in usable else None
         return (swap or Swap(first.view, None, None, confidence=0.9),)
     if len(usable) < 2:
         return ()
     swaps = (
         _swap(replay, _others(replay, usable), pitch, policy)
         for replay in usable
-        if replay.view != main and _from_lines(replay)
+        if replay is not first and _from_lines(replay)
     )
     return tuple(swap for swap in swaps if swap is not None)
 
@@ -108,19 +106,16 @@ def _best_error(sight: Sight, others: Sequence[Sight], pitch: Pitch, policy: Pol
 
     Two rays can meet by accident, far from any pitch: such a pair says nothing.
     """
-    tau = {item.view: item.tau_px(policy) for item in (sight, *others)}
     errors = [
-        np.inf
-        if pair.failed not in (None, "reprojection")
-        or _behind(pair.point, sight, other)
-        or not is_plausible(pair.point, pitch, policy)
-        else max(pair.errors_px[0] / tau[pair.a], pair.errors_px[1] / tau[pair.b])
-        for other in others
-        for pair in triangulate((sight, other), policy)
+        max(item.errors_px[0] / item.a.tau_px(policy), item.errors_px[1] / item.b.tau_px(policy))
+        for item in meet((sight, other) for other in others)
+        if item.baseline_m >= policy.min_baseline_m
+        and not _is_behind(item)
+        and is_plausible(item.place, pitch, policy)
     ]
     return min(errors, default=np.inf)
 
 
-def _behind(point: tuple[float, float, float], *sights: Sight) -> bool:
-    place = np.array([point])
-    return any(sight.camera.pitch_to_camera(place)[0, 2] <= 0 for sight in sights)
+def _is_behind(meeting: Meeting) -> bool:
+    place = meeting.point[None]
+    return any(sight.camera.pitch_to_camera(place)[0, 2] <= 0 for sight in (meeting.a, meeting.b))

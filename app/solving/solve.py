@@ -8,20 +8,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from types import MappingProxyType
 
 import numpy as np
 
 from app.soccer.group import Group, View
 from app.soccer.policy import Policy
-from app.soccer.solution import SOLVER_VERSION, Ball3D, Calibration, Solution, ViewSolution
+from app.soccer.solution import (
+    GATES,
+    SOLVER_VERSION,
+    Ball3D,
+    Calibration,
+    Solution,
+    ViewSolution,
+)
 from app.solving.ball_box import expect_ball, fit_ball
 from app.solving.best_ball import best_ball
 from app.solving.calibrate import calibrate_station, calibration_key
+from app.solving.facts import facts_of
 from app.solving.findings import find
-from app.solving.gates import JudgedView, judge, view_failure
-from app.solving.jaccard import jac_at
-from app.solving.triangulate import Sight, mean_ball, triangulate
+from app.solving.gates import JudgedView, describe
+from app.solving.mean_ball import judged_pairs, mean_ball
+from app.solving.spread import MeanSpread
+from app.solving.triangulate import meet, sights_of
+from app.solving.verdict import PASSES, Verdict, judge
 
 NO_CALIBRATIONS: Mapping[str, Calibration] = MappingProxyType({})
 LEFT_OUT = "excluded"
@@ -40,24 +51,28 @@ def solve(
             time and change nothing.
     """
     known = dict(calibrations)
-    views = tuple(_calibrated(view, group, policy, known) for view in group.views)
-    sights = [
-        sight
-        for view, solved in zip(group.views, views, strict=True)
-        if (sight := _sight(view, solved)) is not None
-    ]
-    pairs = triangulate(sights, policy)
-    ball = mean_ball(pairs, sights, policy)
+    keys = [_calibrated(view, group, policy, known) for view in group.views]
+    found = [known[key] for key in keys]
+    sights = sights_of(group.views, found)
+    meetings = meet(combinations(sights, 2))
+    facts = facts_of(group.views, found, meetings)
+    spread = MeanSpread(facts)
+    verdict = judge(facts, policy, spread)
+    pairs = judged_pairs(meetings, verdict)
+    ball = mean_ball([view.key for view in group.views], facts, verdict, spread, policy)
     views = tuple(
-        _with_ball(view, solved, ball, policy)
-        for view, solved in zip(group.views, views, strict=True)
+        _with_ball(view, ViewSolution(view.key, known[key], key, False, failed), ball, policy)
+        for view, key, failed in zip(group.views, keys, _failed(group, verdict), strict=True)
     )
+    left = {view.view for view in views if view.failed is None}
+    usable = [sight for sight in sights if sight.view in left]
+    judged, left_out = _judged(group, views, verdict, policy), _left_out(group)
     return Solution(
         views=views,
         pairs=pairs,
         ball=ball,
-        best_ball=best_ball(pairs, sights, policy),
-        gates=judge(_judged(group, views, policy), _left_out(group), pairs, ball, policy),
+        best_ball=best_ball(pairs, usable, policy),
+        gates=describe(judged, left_out, pairs, ball, verdict, policy),
         findings=find(group, views, sights, pairs, ball, policy),
         policy_hash=policy.hash,
         solver_version=SOLVER_VERSION,
@@ -69,34 +84,20 @@ def view_letter(index: int) -> str:
     return chr(ord("A") + index) if index < 26 else f"V{index + 1}"
 
 
-def _calibrated(
-    view: View, group: Group, policy: Policy, known: dict[str, Calibration]
-) -> ViewSolution:
+def _calibrated(view: View, group: Group, policy: Policy, known: dict[str, Calibration]) -> str:
+    """Key of a view's calibration, which is known then."""
     key = calibration_key(view.station, group.pitch, policy.calibration)
     if key not in known:
         known[key] = calibrate_station(view.station, group.pitch, policy.calibration)
-    failed: str | None = LEFT_OUT
-    if view.included:
-        failed = view_failure(known[key], _jac(known[key], view, policy), policy)
-    return ViewSolution(view.key, known[key], key, included=False, failed=failed)
+    return key
 
 
-def _jac(calibration: Calibration, view: View, policy: Policy) -> float | None:
-    return jac_at(calibration, policy.jac_gamma_percent / 100 * view.size.diagonal)
-
-
-def _sight(view: View, solved: ViewSolution) -> Sight | None:
-    """The ball as this view sees it; None without camera, ball or inclusion.
-
-    A ball that was put where the others see it is no sight: it would confirm itself.
-    """
-    ball = view.ball
-    if solved.calibration.camera is None or ball is None or not view.included or ball.inferred:
-        return None
-    assert ball.center is not None
-    diameter = ball.box.diameter if ball.box is not None else 0.0
-    sight = Sight(view.key, solved.calibration, ball.center, diameter, view.size, solved.failed)
-    return sight if np.isfinite(sight.ideal_center).all() else None
+def _failed(group: Group, verdict: Verdict) -> list[str | None]:
+    """What each view failed at, or None."""
+    return [
+        LEFT_OUT if not view.included else None if gate == PASSES else GATES[gate]
+        for view, gate in zip(group.views, verdict.view_failed.tolist(), strict=True)
+    ]
 
 
 def _with_ball(
@@ -121,18 +122,22 @@ def _with_ball(
     return replace(solved, ball=fit)
 
 
-def _judged(group: Group, views: Sequence[ViewSolution], policy: Policy) -> tuple[JudgedView, ...]:
+def _judged(
+    group: Group, views: Sequence[ViewSolution], verdict: Verdict, policy: Policy
+) -> tuple[JudgedView, ...]:
     return tuple(
         JudgedView(
             key=view.key,
             letter=view_letter(index),
             calibration=solved.calibration,
-            jac=_jac(solved.calibration, view, policy),
+            jac=None if np.isnan(jac) else jac,
             tau_px=policy.tau_percent / 100 * view.size.diagonal,
             has_ball=view.ball is not None and not view.ball.inferred,
             failed=solved.failed,
         )
-        for index, (view, solved) in enumerate(zip(group.views, views, strict=True))
+        for index, (view, solved, jac) in enumerate(
+            zip(group.views, views, verdict.jac.tolist(), strict=True)
+        )
         if view.included
     )
 

@@ -1,30 +1,20 @@
-"""Triangulate: the ball from every pair of calibrated views, and their mean."""
+"""Triangulate: where the rays of every two views that see the ball meet."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 
-from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import MIN_DEPTH, Camera
-from app.geometry.resection import (
-    PARAMETERS,
-    parameters_from_camera,
-    projection_jacobian,
-)
 from app.geometry.triangulation import parallax_angle, triangulate_pairs
 from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.group import View
 from app.soccer.policy import Policy
-from app.soccer.solution import Ball3D, Calibration, Pair
-
-CLICK_DIAGONAL = float(np.hypot(1920, 1080))
-"""The policy's click sigma holds for 1920 x 1080 and grows with the diagonal."""
-_STEP_PX = 0.5
+from app.soccer.solution import Calibration
 
 
 @dataclass(frozen=True)
@@ -37,7 +27,6 @@ class Sight:
         center: Annotated centre, pixels as the image shows them.
         diameter_px: Of the annotated box, 0 for a point.
         size: Annotated size.
-        failed: First gate that dropped the view, or None.
     """
 
     view: str
@@ -45,13 +34,17 @@ class Sight:
     center: ImagePoint
     diameter_px: float
     size: ImageSize
-    failed: str | None
 
     @property
     def camera(self) -> Camera:
         """The camera of the view."""
         assert self.calibration.camera is not None
         return self.calibration.camera
+
+    @cached_property
+    def P(self) -> FloatArray:
+        """Projection matrix of the camera, shape (3, 4)."""
+        return self.camera.P
 
     @cached_property
     def ideal_center(self) -> FloatArray:
@@ -64,128 +57,95 @@ class Sight:
         return policy.tau_percent / 100 * self.size.diagonal
 
 
-def triangulate(sights: Sequence[Sight], policy: Policy) -> tuple[Pair, ...]:
-    """Every pair of views with its point, whatever the gates say of it.
+@dataclass(frozen=True)
+class Meeting:
+    """Where the rays of two sights meet, whatever the gates say of it.
+
+    Attributes:
+        a: The first sight; ``b`` the second.
+        point: Pitch frame, metres, shape (3,).
+        errors_px: Reprojection error in both.
+        in_front: The point lies in front of both cameras.
+        baseline_m: Between the cameras.
+        parallax_degrees: Between the rays.
+    """
+
+    a: Sight
+    b: Sight
+    point: FloatArray
+    errors_px: tuple[float, float]
+    in_front: bool
+    baseline_m: float
+    parallax_degrees: float
+
+    @property
+    def place(self) -> tuple[float, float, float]:
+        """The point as plain numbers."""
+        x, y, z = self.point.tolist()
+        return x, y, z
+
+
+def sights_of(views: Sequence[View], calibrations: Sequence[Calibration]) -> list[Sight]:
+    """The views that take part: included, calibrated, and with one ball.
+
+    A ball that was put where the others see it is no sight: it would confirm itself. Nor is one
+    beyond the radius where the lens folds the picture.
+
+    Args:
+        views: Of a group.
+        calibrations: Of each view.
+    """
+    sights = [
+        Sight(view.key, calibration, center, ball.box.diameter if ball.box else 0.0, view.size)
+        for view, calibration in zip(views, calibrations, strict=True)
+        if view.included and calibration.camera is not None
+        if (ball := view.ball) is not None and not ball.inferred
+        if (center := ball.center) is not None
+    ]
+    return [sight for sight in sights if np.isfinite(sight.ideal_center).all()]
+
+
+def meet(couples: Iterable[tuple[Sight, Sight]]) -> list[Meeting]:
+    """Where the rays of each couple meet; one camera twice, and parallel rays, meet nowhere.
 
     Source: SoccerNet-v3D (arXiv 2504.10106), triangulation of ball annotations.
     """
-    couples = [
-        (a, b) for a, b in combinations(sights, 2) if not np.array_equal(a.camera.P, b.camera.P)
+    couples = [(a, b) for a, b in couples if not np.array_equal(a.P, b.P)]
+    if not couples:
+        return []
+    points = triangulate_pairs(*lines_of_sight([a for a, _ in couples], [b for _, b in couples]))
+    return [
+        _meeting(a, b, point)
+        for (a, b), point in zip(couples, points, strict=True)
+        if np.isfinite(point).all()
     ]
-    try:
-        points = [*_meet(couples)] if couples else []
-    except DegenerateGeometryError:
-        # A picture twice in a group: rays that are parallel meet nowhere, the others do.
-        couples = [couple for couple in couples if _can_meet(couple)]
-        points = [*_meet(couples)] if couples else []
-    return tuple(_pair(a, b, point, policy) for (a, b), point in zip(couples, points, strict=True))
 
 
-def _meet(couples: Sequence[tuple[Sight, Sight]]) -> FloatArray:
-    return triangulate_pairs(
-        np.array([a.camera.P for a, _ in couples]),
-        np.array([b.camera.P for _, b in couples]),
-        np.array([a.ideal_center for a, _ in couples]),
-        np.array([b.ideal_center for _, b in couples]),
+def lines_of_sight(
+    a: Sequence[Sight], b: Sequence[Sight]
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Couples of sights as ``triangulate_pairs`` takes them."""
+    return (
+        np.array([sight.P for sight in a]),
+        np.array([sight.P for sight in b]),
+        np.array([sight.ideal_center for sight in a]),
+        np.array([sight.ideal_center for sight in b]),
     )
 
 
-def _can_meet(couple: tuple[Sight, Sight]) -> bool:
-    try:
-        _meet([couple])
-    except DegenerateGeometryError:
-        return False
-    return True
-
-
-def mean_ball(pairs: Sequence[Pair], sights: Sequence[Sight], policy: Policy) -> Ball3D | None:
-    """The mean of the valid pairs with its uncertainty; None without a valid pair."""
-    valid = [pair for pair in pairs if pair.valid]
-    if not valid:
-        return None
-    point = np.mean([pair.point for pair in valid], axis=0)
-    used = {pair.a for pair in valid} | {pair.b for pair in valid}
-    seen = {sight.view: sight for sight in sights if sight.view in used}
-    spread = mean_covariance(valid, seen, point, policy)
-    return Ball3D(
-        point=_triple(point),
-        covariance=tuple(spread.ravel().tolist()),
-        sigma_m=float(np.sqrt(np.linalg.eigvalsh(spread)[-1])),
-        parallax_degrees=max(_parallax(seen, pair, point) for pair in valid),
-        views=tuple(seen),
-    )
-
-
-def mean_covariance(
-    pairs: Sequence[Pair], seen: Mapping[str, Sight], point: FloatArray, policy: Policy
-) -> FloatArray:
-    """Covariance of the mean of pairs, square metres, shape (3, 3).
-
-    The uncertainty of each view's pixel is carried through the estimator itself, by central
-    differences: pairs that share a view move together, and a pair of small parallax, which the
-    mean trusts like any other, makes the mean as uncertain as it is.
-
-    Source: Hartley & Zisserman, result 5.6.
-    """
-    steps = [
-        (view, axis, sign) for view in seen for axis in (0, 1) for sign in (_STEP_PX, -_STEP_PX)
-    ]
-    pixels = {
-        view: np.repeat(sight.ideal_center[None], len(steps), axis=0)
-        for view, sight in seen.items()
-    }
-    for row, (view, axis, step) in enumerate(steps):
-        pixels[view][row, axis] += step
-    moved = np.mean(
-        [
-            triangulate_pairs(
-                np.repeat(seen[pair.a].camera.P[None], len(steps), axis=0),
-                np.repeat(seen[pair.b].camera.P[None], len(steps), axis=0),
-                pixels[pair.a],
-                pixels[pair.b],
-            )
-            for pair in pairs
-        ],
-        axis=0,
-    ).reshape(len(seen), 2, 2, 3)
-    slopes = (moved[:, :, 0] - moved[:, :, 1]) / (2 * _STEP_PX)
-    spread = np.zeros((3, 3))
-    for slope, sight in zip(slopes, seen.values(), strict=True):
-        spread += slope.T @ pixel_spread(sight, point, policy) @ slope
-    return spread
-
-
-def pixel_spread(sight: Sight, point: FloatArray, policy: Policy) -> FloatArray:
-    """Covariance of the ball's pixel in a view, square pixels, shape (2, 2).
-
-    The noise of the click, which grows with the size of the ball, and, where the camera comes
-    from lines, the covariance of its calibration carried to the ball.
-    """
-    click = policy.click_sigma_px * sight.size.diagonal / CLICK_DIAGONAL
-    click = float(np.hypot(click, policy.box_sigma_share * sight.diameter_px))
-    return click**2 * np.eye(2) + calibration_spread(sight.calibration, sight.size, point)
-
-
-def _pair(a: Sight, b: Sight, point: FloatArray, policy: Policy) -> Pair:
-    errors = tuple(_reprojection_error(sight, point) for sight in (a, b))
-    baseline = float(np.linalg.norm(a.camera.position - b.camera.position))
-    in_front = all(sight.camera.pitch_to_camera(point[None])[0, 2] > MIN_DEPTH for sight in (a, b))
-    failed = a.failed or b.failed
-    if failed is None and baseline < policy.min_baseline_m:
-        failed = "baseline"
-    close = errors[0] < a.tau_px(policy) and errors[1] < b.tau_px(policy)
-    if failed is None and not (close and in_front):
-        failed = "reprojection"
-    angle = parallax_angle(a.camera.position, b.camera.position, point[None])[0]
-    return Pair(
-        a=a.view,
-        b=b.view,
-        point=_triple(point),
-        errors_px=(errors[0], errors[1]),
-        baseline_m=baseline,
+def _meeting(a: Sight, b: Sight, point: FloatArray) -> Meeting:
+    positions = a.camera.position, b.camera.position
+    angle = parallax_angle(positions[0][None], positions[1][None], point[None])[0]
+    return Meeting(
+        a=a,
+        b=b,
+        point=point,
+        errors_px=(_reprojection_error(a, point), _reprojection_error(b, point)),
+        in_front=all(
+            sight.camera.pitch_to_camera(point[None])[0, 2] > MIN_DEPTH for sight in (a, b)
+        ),
+        baseline_m=float(np.linalg.norm(positions[0] - positions[1])),
         parallax_degrees=float(np.degrees(angle)),
-        valid=failed is None,
-        failed=failed,
     )
 
 
@@ -197,33 +157,6 @@ def _reprojection_error(sight: Sight, point: FloatArray) -> float:
     """
     pixel = sight.camera.project(point[None])[0]
     if np.isnan(pixel[0]):
-        homogeneous = sight.camera.P @ np.append(point, 1.0)
+        homogeneous = sight.P @ np.append(point, 1.0)
         pixel = homogeneous[:2] / homogeneous[2]
     return float(np.hypot(*(pixel - sight.center)))
-
-
-def _parallax(seen: Mapping[str, Sight], pair: Pair, point: FloatArray) -> float:
-    positions = (seen[pair.a].camera.position, seen[pair.b].camera.position)
-    return float(np.degrees(parallax_angle(*positions, point[None])[0]))
-
-
-def calibration_spread(calibration: Calibration, size: ImageSize, point: FloatArray) -> FloatArray:
-    """Covariance that the calibration brings to the pixel of a point, square pixels, (2, 2).
-
-    Args:
-        calibration: With a camera; nothing is known of the uncertainty of a given one: zeros.
-        size: Annotated size.
-        point: In front of the camera, pitch frame, metres, shape (3,).
-    """
-    if calibration.covariance is None or calibration.camera is None:
-        return np.zeros((2, 2))
-    spread = np.array(calibration.covariance).reshape(PARAMETERS, PARAMETERS)
-    half_diagonal = size.diagonal / 2
-    parameters = parameters_from_camera(calibration.camera, half_diagonal)
-    jacobian = projection_jacobian(parameters, point, half_diagonal)
-    carried: FloatArray = jacobian @ spread @ jacobian.T
-    return carried
-
-
-def _triple(point: FloatArray) -> tuple[float, float, float]:
-    return float(point[0]), float(point[1]), float(point[2])

@@ -156,7 +156,8 @@ class CalibrationModel(Base):
 class SolutionModel(Base):
     """A solution without its calibrations, which ``calibrations`` (JSON list) names.
 
-    ``summary`` (JSON) is what the queue shows of it.
+    ``summary`` (JSON) is what the queue shows of it. ``facts`` is what the gates read of the group
+    (``solving.facts_codec``), NULL for a solution from before they were kept.
     """
 
     __tablename__ = "solution"
@@ -174,6 +175,7 @@ class SolutionModel(Base):
     calibrations: Mapped[str]
     summary: Mapped[str]
     body: Mapped[bytes] = mapped_column(LargeBinary)
+    facts: Mapped[bytes | None] = mapped_column(LargeBinary)
 
 
 class VerdictModel(Base):

@@ -43,9 +43,12 @@ class EncodedSolution:
     calibration_keys: tuple[str, ...]
     summary: str
     body: bytes
+    facts: bytes | None
 
 
-def encode_solution(group: Group, solution: Solution, known: Iterable[str] = ()) -> EncodedSolution:
+def encode_solution(
+    group: Group, solution: Solution, known: Iterable[str] = (), facts: bytes | None = None
+) -> EncodedSolution:
     """A solution as bytes; calibrations under a known key are not encoded again."""
     skip = set(known)
     calibrations = {
@@ -59,6 +62,7 @@ def encode_solution(group: Group, solution: Solution, known: Iterable[str] = ())
         calibration_keys=tuple(view.calibration_key for view in solution.views),
         summary=value_codec.dumps(value_codec.to_json(summarize(group, solution))),
         body=_compress(value_codec.to_json(replace(solution, views=bare))),
+        facts=facts,
     )
 
 
@@ -124,6 +128,7 @@ def _row(key: SolutionKey, encoded: EncodedSolution) -> dict[str, object]:
         "calibrations": json_text(encoded.calibration_keys, ascii_=True),
         "summary": encoded.summary,
         "body": encoded.body,
+        "facts": encoded.facts,
     }
 
 

@@ -132,7 +132,9 @@ def _pair(
         "pixels": [click.tolist() for click in clicks],
         "point": point[0].tolist(),
         "reprojected": [camera.project(point)[0].tolist() for camera in (a, b)],
-        "parallax_degrees": float(np.degrees(parallax_angle(a.position, b.position, point)[0])),
+        "parallax_degrees": float(
+            np.degrees(parallax_angle(a.position[None], b.position[None], point)[0])
+        ),
     }
 
 

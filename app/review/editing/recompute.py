@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session
 
 from app.review.datasets.dataset import Dataset, get_dataset, read_dataset
 from app.review.datasets.fan_out import fan_out
+from app.review.editing.encode import encode
 from app.review.editing.known import calibration_keys
 from app.review.editing.solver import Solver
 from app.soccer.group import Group, Station
@@ -32,7 +33,6 @@ from app.store.solutions import (
     SolutionKey,
     decode_calibration,
     encode_calibration,
-    encode_solution,
     insert_calibrations,
     insert_solutions,
     read_calibration_bodies,
@@ -125,7 +125,7 @@ def solve_task(task: Task) -> list[Result]:
 def _solve_one(key: SolutionKey, group: Group, task: Task, known: dict[str, Calibration]) -> Result:
     try:
         solution = task.solver(group, task.policy, known)
-        encoded = encode_solution(group, solution, known)
+        encoded = encode(group, solution, known)
     except Exception as error:
         # One broken group must not stop the others; it stays stale and is reported by name.
         return Result(key, group.key, problem=f"{type(error).__name__}: {error}")

@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 from app.errors import ConflictError, NotFoundError, SharedStationError
 from app.review.editing.codec import edit_from_json, edit_to_json
 from app.review.editing.edit import STATION_EDITS, Edit, need_view
+from app.review.editing.encode import encode
 from app.review.editing.etags import require_unchanged
 from app.review.editing.idempotency import Request, is_repeated, remember
 from app.review.editing.known import known_calibrations
@@ -32,7 +33,7 @@ from app.store.log import Entry, LogEntry, append, read_log
 from app.store.models import GroupModel, LogModel
 from app.store.queue import refresh_queue
 from app.store.session import Store
-from app.store.solutions import SolutionKey, encode_solution, insert_solutions, read_solutions
+from app.store.solutions import SolutionKey, insert_solutions, read_solutions
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ def solved(store: Store, group_id: int, *, solver: Solver = solve) -> GroupState
     with store.read() as session:
         known = known_calibrations(session, [state.group], state.policy)
     solution = solver(state.group, state.policy, known)
-    encoded = encode_solution(state.group, solution, known)
+    encoded = encode(state.group, solution, known)
     with store.write() as session:
         insert_solutions(session, [(state.solution_key, encoded)])
         refresh_queue(session, [group_id])
@@ -189,7 +190,7 @@ def _change(
     if repeated or change.group == state.group:
         return load(store, group_id)
     solution = solver(change.group, state.policy, known)
-    encoded = encode_solution(change.group, solution, known)
+    encoded = encode(change.group, solution, known)
     key = SolutionKey(group_id, group_inputs_hash(change.group), state.policy.hash)
     with store.write() as session:
         if not is_repeated(session, request):

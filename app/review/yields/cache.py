@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 import structlog
 
-from app.review.yields.table import EMPTY, SHAPES, YieldTable
+from app.review.yields.table import EMPTY, YieldTable
+from app.solving.facts import COLUMNS, Facts
 
-FORMAT = "1"
-"""Raised with every change of ``YieldTable``."""
+FORMAT = "2"
+"""Raised with every change of ``Facts``."""
 
 log = structlog.get_logger("touchline.yields")
 
@@ -32,7 +33,8 @@ def keep_table(path: Path, calibration: str, table: YieldTable) -> None:
     """
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     made_by = np.array([FORMAT, calibration])
-    arrays: dict[str, Any] = {name: getattr(table, name) for name in SHAPES}
+    arrays: dict[str, Any] = {name: getattr(table.facts, name) for name in COLUMNS}
+    arrays |= {"group_id": table.group_id, "inputs": table.inputs}
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         with partial.open("wb") as file:
@@ -50,7 +52,9 @@ def kept_table(path: Path, calibration: str) -> YieldTable:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             if arrays["made_by"].tolist() != [FORMAT, calibration]:
                 return EMPTY
-            table = YieldTable(**{name: arrays[name] for name in SHAPES})
+            columns = {name: arrays[name] for name in COLUMNS}
+            ids, inputs = arrays["group_id"], arrays["inputs"]
+            table = YieldTable(ids, inputs, Facts(len(ids), **columns))
     except FileNotFoundError:
         return EMPTY
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
@@ -67,16 +71,21 @@ def forget_table(path: Path) -> None:
 
 def _is_sound(table: YieldTable) -> bool:
     """Whether every array has its type, its shape and rows that exist."""
-    lengths = {"group": table.groups, "inputs": table.groups}
-    for name, (kind, shape) in SHAPES.items():
-        array, per = getattr(table, name), name.partition("_")[0]
+    facts, lengths = table.facts, dict[str, int]()
+    for name, (kind, shape) in COLUMNS.items():
+        array, per = getattr(facts, name), name.partition("_")[0]
         rows = lengths.setdefault(per, len(array))
         if array.shape != (rows, *shape) or not np.issubdtype(array.dtype, kind):
             return False
     inside = (
-        (table.view_group, table.groups),
-        (table.mark_view, lengths["view"]),
-        (table.pair_group, table.groups),
-        (table.pair_view, lengths["view"]),
+        (facts.view_group, table.groups),
+        (facts.mark_view, lengths["view"]),
+        (facts.pair_group, table.groups),
+        (facts.pair_view, lengths["view"]),
     )
-    return all(not len(rows) or 0 <= rows.min() <= rows.max() < count for rows, count in inside)
+    return (
+        table.group_id.dtype == np.int64
+        and table.group_id.shape == table.inputs.shape == (table.groups,)
+        and np.issubdtype(table.inputs.dtype, np.str_)
+        and all(not len(rows) or 0 <= rows.min() <= rows.max() < count for rows, count in inside)
+    )

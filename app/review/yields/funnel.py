@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from app.geometry.arrays import BoolArray, IntArray
-from app.review.yields.gates import Judged, judge_table
 from app.review.yields.store import Snapshot, YieldStore
 from app.soccer.policy import BOXES, CALIBRATION, PITCH, THRESHOLDS, Policy
 from app.soccer.solution import GAMMAS_PERCENT, GATES
+from app.solving.verdict import Verdict, judge
 
 UNSOLVED = "unsolved"
 """Step of the funnel before the gates: groups that nobody has solved yet."""
@@ -109,8 +109,8 @@ def get_yield(
     policy = _changed(snapshot.policy, values or {})
     unanswered = needs_solving(snapshot.policy, policy)
     same = all(item.value(policy) == item.value(snapshot.policy) for item in ANSWERED)
-    judged = snapshot.present if same else judge_table(snapshot.table, policy, snapshot.memo)
-    return _answer(snapshot, policy, judged, unanswered)
+    verdict = snapshot.present if same else judge(snapshot.table.facts, policy, snapshot.spread)
+    return _answer(snapshot, policy, verdict, unanswered)
 
 
 def needs_solving(present: Policy, asked: Policy) -> tuple[str, ...]:
@@ -129,20 +129,20 @@ def _changed(policy: Policy, values: Mapping[str, Any]) -> Policy:
 
 
 def _answer(
-    snapshot: Snapshot, policy: Policy, judged: Judged, unanswered: tuple[str, ...]
+    snapshot: Snapshot, policy: Policy, verdict: Verdict, unanswered: tuple[str, ...]
 ) -> Yield:
-    passes, before = judged.passes, snapshot.present.passes
+    passes, before = verdict.passes, snapshot.present.passes
     return Yield(
         policy=policy,
         groups=snapshot.table.groups + snapshot.unsolved,
         passing=int(passes.sum()),
         unsolved=snapshot.unsolved,
-        funnel=_funnel(snapshot, judged.first, policy),
-        given_not_measured=int(judged.unmeasured.sum()),
+        funnel=_funnel(snapshot, verdict.first, policy),
+        given_not_measured=snapshot.unmeasured,
         curves=_curves(snapshot),
         splits=_splits(snapshot, passes),
-        distances=_distances(snapshot, judged),
-        findings=_findings(snapshot, policy, judged),
+        distances=_distances(snapshot, verdict),
+        findings=_findings(snapshot, policy, verdict),
         leakage=tuple(Leak(match, splits) for match, splits in snapshot.leaks),
         gained=int((passes & ~before).sum()),
         lost=int((before & ~passes).sum()),
@@ -186,13 +186,13 @@ def _splits(snapshot: Snapshot, passes: BoolArray) -> tuple[Part, ...]:
     )
 
 
-def _distances(snapshot: Snapshot, judged: Judged) -> tuple[Part, ...]:
+def _distances(snapshot: Snapshot, verdict: Verdict) -> tuple[Part, ...]:
     """By distance of the ball; groups that have none under the policy stand apart, last."""
-    place = np.digitize(judged.distance, DISTANCES) - 1
-    place[np.isnan(judged.distance)] = len(DISTANCES)
+    place = np.digitize(verdict.distance, DISTANCES) - 1
+    place[np.isnan(verdict.distance)] = len(DISTANCES)
     groups = np.bincount(place, minlength=len(DISTANCES) + 1)
     groups[-1] += snapshot.unsolved
-    passing = np.bincount(place[judged.passes], minlength=len(DISTANCES) + 1)
+    passing = np.bincount(place[verdict.passes], minlength=len(DISTANCES) + 1)
     ends: list[float | None] = [*DISTANCES[1:], None, None]
     return tuple(
         Part("", int(groups[bin_]), int(passing[bin_]), low, ends[bin_])
@@ -200,16 +200,16 @@ def _distances(snapshot: Snapshot, judged: Judged) -> tuple[Part, ...]:
     )
 
 
-def _findings(snapshot: Snapshot, policy: Policy, judged: Judged) -> tuple[Part, ...]:
+def _findings(snapshot: Snapshot, policy: Policy, verdict: Verdict) -> tuple[Part, ...]:
     """Findings about the ball that follow from thresholds, though they are no gates."""
-    x, y, z = judged.point.T
+    x, y, z = verdict.point.T
     half = snapshot.heads.pitch[: snapshot.table.groups].T / 2
     outside = np.maximum(np.abs(x) - half[0], np.abs(y) - half[1])
     implausible = (
         (z > policy.below_grass_m) | (-z > policy.max_height_m) | (outside > policy.outside_pitch_m)
     )
-    low = judged.parallax < policy.low_parallax_degrees
+    low = verdict.parallax < policy.low_parallax_degrees
     return tuple(
-        Part(kind, int(found.sum()), int((found & judged.passes).sum()))
+        Part(kind, int(found.sum()), int((found & verdict.passes).sum()))
         for kind, found in (("implausible_ball", implausible), ("low_parallax", low))
     )

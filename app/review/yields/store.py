@@ -15,11 +15,12 @@ from app.errors import NotFoundError
 from app.geometry.arrays import FloatArray, IntArray
 from app.review.yields.cache import forget_table, keep_table, kept_table
 from app.review.yields.facts import Wanted, read_facts
-from app.review.yields.gates import Judged, judge_table, qualifying_jac
-from app.review.yields.spread import SpreadMemo
+from app.review.yields.figures import is_unmeasured, qualifying_jac
 from app.review.yields.table import EMPTY, YieldTable, join
 from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT, SOLVER_VERSION
+from app.solving.spread import MeanSpread
+from app.solving.verdict import Verdict, judge
 from app.store.codecs import parse, policy_from_json
 from app.store.models import DatasetModel, GroupModel, LogModel, SolutionModel
 from app.store.session import Store
@@ -54,19 +55,21 @@ class Snapshot:
     Attributes:
         policy: The present one.
         unsolved: Groups that the table does not hold yet.
+        unmeasured: Groups whose cameras are given and have no lines to measure JaC.
         heads: Of the groups in the table, then of the others.
         present: What the present policy makes of the table.
-        memo: Of the table.
-        qualifying: For each gamma: ``yield_gates.qualifying_jac``, sorted.
+        spread: Of the table.
+        qualifying: For each gamma: ``figures.qualifying_jac``, sorted.
         leaks: Matches in several splits, with the number of groups in each.
     """
 
     policy: Policy
     table: YieldTable
     unsolved: int
+    unmeasured: int
     heads: Heads
-    present: Judged
-    memo: SpreadMemo
+    present: Verdict
+    spread: MeanSpread
     qualifying: tuple[FloatArray, ...]
     leaks: tuple[tuple[str, tuple[tuple[str, int], ...]], ...]
 
@@ -126,15 +129,18 @@ class YieldStore:
         table = self._table(old, rows)
         if table.groups - old.groups >= WORTH_KEEPING:
             keep_table(place, calibration, table)
-        heads, memo = _heads(rows, table), SpreadMemo(table)
+        heads, spread = _heads(rows, table), MeanSpread(table.facts)
         kept.snapshot = Snapshot(
             policy=policy,
             table=table,
             unsolved=len(rows) - table.groups,
+            unmeasured=int(is_unmeasured(table.facts).sum()),
             heads=heads,
-            present=judge_table(table, policy, memo),
-            memo=memo,
-            qualifying=tuple(np.sort(qualifying_jac(table, gamma)) for gamma in GAMMAS_PERCENT),
+            present=judge(table.facts, policy, spread),
+            spread=spread,
+            qualifying=tuple(
+                np.sort(qualifying_jac(table.facts, gamma)) for gamma in GAMMAS_PERCENT
+            ),
             leaks=_leaks(heads),
         )
         kept.mark, kept.calibration = mark, calibration

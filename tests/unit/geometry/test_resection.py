@@ -12,7 +12,7 @@ from app.geometry.resection import (
     distances,
     normal_equations,
     parameters_from_camera,
-    projection_jacobian,
+    projection_jacobians,
 )
 
 HALF_DIAGONAL = 550.0
@@ -147,7 +147,7 @@ class TestNormalEquations:
 class TestProjectionJacobian:
     def test_equals_its_finite_difference(self):
         point = np.array([40.0, -5.0, -2.0])
-        analytic = projection_jacobian(TRUTH, point, HALF_DIAGONAL)
+        (analytic,) = projection_jacobians(TRUTH[None], point[None], np.array([HALF_DIAGONAL]))
         for parameter in range(PARAMETERS):
             step = np.zeros(PARAMETERS)
             step[parameter] = 1e-6

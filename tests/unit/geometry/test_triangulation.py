@@ -1,3 +1,5 @@
+from itertools import product
+
 import cv2
 import numpy as np
 import pytest
@@ -6,7 +8,12 @@ from app.errors import DegenerateGeometryError, ShapeError
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_looking
 from app.geometry.smallest_singular import smallest_singular_vectors
-from app.geometry.triangulation import parallax_angle, point_covariance, triangulate_pairs
+from app.geometry.triangulation import (
+    moved_points,
+    parallax_angle,
+    point_covariance,
+    triangulate_pairs,
+)
 
 
 def camera_at(*position: float) -> Camera:
@@ -17,6 +24,7 @@ def camera_at(*position: float) -> Camera:
 
 
 MAIN, REPLAY = camera_at(0.0, 60.0, -15.0), camera_at(75.0, -10.0, -8.0)
+PLACES = MAIN.position[None], REPLAY.position[None]
 
 
 class TestTriangulatePairs:
@@ -43,32 +51,70 @@ class TestTriangulatePairs:
         expected = np.linalg.svd(systems)[2][:, -1]
         assert np.allclose(np.abs((found * expected).sum(axis=1)), 1.0, atol=1e-12)
 
-    def test_parallel_rays_meet_nowhere(self):
+    def test_parallel_rays_meet_at_infinity_and_stop_no_others(self):
         aside = Camera(MAIN.rotation, MAIN.position + np.eye(3)[0], (1.0, 1.0), (0.0, 0.0))
         alike = Camera(MAIN.rotation, MAIN.position, (1.0, 1.0), (0.0, 0.0))
-        center = np.zeros((1, 2))
-        with pytest.raises(DegenerateGeometryError, match="parallel"):
-            triangulate_pairs(alike.P[None], aside.P[None], center, center)
+        point = np.array([[20.0, 3.0, -1.0]])
+        found = triangulate_pairs(
+            np.stack([alike.P, MAIN.P]),
+            np.stack([aside.P, REPLAY.P]),
+            np.concatenate([np.zeros((1, 2)), MAIN.project(point)]),
+            np.concatenate([np.zeros((1, 2)), REPLAY.project(point)]),
+        )
+        assert np.isposinf(found[0]).all()
+        assert np.allclose(found[1], point, atol=1e-8)
+
+    def test_flat_pixels_are_our_mistake(self):
+        with pytest.raises(ShapeError, match="pixels_b"):
+            triangulate_pairs(MAIN.P[None], REPLAY.P[None], np.zeros((1, 2)), np.zeros(2))
+
+
+class TestMovedPoints:
+    def test_each_is_the_pair_with_one_pixel_moved(self):
+        generator = np.random.default_rng(3)
+        points = generator.uniform([10, -20, -5], [40, 20, 0], (4, 3))
+        P_a, P_b = np.stack([MAIN.P] * 4), np.stack([REPLAY.P] * 4)
+        pixels = [MAIN.project(points), REPLAY.project(points)]
+        moved = moved_points(P_a, P_b, *pixels, 0.5)
+        assert moved.shape == (4, 2, 2, 2, 3)
+        for view, axis, way in product((0, 1), repeat=3):
+            seen = [place.copy() for place in pixels]
+            seen[view][:, axis] += 0.5 - way
+            expected = triangulate_pairs(P_a, P_b, *seen)
+            assert np.array_equal(moved[:, view, axis, way], expected)
+
+    def test_of_no_pair_there_is_nothing(self):
+        none = np.empty((0, 2))
+        found = moved_points(np.empty((0, 3, 4)), np.empty((0, 3, 4)), none, none, 0.5)
+        assert found.shape == (0, 2, 2, 2, 3)
 
 
 class TestParallaxAngle:
     def test_is_symmetric_in_the_two_cameras(self):
-        points = np.array([[20.0, 3.0, -1.0]])
-        there = parallax_angle(MAIN.position, REPLAY.position, points)
-        assert np.array_equal(there, parallax_angle(REPLAY.position, MAIN.position, points))
+        points, main, replay = np.array([[20.0, 3.0, -1.0]]), *PLACES
+        there = parallax_angle(main, replay, points)
+        assert np.array_equal(there, parallax_angle(replay, main, points))
+
+    def test_each_point_has_cameras_of_its_own(self):
+        points, main, replay = np.array([[20.0, 3.0, -1.0], [9.0, 8.0, 0.0]]), *PLACES
+        cameras = np.concatenate([main, replay])
+        both = parallax_angle(cameras, cameras[::-1], points)
+        assert both[0] == parallax_angle(main, replay, points[:1])[0]
+        assert both[1] == parallax_angle(replay, main, points[1:])[0]
 
     def test_a_one_millimetre_baseline_at_a_hundred_metres_keeps_its_digits(self):
-        near, far = np.zeros(3), np.array([1e-3, 0.0, 0.0])
+        near, far = np.zeros((1, 3)), np.array([[1e-3, 0.0, 0.0]])
         angle = parallax_angle(near, far, np.array([[0.0, 100.0, 0.0]]))[0]
         assert angle == pytest.approx(1e-5, rel=1e-9)
 
     def test_a_point_at_a_camera_has_no_angle(self):
-        with pytest.raises(DegenerateGeometryError):
-            parallax_angle(np.zeros(3), np.ones(3), np.zeros((1, 3)))
+        for here, there in ((0.0, 1.0), (1.0, 0.0)):
+            places = np.full((1, 3), here), np.full((1, 3), there)
+            assert np.isnan(parallax_angle(*places, np.zeros((1, 3)))).all()
 
     def test_a_flat_point_is_our_mistake(self):
         with pytest.raises(ShapeError):
-            parallax_angle(np.zeros(3), np.ones(3), np.zeros(3))
+            parallax_angle(np.zeros((1, 3)), np.ones((1, 3)), np.zeros(3))
 
 
 class TestPointCovariance:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from hypothesis import HealthCheck, settings
 
 from app.geometry.camera import Camera
 from app.geometry.polyline import clip_polyline
@@ -11,6 +12,15 @@ from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
+
+# ``make mutate`` runs a test several times in one process, each time from a new instance.
+settings.register_profile(
+    "mutate",
+    deadline=None,
+    derandomize=True,
+    max_examples=10,
+    suppress_health_check=[HealthCheck.differing_executors],
+)
 
 SIZE = ImageSize(1280, 720)
 CENTER = ((SIZE.width - 1) / 2, (SIZE.height - 1) / 2)

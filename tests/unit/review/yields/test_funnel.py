@@ -16,8 +16,8 @@ from app.review.editing.submit import load, submit
 from app.review.importing.ingest import ingest
 from app.review.queue.listing import list_groups
 from app.review.yields.funnel import WITHOUT_EFFECT, Yield, get_yield
-from app.review.yields.gates import PASSES, judge_table, view_jac
 from app.review.yields.store import YieldStore
+from app.review.yields.table import YieldTable
 from app.sample.scenes import make_scenes
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -25,6 +25,8 @@ from app.soccer.group import Group
 from app.soccer.policy import PAPER, STRICT, THRESHOLDS, CalibrationPolicy, Policy
 from app.soccer.solution import GATES, Solution
 from app.solving.solve import solve
+from app.solving.spread import MeanSpread
+from app.solving.verdict import PASSES, Verdict, judge, view_jac
 from app.store.session import Store
 
 SEEDS = 9
@@ -92,6 +94,10 @@ def random_policy(seed: int) -> Policy:
     )
 
 
+def judge_table(table: YieldTable, policy: Policy) -> Verdict:
+    return judge(table.facts, policy, MeanSpread(table.facts))
+
+
 def solved_again(group: Group, solution: Solution, policy: Policy) -> Solution:
     """What ``solve`` says under another policy; calibrations do not depend on it."""
     known = {view.calibration_key: view.calibration for view in solution.views}
@@ -144,7 +150,7 @@ class TestJudgeTable:
                 for _, solution in solutions
                 for view in solution.views
             ]
-            assert np.array_equal(view_jac(table, gamma), stored, equal_nan=True)
+            assert np.array_equal(view_jac(table.facts, gamma), stored, equal_nan=True)
 
 
 def counted(found: Yield) -> None:
@@ -310,4 +316,6 @@ class TestYieldStore:
         monkeypatch.setattr("app.review.yields.store.MAX_BYTES", first.table.nbytes)
         yields.snapshot(get_dataset(store, "other").id)
         assert yields.snapshot(1) is not first
-        assert np.array_equal(yields.snapshot(1).table.pair_spread, first.table.pair_spread)
+        assert np.array_equal(
+            yields.snapshot(1).table.facts.pair_moved, first.table.facts.pair_moved
+        )

@@ -1,0 +1,218 @@
+"""Facts: what the gates read of groups, in flat arrays; one group alone has facts like many.
+
+Nothing in them depends on a threshold, only on what was said and on the calibrations. Rows of
+views, markings and pairs point to the row of their group or view; those of one group follow
+each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.geometry.resection import PARAMETERS, parameters_from_camera
+from app.geometry.triangulation import moved_points
+from app.soccer.group import View
+from app.soccer.solution import Calibration
+from app.solving.triangulate import Meeting, lines_of_sight, meet, sights_of
+
+STEP_PX = 0.5
+"""How far a pixel is moved to see how its pair's point moves."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Groups (G), their views (V), the views' markings (M) and pairs of views (P).
+
+    Attributes:
+        groups: How many there are.
+        view_group: Row of the group, shape (V,), like ``view_...``.
+        view_included: No person left it out.
+        view_camera: It has a camera.
+        view_given: Its camera came with the data.
+        view_measured: Its JaC can be measured.
+        view_ball: It shows the one ball.
+        view_diagonal: Pixels.
+        view_position: Of the camera, pitch frame, metres, NaN without one, shape (V, 3).
+        view_parameters: Of the camera, shape (V, 8).
+        view_covariance: Of the parameters, zero where it is not known, shape (V, 8, 8).
+        view_ball_px: Diameter of the annotated box, 0 without one.
+        mark_view: Row of the view, shape (M,).
+        mark_px: Largest distance of an annotated point of the marking, infinite without one.
+        pair_group: Row of the group, shape (P,), like ``pair_...``.
+        pair_view: Rows of both views, shape (P, 2).
+        pair_errors: Reprojection errors in both, pixels, shape (P, 2).
+        pair_front: The point lies in front of both cameras.
+        pair_baseline: Metres.
+        pair_parallax: Degrees, at the pair's point.
+        pair_point: Pitch frame, metres, shape (P, 3).
+        pair_moved: The point once a pixel has moved by ``STEP_PX``: view, pixel axis, forwards
+            or back, coordinate; metres, shape (P, 2, 2, 2, 3).
+    """
+
+    groups: int
+    view_group: IntArray
+    view_included: BoolArray
+    view_camera: BoolArray
+    view_given: BoolArray
+    view_measured: BoolArray
+    view_ball: BoolArray
+    view_diagonal: FloatArray
+    view_position: FloatArray
+    view_parameters: FloatArray
+    view_covariance: FloatArray
+    view_ball_px: FloatArray
+    mark_view: IntArray
+    mark_px: FloatArray
+    pair_group: IntArray
+    pair_view: IntArray
+    pair_errors: FloatArray
+    pair_front: BoolArray
+    pair_baseline: FloatArray
+    pair_parallax: FloatArray
+    pair_point: FloatArray
+    pair_moved: FloatArray
+
+    def only(self, kept: BoolArray) -> Facts:
+        """The facts of some of the groups, in the same order."""
+        views = kept[self.view_group]
+        rows = {"view": views, "mark": views[self.mark_view], "pair": kept[self.pair_group]}
+        arrays = {name: getattr(self, name)[rows[name.partition("_")[0]]] for name in COLUMNS}
+        place, view_place = np.cumsum(kept) - 1, np.cumsum(views) - 1
+        arrays["view_group"] = place[arrays["view_group"]]
+        arrays["mark_view"] = view_place[arrays["mark_view"]]
+        arrays["pair_group"] = place[arrays["pair_group"]]
+        arrays["pair_view"] = view_place[arrays["pair_view"]]
+        return Facts(int(kept.sum()), **arrays)
+
+
+COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
+    "view_group": (np.int64, ()),
+    "view_included": (np.bool_, ()),
+    "view_camera": (np.bool_, ()),
+    "view_given": (np.bool_, ()),
+    "view_measured": (np.bool_, ()),
+    "view_ball": (np.bool_, ()),
+    "view_diagonal": (np.float64, ()),
+    "view_position": (np.float64, (3,)),
+    "view_parameters": (np.float64, (PARAMETERS,)),
+    "view_covariance": (np.float64, (PARAMETERS, PARAMETERS)),
+    "view_ball_px": (np.float64, ()),
+    "mark_view": (np.int64, ()),
+    "mark_px": (np.float64, ()),
+    "pair_group": (np.int64, ()),
+    "pair_view": (np.int64, (2,)),
+    "pair_errors": (np.float64, (2,)),
+    "pair_front": (np.bool_, ()),
+    "pair_baseline": (np.float64, ()),
+    "pair_parallax": (np.float64, ()),
+    "pair_point": (np.float64, (3,)),
+    "pair_moved": (np.float64, (2, 2, 2, 3)),
+}
+"""Type of each array, and shape of one row of it."""
+
+NOTHING = Facts(0, **{name: np.empty((0, *shape), kind) for name, (kind, shape) in COLUMNS.items()})
+"""The facts of no group."""
+
+
+def join(parts: Sequence[Facts]) -> Facts:
+    """The groups of several facts, one after the other."""
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
+    groups = [part.groups for part in parts]
+    views = [len(part.view_group) for part in parts]
+    for name, sizes in (("view_group", groups), ("pair_group", groups), ("mark_view", views)):
+        arrays[name] += _offsets(parts, name, sizes)
+    arrays["pair_view"] += _offsets(parts, "pair_view", views)[:, None]
+    return Facts(sum(groups), **arrays)
+
+
+def _offsets(parts: Sequence[Facts], name: str, sizes: Sequence[int]) -> IntArray:
+    """For each row of ``name``: how many rows the parts before its own have."""
+    starts = np.cumsum([0, *sizes[:-1]])
+    return np.repeat(starts, [len(getattr(part, name)) for part in parts])
+
+
+def group_facts(views: Sequence[View], calibrations: Sequence[Calibration]) -> Facts:
+    """The facts of one group, from what was said of its views and the calibration of each."""
+    meetings = meet(combinations(sights_of(views, calibrations), 2))
+    return facts_of(views, calibrations, meetings)
+
+
+def facts_of(
+    views: Sequence[View], calibrations: Sequence[Calibration], meetings: Sequence[Meeting]
+) -> Facts:
+    """The facts of one group.
+
+    Args:
+        views: Of the group.
+        calibrations: Of each view.
+        meetings: Of every two of its sights.
+    """
+    marks = [
+        (place, fit.largest_px)
+        for place, calibration in enumerate(calibrations)
+        for fit in calibration.markings
+    ]
+    balls = [None if view.ball is None or view.ball.inferred else view.ball for view in views]
+    boxes = [ball.box if ball is not None else None for ball in balls]
+    diagonals = [view.size.diagonal for view in views]
+    parameters, covariances = _uncertainties(calibrations, diagonals)
+    places = {view.key: place for place, view in enumerate(views)}
+    return Facts(
+        groups=1,
+        view_group=np.zeros(len(views), np.int64),
+        view_included=np.array([view.included for view in views], bool),
+        view_camera=np.array([item.camera is not None for item in calibrations], bool),
+        view_given=np.array([item.source == "given" for item in calibrations], bool),
+        view_measured=np.array([item.jac is not None for item in calibrations], bool),
+        view_ball=np.array([ball is not None for ball in balls], bool),
+        view_diagonal=np.array(diagonals, float),
+        view_position=_rows([_position(item) for item in calibrations], 3),
+        view_parameters=parameters,
+        view_covariance=covariances,
+        view_ball_px=np.array([box.diameter if box is not None else 0.0 for box in boxes], float),
+        mark_view=np.array([place for place, _ in marks], np.int64),
+        mark_px=np.array([np.inf if apart is None else apart for _, apart in marks], float),
+        pair_group=np.zeros(len(meetings), np.int64),
+        pair_view=np.array(
+            [(places[item.a.view], places[item.b.view]) for item in meetings], np.int64
+        ).reshape(-1, 2),
+        pair_errors=_rows([item.errors_px for item in meetings], 2),
+        pair_front=np.array([item.in_front for item in meetings], bool),
+        pair_baseline=np.array([item.baseline_m for item in meetings], float),
+        pair_parallax=np.array([item.parallax_degrees for item in meetings], float),
+        pair_point=_rows([item.point for item in meetings], 3),
+        pair_moved=_moved(meetings),
+    )
+
+
+def _uncertainties(
+    calibrations: Sequence[Calibration], diagonals: Sequence[float]
+) -> tuple[FloatArray, FloatArray]:
+    """Parameters and their covariance of the cameras that have one, zeros for the others."""
+    parameters = np.zeros((len(calibrations), PARAMETERS))
+    covariances = np.zeros((len(calibrations), PARAMETERS, PARAMETERS))
+    for place, (item, diagonal) in enumerate(zip(calibrations, diagonals, strict=True)):
+        if item.camera is not None and item.covariance is not None:
+            parameters[place] = parameters_from_camera(item.camera, diagonal / 2)
+            covariances[place] = np.reshape(item.covariance, (PARAMETERS, PARAMETERS))
+    return parameters, covariances
+
+
+def _position(calibration: Calibration) -> Sequence[float] | FloatArray:
+    return (np.nan,) * 3 if calibration.camera is None else calibration.camera.position
+
+
+def _moved(meetings: Sequence[Meeting]) -> FloatArray:
+    if not meetings:
+        return NOTHING.pair_moved
+    a, b = [item.a for item in meetings], [item.b for item in meetings]
+    return moved_points(*lines_of_sight(a, b), STEP_PX)
+
+
+def _rows(values: Sequence[Sequence[float] | FloatArray], width: int) -> FloatArray:
+    return np.array(values, float).reshape(-1, width)

@@ -1,0 +1,33 @@
+"""The facts of one group as bytes: what is kept beside its solution for what-if."""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any
+
+import numpy as np
+
+from app.solving.facts import COLUMNS, Facts
+
+_NUMBERS = "<f8"
+_ROWS = ("view", "mark", "pair")
+
+
+def facts_to_bytes(facts: Facts) -> bytes:
+    """Compressed little-endian doubles: how many views, markings and pairs, then each column."""
+    counts = [len(facts.view_group), len(facts.mark_view), len(facts.pair_group)]
+    columns = [getattr(facts, name).ravel() for name in COLUMNS]
+    return zlib.compress(np.concatenate([counts, *columns]).astype(_NUMBERS).tobytes())
+
+
+def facts_from_bytes(content: bytes) -> Facts:
+    """Back from ``facts_to_bytes`` of one group."""
+    numbers = np.frombuffer(zlib.decompress(content), _NUMBERS)
+    counts = dict(zip(_ROWS, numbers[: len(_ROWS)].astype(int).tolist(), strict=True))
+    arrays: dict[str, Any] = {}
+    at = len(_ROWS)
+    for name, (kind, shape) in COLUMNS.items():
+        rows = counts[name.partition("_")[0]]
+        end = at + rows * int(np.prod(shape))
+        arrays[name], at = numbers[at:end].reshape(rows, *shape).astype(kind), end
+    return Facts(1, **arrays)

@@ -1,0 +1,56 @@
+"""Mean ball: the paper's 3D ball of one group, the mean of its valid pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.soccer.policy import Policy
+from app.soccer.solution import GATES, Ball3D, Pair
+from app.solving.facts import Facts
+from app.solving.spread import MeanSpread, longest_sigma
+from app.solving.triangulate import Meeting
+from app.solving.verdict import PASSES, Verdict
+
+
+def judged_pairs(meetings: Sequence[Meeting], verdict: Verdict) -> tuple[Pair, ...]:
+    """Every pair of views with its point, and the gate that makes it invalid."""
+    return tuple(
+        Pair(
+            a=item.a.view,
+            b=item.b.view,
+            point=item.place,
+            errors_px=item.errors_px,
+            baseline_m=item.baseline_m,
+            parallax_degrees=item.parallax_degrees,
+            valid=gate == PASSES,
+            failed=None if gate == PASSES else GATES[gate],
+        )
+        for item, gate in zip(meetings, verdict.pair_failed.tolist(), strict=True)
+    )
+
+
+def mean_ball(
+    keys: Sequence[str], facts: Facts, verdict: Verdict, spread: MeanSpread, policy: Policy
+) -> Ball3D | None:
+    """The mean of the valid pairs with its uncertainty; None without a valid pair.
+
+    Args:
+        keys: Of the views.
+        facts: Of the one group.
+        verdict: What the policy makes of them.
+        spread: Of the same facts.
+        policy: How noisy a click is.
+    """
+    if not verdict.valid.any():
+        return None
+    covariance = spread.covariances(verdict.valid, np.array([0]), verdict.point, policy)
+    x, y, z = verdict.point[0].tolist()
+    return Ball3D(
+        point=(x, y, z),
+        covariance=tuple(covariance.ravel().tolist()),
+        sigma_m=float(longest_sigma(covariance)[0]),
+        parallax_degrees=float(verdict.parallax[0]),
+        views=tuple(keys[place] for place in np.unique(facts.pair_view[verdict.valid]).tolist()),
+    )

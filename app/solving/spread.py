@@ -1,0 +1,210 @@
+"""Spread: how certain a ball is, from the noise of clicks and the covariance of calibrations."""
+
+from __future__ import annotations
+
+from threading import Lock
+
+import numpy as np
+
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.geometry.resection import PARAMETERS, parameters_from_camera, projection_jacobians
+from app.soccer.frames import ImageSize
+from app.soccer.policy import Policy
+from app.soccer.solution import Calibration
+from app.solving.facts import STEP_PX, Facts
+from app.solving.triangulate import Sight
+
+CLICK_DIAGONAL = float(np.hypot(1920, 1080))
+"""The policy's click sigma holds for 1920 x 1080 and grows with the diagonal."""
+_BITS = 62
+_ROUNDING = 1e-9
+
+
+def click_variance(diagonal: FloatArray, ball_px: FloatArray, policy: Policy) -> FloatArray:
+    """Variance of each coordinate of annotated ball centres, square pixels, shape (N,).
+
+    The noise of a click grows with the picture and with the size of the ball.
+
+    Args:
+        diagonal: Of the images, pixels, shape (N,).
+        ball_px: Diameter of the annotated boxes, 0 without one, pixels, shape (N,).
+        policy: Holds both noises.
+    """
+    click = policy.click_sigma_px * diagonal / CLICK_DIAGONAL
+    sigma = np.hypot(click, policy.box_sigma_share * ball_px)
+    # As Python squares a float; the square of an array differs in the last bit now and then.
+    return np.float_power(sigma, 2)
+
+
+def carried_spreads(
+    parameters: FloatArray, covariances: FloatArray, points: FloatArray, diagonals: FloatArray
+) -> FloatArray:
+    """Covariance that calibrations bring to the pixels of points, square pixels, (N, 2, 2).
+
+    Args:
+        parameters: Of the cameras, shape (N, 8).
+        covariances: Of the parameters, shape (N, 8, 8).
+        points: One in front of each camera, pitch frame, metres, shape (N, 3).
+        diagonals: Of the images, pixels, shape (N,).
+    """
+    jacobians = projection_jacobians(parameters, points, diagonals / 2)
+    carried: FloatArray = jacobians @ covariances @ jacobians.transpose(0, 2, 1)
+    return carried
+
+
+def calibration_spread(calibration: Calibration, size: ImageSize, point: FloatArray) -> FloatArray:
+    """Covariance that the calibration brings to the pixel of a point, square pixels, (2, 2).
+
+    Args:
+        calibration: With a camera; nothing is known of the uncertainty of a given one: zeros.
+        size: Annotated size.
+        point: In front of the camera, pitch frame, metres, shape (3,).
+    """
+    if calibration.covariance is None or calibration.camera is None:
+        return np.zeros((2, 2))
+    parameters = parameters_from_camera(calibration.camera, size.diagonal / 2)
+    covariance = np.array(calibration.covariance).reshape(1, PARAMETERS, PARAMETERS)
+    diagonal = np.array([size.diagonal])
+    spread: FloatArray = carried_spreads(parameters[None], covariance, point[None], diagonal)[0]
+    return spread
+
+
+def pixel_spread(sight: Sight, point: FloatArray, policy: Policy) -> FloatArray:
+    """Covariance of the ball's pixel in a view, square pixels, shape (2, 2).
+
+    The noise of the click, and, where the camera comes from lines, the covariance of its
+    calibration carried to the ball.
+    """
+    diagonal, diameter = np.array([sight.size.diagonal]), np.array([sight.diameter_px])
+    noise = click_variance(diagonal, diameter, policy)
+    return noise * np.eye(2) + calibration_spread(sight.calibration, sight.size, point)
+
+
+def longest_sigma(covariances: FloatArray) -> FloatArray:
+    """Standard deviation along the longest axis, metres, infinite where nothing is known, (N,).
+
+    Args:
+        covariances: Square metres, shape (N, 3, 3).
+    """
+    sigma = np.full(len(covariances), np.inf)
+    known = np.isfinite(covariances).all(axis=(1, 2))
+    sigma[known] = np.sqrt(np.linalg.eigvalsh(covariances[known])[:, -1])
+    return sigma
+
+
+def is_within(covariances: FloatArray, sigma_m: float) -> BoolArray:
+    """Whether the standard deviation along the longest axis is at most so many metres, (N,).
+
+    Args:
+        covariances: Square metres, shape (N, 3, 3).
+        sigma_m: The limit, metres.
+    """
+    variances = covariances.diagonal(axis1=1, axis2=2)
+    limit = sigma_m * abs(sigma_m)
+    # The longest lies between the largest of the three and their sum: few need eigenvalues.
+    within: BoolArray = variances.sum(axis=1) * (1 + _ROUNDING) < limit
+    near = np.flatnonzero(~within & ~(variances.max(axis=1) * (1 - _ROUNDING) > limit))
+    within[near] = sigma_m - longest_sigma(covariances[near]) >= 0
+    return within
+
+
+class MeanSpread:
+    """Covariances of the mean of valid pairs, for each group of some facts.
+
+    The uncertainty of each view's pixel is carried through the estimator itself, by central
+    differences: pairs that share a view move together, and a pair of small parallax, which the
+    mean trusts like any other, makes the mean as uncertain as it is. What does not depend on
+    the policy is kept: while somebody moves a threshold, few groups change their pairs.
+
+    Source: Hartley & Zisserman, result 5.6.
+    """
+
+    def __init__(self, facts: Facts):
+        self._facts, self._lock = facts, Lock()
+        starts = np.searchsorted(facts.pair_group, np.arange(facts.groups))
+        place = np.arange(len(facts.pair_group)) - starts[facts.pair_group]
+        # A group of twelve views has more pairs than a number has bits: it is computed anew.
+        self._bit = np.where(place < _BITS, np.int64(1) << np.minimum(place, _BITS), 0)
+        self._long = np.isin(np.arange(facts.groups), facts.pair_group[place >= _BITS])
+        self._pairs = np.zeros(facts.groups, np.int64)
+        self._used = np.zeros(len(facts.view_group), bool)
+        self._slope = np.zeros((len(facts.view_group), 2, 3))
+        self._carried = np.zeros((len(facts.view_group), 2, 2))
+
+    def covariances(
+        self, valid: BoolArray, groups: IntArray, points: FloatArray, policy: Policy
+    ) -> FloatArray:
+        """Of the means of the valid pairs of some groups, square metres, shape (N, 3, 3).
+
+        Args:
+            valid: Pairs that count, shape (P,).
+            groups: Rows of groups that have any, increasing, shape (N,).
+            points: Their mean points, pitch frame, metres, shape (N, 3).
+            policy: How noisy a click is.
+        """
+        facts = self._facts
+        with self._lock, np.errstate(invalid="ignore"):
+            self._follow(valid, groups, points)
+            asked = np.zeros(facts.groups, bool)
+            asked[groups] = True
+            views = np.flatnonzero(self._used & asked[facts.view_group])
+            slopes, pixels = self._slope[views], self._carried[views]
+            noise = click_variance(facts.view_diagonal[views], facts.view_ball_px[views], policy)
+            pixels = noise[:, None, None] * np.eye(2) + pixels
+            parts = (slopes.transpose(0, 2, 1) @ pixels @ slopes).reshape(-1, 9)
+        owner = np.searchsorted(groups, facts.view_group[views])
+        total = [np.bincount(owner, part, minlength=len(groups)) for part in parts.T]
+        return np.array(total, float).T.reshape(-1, 3, 3)
+
+    def _follow(self, valid: BoolArray, groups: IntArray, points: FloatArray) -> None:
+        """Compute slopes and carried covariances anew where the valid pairs are others."""
+        facts = self._facts
+        pairs = np.zeros(facts.groups, np.int64)
+        np.add.at(pairs, facts.pair_group[valid], self._bit[valid])
+        new = (pairs != self._pairs)[groups] | self._long[groups]
+        if not new.any():
+            return
+        fresh = np.zeros(facts.groups, bool)
+        fresh[groups[new]] = True
+        place = np.zeros((facts.groups, 3))
+        place[groups] = points
+        views, slopes = _mean_slopes(facts, np.flatnonzero(valid & fresh[facts.pair_group]))
+        self._pairs[fresh] = pairs[fresh]
+        self._used[fresh[facts.view_group]] = False
+        self._used[views], self._slope[views] = True, slopes
+        known = views[facts.view_covariance[views, 0, 0] > 0]
+        self._carried[known] = carried_spreads(
+            facts.view_parameters[known],
+            facts.view_covariance[known],
+            place[facts.view_group[known]],
+            facts.view_diagonal[known],
+        )
+
+
+def _mean_slopes(facts: Facts, pairs: IntArray) -> tuple[IntArray, FloatArray]:
+    """How far the mean of pairs moves with the pixel of each of their views.
+
+    Args:
+        facts: The groups.
+        pairs: Rows of the pairs that count, increasing.
+
+    Returns:
+        Rows of the views, increasing, shape (N,), and metres by pixel axis and coordinate,
+        shape (N, 2, 3).
+    """
+    views = np.unique(facts.pair_view[pairs])
+    owner = facts.pair_group[pairs]
+    first = np.searchsorted(owner, facts.view_group[views])
+    count = np.searchsorted(owner, facts.view_group[views], "right") - first
+    total = np.zeros((len(views), 2, 2, 3))
+    for place in range(count.max(initial=0)):
+        rows = np.flatnonzero(place < count)
+        chosen = pairs[first[rows] + place]
+        # A pair without the view stays where it is.
+        moved = np.tile(facts.pair_point[chosen, None, None], (2, 2, 1))
+        for side in (0, 1):
+            mine = facts.pair_view[chosen, side] == views[rows]
+            moved[mine] = facts.pair_moved[chosen[mine], side]
+        total[rows] += moved
+    means = total / count[:, None, None, None]
+    return views, (means[:, :, 0] - means[:, :, 1]) / (2 * STEP_PX)

@@ -1,0 +1,175 @@
+"""Verdict: what a policy makes of facts, all groups at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.geometry.triangulation import parallax_angle
+from app.soccer.policy import Policy
+from app.soccer.solution import GATES
+from app.solving.facts import Facts
+from app.solving.spread import MeanSpread, is_within
+
+MIN_VIEWS = 2
+PASSES = len(GATES)
+"""Stands for the first failing gate of what fails none."""
+_CALIBRATABLE, _JAC, _TWO_VIEWS, _BALL, _BASELINE, _REPROJECTION, _PARALLAX, _SIGMA = range(PASSES)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a policy makes of groups (G), their views (V) and pairs (P); gates are indices.
+
+    Attributes:
+        jac: Of each view at the policy's gamma, NaN where it cannot be measured, shape (V,).
+        view_failed: First gate that drops an included view, or ``PASSES``, shape (V,).
+        pair_failed: First gate that makes a pair invalid, or ``PASSES``, shape (P,).
+        failed: Whether a group fails a gate that the policy asks for, shape (8, G).
+        baseline: Widest of the views that are left, metres, 0 where one camera sees the ball
+            twice, NaN where no two see it, shape (G,).
+        point: Mean of the valid pairs, pitch frame, metres, NaN without one, shape (G, 3).
+        parallax: The largest over the valid pairs, at the mean, degrees, NaN without one, (G,).
+        distance: Of the mean from the camera of the first view that it comes from, metres, (G,).
+    """
+
+    jac: FloatArray
+    view_failed: IntArray
+    pair_failed: IntArray
+    failed: BoolArray
+    baseline: FloatArray
+    point: FloatArray
+    parallax: FloatArray
+    distance: FloatArray
+
+    @property
+    def valid(self) -> BoolArray:
+        """Which pairs count, shape (P,)."""
+        valid: BoolArray = self.pair_failed == PASSES
+        return valid
+
+    @cached_property
+    def first(self) -> IntArray:
+        """First gate that each group fails, or ``PASSES``, shape (G,)."""
+        return np.where(self.failed.any(axis=0), self.failed.argmax(axis=0), PASSES)
+
+    @cached_property
+    def passes(self) -> BoolArray:
+        """Which groups pass every gate that the policy asks for, shape (G,)."""
+        passing: BoolArray = self.first == PASSES
+        return passing
+
+
+def judge(facts: Facts, policy: Policy, spread: MeanSpread) -> Verdict:
+    """Judge every group by the thresholds of a policy.
+
+    Args:
+        facts: The groups.
+        policy: The thresholds.
+        spread: Of the same facts, kept where several policies are tried one after the other.
+    """
+    jac = view_jac(facts, policy.jac_gamma_percent)
+    view_failed = _view_failed(facts, jac, policy)
+    left = facts.view_included & (view_failed == PASSES)
+    pair_failed = _pair_failed(facts, view_failed, policy)
+    point, parallax, distance = _mean(facts, pair_failed == PASSES)
+    baseline = _baseline(facts, left)
+    failed = np.zeros((PASSES, facts.groups), bool)
+    failed[_CALIBRATABLE : _BALL + 1] = _view_gates(facts, view_failed, left)
+    failed[_BASELINE] = ~(baseline >= policy.min_baseline_m)
+    failed[_REPROJECTION] = np.isnan(point[:, 0])
+    if policy.min_parallax_degrees is not None:
+        failed[_PARALLAX] = ~(parallax >= policy.min_parallax_degrees)
+    if policy.max_sigma_m is not None:
+        there = np.flatnonzero(~failed[_REPROJECTION])
+        spreads = spread.covariances(pair_failed == PASSES, there, point[there], policy)
+        failed[_SIGMA] = True
+        failed[_SIGMA, there] = ~is_within(spreads, policy.max_sigma_m)
+    return Verdict(jac, view_failed, pair_failed, failed, baseline, point, parallax, distance)
+
+
+def view_jac(facts: Facts, gamma_percent: float) -> FloatArray:
+    """JaC of each view, NaN where it cannot be measured, shape (V,)."""
+    gamma_px = gamma_percent / 100 * facts.view_diagonal
+    close = facts.mark_px < gamma_px[facts.mark_view]
+    views = len(facts.view_group)
+    hits = np.bincount(facts.mark_view[close], minlength=views)
+    marks = np.bincount(facts.mark_view, minlength=views)
+    return np.where(facts.view_measured, hits / np.maximum(marks, 1), np.nan)
+
+
+def _view_failed(facts: Facts, jac: FloatArray, policy: Policy) -> IntArray:
+    failed = np.full(len(facts.view_group), PASSES)
+    # NaN where there is nothing to measure, and then nothing falls.
+    failed[jac <= policy.min_jac] = _JAC
+    failed[~facts.view_camera] = _CALIBRATABLE
+    failed[~facts.view_included] = PASSES
+    return failed
+
+
+def _pair_failed(facts: Facts, view_failed: IntArray, policy: Policy) -> IntArray:
+    tau_px = policy.tau_percent / 100 * facts.view_diagonal
+    a, b = (facts.pair_errors < tau_px[facts.pair_view]).T
+    failed = np.where(a & b & facts.pair_front, PASSES, _REPROJECTION)
+    failed[facts.pair_baseline < policy.min_baseline_m] = _BASELINE
+    a, b = view_failed[facts.pair_view].T
+    first: IntArray = np.minimum(failed, np.minimum(a, b))
+    return first
+
+
+def _view_gates(facts: Facts, view_failed: IntArray, left: BoolArray) -> BoolArray:
+    """The gates that are judged from views: which groups fail them, shape (4, G)."""
+    included, bare, fallen, remaining, shown = (
+        np.bincount(facts.view_group[chosen], minlength=facts.groups)
+        for chosen in (
+            facts.view_included,
+            view_failed == _CALIBRATABLE,
+            view_failed == _JAC,
+            left,
+            left & facts.view_ball,
+        )
+    )
+    too_few, cameras = remaining < MIN_VIEWS, included - bare
+    return np.stack(
+        [
+            too_few & (bare > 0) & (cameras < MIN_VIEWS),
+            too_few & (fallen > 0) & (cameras >= MIN_VIEWS),
+            too_few,
+            shown < MIN_VIEWS,
+        ]
+    )
+
+
+def _baseline(facts: Facts, left: BoolArray) -> FloatArray:
+    shown = np.bincount(facts.view_group[left & facts.view_ball], minlength=facts.groups)
+    widest = np.where(shown >= MIN_VIEWS, 0.0, np.nan)
+    a, b = left[facts.pair_view].T
+    pairs = a & b
+    # Views of a pair show the ball, so none of these is NaN.
+    np.maximum.at(widest, facts.pair_group[pairs], facts.pair_baseline[pairs])
+    return widest
+
+
+def _mean(facts: Facts, valid: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Mean point of the valid pairs, its largest parallax in degrees, and its distance."""
+    pairs = np.flatnonzero(valid)
+    owner = facts.pair_group[pairs]
+    number = np.bincount(owner, minlength=facts.groups)
+    there = number > 0
+    sums = [np.bincount(owner, part, facts.groups) for part in facts.pair_point[pairs].T]
+    point = np.column_stack(sums) / np.where(there, number, np.nan)[:, None]
+    angle = facts.pair_parallax[pairs]
+    several = np.flatnonzero(number[owner] > 1)
+    a, b = facts.view_position[facts.pair_view[pairs[several]]].transpose(1, 0, 2)
+    angle[several] = np.degrees(parallax_angle(a, b, point[owner[several]]))
+    largest = np.where(there, -np.inf, np.nan)
+    np.maximum.at(largest, owner, angle)
+    distance = np.full(facts.groups, np.nan)
+    # Pairs come in the order of their groups and views.
+    first = pairs[np.searchsorted(owner, np.flatnonzero(there))]
+    camera = facts.view_position[facts.pair_view[first, 0]]
+    distance[there] = np.linalg.norm(camera - point[there], axis=1)
+    return point, largest, distance

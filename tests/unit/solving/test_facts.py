@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.geometry.resection import parameters_from_camera
+from app.geometry.triangulation import triangulate_pairs
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import ImagePoint
+from app.soccer.solution import Calibration, MarkingFit
+from app.solving.facts import COLUMNS, NOTHING, STEP_PX, Facts, group_facts, join
+from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, SIZE, given_view
+from tests.unit.solving.random_groups import random_views
+
+BALL = (38.0, 2.0, -1.4)
+SEEDS = st.lists(st.integers(0, 10_000), min_size=1, max_size=6)
+
+
+def same(one: Facts, other: Facts) -> bool:
+    return one.groups == other.groups and all(
+        getattr(one, name).dtype == getattr(other, name).dtype == np.dtype(kind)
+        and getattr(one, name).shape[1:] == shape
+        and np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
+        for name, (kind, shape) in COLUMNS.items()
+    )
+
+
+def random_facts(seeds: list[int]) -> list[Facts]:
+    return [group_facts(*random_views(seed)) for seed in seeds]
+
+
+class TestGroupFacts:
+    def facts(self) -> Facts:
+        fits = (MarkingFit("a", "tp", (1.0, 3.0, 2.0)), MarkingFit("b", "fp"))
+        spread = tuple(np.diag(np.arange(1.0, 9.0)).ravel().tolist())
+        views = [given_view(key, camera, BALL) for key, camera in zip("abc", CAMERAS, strict=True)]
+        views[2] = replace(views[2], included=False)
+        calibrations = [
+            Calibration("lines", MAIN, jac=(0.5,) * 3, markings=fits, covariance=spread),
+            Calibration("given", BEHIND_GOAL),
+            Calibration("lines", None, markings=fits[:1]),
+        ]
+        return group_facts(views, calibrations)
+
+    def test_says_of_each_view_what_the_gates_read(self):
+        facts = self.facts()
+        assert facts.groups == 1
+        assert facts.view_group.tolist() == [0, 0, 0]
+        assert facts.view_included.tolist() == [True, True, False]
+        assert facts.view_camera.tolist() == [True, True, False]
+        assert facts.view_given.tolist() == [False, True, False]
+        assert facts.view_measured.tolist() == [True, False, False]
+        assert facts.view_ball.tolist() == [True, True, True]
+        assert facts.view_diagonal.tolist() == [SIZE.diagonal] * 3
+        assert np.array_equal(facts.view_position[:2], [MAIN.position, BEHIND_GOAL.position])
+        assert np.isnan(facts.view_position[2]).all()
+        parameters = parameters_from_camera(MAIN, SIZE.diagonal / 2)
+        assert np.array_equal(facts.view_parameters, [parameters, np.zeros(8), np.zeros(8)])
+        assert np.array_equal(facts.view_covariance[0], np.diag(np.arange(1.0, 9.0)))
+        assert not facts.view_covariance[1:].any()
+        assert (facts.view_ball_px > 0).all()
+
+    def test_a_marking_has_its_largest_distance_and_none_is_infinite(self):
+        facts = self.facts()
+        assert facts.mark_view.tolist() == [0, 0, 2]
+        assert facts.mark_px.tolist() == [3.0, np.inf, 3.0]
+
+    def test_a_pair_has_the_numbers_of_its_meeting(self):
+        facts = self.facts()
+        assert facts.pair_view.tolist() == [[0, 1]]
+        assert facts.pair_point == pytest.approx(np.array([BALL]), abs=1e-6)
+        assert facts.pair_errors == pytest.approx(np.zeros((1, 2)), abs=1e-5)
+        assert facts.pair_front.tolist() == [True]
+        apart = np.linalg.norm(MAIN.position - BEHIND_GOAL.position)
+        assert facts.pair_baseline == pytest.approx(apart)
+
+    def test_a_pair_knows_where_its_point_moves_with_a_pixel(self):
+        facts = self.facts()
+        bare = [replace(camera, distortion=np.zeros(12)) for camera in (MAIN, BEHIND_GOAL)]
+        pixels = [camera.project(np.array([BALL])) for camera in bare]
+        pixels[1][0, 1] -= STEP_PX
+        expected = triangulate_pairs(MAIN.P[None], BEHIND_GOAL.P[None], *pixels)
+        assert facts.pair_moved[:, 1, 1, 1] == pytest.approx(expected, abs=1e-6)
+
+    def test_a_ball_that_was_put_where_the_others_see_it_is_none(self):
+        put = BallAnnotation(point=ImagePoint(9.0, 9.0), inferred=True)
+        view = replace(given_view("a", MAIN, BALL), balls=(put,))
+        facts = group_facts([view], [Calibration("given", MAIN)])
+        assert (facts.view_ball.tolist(), facts.view_ball_px.tolist()) == ([False], [0.0])
+
+    def test_a_group_without_views_has_nothing(self):
+        assert same(group_facts([], []), replace(NOTHING, groups=1))
+
+
+class TestJoin:
+    @given(SEEDS)
+    @settings(max_examples=25, deadline=None)
+    def test_each_group_comes_back_alone(self, seeds):
+        parts = random_facts(seeds)
+        whole = join(parts)
+        assert whole.groups == len(parts)
+        for place, part in enumerate(parts):
+            assert same(whole.only(np.arange(len(parts)) == place), part)
+
+    @given(SEEDS, st.integers(1, 5))
+    @settings(max_examples=15, deadline=None)
+    def test_it_does_not_matter_what_is_joined_first(self, seeds, first):
+        parts = random_facts(seeds)
+        assert same(join([join([NOTHING, *parts[:first]]), *parts[first:]]), join(parts))
+
+    def test_all_groups_are_the_facts_themselves(self):
+        whole = join(random_facts([1, 2, 3]))
+        assert same(whole.only(np.ones(3, bool)), whole)
+        assert same(whole.only(np.zeros(3, bool)), NOTHING)
+
+
+class TestCodec:
+    @given(st.integers(0, 10_000))
+    @settings(max_examples=25, deadline=None)
+    def test_facts_come_back_to_the_last_bit(self, seed):
+        (facts,) = random_facts([seed])
+        assert same(facts_from_bytes(facts_to_bytes(facts)), facts)
+
+    def test_a_group_without_anything_comes_back(self):
+        empty = replace(NOTHING, groups=1)
+        assert same(facts_from_bytes(facts_to_bytes(empty)), empty)
+
+
+CAMERAS = MAIN, BEHIND_GOAL, OPPOSITE

@@ -1,0 +1,263 @@
+"""The gates in words, from a verdict made by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.soccer.policy import PAPER, Policy
+from app.soccer.solution import GATES, Ball3D, Calibration, Gate, Pair
+from app.solving.gates import JudgedView, describe
+from app.solving.verdict import Verdict
+
+ASKED = replace(PAPER, min_parallax_degrees=5.0, max_sigma_m=0.5)
+BALL = Ball3D((1.0, 2.0, -0.5), (0.0,) * 9, 0.25, 20.0, ("a", "b"))
+
+
+def seen(letter: str, jac: float | None = 0.875, **changes: object) -> JudgedView:
+    """An included view in good order."""
+    view = JudgedView(
+        key=letter.lower(),
+        letter=letter,
+        calibration=Calibration("lines", None, reason="too few lines"),
+        jac=jac,
+        tau_px=20.0,
+        has_ball=True,
+        failed=None,
+    )
+    return replace(view, **changes)
+
+
+def given(letter: str) -> JudgedView:
+    return seen(letter, None, calibration=Calibration("given", None))
+
+
+def pair(a: str, b: str, *errors: float, failed: str | None = None) -> Pair:
+    return Pair(a, b, (0.0, 0.0, 0.0), errors, 40.0, 20.0, failed is None, failed)  # type: ignore[arg-type]
+
+
+def gates(
+    views: list[JudgedView],
+    failed: tuple[str, ...] = (),
+    *,
+    left_out: tuple[str, ...] = (),
+    pairs: tuple[Pair, ...] = (),
+    ball: Ball3D | None = None,
+    baseline: float = math.nan,
+    policy: Policy = PAPER,
+) -> dict[str, Gate]:
+    """The gates by name, of a group that fails some."""
+    fails = np.array([[name in failed] for name in GATES])
+    nothing = np.empty(0)
+    verdict = Verdict(
+        jac=nothing,
+        view_failed=nothing.astype(int),
+        pair_failed=nothing.astype(int),
+        failed=fails,
+        baseline=np.array([baseline]),
+        point=nothing,
+        parallax=nothing,
+        distance=nothing,
+    )
+    found = describe(views, left_out, pairs, ball, verdict, policy)
+    assert tuple(gate.name for gate in found) == GATES
+    return {gate.name: gate for gate in found}
+
+
+NO_CAMERA = {"failed": "calibratable", "jac": None}
+LOW = {"failed": "jac", "jac": 0.5}
+
+
+class TestCalibratable:
+    def test_counts_the_views_with_a_camera(self):
+        found = gates([seen("A"), seen("B", **NO_CAMERA), seen("C")])["calibratable"]
+        assert found == Gate("calibratable", True, 2.0, 2, 0.0, "in 2 of 3 views")
+
+    def test_a_group_of_one_view_needs_one_camera(self):
+        assert gates([seen("A")])["calibratable"].threshold == 1
+
+    def test_names_the_first_view_without_one_when_it_is_to_blame(self):
+        views = [seen("A"), seen("B", **NO_CAMERA), seen("C", **NO_CAMERA)]
+        found = gates(views, ("calibratable", "two_views"))["calibratable"]
+        sentence = "B has no camera: too few lines"
+        assert found == Gate("calibratable", False, 1.0, 2, -0.5, sentence, "b")
+
+
+class TestJac:
+    def test_says_the_worst_of_the_views_that_are_left(self):
+        views = [seen("A", 1.0), seen("B", 0.875), seen("C", **LOW)]
+        sentence = "worst 0.88 · B; C below, not used"
+        assert gates(views)["jac"] == Gate("jac", True, 0.875, 0.75, 0.125 / 0.75, sentence)
+
+    def test_names_all_views_below(self):
+        found = gates([seen("A"), seen("B", **LOW), seen("C", **LOW)])["jac"]
+        assert found.sentence == "0.88 · A; B, C below, not used"
+
+    def test_says_the_worst_of_the_fallen_when_they_are_to_blame(self):
+        views = [seen("A", 0.25), seen("B", 0.5, failed="jac"), seen("C", 0.375, failed="jac")]
+        found = gates(views, ("jac", "two_views"))["jac"]
+        assert found == Gate("jac", False, 0.375, 0.75, -0.5, "worst 0.38 · C", "c")
+
+    def test_where_all_fell_and_another_gate_is_to_blame_the_fallen_speak(self):
+        found = gates([seen("A", **LOW), seen("B", **NO_CAMERA)], ("calibratable",))["jac"]
+        assert (found.passed, found.sentence, found.view) == (
+            True,
+            "0.50 · A; A below, not used",
+            None,
+        )
+
+    @pytest.mark.parametrize(
+        ("jac", "said"),
+        [(0.75, "exactly 0.75"), (0.7512, "0.7512"), (0.7488, "0.7488"), (0.7612, "0.76")],
+    )
+    def test_says_as_many_digits_as_it_takes(self, jac: float, said: str):
+        assert gates([seen("A", jac)])["jac"].sentence == f"{said} · A"
+
+    def test_given_cameras_without_lines_are_not_measured(self):
+        sentence = "not measured, the cameras were given"
+        assert gates([given("A"), seen("B", None)])["jac"] == Gate(
+            "jac", True, None, 0.75, None, sentence
+        )
+
+    def test_without_any_line_there_is_nothing_to_measure(self):
+        assert gates([seen("A", None)])["jac"].sentence == "nothing to measure"
+
+    def test_one_measured_view_is_enough_to_speak(self):
+        assert gates([given("A"), seen("B")])["jac"].value == 0.875
+
+
+class TestTwoViews:
+    def test_counts_what_is_left_of_all(self):
+        found = gates([seen("A"), seen("B"), seen("C", **LOW)], left_out=("D",))["two_views"]
+        assert found == Gate("two_views", True, 2.0, 2, 0.0, "2 of 4")
+
+    def test_says_of_each_missing_view_why(self):
+        views = [seen("A"), seen("B", **LOW), seen("C", **NO_CAMERA), seen("D", **LOW)]
+        found = gates(views, ("jac", "two_views"), left_out=("E", "F"))["two_views"]
+        sentence = (
+            "1 of 6, B, D not counted (lines do not fit), C not counted (no camera), "
+            "E, F left out by a person"
+        )
+        assert found == Gate("two_views", False, 1.0, 2, -0.5, sentence)
+
+    def test_one_view_alone_says_only_that(self):
+        assert gates([seen("A")], ("two_views",))["two_views"].sentence == "1 of 1"
+
+
+class TestBall:
+    def test_counts_the_views_that_show_it(self):
+        found = gates([seen("A"), seen("B"), seen("C", has_ball=False)])["ball"]
+        assert found == Gate("ball", True, 2.0, 2, 0.0, "in 2 views, none in C")
+
+    def test_names_the_first_view_without_it(self):
+        views = [seen("A"), seen("B", has_ball=False), seen("C", has_ball=False)]
+        found = gates(views, ("ball",))["ball"]
+        assert found == Gate("ball", False, 1.0, 2, -0.5, "in 1 view, none in B, C", "b")
+
+    def test_a_ball_in_a_view_that_does_not_count_is_said(self):
+        views = [seen("A"), seen("B", **LOW), seen("C", has_ball=False, **NO_CAMERA)]
+        found = gates(views, ("ball",))["ball"]
+        assert found.sentence == "in 1 view, B not counted (lines do not fit)"
+        assert found.view is None
+
+    def test_where_every_view_shows_it_no_view_is_named(self):
+        found = gates([seen("A"), seen("B")])["ball"]
+        assert (found.sentence, found.view) == ("in 2 views", None)
+
+
+class TestBaseline:
+    def test_says_the_widest(self):
+        found = gates([seen("A"), seen("B")], baseline=15.0, policy=ASKED)["baseline"]
+        assert found == Gate("baseline", True, 15.0, 1.0, 14.0, "15.0 m")
+
+    def test_names_the_views_that_are_too_close(self):
+        views = [seen("A"), seen("B", has_ball=False), seen("C"), seen("D", **LOW)]
+        found = gates(views, ("baseline",), baseline=0.25)["baseline"]
+        assert found == Gate("baseline", False, 0.25, 1.0, -0.75, "A–C 0.2 m apart")
+
+    def test_without_two_sights_it_is_not_judged(self):
+        found = gates([seen("A")], ("baseline",))["baseline"]
+        assert found == Gate("baseline", False, None, 1.0, None, "not judged")
+
+
+class TestReprojection:
+    def test_the_best_pair_speaks_with_its_larger_error(self):
+        views = [seen("A"), seen("B"), seen("C")]
+        pairs = (pair("a", "b", 4.0, 6.0), pair("a", "c", 2.0, 5.0), pair("b", "c", 9.0, 1.0))
+        found = gates(views, pairs=pairs)["reprojection"]
+        assert found == Gate("reprojection", True, 5.0, 20.0, 0.75, "A–C 5.0 px")
+
+    def test_errors_compare_in_units_of_their_own_views_tau(self):
+        views = [seen("A", tau_px=4.0), seen("B", tau_px=40.0)]
+        found = gates(views, pairs=(pair("a", "b", 2.0, 10.0),))["reprojection"]
+        assert found == Gate("reprojection", True, 2.0, 4.0, 0.5, "A–B 2.0 px")
+        found = gates(views, pairs=(pair("a", "b", 2.0, 30.0),))["reprojection"]
+        assert (found.value, found.threshold, found.margin) == (30.0, 40.0, 0.25)
+
+    def test_a_valid_pair_goes_before_a_closer_one_that_is_not(self):
+        views = [seen("A"), seen("B"), seen("C")]
+        behind = pair("a", "b", 1.0, 1.0, failed="reprojection")
+        far = pair("b", "c", 50.0, 50.0, failed="reprojection")
+        found = gates(views, pairs=(behind, pair("a", "c", 2.0, 8.0), far))["reprojection"]
+        assert (found.passed, found.sentence) == (True, "A–C 8.0 px; A–B, B–C left out")
+
+    def test_without_a_valid_pair_the_closest_speaks_and_none_is_left_out(self):
+        views = [seen("A"), seen("B"), seen("C")]
+        pairs = (
+            pair("a", "b", 60.0, 30.0, failed="reprojection"),
+            pair("a", "c", 30.0, 40.0, failed="reprojection"),
+        )
+        found = gates(views, ("reprojection",), pairs=pairs)["reprojection"]
+        assert found == Gate("reprojection", False, 40.0, 20.0, -1.0, "A–C 40.0 px")
+
+    def test_pairs_that_failed_before_do_not_speak(self):
+        views = [seen("A"), seen("B"), seen("C", **LOW)]
+        pairs = (
+            pair("a", "b", 1.0, 1.0, failed="baseline"),
+            pair("a", "c", 1.0, 1.0, failed="jac"),
+        )
+        found = gates(views, ("reprojection",), pairs=pairs)["reprojection"]
+        assert found == Gate("reprojection", False, None, None, None, "not judged")
+
+
+class TestParallax:
+    def test_says_the_angle(self):
+        found = gates([], ball=BALL, policy=ASKED)["parallax"]
+        assert found == Gate("parallax", True, 20.0, 5.0, 3.0, "20.0°")
+
+    def test_fails_where_the_verdict_says_so(self):
+        low = replace(BALL, parallax_degrees=2.5)
+        found = gates([], ("parallax",), ball=low, policy=ASKED)["parallax"]
+        assert found == Gate("parallax", False, 2.5, 5.0, -0.5, "2.5°")
+
+    def test_is_said_where_it_is_not_asked(self):
+        found = gates([], ball=BALL)["parallax"]
+        assert found == Gate("parallax", True, 20.0, None, None, "20.0°", active=False)
+
+    def test_without_a_ball_it_is_not_judged(self):
+        found = gates([], policy=ASKED)["parallax"]
+        assert found == Gate("parallax", False, None, 5.0, None, "not judged")
+        assert gates([])["parallax"] == replace(found, threshold=None, active=False)
+
+
+class TestSigma:
+    def test_says_the_uncertainty(self):
+        found = gates([], ball=BALL, policy=ASKED)["sigma"]
+        assert found == Gate("sigma", True, 0.25, 0.5, 0.5, "0.25 m")
+
+    def test_fails_where_the_verdict_says_so(self):
+        vague = replace(BALL, sigma_m=1.0)
+        found = gates([], ("sigma",), ball=vague, policy=ASKED)["sigma"]
+        assert found == Gate("sigma", False, 1.0, 0.5, -1.0, "1.00 m")
+
+    def test_is_said_where_it_is_not_asked(self):
+        found = gates([], ball=BALL)["sigma"]
+        assert found == Gate("sigma", True, 0.25, None, None, "0.25 m", active=False)
+
+    def test_without_a_ball_it_is_not_judged(self):
+        found = gates([], policy=ASKED)["sigma"]
+        assert found == Gate("sigma", False, None, 0.5, None, "not judged")
+        assert gates([])["sigma"] == replace(found, threshold=None, active=False)

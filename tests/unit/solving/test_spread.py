@@ -1,0 +1,157 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.geometry.camera import Camera
+from app.geometry.rotation import rotation_looking
+from app.geometry.triangulation import triangulate_pairs
+from app.soccer.frames import ImagePoint
+from app.soccer.policy import PAPER
+from app.soccer.solution import Calibration
+from app.solving.facts import group_facts, join
+from app.solving.spread import (
+    CLICK_DIAGONAL,
+    MeanSpread,
+    calibration_spread,
+    click_variance,
+    is_within,
+    longest_sigma,
+    pixel_spread,
+)
+from app.solving.triangulate import Sight
+from app.solving.verdict import judge
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, SIZE, given_view
+from tests.unit.solving.random_groups import random_policy, random_views
+
+BALL = (38.0, 2.0, -1.4)
+DIAGONAL = np.array([CLICK_DIAGONAL])
+
+
+class TestClickVariance:
+    def test_is_that_of_the_policy_at_full_high_definition(self):
+        policy = replace(PAPER, click_sigma_px=3.0, box_sigma_share=0.5)
+        assert click_variance(DIAGONAL, np.array([0.0]), policy) == pytest.approx(9.0)
+        assert click_variance(DIAGONAL / 2, np.array([0.0]), policy) == pytest.approx(2.25)
+        assert click_variance(DIAGONAL, np.array([8.0]), policy) == pytest.approx(9.0 + 16.0)
+
+    @given(st.floats(0.01, 9.0), st.floats(0.0, 60.0))
+    def test_one_alone_has_the_bits_of_a_python_float(self, click, diameter):
+        policy = replace(PAPER, click_sigma_px=click)
+        sigma = float(np.hypot(click * CLICK_DIAGONAL / CLICK_DIAGONAL, 0.04 * diameter))
+        assert click_variance(DIAGONAL, np.array([diameter]), policy).tolist() == [sigma**2]
+
+
+class TestCalibrationSpread:
+    def test_a_camera_that_may_stand_aside_moves_the_pixel_by_as_much(self):
+        place = np.array([0.0, 20.0, 0.0])
+        camera = Camera(rotation_looking(place, np.zeros(3)), place, (1000.0,) * 2, (639.5, 359.5))
+        covariance = np.zeros((8, 8))
+        covariance[3, 3] = 0.04
+        calibration = Calibration("lines", camera, covariance=tuple(covariance.ravel()))
+        spread = calibration_spread(calibration, SIZE, np.zeros(3))
+        # 20 cm at 20 m are 10 px for 1000 px a radian.
+        assert np.allclose(spread, [[100.0, 0.0], [0.0, 0.0]])
+        sight = Sight("a", calibration, ImagePoint(639.5, 359.5), 0.0, SIZE)
+        noise = (SIZE.diagonal / CLICK_DIAGONAL) ** 2
+        assert np.allclose(pixel_spread(sight, np.zeros(3), PAPER), spread + noise * np.eye(2))
+
+    def test_of_a_given_camera_nothing_is_known(self):
+        assert not calibration_spread(Calibration("given", MAIN), SIZE, np.array(BALL)).any()
+
+
+class TestLongestSigma:
+    def test_is_along_the_longest_axis(self):
+        turn = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+        spread = turn @ np.diag([9.0, 1.0, 4.0]) @ turn.T
+        assert longest_sigma(spread[None]) == pytest.approx([3.0])
+
+    def test_where_nothing_is_known_it_is_infinite(self):
+        spreads = np.stack([np.full((3, 3), np.nan), np.eye(3)])
+        assert longest_sigma(spreads).tolist() == [np.inf, 1.0]
+        assert is_within(spreads, 2.0).tolist() == [False, True]
+
+
+class TestIsWithin:
+    @given(st.integers(0, 10_000), st.floats(0.2, 1.8))
+    def test_says_what_the_eigenvalues_say(self, seed, share):
+        root = np.random.default_rng(seed).normal(size=(20, 3, 3)) * [1.0, 0.3, 0.1]
+        spreads = root @ root.transpose(0, 2, 1)
+        limit = share * float(np.median(longest_sigma(spreads)))
+        assert np.array_equal(is_within(spreads, limit), longest_sigma(spreads) <= limit)
+
+    def test_the_very_value_is_within(self):
+        root = np.random.default_rng(4).normal(size=(50, 3, 3))
+        for spread in (root @ root.transpose(0, 2, 1))[:, None]:
+            (sigma,) = longest_sigma(spread)
+            assert is_within(spread, float(sigma)).all()
+            assert not is_within(spread, float(np.nextafter(sigma, 0.0))).any()
+
+    def test_a_threshold_of_zero_lets_nothing_through(self):
+        assert is_within(np.eye(3)[None], 0.0).tolist() == [False]
+
+
+class TestMeanSpread:
+    def covariance(self, *cameras: Camera, policy=PAPER) -> np.ndarray:
+        views = [given_view(str(place), camera, BALL) for place, camera in enumerate(cameras)]
+        facts = group_facts(views, [Calibration("given", camera) for camera in cameras])
+        spread = MeanSpread(facts)
+        verdict = judge(facts, policy, spread)
+        return spread.covariances(verdict.valid, np.array([0]), verdict.point, policy)[0]
+
+    def test_is_what_noisy_clicks_scatter(self):
+        policy = replace(PAPER, box_sigma_share=0.0, click_sigma_px=1.5)
+        rng, cameras = np.random.default_rng(1), (MAIN, BEHIND_GOAL, OPPOSITE)
+        bare = [replace(camera, distortion=np.zeros(12)) for camera in cameras]
+        sigma = 1.5 * SIZE.diagonal / CLICK_DIAGONAL
+        seen = [
+            camera.project(np.array([BALL])) + rng.normal(0, sigma, (4000, 2)) for camera in bare
+        ]
+        P = [np.stack([camera.P] * 4000) for camera in bare]
+        pairs = [
+            triangulate_pairs(P[a], P[b], seen[a], seen[b]) for a, b in ((0, 1), (0, 2), (1, 2))
+        ]
+        scattered = np.cov(np.mean(pairs, axis=0).T)
+        found = self.covariance(*cameras, policy=policy)
+        assert np.allclose(found, scattered, atol=0.08 * np.abs(scattered).max())
+
+    def test_grows_with_the_square_of_the_click(self):
+        one, two = (
+            self.covariance(
+                MAIN, OPPOSITE, policy=replace(PAPER, box_sigma_share=0.0, click_sigma_px=click)
+            )
+            for click in (1.0, 2.0)
+        )
+        assert np.allclose(two, 4 * one)
+
+    @given(st.lists(st.integers(0, 1000), min_size=2, max_size=6))
+    @settings(max_examples=30, deadline=None)
+    def test_what_is_kept_of_other_policies_changes_no_bit(self, seeds):
+        facts = join([group_facts(*random_views(seed)) for seed in range(60)])
+        kept = MeanSpread(facts)
+        for seed in seeds:
+            policy = replace(random_policy(seed), max_sigma_m=0.1)
+            verdict, groups = judge(facts, policy, kept), np.arange(facts.groups)
+            there = groups[~np.isnan(verdict.point[:, 0])]
+            asked = (verdict.valid, there, verdict.point[there], policy)
+            fresh = MeanSpread(facts).covariances(*asked)
+            assert np.array_equal(kept.covariances(*asked), fresh, equal_nan=True)
+
+    def test_a_group_of_thirteen_views_has_more_pairs_than_are_kept(self):
+        rng = np.random.default_rng(8)
+        cameras = [
+            replace(MAIN, position=MAIN.position + rng.normal(0, 9, 3), distortion=np.zeros(12))
+            for _ in range(13)
+        ]
+        views = [given_view(str(place), camera, BALL) for place, camera in enumerate(cameras)]
+        facts = group_facts(views, [Calibration("given", camera) for camera in cameras])
+        kept, zero = MeanSpread(facts), np.array([0])
+        for last in (70, 71):
+            valid = np.arange(len(facts.pair_group)) <= last
+            point = facts.pair_point[valid].mean(axis=0)[None]
+            fresh = MeanSpread(facts).covariances(valid, zero, point, PAPER)
+            assert np.array_equal(kept.covariances(valid, zero, point, PAPER), fresh)

@@ -1,0 +1,202 @@
+"""The engine of the gates: laws on random groups, thresholds by hand."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.soccer.policy import PAPER, Policy
+from app.soccer.solution import GATES
+from app.solving.facts import Facts, group_facts, join
+from app.solving.spread import MeanSpread
+from app.solving.verdict import PASSES, Verdict, judge, view_jac
+from tests.unit.solving.random_groups import random_policy, random_views
+
+
+def judged(facts: Facts, policy: Policy = PAPER) -> Verdict:
+    return judge(facts, policy, MeanSpread(facts))
+
+
+def facts(views: int = 2, **changes: object) -> Facts:
+    """A group whose views all see the ball, with a pair of the first two that is in good order."""
+    pairs = 1 if views > 1 else 0
+    made = Facts(
+        groups=1,
+        view_group=np.zeros(views, np.int64),
+        view_included=np.ones(views, bool),
+        view_camera=np.ones(views, bool),
+        view_given=np.zeros(views, bool),
+        view_measured=np.ones(views, bool),
+        view_ball=np.ones(views, bool),
+        view_diagonal=np.full(views, 1000.0),
+        view_position=np.array([[10.0, 0.0, 0.0], [0.0, 10.0, 0.0], [-5.0, 0.0, 0.0]])[:views],
+        view_parameters=np.zeros((views, 8)),
+        view_covariance=np.zeros((views, 8, 8)),
+        view_ball_px=np.zeros(views),
+        mark_view=np.repeat(np.arange(views), 4),
+        mark_px=np.tile([1.0, 2.0, 3.0, 4.0], views),
+        pair_group=np.zeros(pairs, np.int64),
+        pair_view=np.array([[0, 1]])[:pairs],
+        pair_errors=np.array([[3.0, 4.0]])[:pairs],
+        pair_front=np.ones(pairs, bool),
+        pair_baseline=np.full(pairs, 14.0),
+        pair_parallax=np.full(pairs, 90.0),
+        pair_point=np.zeros((pairs, 3)),
+        pair_moved=np.zeros((pairs, 2, 2, 2, 3)),
+    )
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+def failing(verdict: Verdict) -> list[str]:
+    return [name for name, fails in zip(GATES, verdict.failed[:, 0], strict=True) if fails]
+
+
+class TestJudge:
+    @given(st.lists(st.integers(0, 10_000), min_size=1, max_size=8), st.integers(0, 1000))
+    @settings(max_examples=40, deadline=None)
+    def test_a_table_is_judged_as_each_of_its_groups_alone_bit_by_bit(self, seeds, seed):
+        policy = random_policy(seed)
+        parts = [group_facts(*random_views(seed)) for seed in seeds]
+        together, alone = judged(join(parts), policy), [judged(part, policy) for part in parts]
+        for item in fields(Verdict):
+            axis = 1 if item.name == "failed" else 0
+            pieces = np.concatenate([getattr(one, item.name) for one in alone], axis=axis)
+            assert np.array_equal(getattr(together, item.name), pieces, equal_nan=True), item.name
+
+    @given(st.integers(0, 10_000), st.integers(0, 1000))
+    @settings(max_examples=40, deadline=None)
+    def test_a_stricter_policy_lets_no_more_through(self, seed, other):
+        found, policy = group_facts(*random_views(seed)), random_policy(other)
+        stricter = replace(
+            policy,
+            min_baseline_m=policy.min_baseline_m + 5,
+            min_parallax_degrees=(policy.min_parallax_degrees or 0.0) + 5,
+            max_sigma_m=(policy.max_sigma_m or 1.0) / 2,
+        )
+        if not judged(found, policy).passes[0]:
+            assert not judged(found, stricter).passes[0] or judged(found, stricter).valid.sum() < (
+                judged(found, policy).valid.sum()
+            )
+
+    def test_random_groups_and_policies_reach_every_gate(self):
+        whole = join([group_facts(*random_views(seed)) for seed in range(150)])
+        first = np.concatenate([judged(whole, random_policy(seed)).first for seed in range(12)])
+        assert set(first.tolist()) == set(range(PASSES + 1))
+
+    def test_a_group_in_good_order_passes(self):
+        verdict = judged(facts())
+        assert failing(verdict) == []
+        assert (verdict.passes.tolist(), verdict.first.tolist()) == ([True], [PASSES])
+        assert verdict.point.tolist() == [[0.0, 0.0, 0.0]]
+        assert (verdict.parallax.tolist(), verdict.distance.tolist()) == ([90.0], [10.0])
+
+    def test_two_without_a_camera_are_to_blame(self):
+        verdict = judged(facts(3, view_camera=np.array([True, False, False])))
+        assert failing(verdict)[:3] == ["calibratable", "two_views", "ball"]
+        assert verdict.view_failed.tolist() == [PASSES, 0, 0]
+
+    def test_lines_that_do_not_fit_are_to_blame_where_two_have_a_camera(self):
+        verdict = judged(facts(3, mark_px=np.repeat([1.0, 9.0, 9.0], 4)))
+        assert failing(verdict)[:2] == ["jac", "two_views"]
+        assert verdict.view_failed.tolist() == [PASSES, 1, 1]
+        assert verdict.pair_failed.tolist() == [1]
+
+    def test_jac_must_lie_above_its_threshold(self):
+        """At gamma 0.35 % of 1000 px, three of four markings are found."""
+        at = replace(PAPER, jac_gamma_percent=0.35)
+        assert judged(facts(), at).jac.tolist() == [0.75, 0.75]
+        assert "jac" in failing(judged(facts(), at))
+        assert failing(judged(facts(), replace(at, min_jac=0.7499))) == []
+
+    def test_a_camera_that_cannot_be_measured_never_falls(self):
+        verdict = judged(facts(view_measured=np.zeros(2, bool)), replace(PAPER, min_jac=1.0))
+        assert np.isnan(verdict.jac).all()
+        assert failing(verdict) == []
+
+    def test_a_view_that_a_person_left_out_counts_for_nothing(self):
+        without = np.array([True, False, True])
+        verdict = judged(facts(3, view_included=without, view_camera=np.array([1, 0, 1], bool)))
+        assert verdict.view_failed.tolist() == [PASSES] * 3
+        assert "calibratable" not in failing(verdict)
+
+    @pytest.mark.parametrize(("widest", "passes"), [(1.0, True), (0.999, False)])
+    def test_the_baseline_may_be_just_what_is_asked(self, widest, passes):
+        verdict = judged(facts(pair_baseline=np.array([widest])))
+        assert verdict.passes.tolist() == [passes]
+        assert verdict.pair_failed.tolist() == [PASSES if passes else GATES.index("baseline")]
+
+    def test_one_camera_twice_is_no_metre_apart(self):
+        none = {name: getattr(facts(1), name) for name in dir(facts()) if name.startswith("pair_")}
+        verdict = judged(facts(**none))
+        assert verdict.baseline.tolist() == [0.0]
+        assert failing(verdict) == ["baseline", "reprojection"]
+        assert failing(judged(facts(**none), replace(PAPER, min_baseline_m=0.0))) == [
+            "reprojection"
+        ]
+
+    def test_without_two_sights_there_is_no_baseline(self):
+        verdict = judged(facts(1))
+        assert np.isnan(verdict.baseline).all()
+        assert failing(verdict) == ["two_views", "ball", "baseline", "reprojection"]
+
+    @pytest.mark.parametrize("errors", [(10.0, 3.0), (3.0, 10.0)])
+    def test_an_error_must_lie_below_tau(self, errors):
+        """Of a diagonal of 1000 px, one per cent."""
+        assert failing(judged(facts(pair_errors=np.array([errors])))) == ["reprojection"]
+        closer = facts(pair_errors=np.array([errors]) - 1e-9)
+        assert failing(judged(closer)) == []
+
+    def test_a_point_behind_a_camera_is_refused(self):
+        assert failing(judged(facts(pair_front=np.array([False])))) == ["reprojection"]
+
+    @pytest.mark.parametrize(("asked", "fails"), [(90.0, []), (90.001, ["parallax"])])
+    def test_the_parallax_may_be_just_what_is_asked(self, asked, fails):
+        policy = replace(PAPER, min_parallax_degrees=asked)
+        assert failing(judged(facts(), policy)) == fails
+
+    def test_the_mean_is_over_valid_pairs_and_takes_its_own_parallax(self):
+        verdict = judged(
+            facts(
+                3,
+                pair_group=np.zeros(3, np.int64),
+                pair_view=np.array([[0, 1], [0, 2], [1, 2]]),
+                pair_errors=np.array([[3.0, 3.0], [3.0, 3.0], [99.0, 3.0]]),
+                pair_front=np.ones(3, bool),
+                pair_baseline=np.full(3, 14.0),
+                pair_parallax=np.full(3, 7.0),
+                pair_point=np.array([[0.0, 0.0, 3.0], [0.0, 0.0, -3.0], [50.0, 0.0, 0.0]]),
+                pair_moved=np.zeros((3, 2, 2, 2, 3)),
+            )
+        )
+        assert verdict.valid.tolist() == [True, True, False]
+        assert verdict.point.tolist() == [[0.0, 0.0, 0.0]]
+        assert verdict.parallax == pytest.approx([180.0])
+        assert verdict.distance.tolist() == [10.0]
+
+    def test_sigma_is_judged_where_it_is_asked(self):
+        # One pixel in either view moves the point by a metre along x; a click is one pixel.
+        moved = np.zeros((1, 2, 2, 2, 3))
+        moved[0, :, 0, :, 0] = [0.5, -0.5]
+        one = facts(pair_moved=moved, view_diagonal=np.full(2, np.hypot(1920, 1080)))
+        for limit, fails in ((np.sqrt(2) * 1.000001, []), (np.sqrt(2) * 0.999999, ["sigma"])):
+            policy = replace(PAPER, max_sigma_m=float(limit), min_jac=0.0)
+            assert failing(judged(one, policy)) == fails
+
+    def test_without_a_ball_what_is_asked_of_it_fails(self):
+        policy = replace(PAPER, max_sigma_m=9.0, min_parallax_degrees=1.0)
+        assert failing(judged(facts(1), policy))[-2:] == ["parallax", "sigma"]
+
+
+class TestViewJac:
+    def test_a_point_at_gamma_is_not_close(self):
+        """0.2 % of 1000 px are the 2 px of the second marking."""
+        assert view_jac(facts(), 0.2).tolist() == [0.25, 0.25]
+        assert view_jac(facts(), 0.2000001).tolist() == [0.5, 0.5]
+
+    def test_measured_with_nothing_to_see_is_zero(self):
+        bare = facts(mark_view=np.empty(0, np.int64), mark_px=np.empty(0))
+        assert view_jac(bare, 0.5).tolist() == [0.0, 0.0]
