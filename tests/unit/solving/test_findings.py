@@ -1,9 +1,158 @@
 from __future__ import annotations
 
-import pytest
+from dataclasses import replace
 
-from app.solving.findings import _sides_swapped
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box
+from app.soccer.policy import PAPER
+from app.soccer.solution import Ball3D, BallFit, Calibration, Finding, Fix, Pair, ViewSolution
+from app.solving.findings import _BY_WEIGHT, _sides_swapped, find
 from app.solving.sides import Swap
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, SIZE, given_view, group
+
+BALL = (38.0, 2.0, -1.4)
+CAMERAS = {"a": MAIN, "b": BEHIND_GOAL, "c": OPPOSITE}
+GOOD = Ball3D(BALL, (0.0,) * 9, 0.1, 60.0, ("a", "b"))
+TAU = 0.01 * SIZE.diagonal
+
+
+def made(keys: str):
+    return group(*(given_view(key, CAMERAS[key], BALL) for key in keys))
+
+
+def pair(a: str, b: str, *errors: float, failed: str | None = None) -> Pair:
+    return Pair(a, b, BALL, errors, 40.0, 60.0, failed is None, failed)
+
+
+def solved(key: str, ratio: float | None = None, *, included: bool = True) -> ViewSolution:
+    fit = BallFit(None, None, None, None, None, None, None, ratio, None)
+    calibration = Calibration("given", CAMERAS[key])
+    return ViewSolution(key, calibration, key, included, None, fit)
+
+
+def found(of, *, pairs=(), ball=GOOD, views=None, policy=PAPER) -> tuple[Finding, ...]:
+    views = views or [solved(view.key) for view in of.views]
+    return find(of, views, [], pairs, ball, policy)
+
+
+class TestFind:
+    def test_a_group_in_good_order_has_none(self) -> None:
+        assert found(made("abc"), pairs=(pair("a", "b", 1.0, 2.0),)) == ()
+
+    def test_a_group_without_views_has_none(self) -> None:
+        assert find(group(), (), (), (), None, PAPER) == ()
+
+    @given(st.floats(0, 10), st.floats(0, 3), st.floats(-60, 2), st.floats(0.2, 4), st.booleans())
+    def test_what_explains_most_comes_first(self, angle, sigma, z, ratio, several) -> None:
+        of = made("ab")
+        if several:
+            of = of.with_view(replace(of.views[0], balls=of.views[0].balls * 2))
+        ball = replace(GOOD, parallax_degrees=angle, sigma_m=sigma, point=(38.0, 2.0, z))
+        kinds = [
+            item.kind for item in found(of, ball=ball, views=[solved("a", ratio), solved("b")])
+        ]
+        assert kinds == sorted(kinds, key=_BY_WEIGHT.index)
+
+
+class TestSeveralBalls:
+    def test_two_balls_in_a_view_are_to_be_picked_from(self) -> None:
+        of = made("ab")
+        two = replace(of.views[1], balls=(*of.views[1].balls, BallAnnotation(box=Box(1, 2, 9, 9))))
+        (item,) = found(of.with_view(two))
+        assert (item.kind, item.view, item.number, item.threshold) == ("several_balls", "b", 2, 1)
+        assert item.fix == Fix("pick_ball", "b")
+
+    def test_one_out_of_view_is_not_another(self) -> None:
+        of = made("ab")
+        two = replace(of.views[1], balls=(*of.views[1].balls, BallAnnotation(out_of_view=True)))
+        assert found(of.with_view(two)) == ()
+
+
+class TestViewDisagrees:
+    PAIRS = (
+        pair("a", "b", 1.0, 2.0),
+        pair("a", "c", 40.0, 30.0, failed="reprojection"),
+        pair("b", "c", 20.0, 35.0, failed="reprojection"),
+    )
+
+    def test_one_in_no_valid_pair_is_named_with_its_closest_pair(self) -> None:
+        views = [solved("a"), solved("b"), solved("c", included=False)]
+        (item,) = found(made("abc"), pairs=self.PAIRS, views=views)
+        assert (item.kind, item.view, item.number) == ("view_disagrees", "c", 35.0)
+        assert item.threshold == pytest.approx(TAU)
+        assert item.fix == Fix("exclude_view", "c")
+        assert f"35.0 px apart at best, {TAU:.1f} px are allowed" in item.sentence
+
+    def test_one_that_was_not_judged_is_not(self) -> None:
+        views = [solved("a"), solved("b"), solved("c", included=False)]
+        assert found(made("abc"), pairs=self.PAIRS[:1], views=views) == ()
+
+    def test_where_no_pair_is_valid_nobody_disagrees_with_the_rest(self) -> None:
+        views = [solved(key, included=False) for key in "abc"]
+        kinds = [item.kind for item in found(made("abc"), pairs=self.PAIRS[1:], views=views)]
+        assert kinds == []
+
+
+class TestBallSize:
+    @pytest.mark.parametrize(("ratio", "limit"), [(2.01, 2.0), (0.49, 0.5)])
+    def test_a_box_twice_too_large_or_small_is_said(self, ratio: float, limit: float) -> None:
+        (item,) = found(made("ab"), views=[solved("a"), solved("b", ratio)])
+        assert (item.kind, item.view) == ("ball_size", "b")
+        assert (item.number, item.threshold) == (ratio, limit)
+
+    @pytest.mark.parametrize("ratio", [2.0, 0.5, 1.0, None])
+    def test_up_to_twice_is_not(self, ratio: float | None) -> None:
+        assert found(made("ab"), views=[solved("a"), solved("b", ratio)]) == ()
+
+    def test_a_view_in_no_valid_pair_says_nothing_of_its_box(self) -> None:
+        assert found(made("ab"), views=[solved("a"), solved("b", 9.0, included=False)]) == ()
+
+
+class TestNotSynchronous:
+    APART = pair("a", "b", 30.0, 50.0, failed="reprojection")
+
+    def test_two_views_whose_balls_do_not_meet(self) -> None:
+        (item,) = found(made("ab"), pairs=(self.APART,), ball=None)
+        assert (item.kind, item.number) == ("not_synchronous", 50.0)
+        assert item.threshold == pytest.approx(TAU)
+        assert item.sentence.startswith("The two views do not see the ball in the same place (50 ")
+
+    def test_of_more_views_the_closest_pair_is_said(self) -> None:
+        pairs = (self.APART, pair("a", "c", 20.0, 10.0, failed="reprojection"))
+        (item,) = found(made("abc"), pairs=pairs, ball=None)
+        assert item.number == 20.0
+        assert item.sentence.startswith("No two views see the ball in the same place (the closest")
+
+    def test_static_cameras_run_on_one_clock(self) -> None:
+        of = made("ab")
+        for view in of.views:
+            of = of.with_view(replace(view, station=replace(view.station, shared=True)))
+        assert found(of, pairs=(self.APART,), ball=None) == ()
+
+    def test_a_pair_that_failed_before_says_nothing(self) -> None:
+        close = replace(self.APART, failed="baseline")
+        assert found(made("ab"), pairs=(close,), ball=None) == ()
+
+
+class TestOfTheBall:
+    @pytest.mark.parametrize(("angle", "kinds"), [(4.99, ["low_parallax"]), (5.0, [])])
+    def test_low_parallax_lies_below_the_policys_angle(self, angle, kinds) -> None:
+        items = found(made("ab"), ball=replace(GOOD, parallax_degrees=angle))
+        assert [item.kind for item in items] == kinds
+
+    @pytest.mark.parametrize(("sigma", "kinds"), [(1.01, ["high_uncertainty"]), (1.0, [])])
+    def test_high_uncertainty_lies_above_a_metre(self, sigma, kinds) -> None:
+        items = found(made("ab"), ball=replace(GOOD, sigma_m=sigma))
+        assert [item.kind for item in items] == kinds
+
+    def test_an_implausible_ball_has_the_number_of_what_is_wrong_first(self) -> None:
+        (item,) = found(made("ab"), ball=replace(GOOD, point=(70.0, 2.0, 0.75)))
+        assert (item.kind, item.number, item.threshold) == ("implausible_ball", 0.75, 0.5)
+        assert "lies 0.8 m below the grass and is 18 m outside the pitch" in item.sentence
 
 
 class TestSidesSwapped:

@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from app.soccer.policy import PAPER
+from app.soccer.solution import Calibration
+from app.solving.facts import facts_of
+from app.solving.mean_ball import judged_pairs, mean_ball
+from app.solving.spread import MeanSpread
+from app.solving.triangulate import meet, sights_of
+from app.solving.verdict import judge
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
+from tests.unit.solving.test_solve import shifted
+
+BALL = (38.0, 2.0, -1.4)
+KEYS = ("a", "b", "c")
+
+
+def solved(*shifts: float, policy=PAPER):
+    """Pairs and ball of three given views whose balls are moved down by so many pixels."""
+    cameras = (MAIN, BEHIND_GOAL, OPPOSITE)
+    views = [
+        shifted(given_view(key, camera, BALL), 0.0, shift)
+        for key, camera, shift in zip(KEYS, cameras, shifts, strict=True)
+    ]
+    calibrations = [Calibration("given", camera) for camera in cameras]
+    meetings = meet(combinations(sights_of(views, calibrations), 2))
+    facts = facts_of(views, calibrations, meetings)
+    spread = MeanSpread(facts)
+    verdict = judge(facts, policy, spread)
+    return judged_pairs(meetings, verdict), mean_ball(KEYS, facts, verdict, spread, policy)
+
+
+class TestJudgedPairs:
+    def test_each_says_its_views_and_the_gate_that_makes_it_invalid(self):
+        pairs, _ = solved(0.0, 0.0, 60.0)
+        assert [(pair.a, pair.b, pair.valid, pair.failed) for pair in pairs] == [
+            ("a", "b", True, None),
+            ("a", "c", False, "reprojection"),
+            ("b", "c", False, "reprojection"),
+        ]
+        assert pairs[0].point == pytest.approx(BALL, abs=1e-6)
+        assert all(type(number) is float for number in pairs[0].point)
+
+
+class TestMeanBall:
+    def test_is_the_mean_of_the_valid_pairs(self):
+        pairs, ball = solved(0.0, 3.0, -2.0)
+        assert [pair.valid for pair in pairs] == [True] * 3
+        assert ball.point == pytest.approx(np.mean([pair.point for pair in pairs], axis=0))
+        assert ball.views == KEYS
+
+    def test_names_only_the_views_that_it_comes_from(self):
+        pairs, ball = solved(0.0, 0.0, 60.0)
+        assert (ball.views, ball.point) == (("a", "b"), pairs[0].point)
+        assert ball.parallax_degrees == pairs[0].parallax_degrees
+
+    def test_its_sigma_is_that_of_its_covariance(self):
+        _, ball = solved(0.0, 0.0, 0.0)
+        spread = np.reshape(ball.covariance, (3, 3))
+        assert ball.sigma_m == pytest.approx(np.sqrt(np.linalg.eigvalsh(spread)[-1]))
+        assert np.allclose(spread, spread.T)
+
+    def test_without_a_valid_pair_there_is_none(self):
+        assert solved(0.0, 90.0, -90.0)[1] is None

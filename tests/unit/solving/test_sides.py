@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.geometry.camera import Camera
+from app.soccer.frames import ImagePoint
+from app.soccer.policy import PAPER
+from app.soccer.solution import Calibration
+from app.solving.sides import Swap, find_swaps, turned_camera
+from app.solving.triangulate import Sight
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH, SIZE
+
+BALL = (38.0, 2.0, -1.4)
+
+
+def sight(view: str, camera: Camera, *, labelled: Camera | None = None, source="lines") -> Sight:
+    """The ball as a camera sees it, calibrated as that camera or as another."""
+    x, y = camera.project(np.array([BALL]))[0]
+    calibration = Calibration(source, labelled or camera)
+    return Sight(view, calibration, ImagePoint(float(x), float(y)), 9.0, SIZE)
+
+
+A, B, C = sight("a", MAIN), sight("b", BEHIND_GOAL), sight("c", OPPOSITE)
+TURNED = sight("b", BEHIND_GOAL, labelled=turned_camera(BEHIND_GOAL))
+
+
+def swaps(*sights: Sight, first: Sight | None = A, **changes: float) -> tuple[Swap, ...]:
+    return find_swaps(first, sights, PITCH, replace(PAPER, **changes))
+
+
+class TestTurnedCamera:
+    @given(st.floats(5, 50), st.floats(-30, 30), st.floats(-8, 0))
+    def test_sees_the_turned_point_where_the_camera_sees_the_point(self, x, y, z):
+        there = turned_camera(MAIN).project(np.array([[-x, -y, z]]))
+        assert np.allclose(there, MAIN.project(np.array([[x, y, z]])), equal_nan=True)
+
+    def test_turned_twice_is_the_camera(self):
+        assert turned_camera(turned_camera(OPPOSITE)) == OPPOSITE
+
+
+class TestFindSwaps:
+    def test_views_that_agree_are_left_alone(self):
+        assert swaps(A, B, C) == ()
+
+    def test_a_replay_that_fits_once_turned_is_found(self):
+        (found,) = swaps(A, TURNED, C)
+        assert (found.view, found.turned_error_px) == ("b", pytest.approx(0.0, abs=1e-3))
+        assert 0.5 < found.confidence <= 1.0
+
+    def test_a_meeting_far_from_any_pitch_counts_only_where_the_policy_allows_it(self):
+        assert swaps(A, TURNED)[0].error_px is None
+        (found,) = swaps(A, TURNED, max_height_m=1e6, outside_pitch_m=1e6, below_grass_m=1e6)
+        assert found.error_px > 50.0
+        total = found.error_px + found.turned_error_px
+        assert found.confidence == pytest.approx(found.error_px / total)
+
+    def test_a_given_camera_rests_on_no_labels(self):
+        given_ = replace(TURNED, calibration=replace(TURNED.calibration, source="given"))
+        assert swaps(A, given_, C) == ()
+
+    def test_without_a_main_camera_every_replay_may_be_turned(self):
+        assert "b" in [swap.view for swap in swaps(TURNED, C, first=None)]
+
+    def test_one_view_alone_tells_nothing(self):
+        assert swaps(TURNED, first=None) == ()
+        assert swaps(A) == ()
+
+    def test_views_too_close_tell_nothing(self):
+        assert swaps(A, TURNED, C, min_baseline_m=1000.0) == ()
+
+    def test_a_main_camera_on_the_far_side_is_the_one_to_turn(self):
+        wrong = sight("a", MAIN, labelled=turned_camera(MAIN))
+        (found,) = swaps(wrong, B, C, first=wrong)
+        assert (found.view, found.turned_error_px) == ("a", pytest.approx(0.0, abs=1e-3))
+
+    @pytest.mark.parametrize("usable", [(), (0,), (0, 1)])
+    def test_a_main_camera_on_the_far_side_is_named_though_all_agree_or_nobody_can_tell(
+        self, usable
+    ):
+        wrong = sight("a", MAIN, labelled=turned_camera(MAIN))
+        others = (wrong, TURNED)
+        found = swaps(*(others[place] for place in usable), first=wrong)
+        assert found == (Swap("a", None, None, 0.9),)
+
+    def test_a_given_main_camera_may_stand_where_it_likes(self):
+        far = sight("a", turned_camera(MAIN), source="given")
+        far = replace(far, center=ImagePoint(9.0, 9.0))
+        assert [swap.view for swap in swaps(far, B, first=far)] != ["a"]
