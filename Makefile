@@ -5,7 +5,7 @@ BIN := .venv/bin
 export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
-.PHONY: setup run test test-python test-browser check bench paper chromium clean
+.PHONY: setup run test test-python test-browser check bench mutate paper chromium clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready static/node_modules/.ready
@@ -46,6 +46,9 @@ check: setup
 
 bench: setup
 	$(BIN)/python -m tests.bench
+
+mutate: setup
+	$(BIN)/python -m tests.mutate
 
 paper: setup
 	$(BIN)/python -m tests.paper

@@ -170,8 +170,7 @@ def _fallen(views: Sequence[JudgedView]) -> list[str]:
         for name in dict.fromkeys(view.failed for view in views if view.failed is not None)
     }
     return [
-        f"{_letters(fallen)} not counted ({_FALLEN_AT.get(name, name)})"
-        for name, fallen in reasons.items()
+        f"{_letters(fallen)} not counted ({_FALLEN_AT[name]})" for name, fallen in reasons.items()
     ]
 
 

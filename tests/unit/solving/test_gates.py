@@ -197,6 +197,11 @@ class TestReprojection:
         found = gates(views, pairs=(pair("a", "b", 2.0, 30.0),))["reprojection"]
         assert (found.value, found.threshold, found.margin) == (30.0, 40.0, 0.25)
 
+    def test_pairs_compare_in_units_of_tau_as_well(self):
+        views = [seen("A", tau_px=4.0), seen("B", tau_px=40.0), seen("C", tau_px=40.0)]
+        pairs = (pair("a", "b", 2.0, 2.0), pair("b", "c", 10.0, 8.0))
+        assert gates(views, pairs=pairs)["reprojection"].sentence == "B–C 10.0 px"
+
     def test_a_valid_pair_goes_before_a_closer_one_that_is_not(self):
         views = [seen("A"), seen("B"), seen("C")]
         behind = pair("a", "b", 1.0, 1.0, failed="reprojection")
