@@ -1,9 +1,9 @@
 """``make mutate``: how many small faults in the arithmetic of gates and balls the tests find.
 
 Faults are planted one by one by mutmut in the modules that ``pyproject.toml`` names; a fault
-that no test finds survives. ``mutmut show NAME`` prints it. A few cannot be found, because
-they change nothing: a check of lengths that are equal always, a type that is only hinted, the
-name of a keyword's default, a bound that no float lies upon.
+that no test finds survives; ``python -m mutmut show NAME`` prints it. Some change nothing and
+cannot be found: ``strict=False`` for lengths that are always equal, one coordinate of a pixel
+instead of the other where both are NaN together, ``max`` without its key.
 """
 
 from __future__ import annotations

@@ -64,6 +64,8 @@ class TestFitBall:
         aside = fit(boxed(400.0, 350.0, 10.0, 10.0))
         assert aside.monocular == pytest.approx((2.0, 0.0, -1.0), abs=1e-9)
         assert aside.monocular_error_m == pytest.approx(np.hypot(2.0, 1.0))
+        flying = fit(boxed(400.0, 350.0, 10.0, 10.0), (0.0, 0.0, -1.0))
+        assert flying.monocular_error_m == pytest.approx(2.0)
 
     def test_the_exact_box_is_that_of_the_outline(self):
         box = fit(boxed(300.0, 400.0, 10.0, 10.0), (0.0, 0.0, -1.0)).exact_box
