@@ -11,7 +11,6 @@
       ConflictError
         StaleRevisionError  (current)
         SharedStationError  (station)
-        IdempotencyError
       GeometryError
         DegenerateGeometryError
       StorageError          the disk or the database refuses
@@ -120,10 +119,6 @@ class SharedStationError(ConflictError):
             hint=f"Edit the lines of station {station} instead.",
         )
         self.station = station
-
-
-class IdempotencyError(ConflictError):
-    """An Idempotency-Key was used again with another body."""
 
 
 class GeometryError(ReviewError):

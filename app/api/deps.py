@@ -115,28 +115,10 @@ def require_if_match(
     return if_match.strip()
 
 
-def get_idempotency_key(
-    idempotency_key: Annotated[
-        str | None,
-        Header(
-            alias="Idempotency-Key",
-            description="Any text of up to 200 visible characters. The same key with the same "
-            "request gives the first answer again; with another request, 422.",
-        ),
-    ] = None,
-) -> str | None:
-    """The caller's name for this request, so that sending it twice does it once.
-
-    ``Idempotency`` has checked its form, on whatever route it was sent.
-    """
-    return idempotency_key
-
-
 AppServices = Annotated[Services, Depends(get_services)]
 AppStore = Annotated[Store, Depends(get_store)]
 Actor = Annotated[str, Depends(get_actor)]
 IfMatch = Annotated[str, Depends(require_if_match)]
-IdempotencyKey = Annotated[str | None, Depends(get_idempotency_key)]
 Id = Annotated[int, Path(ge=1, le=MAX_ID)]
 DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]
 DatasetQuery = Annotated[

@@ -6,10 +6,10 @@ from app.api.schemas.annotation import points_of
 from app.api.schemas.preview import PreviewRequest, ViewPreview
 from app.errors import InputError
 from app.review.editing.edit import Edit, IncludeView, SetBall, SetLines
-from app.review.editing.state import GroupState
+from app.soccer.group import Group
 
 
-def preview_edits(state: GroupState, request: PreviewRequest) -> list[Edit]:
+def preview_edits(group: Group, request: PreviewRequest) -> list[Edit]:
     """The edits that a what-if asks for, in the order of its views.
 
     Raises:
@@ -17,10 +17,10 @@ def preview_edits(state: GroupState, request: PreviewRequest) -> list[Edit]:
     """
     edits: list[Edit] = []
     for key, change in request.views.items():
-        if state.group.view(key) is None:
+        if group.view(key) is None:
             raise InputError(
                 f"the group has no view {key}",
-                hint=f"Its views are {', '.join(state.view_ids)}.",
+                hint=f"Its views are {', '.join(view.key for view in group.views)}.",
                 pointer=f"/views/{key.replace('~', '~0').replace('/', '~1')}",
             )
         edits.extend(_view_edits(key, change))

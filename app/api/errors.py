@@ -17,7 +17,6 @@ from app.api.schemas.problem import FieldProblem
 from app.errors import (
     ConflictError,
     GeometryError,
-    IdempotencyError,
     ImageError,
     InputError,
     NotFoundError,
@@ -37,7 +36,6 @@ STATUSES: tuple[tuple[type[ReviewError], int], ...] = (
     (InputError, 400),
     (NotFoundError, 404),
     (StaleRevisionError, 412),
-    (IdempotencyError, 422),
     (ConflictError, 409),
     (GeometryError, 422),
     (StorageError, 507),

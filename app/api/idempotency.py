@@ -1,7 +1,8 @@
 """Idempotency-Key: a request that is sent again gets the answer that it got the first time.
 
-What makes an edit happen once is written with the edit itself (``review.idempotency``). This adds
-the first answer, whatever became of the state since, and covers every route that changes something.
+A route keeps its answer in the transaction of its work (``api.reply``), so that wherever the server
+is stopped a repetition finds either both or neither. The answers of other routes are kept here,
+once they are sent.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import re
+import time
+from contextlib import suppress
 
 import structlog
 from anyio.to_thread import run_sync
@@ -17,10 +20,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.errors import RETRY_SECONDS, status_of
 from app.api.problem import make_problem, problem_response
+from app.api.reply import ASKED, KEPT_HEADERS, Asked
 from app.api.security.bodies import BYTES
 from app.api.security.origin import SAFE_METHODS
 from app.errors import OverloadedError, ReviewError, StorageError
-from app.store.answers import Answer, find_answer, keep_answer
+from app.store.answers import Answer, find_answer, forget_answers, keep_answer
 from app.store.codecs import canonical, parse
 from app.store.session import Store
 
@@ -32,7 +36,8 @@ REPLAYED = "Idempotency-Replayed"
 """Says that an answer is not a new one."""
 MAX_ANSWER_BYTES = 8 * 1024 * 1024
 """Larger answers are not kept; no route that changes something gives one."""
-_KEPT_HEADERS = ("content-type", "etag", "location", "cache-control")
+TIDY_SECONDS = 3600.0
+"""Between two looks for answers that are too old."""
 PATIENCE = 60.0
 """Seconds that a repetition waits for the first one to be answered."""
 
@@ -48,6 +53,7 @@ class Idempotency:
     def __init__(self, app: ASGIApp, actor: str):
         self.app, self._actor = app, actor
         self._under_way: dict[str, asyncio.Event] = {}
+        self._tidied = -TIDY_SECONDS
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One request."""
@@ -86,21 +92,39 @@ class Idempotency:
             return
         if known is None:
             await self._first(key, request, send)
+            await self._tidy(request.store)
         else:
             await _again(known, request, send)
 
     async def _first(self, key: str, request: _Request, send: Send) -> None:
-        if not request.streamed:
+        if request.streamed:
+            # What is asked for is known once its bytes have passed.
+            asked = None
+        else:
             await request.read()
+            asked = Asked(key, self._actor, request.digest())
+            request.scope[ASKED] = asked
         recorded = _Recorded(send)
         await self.app(request.scope, request.receive, recorded.send)
-        if recorded.is_kept:
+        if recorded.is_kept and not (asked and asked.kept):
             try:
                 answer = recorded.answer(request.digest())
                 await run_sync(self._keep, request.store, key, answer)
             except StorageError as error:
                 # It is sent already; a repetition is answered with the state as it is then.
                 log.warning("an answer could not be kept", error=str(error))
+
+    async def _tidy(self, store: Store) -> None:
+        """Forget old answers from time to time, after an answer that was sent."""
+        if time.monotonic() - self._tidied < TIDY_SECONDS:
+            return
+        self._tidied = time.monotonic()
+        with suppress(StorageError):
+            await run_sync(self._forget, store)
+
+    def _forget(self, store: Store) -> None:
+        with store.write() as session:
+            forget_answers(session)
 
     def _find(self, store: Store, key: str) -> Answer | None:
         with store.read() as session:
@@ -210,5 +234,5 @@ class _Recorded:
 
     def answer(self, digest: str) -> Answer:
         """What is kept."""
-        headers = {name: self._headers[name] for name in _KEPT_HEADERS if name in self._headers}
+        headers = {name: self._headers[name] for name in KEPT_HEADERS if name in self._headers}
         return Answer(digest, self._status, headers, bytes(self._body))

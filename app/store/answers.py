@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from typing import TypeVar
 
-from sqlalchemy import delete, select
+from sqlalchemy import bindparam, delete, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
@@ -15,8 +17,10 @@ from app.finite import json_text
 from app.store.clock import now
 from app.store.job_models import AnswerModel
 
+T = TypeVar("T")
+
 KEPT_HOURS = 24
-"""How long an answer is kept; a later repetition still does not do an edit twice."""
+"""How long an answer is kept; what an edit builds on (If-Match) still stops a later repetition."""
 _FAST = 1
 
 
@@ -30,32 +34,57 @@ class Answer:
     body: bytes
 
 
+Kept = Callable[[Session], None]
+"""Writes an answer into a transaction; called as the last in it."""
+Keep = Callable[[T], Kept]
+"""Makes the answer of what work came to, to be kept in the transaction of that work: then the
+same request, sent again, gets it, wherever the server was stopped."""
+
+
+def keep_nothing(_outcome: object) -> Kept:
+    """For work that nobody asked for under a key."""
+    return lambda _session: None
+
+
 def find_answer(session: Session, key: str, actor: str) -> Answer | None:
     """The answer that is kept under a key, or None."""
-    row = session.execute(
-        select(*AnswerModel.__table__.columns).where(
-            AnswerModel.key == key, AnswerModel.actor == actor
-        )
-    ).one_or_none()
+    row = session.execute(_FIND, {"key": key, "actor": actor, "oldest": _oldest()}).one_or_none()
     if row is None:
         return None
     body = zlib.decompress(row.body)
     return Answer(row.request_digest, row.status, json.loads(row.headers), body)
 
 
-def keep_answer(session: Session, key: str, actor: str, answer: Answer) -> None:
-    """Keep an answer under a key, unless one is kept; those that are too old are forgotten."""
-    oldest = datetime.now(UTC) - timedelta(hours=KEPT_HOURS)
-    session.execute(
-        delete(AnswerModel).where(AnswerModel.at < oldest.isoformat(timespec="microseconds"))
-    )
+def keep_answer(session: Session, key: str, actor: str, answer: Answer) -> bool:
+    """Keep an answer under a key; False where one is kept already, which stays."""
     values = {
-        "key": key,
-        "actor": actor,
         "request_digest": answer.request_digest,
         "status": answer.status,
         "headers": json_text(answer.headers, ascii_=True),
         "body": zlib.compress(answer.body, _FAST),
         "at": now(),
     }
-    session.execute(insert(AnswerModel).on_conflict_do_nothing(), [values])
+    statement = insert(AnswerModel).values(key=key, actor=actor, **values)
+    fresh = statement.on_conflict_do_update(
+        index_elements=[AnswerModel.key, AnswerModel.actor],
+        set_=values,
+        where=AnswerModel.at < _oldest(),
+    ).returning(AnswerModel.key)
+    return session.execute(fresh).one_or_none() is not None
+
+
+def forget_answers(session: Session) -> None:
+    """Forget the answers that are too old."""
+    session.execute(delete(AnswerModel).where(AnswerModel.at < _oldest()))
+
+
+def _oldest() -> str:
+    oldest = datetime.now(UTC) - timedelta(hours=KEPT_HOURS)
+    return oldest.isoformat(timespec="microseconds")
+
+
+_FIND = select(*AnswerModel.__table__.columns).where(
+    AnswerModel.key == bindparam("key"),
+    AnswerModel.actor == bindparam("actor"),
+    AnswerModel.at >= bindparam("oldest"),
+)

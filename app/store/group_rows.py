@@ -68,9 +68,10 @@ def next_id(session: Session, model: Any) -> int:
 
     Ids of deleted datasets are not given again: the log still speaks of what had them.
     """
-    newest = session.scalar(select(func.max(model.id))) or 0
+    newest = select(func.coalesce(func.max(model.id), 0)).scalar_subquery()
     used = select(UsedIdModel.id).where(UsedIdModel.table == model.__tablename__)
-    return max(int(newest), session.scalar(used) or 0) + 1
+    given = func.max(newest, func.coalesce(used.scalar_subquery(), 0))
+    return int(session.scalar(select(given)) or 0) + 1
 
 
 @dataclass

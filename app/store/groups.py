@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from sqlalchemy import delete, select, update
+from sqlalchemy import BindParameter, bindparam, delete, null, select, update
 from sqlalchemy.orm import Session
+from sqlalchemy.sql import FromClause
 
+from app.errors import NotFoundError
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch
+from app.soccer.policy import Policy
 from app.store import codecs
+from app.store.datasets import policy_of
 from app.store.digest import inputs_hash, station_digest, view_digest
 from app.store.group_rows import NewRows, head_values, station_values, view_values
-from app.store.models import GroupModel, ImportFindingModel, StationModel, ViewModel
+from app.store.models import (
+    DatasetModel,
+    GroupModel,
+    ImportFindingModel,
+    StationModel,
+    ViewModel,
+)
 
 
 @dataclass(frozen=True)
@@ -38,7 +49,7 @@ class StoredStation:
 
 @dataclass(frozen=True)
 class StoredGroup:
-    """A group with its row's keeping.
+    """A group with its row's keeping, and its dataset's name and policy.
 
     Attributes:
         view_ids: Id of each view, by key.
@@ -48,6 +59,8 @@ class StoredGroup:
 
     id: int
     dataset_id: int
+    dataset: str
+    policy: Policy
     number: int
     revision: int
     changed: str
@@ -74,6 +87,36 @@ class StoredGroup:
         return key in self.edited_views or (not own.station.shared and own.edited)
 
 
+def _row_of(table: FromClause) -> Any:
+    """A row of one table, cut out of a row of several."""
+    return namedtuple("Row", table.columns.keys())
+
+
+_VIEW, _STATION = ViewModel.__table__, StationModel.__table__
+_ViewRow, _StationRow = _row_of(_VIEW), _row_of(_STATION)
+_WIDTH = len(_VIEW.columns)
+_IDS: BindParameter[Any] = bindparam("ids", expanding=True)
+_HEADS = (
+    select(*GroupModel.__table__.columns, DatasetModel.name.label("dataset"), DatasetModel.policy)
+    .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+    .where(GroupModel.id.in_(_IDS))
+)
+
+
+def _views(*columns: Any) -> Any:
+    return (
+        select(*columns, *_STATION.columns)
+        .join_from(_VIEW, _STATION, _STATION.c.id == _VIEW.c.station_id)
+        .where(_VIEW.c.group_id.in_(_IDS))
+        .order_by(_VIEW.c.position)
+    )
+
+
+_OF_VIEW = select(_VIEW.c.group_id).where(_VIEW.c.id == bindparam("view"))
+_VIEWS = _views(*_VIEW.columns)
+_VIEWS_ALONE = _views(*(null() if c.name == "extras" else c for c in _VIEW.columns))
+
+
 def read_groups(
     session: Session, ids: Sequence[int], *, extras: bool = True
 ) -> dict[int, StoredGroup]:
@@ -84,24 +127,31 @@ def read_groups(
         ids: At most a few hundred.
         extras: Read what the ball pipeline does not use, too.
     """
-    heads = {
-        row.id: row
-        for row in session.execute(
-            select(*GroupModel.__table__.columns).where(GroupModel.id.in_(ids))
-        )
-    }
-    columns = [c for c in ViewModel.__table__.columns if extras or c.name != "extras"]
+    heads = {row.id: row for row in session.execute(_HEADS, {"ids": list(ids)})}
     views: dict[int, list[Any]] = {}
-    for row in session.execute(
-        select(*columns).where(ViewModel.group_id.in_(ids)).order_by(ViewModel.position)
-    ):
-        views.setdefault(row.group_id, []).append(row)
-    stations = read_stations(session, {row.station_id for rows in views.values() for row in rows})
+    stations: dict[int, StoredStation] = {}
+    for row in session.execute(_VIEWS if extras else _VIEWS_ALONE, {"ids": list(ids)}):
+        view, station = _ViewRow._make(row[:_WIDTH]), _StationRow._make(row[_WIDTH:])
+        views.setdefault(view.group_id, []).append(view)
+        if station.id not in stations:
+            stations[station.id] = stored_station(station)
     return {
         number: _stored_group(heads[number], views.get(number, []), stations)
         for number in ids
         if number in heads
     }
+
+
+def group_of_view(session: Session, view_id: int) -> int:
+    """Id of the group of a view.
+
+    Raises:
+        NotFoundError: There is no such view.
+    """
+    found = session.scalar(_OF_VIEW, {"view": view_id})
+    if found is None:
+        raise NotFoundError(f"there is no view {view_id}")
+    return int(found)
 
 
 def read_stations(session: Session, ids: Iterable[int]) -> dict[int, StoredStation]:
@@ -124,6 +174,8 @@ def _stored_group(
     return StoredGroup(
         id=head.id,
         dataset_id=head.dataset_id,
+        dataset=head.dataset,
+        policy=policy_of(head.policy),
         number=head.number,
         revision=head.revision,
         changed=head.changed,
@@ -140,7 +192,7 @@ def _view_from_row(row: Any, station: Station) -> View:
     media = None
     if row.media_path is not None:
         media = Media(row.media_path, row.media_member, row.media_frame)
-    extras, why = getattr(row, "extras", None), row.left_out
+    extras, why = row.extras, row.left_out
     return View(
         key=row.key,
         station=station,
@@ -168,17 +220,69 @@ def stored_station(row: Any) -> StoredStation:
     )
 
 
+def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
+    """A stored group as it is once an edit has made it into ``group``, the same views otherwise.
+
+    Shared stations are the stored ones; only what differs is digested again.
+    """
+    stations, digests = dict(stored.stations), dict(stored.view_digests)
+    for view, old in zip(group.views, stored.group.views, strict=True):
+        own = stations[view.key]
+        if view.station != old.station and not own.station.shared:
+            stations[view.key] = replace(
+                own,
+                revision=own.revision + 1,
+                station=view.station,
+                digest=station_digest(view.station),
+            )
+        if _differs(view, old):
+            digests[view.key] = (view_digest(view), digests[view.key][1])
+    pairs = [(digests[view.key][0], stations[view.key].digest) for view in group.views]
+    return replace(
+        stored,
+        revision=stored.revision + 1,
+        changed=at,
+        inputs_hash=inputs_hash(group.pitch, pairs),
+        group=group,
+        stations=stations,
+        view_digests=digests,
+    )
+
+
+def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> None:
+    """Write what ``next_revision`` changed; solutions and queue are the caller's to refresh."""
+    for position, (view, old) in enumerate(zip(after.group.views, stored.group.views, strict=True)):
+        if _differs(view, old):
+            _update(session, _VIEW, after.view_ids[view.key], view_values(view, position))
+        own = after.stations[view.key]
+        if own != stored.stations[view.key]:
+            values = {**station_values(own.station), "revision": own.revision}
+            _update(session, _STATION, own.id, values)
+    names = ("revision", "changed", "inputs_hash")
+    values = {name: getattr(after, name) for name in names}
+    _update(session, GroupModel.__table__, after.id, values)
+
+
+def _differs(view: View, old: View) -> bool:
+    """Whether the view's own row is another; its station has one of its own."""
+    return replace(view, station=old.station) != old
+
+
+def _update(session: Session, table: Any, identity: int, values: Mapping[str, Any]) -> None:
+    session.execute(update(table).where(table.c.id == identity).values(values))
+
+
 def save_group(
     session: Session,
     stored: StoredGroup,
     group: Group,
     *,
     at: str,
-    source: Group | None = None,
+    source: Group,
     digest: str | None = None,
     shared: Mapping[str, int] | None = None,
 ) -> None:
-    """Write the next revision of a group: what changed of its head, views and own stations.
+    """Write the next revision of a group whose dataset has changed: head, views, own stations.
 
     Shared stations are left alone; ``save_station`` writes those. Views that are gone are
     deleted, new ones inserted.
@@ -188,17 +292,14 @@ def save_group(
         stored: The group as it is.
         group: The group as it shall be.
         at: Time of the change.
-        source: Where the change comes from the dataset: the group as it would be had nobody
-            edited it.
+        source: The group as it would be had nobody edited it.
     """
     kept = {view.key for view in group.views if keeps_station(stored, view)}
     _delete_views(session, stored, set(stored.view_ids) - kept)
     for position, view in enumerate(group.views):
         if view.key in kept:
-            base = None if source is None else source.view(view.key)
-            _save_view(session, stored, view, position, base)
+            _save_view(session, stored, view, position, source.view(view.key))
     if len(kept) < len(group.views):
-        # Only an import brings new views; asking for new ids would cost every edit.
         rows = NewRows(session, stored.dataset_id)
         for position, view in enumerate(group.views):
             if view.key not in kept:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, insert, select
+from sqlalchemy import ColumnElement, bindparam, insert, select
 from sqlalchemy.orm import Session
 
 from app.errors import StorageError
@@ -68,6 +68,42 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
         rows.append({**row, "id": number, "hash": previous, "body": zlib.compress(body)})
     session.execute(insert(LogModel), rows, execution_options={"render_nulls": True})
     return [row["id"] for row in rows]
+
+
+_STEPS = (
+    select(LogModel.group_id, LogModel.id, LogModel.kind)
+    .where(
+        LogModel.group_id.in_(bindparam("groups", expanding=True)),
+        LogModel.kind.in_(bindparam("kinds", expanding=True)),
+    )
+    .order_by(LogModel.id)
+)
+
+
+def group_steps(session: Session, group_ids: Sequence[int], kinds: Iterable[str]) -> Sequence[Any]:
+    """Rows (group_id, id, kind) of the entries of some kinds about groups, in order."""
+    return session.execute(_STEPS, {"groups": list(group_ids), "kinds": list(kinds)}).all()
+
+
+def station_steps(session: Session, station_id: int, kinds: Iterable[str]) -> Sequence[Any]:
+    """Rows (id, kind) of the entries of some kinds about a station, in order."""
+    statement = (
+        select(LogModel.id, LogModel.kind)
+        .where(LogModel.station_id == station_id, LogModel.kind.in_(kinds))
+        .order_by(LogModel.id)
+    )
+    return session.execute(statement).all()
+
+
+def group_entries(session: Session, group_id: int) -> list[LogEntry]:
+    """Everything that was said about a group, oldest first."""
+    return list(read_log(session, LogModel.group_id == group_id))
+
+
+def read_entry(session: Session, log_id: int) -> LogEntry:
+    """The entry of an id that is there."""
+    (entry,) = read_log(session, LogModel.id == log_id)
+    return entry
 
 
 def read_log(session: Session, *where: ColumnElement[bool], after: int = 0) -> Iterator[LogEntry]:

@@ -233,18 +233,6 @@ class LogModel(Base):
     hash: Mapped[str]
 
 
-class IdempotencyModel(Base):
-    """A request that was carried out, so that sending it again does not do it again."""
-
-    __tablename__ = "idempotency"
-
-    key: Mapped[str] = mapped_column(primary_key=True)
-    actor: Mapped[str] = mapped_column(primary_key=True)
-    request_digest: Mapped[str]
-    log_id: Mapped[int]
-    at: Mapped[str]
-
-
 class QueueModel(Base):
     """One row a group, for lists: everything that can be filtered or sorted, in plain columns.
 

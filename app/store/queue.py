@@ -5,12 +5,26 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, fields
-from typing import Any
+from typing import Any, cast
 
-from sqlalchemy import and_, func, insert, or_, select, update
+from sqlalchemy import (
+    BindParameter,
+    Table,
+    and_,
+    bindparam,
+    func,
+    insert,
+    literal,
+    or_,
+    select,
+    union_all,
+    update,
+)
 from sqlalchemy.orm import Session
+from sqlalchemy.sql.dml import Update
 
 from app.soccer.solution import SOLVER_VERSION
+from app.store.groups import StoredGroup
 from app.store.models import (
     DatasetModel,
     GroupModel,
@@ -23,8 +37,27 @@ from app.store.models import (
 )
 from app.store.solutions import read_summary
 from app.store.summary import Summary
+from app.store.verdicts import StoredVerdict
 
 _BATCH = 1000
+_QUEUE = cast(Table, QueueModel.__table__)
+_NOTICE = ImportFindingModel.__table__
+_VIEW = ViewModel.__table__
+_IDS: BindParameter[Any] = bindparam("ids", expanding=True)
+_NOTICED = union_all(
+    select(
+        _NOTICE.c.group_id.label("group"),
+        _NOTICE.c.kind,
+        _NOTICE.c.sentence,
+        _NOTICE.c.view,
+        literal(0).label("shared"),
+        _NOTICE.c.id,
+    ).where(_NOTICE.c.group_id.in_(_IDS)),
+    select(_VIEW.c.group_id, _NOTICE.c.kind, _NOTICE.c.sentence, _VIEW.c.key, 1, _NOTICE.c.id)
+    .join_from(_VIEW, _NOTICE, _NOTICE.c.station_id == _VIEW.c.station_id)
+    .where(_VIEW.c.group_id.in_(_IDS)),
+).order_by("shared", "id")
+"""A group's own come before those of its static cameras."""
 _NUMBERS = [item.name for item in fields(Summary) if item.name not in ("passes", "findings")]
 
 
@@ -51,6 +84,43 @@ def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
         ]
         if values:
             session.execute(update(QueueModel), values)
+
+
+def update_row(
+    session: Session,
+    stored: StoredGroup,
+    verdict: StoredVerdict | None,
+    noticed: Sequence[str],
+    summary: Summary,
+) -> None:
+    """Bring a group's row in step whose edit and solution are at hand: nothing is read.
+
+    Args:
+        session: A write session.
+        stored: The group as it is now.
+        verdict: The newest one.
+        noticed: Kinds of what imports noticed.
+        summary: Of the group's solution.
+    """
+    edited = {stored.id} if stored.edited else set[int]()
+    values = {
+        "changed": stored.changed,
+        **_judged(stored, verdict, edited, summary.passes),
+        **_computed(summary, noticed),
+    }
+    session.execute(_row_of(stored.id).values(values))
+
+
+def update_verdict(
+    session: Session, stored: StoredGroup, verdict: StoredVerdict, passes: bool | None
+) -> None:
+    """Show a new verdict in a group's row; the rest of it is in step."""
+    edited = {stored.id} if stored.edited else set[int]()
+    session.execute(_row_of(stored.id).values(_judged(stored, verdict, edited, passes)))
+
+
+def _row_of(group_id: int) -> Update:
+    return update(_QUEUE).where(_QUEUE.c.group_id == group_id)
 
 
 def _refresh(session: Session, ids: Sequence[int]) -> None:
@@ -121,22 +191,7 @@ def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]
         Rows (kind, sentence, view) by group id.
     """
     found: dict[int, list[Any]] = defaultdict(list)
-    model = ImportFindingModel
-    own = select(model.group_id.label("group"), model.kind, model.sentence, model.view)
-    for row in session.execute(own.where(model.group_id.in_(ids)).order_by(model.id)):
-        found[row.group].append(row)
-    shared = (
-        select(
-            ViewModel.group_id.label("group"),
-            model.kind,
-            model.sentence,
-            ViewModel.key.label("view"),
-        )
-        .join(ViewModel, ViewModel.station_id == model.station_id)
-        .where(ViewModel.group_id.in_(ids))
-        .order_by(model.id)
-    )
-    for row in session.execute(shared):
+    for row in session.execute(_NOTICED, {"ids": list(ids)}):
         found[row.group].append(row)
     return found
 

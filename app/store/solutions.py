@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import bindparam, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
@@ -22,6 +22,18 @@ from app.store.summary import Summary, summarize
 
 _ELSEWHERE = Calibration(source="", camera=None)
 """Stands in a stored solution for the calibration that is kept under its key."""
+
+
+_SOLUTION = SolutionModel.__table__
+_SOLUTIONS = select(*_SOLUTION.columns).where(
+    _SOLUTION.c.group_id.in_(bindparam("groups", expanding=True)),
+    _SOLUTION.c.policy_hash.in_(bindparam("policies", expanding=True)),
+    _SOLUTION.c.inputs_hash.in_(bindparam("inputs", expanding=True)),
+)
+_CALIBRATION = CalibrationModel.__table__
+_CALIBRATIONS = select(*_CALIBRATION.columns).where(
+    _CALIBRATION.c.key.in_(bindparam("keys", expanding=True))
+)
 
 
 @dataclass(frozen=True)
@@ -41,7 +53,7 @@ class EncodedSolution:
     calibrations: Mapping[str, bytes]
     """Calibrations by key, those that the encoder was not told to be known."""
     calibration_keys: tuple[str, ...]
-    summary: str
+    summary: Summary
     body: bytes
     facts: bytes | None
 
@@ -60,7 +72,7 @@ def encode_solution(
     return EncodedSolution(
         calibrations=calibrations,
         calibration_keys=tuple(view.calibration_key for view in solution.views),
-        summary=value_codec.dumps(value_codec.to_json(summarize(group, solution))),
+        summary=summarize(group, solution),
         body=_compress(value_codec.to_json(replace(solution, views=bare))),
         facts=facts,
     )
@@ -92,7 +104,8 @@ def insert_solutions(
     for _key, encoded in solutions:
         bodies.update(encoded.calibrations)
     insert_calibrations(session, bodies)
-    _require_calibrations(session, solutions)
+    wanted = {key for _, encoded in solutions for key in encoded.calibration_keys}
+    _require_calibrations(session, wanted - set(bodies))
     if solutions:
         session.execute(
             insert(SolutionModel).on_conflict_do_nothing(),
@@ -100,13 +113,10 @@ def insert_solutions(
         )
 
 
-def _require_calibrations(
-    session: Session, solutions: Sequence[tuple[SolutionKey, EncodedSolution]]
-) -> None:
+def _require_calibrations(session: Session, wanted: set[str]) -> None:
     """A dataset that is deleted takes its calibrations along, and the solver may have read one."""
-    wanted = {key for _, encoded in solutions for key in encoded.calibration_keys}
     statement = select(CalibrationModel.key).where(CalibrationModel.key.in_(wanted))
-    if wanted - set(session.scalars(statement)):
+    if wanted and wanted - set(session.scalars(statement)):
         raise ConflictError("a calibration was deleted while this was computed", hint="Try again.")
 
 
@@ -126,7 +136,7 @@ def _row(key: SolutionKey, encoded: EncodedSolution) -> dict[str, object]:
         "policy_hash": key.policy_hash,
         "solver_version": key.solver_version,
         "calibrations": json_text(encoded.calibration_keys, ascii_=True),
-        "summary": encoded.summary,
+        "summary": value_codec.dumps(value_codec.to_json(encoded.summary)),
         "body": encoded.body,
         "facts": encoded.facts,
     }
@@ -135,14 +145,14 @@ def _row(key: SolutionKey, encoded: EncodedSolution) -> dict[str, object]:
 def read_solutions(session: Session, keys: Iterable[SolutionKey]) -> dict[int, Solution]:
     """Solutions by group id; a group without one under its key is left out."""
     wanted = {key.group_id: key for key in keys}
-    statement = select(*SolutionModel.__table__.columns).where(
-        SolutionModel.group_id.in_(wanted),
-        SolutionModel.policy_hash.in_({key.policy_hash for key in wanted.values()}),
-        SolutionModel.inputs_hash.in_({key.inputs_hash for key in wanted.values()}),
-    )
+    found = {
+        "groups": list(wanted),
+        "policies": list({key.policy_hash for key in wanted.values()}),
+        "inputs": list({key.inputs_hash for key in wanted.values()}),
+    }
     rows = [
         row
-        for row in session.execute(statement)
+        for row in session.execute(_SOLUTIONS, found)
         if wanted[row.group_id]
         == SolutionKey(row.group_id, row.inputs_hash, row.policy_hash, row.solver_version)
     ]
@@ -171,10 +181,7 @@ def read_calibrations(session: Session, keys: Iterable[str]) -> dict[str, Calibr
 
 def read_calibration_bodies(session: Session, keys: Iterable[str]) -> dict[str, bytes]:
     """Encoded calibrations by key; unknown keys are left out."""
-    statement = select(CalibrationModel.key, CalibrationModel.body).where(
-        CalibrationModel.key.in_(list(keys))
-    )
-    return {row.key: row.body for row in session.execute(statement)}
+    return {row.key: row.body for row in session.execute(_CALIBRATIONS, {"keys": list(keys)})}
 
 
 def read_summary(text: str) -> Summary:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Response
 
-from app.api.deps import Actor, AppStore, DatasetPath, Id, IdempotencyKey
+from app.api.deps import Actor, AppStore, DatasetPath, Id
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.bulk import (
     BatchList,
     BulkResult,
@@ -26,6 +27,7 @@ DryRun = Annotated[bool, Query(description="Only say what would happen.")]
 @router.post(
     "/datasets/{dataset}/verdicts",
     operation_id="setVerdicts",
+    response_model=BulkResult,
     responses=responses(404, 409, 413, 415),
 )
 def post_verdicts(
@@ -33,9 +35,9 @@ def post_verdicts(
     verdict: BulkVerdict,
     store: AppStore,
     actor: Actor,
-    key: IdempotencyKey,
+    asked: AskedUnder,
     dry_run: DryRun = False,
-) -> BulkResult:
+) -> Response:
     """Judge every group that the query matches, as each of them is when its turn comes.
 
     Accepting a group that fails a gate needs a note; without one such groups are refused and
@@ -45,11 +47,12 @@ def post_verdicts(
     found = dataset_id(store, dataset)
     said = (verdict.q, verdict.state, verdict.reason, verdict.note)
     if dry_run:
-        return BulkResult.planned(bulk.plan_verdicts(store, found, *said))
+        return document(BulkResult.planned(bulk.plan_verdicts(store, found, *said)))
+    reply = Reply[bulk.BatchReport](asked, lambda report: document(BulkResult.done(report)))
     report = bulk.give_verdicts(
-        store, found, *said, actor=actor, expected=verdict.expected, idempotency_key=key
+        store, found, *said, actor=actor, expected=verdict.expected, keep=reply.keep
     )
-    return BulkResult.done(report)
+    return reply.of(report)
 
 
 @router.get(
@@ -71,13 +74,16 @@ def list_batches(
     response_model=RedoDocument,
     responses=responses(404, 409),
 )
-def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_redo.RedoReport:
+def redo_batch(batch: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
     """Give the verdicts of a batch again that was taken back, as a new batch.
 
     Groups that somebody has judged or edited since stay as they are. 409 when the batch was not
     taken back, or was given again already.
     """
-    return bulk_redo.redo_batch(store, batch, actor=actor)
+    reply = Reply[bulk_redo.RedoReport](
+        asked, lambda report: document(RedoDocument.model_validate(report))
+    )
+    return reply.of(bulk_redo.redo_batch(store, batch, actor=actor, keep=reply.keep))
 
 
 @router.post(
@@ -86,9 +92,12 @@ def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_redo.RedoReport
     response_model=UndoDocument,
     responses=responses(404, 409),
 )
-def undo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
+def undo_batch(batch: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
     """Give each group of a batch the verdict back that it had before; 409 the second time.
 
     Groups that somebody has judged since keep that verdict.
     """
-    return bulk_undo.undo_batch(store, batch, actor=actor)
+    reply = Reply[bulk_undo.UndoReport](
+        asked, lambda report: document(UndoDocument.model_validate(report))
+    )
+    return reply.of(bulk_undo.undo_batch(store, batch, actor=actor, keep=reply.keep))

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
 
-from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id, IdempotencyKey
+from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import Responses, responses
 from app.api.schemas.evaluation import (
@@ -84,7 +84,6 @@ def start_evaluation(
     request: EvaluationBody,
     services: AppServices,
     actor: Actor,
-    _key: IdempotencyKey,
     response: Response,
 ) -> JobDocument:
     """Evaluate predictions against a frozen version, or the dataset as it is now.

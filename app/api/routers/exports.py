@@ -9,9 +9,10 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Path, Response
 from starlette.responses import FileResponse
 
-from app.api.deps import Actor, AppServices, IdempotencyKey, Services
-from app.api.jobs import ACCEPTED, accepted
+from app.api.deps import Actor, AppServices, Services
+from app.api.jobs import ACCEPTED, job_address
 from app.api.problem import Responses, responses
+from app.api.reply import AskedUnder, Reply, document
 from app.api.routers.jobs import Cursor, DatasetFilter, Limit, parse_cursor
 from app.api.schemas.export import (
     ExportDocument,
@@ -19,9 +20,11 @@ from app.api.schemas.export import (
     ExportPage,
     ExportRequest,
 )
+from app.api.schemas.job import JobDocument
 from app.errors import ConflictError, NotFoundError
 from app.review.datasets.dataset import get_dataset
 from app.review.jobs.exports import KIND, request_export
+from app.store.jobs import Job
 
 router = APIRouter(prefix="/exports", tags=["exports"])
 
@@ -40,20 +43,28 @@ ZIP: Responses = {
     "",
     operation_id="makeExport",
     status_code=202,
+    response_model=ExportJobDocument,
     responses={**responses(404, 409, 413, 415, 507), **ACCEPTED},
 )
 def make_export(
-    request: ExportRequest,
-    services: AppServices,
-    actor: Actor,
-    _key: IdempotencyKey,
-    response: Response,
-) -> ExportJobDocument:
+    request: ExportRequest, services: AppServices, actor: Actor, asked: AskedUnder
+) -> Response:
     """Write accepted groups, or all of them, to a zip; 400 when there is nothing to write."""
+    reply = Reply(asked, _export_answer)
     job = request_export(
-        services.jobs, services.store, services.exports, request.model_dump(), actor=actor
+        services.jobs,
+        services.store,
+        services.exports,
+        request.model_dump(),
+        actor=actor,
+        keep=reply.keep,
     )
-    return ExportJobDocument.of_export(accepted(job, response))
+    return reply.of(job)
+
+
+def _export_answer(job: Job) -> Response:
+    started = ExportJobDocument.of_export(JobDocument.of(job))
+    return document(started, 202, job_address(job))
 
 
 @router.get("", operation_id="listExports", responses=responses(404))

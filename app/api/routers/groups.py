@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import reduce
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -15,13 +13,13 @@ from app.api.deps import (
     AppStore,
     DatasetQuery,
     Id,
-    IdempotencyKey,
     IfMatch,
     QueryText,
     etag_matches,
 )
 from app.api.edits import preview_edits
 from app.api.problem import Responses, responses
+from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
 from app.api.schemas.queue import (
@@ -50,23 +48,15 @@ CHANGED: Responses = {200: {"headers": ETAG, "description": "The whole group as 
 CONFLICTS = (404, 409, 412, 413, 415, 428)
 
 
-def answer(state: GroupState, response: Response) -> GroupDocument:
+def group_answer(state: GroupState) -> Response:
     """The document of a group, its ETag in the header."""
-    response.headers["ETag"] = state.etag
-    response.headers["Cache-Control"] = "private, no-cache"
-    return GroupDocument.of(state)
+    headers = {"ETag": state.etag, "Cache-Control": "private, no-cache"}
+    return document(GroupDocument.of(state), headers=headers)
 
 
 def load_document(store: Store, group_id: int) -> GroupDocument:
     """The document of a group as it is now."""
-    return GroupDocument.of(with_solution(store, submit.load(store, group_id)))
-
-
-def with_solution(store: Store, state: GroupState) -> GroupState:
-    """The state with its solution, computed where that is still to do; reading saves nothing."""
-    if state.solution is not None:
-        return state
-    return replace(state, solution=submit.preview(store, state.id, []))
+    return GroupDocument.of(submit.load_solved(store, group_id))
 
 
 @router.get("", operation_id="listGroups", responses=responses(404))
@@ -130,20 +120,19 @@ def list_group_ids(
     response_model=GroupDocument,
     responses={**responses(404), 200: {"headers": ETAG}, 304: {"description": "Not changed."}},
 )
-def get_group(
-    group: Id, store: AppStore, request: Request, response: Response
-) -> GroupDocument | Response:
+def get_group(group: Id, store: AppStore, request: Request) -> Response:
     """One group, complete: annotations, solution, verdict."""
-    state = submit.load(store, group)
-    if etag_matches(request, state.etag):
-        return Response(status_code=304, headers={"ETag": state.etag})
-    return answer(with_solution(store, state), response)
+    if "if-none-match" in request.headers:
+        etag = submit.current_etag(store, group)
+        if etag_matches(request, etag):
+            return Response(status_code=304, headers={"ETag": etag})
+    return group_answer(submit.load_solved(store, group))
 
 
 @router.get("/{group}/solution", operation_id="getSolution", responses=responses(404))
 def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     """The solution of a group."""
-    state = with_solution(store, submit.load(store, group))
+    state = submit.load_solved(store, group)
     if state.solution is None:
         raise NotFoundError(f"group {group} has no solution")
     return SolutionDocument.of(state.solution, state.group)
@@ -171,46 +160,46 @@ def get_history(group: Id, store: AppStore) -> History:
 )
 def preview_group(group: Id, changes: PreviewRequest, store: AppStore) -> PreviewDocument:
     """What the solution would be; nothing is saved."""
-    state = submit.load(store, group)
-    edits = preview_edits(state, changes)
-    solution = submit.preview(store, group, edits)
-    edited = reduce(lambda before, edit: edit.apply(before), edits, state.group)
+    edited, solution = submit.preview(store, group, lambda found: preview_edits(found, changes))
     return PreviewDocument(solution=SolutionDocument.of(solution, edited))
 
 
-@router.post("/{group}/undo", operation_id="undo", responses={**responses(*CONFLICTS), **CHANGED})
+@router.post(
+    "/{group}/undo",
+    operation_id="undo",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
 def undo(
-    group: Id,
-    store: AppStore,
-    actor: Actor,
-    if_match: IfMatch,
-    key: IdempotencyKey,
-    response: Response,
-) -> GroupDocument:
+    group: Id, store: AppStore, actor: Actor, if_match: IfMatch, asked: AskedUnder
+) -> Response:
     """Take the last edit back; 409 when there is none."""
+    reply = Reply(asked, group_answer)
     with current_state(lambda: load_document(store, group)):
-        state = submit.undo(store, group, if_match=if_match, actor=actor, idempotency_key=key)
-    return answer(state, response)
+        state = submit.undo(store, group, if_match=if_match, actor=actor, keep=reply.keep)
+    return reply.of(state)
 
 
-@router.post("/{group}/redo", operation_id="redo", responses={**responses(*CONFLICTS), **CHANGED})
+@router.post(
+    "/{group}/redo",
+    operation_id="redo",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
 def redo(
-    group: Id,
-    store: AppStore,
-    actor: Actor,
-    if_match: IfMatch,
-    key: IdempotencyKey,
-    response: Response,
-) -> GroupDocument:
+    group: Id, store: AppStore, actor: Actor, if_match: IfMatch, asked: AskedUnder
+) -> Response:
     """Do again what was undone last; 409 when there is nothing."""
+    reply = Reply(asked, group_answer)
     with current_state(lambda: load_document(store, group)):
-        state = submit.redo(store, group, if_match=if_match, actor=actor, idempotency_key=key)
-    return answer(state, response)
+        state = submit.redo(store, group, if_match=if_match, actor=actor, keep=reply.keep)
+    return reply.of(state)
 
 
 @router.put(
     "/{group}/verdict",
     operation_id="setVerdict",
+    response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 def put_verdict(
@@ -219,19 +208,11 @@ def put_verdict(
     store: AppStore,
     actor: Actor,
     if_match: IfMatch,
-    key: IdempotencyKey,
-    response: Response,
-) -> GroupDocument:
+    asked: AskedUnder,
+) -> Response:
     """Accept, reject with a reason, defer, or take a verdict back."""
+    reply = Reply(asked, group_answer)
+    said = (verdict.state, verdict.reason, verdict.note)
     with current_state(lambda: load_document(store, group)):
-        state = set_verdict(
-            store,
-            group,
-            verdict.state,
-            verdict.reason,
-            verdict.note,
-            if_match=if_match,
-            actor=actor,
-            idempotency_key=key,
-        )
-    return answer(state, response)
+        state = set_verdict(store, group, *said, if_match=if_match, actor=actor, keep=reply.keep)
+    return reply.of(state)

@@ -7,7 +7,6 @@ from fastapi import APIRouter
 from app.api.deps import AppStore, Id
 from app.api.lookup import find_view
 from app.api.problem import responses
-from app.api.routers.groups import with_solution
 from app.api.schemas.insight import Influences, Remedies
 from app.review.editing import submit
 from app.review.editing.influence import influences
@@ -19,7 +18,7 @@ router = APIRouter(tags=["insight"])
 @router.get("/groups/{group}/remedies", operation_id="getRemedies", responses=responses(404))
 def get_remedies(group: Id, store: AppStore) -> Remedies:
     """Small edits with which a group that fails would pass, each tried out; saves nothing."""
-    state = with_solution(store, submit.load(store, group))
+    state = submit.load_solved(store, group)
     if state.solution is None:
         return Remedies(items=[])
     found = find_remedies(state.group, state.policy, state.solution)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from fastapi import APIRouter, Response
 
 from app.api.conflicts import current_state
-from app.api.deps import Actor, AppServices, AppStore, DatasetPath, IdempotencyKey, IfMatch
-from app.api.jobs import accepted
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
+from app.api.jobs import job_address
 from app.api.problem import Responses, responses
+from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument
 from app.api.schemas.policy import (
     PolicyCatalogue,
@@ -16,9 +17,8 @@ from app.api.schemas.policy import (
     ShippedPolicyDocument,
 )
 from app.errors import InputError
-from app.review.datasets.dataset import get_dataset
-from app.review.jobs.solve import request_solve
-from app.review.policies.policy import change_policy, read_policy
+from app.review.jobs.solve import Judged, request_policy
+from app.review.policies.policy import read_policy
 from app.review.policies.text import CUSTOM, policy_from_yaml, policy_with
 from app.soccer.policy import POLICIES, THRESHOLDS, Policy
 
@@ -50,13 +50,16 @@ def list_policies() -> PolicyCatalogue:
 )
 def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> PolicyStateDocument:
     """What judges the dataset, and what judged it before."""
-    return _answer(PolicyStateDocument.of(read_policy(store, dataset)), response)
+    policy = PolicyStateDocument.of(read_policy(store, dataset))
+    response.headers.update(_tagged(policy))
+    return policy
 
 
 @router.put(
     "/datasets/{dataset}/policy",
     operation_id="setPolicy",
     status_code=202,
+    response_model=JobDocument,
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
 def put_policy(
@@ -65,9 +68,8 @@ def put_policy(
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    _key: IdempotencyKey,
-    response: Response,
-) -> JobDocument:
+    asked: AskedUnder,
+) -> Response:
     """Judge the dataset by another policy.
 
     What that leaves without a solution is stale and solved by the job; `result.policy` of the
@@ -76,13 +78,24 @@ def put_policy(
     store = services.store
     present = read_policy(store, dataset)
     policy = wanted(change, present.policy)
+    reply = Reply(asked, _judged)
     with current_state(lambda: PolicyStateDocument.of(read_policy(store, dataset))):
-        state = change_policy(store, present.dataset_id, policy, if_match=if_match, actor=actor)
-    document = _answer(PolicyStateDocument.of(state), response)
-    found = get_dataset(store, state.dataset_id)
-    job = accepted(request_solve(services.jobs, store, found, actor=actor), response)
-    job.result = {"policy": document.model_dump(mode="json")}
-    return job
+        judged = request_policy(
+            services.jobs,
+            store,
+            present.dataset_id,
+            policy,
+            if_match=if_match,
+            actor=actor,
+            keep=reply.keep,
+        )
+    return reply.of(judged)
+
+
+def _judged(judged: Judged) -> Response:
+    policy, job = PolicyStateDocument.of(judged.state), JobDocument.model_validate(judged.job)
+    job.result = {"policy": policy.model_dump(mode="json")}
+    return document(job, 202, {**_tagged(policy), **job_address(judged.job)})
 
 
 def wanted(change: PolicyChange, present: Policy) -> Policy:
@@ -107,7 +120,5 @@ def wanted(change: PolicyChange, present: Policy) -> Policy:
     return policy_with(present, change.values or {}, name=name, pointer="/values")
 
 
-def _answer(document: PolicyStateDocument, response: Response) -> PolicyStateDocument:
-    response.headers["ETag"] = document.etag
-    response.headers["Cache-Control"] = "private, no-cache"
-    return document
+def _tagged(policy: PolicyStateDocument) -> dict[str, str]:
+    return {"ETag": policy.etag, "Cache-Control": "private, no-cache"}

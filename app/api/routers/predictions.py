@@ -7,11 +7,12 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.api.conflicts import current_state
-from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, IdempotencyKey, IfMatch
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, IfMatch
 from app.api.jobs import ACCEPTED, accepted
 from app.api.lookup import find_view
 from app.api.problem import responses
-from app.api.routers.groups import CHANGED, CONFLICTS, answer, load_document
+from app.api.reply import AskedUnder, Reply
+from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.job import JobDocument
 from app.api.schemas.prediction import (
@@ -62,7 +63,6 @@ def add_predictions(
     request: PredictionRequest,
     services: AppServices,
     actor: Actor,
-    _key: IdempotencyKey,
     response: Response,
 ) -> PredictionSet:
     """Read uploaded files into a new set of predictions.
@@ -96,7 +96,6 @@ def accept_predictions(
     request: AcceptBody,
     services: AppServices,
     actor: Actor,
-    _key: IdempotencyKey,
     response: Response,
 ) -> AcceptOutcome | Response:
     """Make annotations of predictions, as edits in the log that can be undone.
@@ -164,6 +163,7 @@ def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocumen
 @router.post(
     "/views/{view}/predictions/{prediction}/accept",
     operation_id="acceptPrediction",
+    response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 def accept_prediction(
@@ -172,15 +172,14 @@ def accept_prediction(
     store: AppStore,
     actor: Actor,
     if_match: IfMatch,
-    key: IdempotencyKey,
-    response: Response,
+    asked: AskedUnder,
     replace: Annotated[
         bool, Query(description="Also where the view has another ball; else that is a 409.")
     ] = False,
-) -> GroupDocument:
+) -> Response:
     """Make this very prediction the ball of its view: an edit that can be undone."""
-    group = find_view(store, view).group_id
-    with current_state(lambda: load_document(store, group)):
+    reply = Reply(asked, group_answer)
+    with current_state(lambda: load_document(store, find_view(store, view).group_id)):
         state = accept_box(
             store,
             view,
@@ -188,9 +187,9 @@ def accept_prediction(
             if_match=if_match,
             actor=actor,
             replace=replace,
-            idempotency_key=key,
+            keep=reply.keep,
         )
-    return answer(state, response)
+    return reply.of(state)
 
 
 def _files(settings: Settings, request: PredictionRequest) -> review.PredictionFiles:

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Response
 
 from app.api.deps import Actor, AppStore, DatasetPath, Id
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.saved_view import (
     NewSavedView,
     ReviewerList,
@@ -14,6 +15,7 @@ from app.api.schemas.saved_view import (
 )
 from app.review.datasets.dataset import dataset_id
 from app.review.queue import saved_views
+from app.review.queue.saved_views import SavedView
 from app.review.verdicts import reviewers
 
 router = APIRouter(tags=["queue"])
@@ -42,12 +44,19 @@ def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
     },
 )
 def save_view(
-    dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor, response: Response
-) -> saved_views.SavedView:
+    dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor, asked: AskedUnder
+) -> Response:
     """Keep a query under a name; 409 when the name is taken."""
-    saved = saved_views.save_view(store, dataset_id(store, dataset), view.name, view.q, actor=actor)
-    response.headers["Location"] = f"/api/v1/saved-views/{saved.id}"
-    return saved
+    reply = Reply(asked, _saved)
+    saved = saved_views.save_view(
+        store, dataset_id(store, dataset), view.name, view.q, actor=actor, keep=reply.keep
+    )
+    return reply.of(saved)
+
+
+def _saved(view: SavedView) -> Response:
+    headers = {"Location": f"/api/v1/saved-views/{view.id}"}
+    return document(SavedViewDocument.model_validate(view), 201, headers)
 
 
 @router.get(
@@ -67,9 +76,10 @@ def get_saved_view(view: Id, store: AppStore) -> saved_views.SavedView:
     response_model=SavedViewDocument,
     responses=responses(404),
 )
-def delete_saved_view(view: Id, store: AppStore) -> saved_views.SavedView:
+def delete_saved_view(view: Id, store: AppStore, asked: AskedUnder) -> Response:
     """Forget a saved view; the answer is what it was, so that it can be saved again."""
-    return saved_views.delete_view(store, view)
+    reply = Reply[SavedView](asked, lambda gone: document(SavedViewDocument.model_validate(gone)))
+    return reply.of(saved_views.delete_view(store, view, keep=reply.keep))
 
 
 @router.get("/datasets/{dataset}/reviewers", operation_id="listReviewers", responses=responses(404))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
@@ -14,18 +15,17 @@ from app.api.deps import (
     AppServices,
     AppStore,
     Id,
-    IdempotencyKey,
     IfMatch,
     Services,
 )
 from app.api.problem import Responses, responses
-from app.api.routers.groups import CHANGED, CONFLICTS, answer, load_document
+from app.api.reply import Asked, AskedUnder, Reply
+from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document
 from app.api.schemas.annotation import LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.station import StationDetail
 from app.api.schemas.view import StationEdit
 from app.errors import NotFoundError
-from app.review.datasets.dataset import get_dataset
 from app.review.editing.edit import SetStationCalibration, SetStationLines
 from app.review.editing.stations import (
     StationState,
@@ -65,122 +65,102 @@ def get_station(station: Id, store: AppStore, response: Response) -> StationDeta
     return StationDetail.of(state)
 
 
-@router.patch("/{station}/lines", operation_id="setStationLines", responses=STATION_CHANGED)
+@router.patch(
+    "/{station}/lines",
+    operation_id="setStationLines",
+    response_model=GroupDocument,
+    responses=STATION_CHANGED,
+)
 def patch_lines(
     station: Id,
     lines: LinesEdit,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    key: IdempotencyKey,
-    response: Response,
+    asked: AskedUnder,
     group: GroupOfStation = None,
-) -> GroupDocument:
+) -> Response:
     """Change the lines of a static camera; If-Match takes the station's ETag.
 
     The group that is answered is solved at once, the others in the background.
     """
-    edit = SetStationLines(lines.points())
-    return _change(
-        services,
-        station,
-        group,
-        lambda: submit_station(
-            services.store, station, edit, if_match=if_match, actor=actor, idempotency_key=key
-        ),
-        actor,
-        response,
-    )
+    change = partial(submit_station, edit=SetStationLines(lines.points()))
+    return _change(services, station, group, change, if_match, actor, asked)
 
 
-@router.patch("/{station}", operation_id="changeStation", responses=STATION_CHANGED)
+@router.patch(
+    "/{station}",
+    operation_id="changeStation",
+    response_model=GroupDocument,
+    responses=STATION_CHANGED,
+)
 def patch_station(
     station: Id,
     change: StationEdit,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    key: IdempotencyKey,
-    response: Response,
+    asked: AskedUnder,
     group: GroupOfStation = None,
-) -> GroupDocument:
+) -> Response:
     """Choose whether the given calibration counts or the lines; If-Match as for lines."""
-    edit = SetStationCalibration(change.calibration)
-    return _change(
-        services,
-        station,
-        group,
-        lambda: submit_station(
-            services.store, station, edit, if_match=if_match, actor=actor, idempotency_key=key
-        ),
-        actor,
-        response,
-    )
+    edited = partial(submit_station, edit=SetStationCalibration(change.calibration))
+    return _change(services, station, group, edited, if_match, actor, asked)
 
 
-@router.post("/{station}/undo", operation_id="undoStation", responses=STATION_CHANGED)
+@router.post(
+    "/{station}/undo",
+    operation_id="undoStation",
+    response_model=GroupDocument,
+    responses=STATION_CHANGED,
+)
 def undo(
     station: Id,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    key: IdempotencyKey,
-    response: Response,
+    asked: AskedUnder,
     group: GroupOfStation = None,
-) -> GroupDocument:
+) -> Response:
     """Take the last edit of a static camera back; 409 when there is none."""
-    return _change(
-        services,
-        station,
-        group,
-        lambda: undo_station(
-            services.store, station, if_match=if_match, actor=actor, idempotency_key=key
-        ),
-        actor,
-        response,
-    )
+    return _change(services, station, group, undo_station, if_match, actor, asked)
 
 
-@router.post("/{station}/redo", operation_id="redoStation", responses=STATION_CHANGED)
+@router.post(
+    "/{station}/redo",
+    operation_id="redoStation",
+    response_model=GroupDocument,
+    responses=STATION_CHANGED,
+)
 def redo(
     station: Id,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    key: IdempotencyKey,
-    response: Response,
+    asked: AskedUnder,
     group: GroupOfStation = None,
-) -> GroupDocument:
+) -> Response:
     """Do again what was undone last; 409 when there is nothing."""
-    return _change(
-        services,
-        station,
-        group,
-        lambda: redo_station(
-            services.store, station, if_match=if_match, actor=actor, idempotency_key=key
-        ),
-        actor,
-        response,
-    )
+    return _change(services, station, group, redo_station, if_match, actor, asked)
 
 
 def _change(
     services: Services,
     station: int,
     group: int | None,
-    change: Callable[[], StationState],
+    change: Callable[..., StationState],
+    if_match: str,
     actor: str,
-    response: Response,
-) -> GroupDocument:
-    """Change a station, solve the group in view at once, and queue the others."""
+    asked: Asked | None,
+) -> Response:
+    """Change a station with the group in view, and queue the others."""
     store = services.store
     shown = _shown_group(load_station(store, station), group)
+    reply = Reply(asked, group_answer)
     with current_state(lambda: load_document(store, shown)):
-        state = change()
-    document = answer(solved(store, shown), response)
-    dataset = get_dataset(store, state.dataset_id)
-    request_solve(services.jobs, store, dataset, actor=actor)
-    return document
+        state = change(store, station, if_match=if_match, actor=actor, shown=shown, keep=reply.keep)
+    request_solve(services.jobs, store, state.dataset_id, actor=actor)
+    return reply.made or group_answer(solved(store, shown))
 
 
 def _shown_group(state: StationState, group: int | None) -> int:

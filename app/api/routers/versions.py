@@ -7,8 +7,9 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id
-from app.api.jobs import ACCEPTED, accepted
+from app.api.jobs import ACCEPTED, job_answer
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument
 from app.api.schemas.version import (
     Changelog,
@@ -51,8 +52,8 @@ def freeze_version(
     request: VersionRequest,
     services: AppServices,
     actor: Actor,
-    response: Response,
-) -> JobDocument | Response:
+    asked: AskedUnder,
+) -> Response:
     """Freeze the dataset as it is into a version that never changes.
 
     409 when the name is taken or groups that might enter are not solved; 400 when none enters.
@@ -60,12 +61,12 @@ def freeze_version(
     """
     if request.dry_run:
         plan = plan_freeze(services.store, dataset, request.value())
-        document = FreezePlanDocument.model_validate(plan)
-        return Response(document.model_dump_json(), media_type="application/json")
+        return document(FreezePlanDocument.model_validate(plan))
+    reply = Reply(asked, job_answer)
     job = version_jobs.request_freeze(
-        services.jobs, services.store, dataset, request.value(), actor=actor
+        services.jobs, services.store, dataset, request.value(), actor=actor, keep=reply.keep
     )
-    return accepted(job, response)
+    return reply.of(job)
 
 
 @router.get(
@@ -109,11 +110,13 @@ def get_diff(
     "/versions/{version}/verify",
     operation_id="verifyVersion",
     status_code=202,
+    response_model=JobDocument,
     responses={**responses(404), **ACCEPTED},
 )
-def verify_version(
-    version: Id, services: AppServices, actor: Actor, response: Response
-) -> JobDocument:
+def verify_version(version: Id, services: AppServices, actor: Actor, asked: AskedUnder) -> Response:
     """Compute a version from scratch and compare it bit for bit; the job's result reports."""
-    job = version_jobs.request_verify(services.jobs, services.store, version, actor=actor)
-    return accepted(job, response)
+    reply = Reply(asked, job_answer)
+    job = version_jobs.request_verify(
+        services.jobs, services.store, version, actor=actor, keep=reply.keep
+    )
+    return reply.of(job)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Annotated
 
@@ -14,20 +15,20 @@ from app.api.deps import (
     AppServices,
     AppStore,
     Id,
-    IdempotencyKey,
     IfMatch,
     etag_matches,
 )
 from app.api.lookup import FoundView, find_view
 from app.api.problem import Responses, responses
-from app.api.routers.groups import CHANGED, CONFLICTS, answer, load_document
+from app.api.reply import Asked, AskedUnder, Reply
+from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.editing.edit import Edit, IncludeView, SetBall, SetCalibrationSource, SetLines
-from app.review.editing.submit import submit
+from app.review.editing.submit import submit_view
 from app.soccer.group import Media
 from app.store.media import content_type, read_frame
 from app.store.neighbours import FARTHEST, neighbours
@@ -57,7 +58,10 @@ IMAGES: Responses = {
 
 
 @router.patch(
-    "/{view}/lines", operation_id="setViewLines", responses={**responses(*CONFLICTS), **CHANGED}
+    "/{view}/lines",
+    operation_id="setViewLines",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
 )
 def patch_lines(
     view: Id,
@@ -65,17 +69,17 @@ def patch_lines(
     store: AppStore,
     actor: Actor,
     if_match: IfMatch,
-    key: IdempotencyKey,
-    response: Response,
-) -> GroupDocument:
+    asked: AskedUnder,
+) -> Response:
     """Draw, move or delete markings; 409 names the station when the camera is static."""
-    found = find_view(store, view)
-    edit = SetLines(found.key, lines.points())
-    return _submit(store, found.group_id, edit, if_match, actor, key, response)
+    return _submit(store, view, lambda key: SetLines(key, lines.points()), if_match, actor, asked)
 
 
 @router.patch(
-    "/{view}/ball", operation_id="setViewBall", responses={**responses(*CONFLICTS), **CHANGED}
+    "/{view}/ball",
+    operation_id="setViewBall",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
 )
 def patch_ball(
     view: Id,
@@ -83,45 +87,49 @@ def patch_ball(
     store: AppStore,
     actor: Actor,
     if_match: IfMatch,
-    key: IdempotencyKey,
-    response: Response,
-) -> GroupDocument:
+    asked: AskedUnder,
+) -> Response:
     """Say where the ball is in this view, that it is out of view, or that there is none."""
-    found = find_view(store, view)
-    edit = SetBall(found.key, None if ball is None else ball.ball())
-    return _submit(store, found.group_id, edit, if_match, actor, key, response)
+    said = None if ball is None else ball.ball()
+    return _submit(store, view, lambda key: SetBall(key, said), if_match, actor, asked)
 
 
-@router.patch("/{view}", operation_id="changeView", responses={**responses(*CONFLICTS), **CHANGED})
+@router.patch(
+    "/{view}",
+    operation_id="changeView",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
 def patch_view(
     view: Id,
     change: ViewEdit,
     store: AppStore,
     actor: Actor,
     if_match: IfMatch,
-    key: IdempotencyKey,
-    response: Response,
-) -> GroupDocument:
+    asked: AskedUnder,
+) -> Response:
     """Leave the view out of its group and say why, take it in again, or choose its calibration."""
-    found = find_view(store, view)
-    edit: Edit = IncludeView(found.key, change.included, change.reason, change.note)
-    if "calibration" in change.model_fields_set:
-        edit = SetCalibrationSource(found.key, change.calibration)
-    return _submit(store, found.group_id, edit, if_match, actor, key, response)
+
+    def edit(key: str) -> Edit:
+        if "calibration" in change.model_fields_set:
+            return SetCalibrationSource(key, change.calibration)
+        return IncludeView(key, change.included, change.reason, change.note)
+
+    return _submit(store, view, edit, if_match, actor, asked)
 
 
 def _submit(
     store: Store,
-    group: int,
-    edit: Edit,
+    view: int,
+    edit_of: Callable[[str], Edit],
     if_match: str,
     actor: str,
-    key: str | None,
-    response: Response,
-) -> GroupDocument:
-    with current_state(lambda: load_document(store, group)):
-        state = submit(store, group, edit, if_match=if_match, actor=actor, idempotency_key=key)
-    return answer(state, response)
+    asked: Asked | None,
+) -> Response:
+    reply = Reply(asked, group_answer)
+    with current_state(lambda: load_document(store, find_view(store, view).group_id)):
+        state = submit_view(store, view, edit_of, if_match=if_match, actor=actor, keep=reply.keep)
+    return reply.of(state)
 
 
 @router.get(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
-from sqlalchemy import and_, func, select
+from sqlalchemy import and_, bindparam, func, select
 from sqlalchemy.orm import Session
 
 from app.errors import NotFoundError, StaleRevisionError
@@ -14,6 +15,19 @@ from app.store.codecs import parse
 from app.store.digest import digest
 from app.store.models import DatasetModel, GroupModel, SolutionModel, VerdictModel
 from app.store.queue import import_findings
+
+_NEWEST = (
+    select(func.max(VerdictModel.id))
+    .where(VerdictModel.group_id == GroupModel.id)
+    .correlate(GroupModel)
+    .scalar_subquery()
+    .label("last")
+)
+_HEAD = (
+    select(GroupModel.inputs_hash, GroupModel.revision, DatasetModel.policy_hash, _NEWEST)
+    .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+    .where(GroupModel.id == bindparam("group"))
+)
 
 
 def said_part(inputs_hash: str, revision: int, verdict_id: int) -> str:
@@ -41,15 +55,25 @@ def group_etag(
     return f'"{said}-{computed}"'
 
 
-def read_said(session: Session, group_id: int) -> str | None:
-    """The first part of a group's ETag as it is now; None where there is no such group."""
-    newest = select(func.max(VerdictModel.id)).where(VerdictModel.group_id == group_id)
-    row = session.execute(
-        select(
-            GroupModel.inputs_hash, GroupModel.revision, newest.scalar_subquery().label("last")
-        ).where(GroupModel.id == group_id)
-    ).one_or_none()
-    return None if row is None else said_part(row.inputs_hash, row.revision, row.last or 0)
+@dataclass(frozen=True)
+class Head:
+    """What a change of a group rests on.
+
+    Attributes:
+        said: ``said_part``.
+        policy_hash: Of the policy that judges it.
+    """
+
+    said: str
+    policy_hash: str
+
+
+def read_head(session: Session, group_id: int) -> Head | None:
+    """What a change of a group would rest on now; None where there is no such group."""
+    row = session.execute(_HEAD, {"group": group_id}).one_or_none()
+    if row is None:
+        return None
+    return Head(said_part(row.inputs_hash, row.revision, row.last or 0), row.policy_hash)
 
 
 def said_of(etag: str) -> str:
@@ -57,19 +81,28 @@ def said_of(etag: str) -> str:
     return etag.strip().strip('"').partition("-")[0]
 
 
-def require_unchanged(session: Session, group_id: int, if_match: str, what: str) -> None:
+def require_unchanged(session: Session, group_id: int, if_match: str, what: str) -> str:
     """Refuse a change that builds on another state of a group than the present one.
 
-    Two numbers and a digest are read, and nothing is decoded: this is what runs while everybody
+    A few numbers and digests are read, and nothing is decoded: this is what runs while everybody
     else who writes is waiting.
+
+    Returns:
+        Hash of the policy that judges the group now.
 
     Raises:
         NotFoundError: The group is gone.
         StaleRevisionError: With both ETags.
     """
-    said = read_said(session, group_id)
-    if said is None:
+    head = read_head(session, group_id)
+    if head is None:
         raise NotFoundError(f"there is no group {group_id}")
+    require_said(session, group_id, head.said, if_match, what)
+    return head.policy_hash
+
+
+def require_said(session: Session, group_id: int, said: str, if_match: str, what: str) -> None:
+    """``require_unchanged`` where what was said about the group is known."""
     if said != said_of(if_match):
         raise StaleRevisionError(
             f"{what} has changed in the meantime",
@@ -80,12 +113,6 @@ def require_unchanged(session: Session, group_id: int, if_match: str, what: str)
 
 def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
     """ETags by group id; at most a few hundred groups, those that do not exist are left out."""
-    newest = (
-        select(func.max(VerdictModel.id))
-        .where(VerdictModel.group_id == GroupModel.id)
-        .correlate(GroupModel)
-        .scalar_subquery()
-    )
     statement = (
         select(
             GroupModel.id,
@@ -94,7 +121,7 @@ def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
             DatasetModel.policy,
             DatasetModel.policy_hash,
             SolutionModel.summary,
-            newest.label("last"),
+            _NEWEST,
         )
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
         .outerjoin(

@@ -16,7 +16,6 @@ from app.review.datasets.dataset import Dataset, get_dataset, read_dataset
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.encode import encode
 from app.review.editing.known import calibration_keys
-from app.review.editing.solver import Solver
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
@@ -62,7 +61,6 @@ class Task:
     groups: tuple[tuple[SolutionKey, bytes], ...]
     policy: Policy
     calibrations: Mapping[str, bytes]
-    solver: Solver
 
 
 @dataclass(frozen=True)
@@ -87,8 +85,6 @@ def solve_dataset(
     dataset: str | int,
     executor: Executor | None = None,
     progress: Progress | None = None,
-    *,
-    solver: Solver = solve,
 ) -> SolveReport:
     """Solve what is stale in a dataset.
 
@@ -98,7 +94,6 @@ def solve_dataset(
         executor: Where chunks are solved; None: here, one after the other.
         progress: Called after each chunk; an error that it raises ends the run, and nothing
             that was saved before is lost.
-        solver: Only tests put another one in; a function of a module, so that it travels.
     """
     found, ids = get_dataset(store, dataset), stale_groups(store, dataset)
     report = SolveReport(total=len(ids))
@@ -106,7 +101,7 @@ def solve_dataset(
         progress(0, report.total)
     _calibrate_shared(store, found)
     chunks = (ids[start : start + CHUNK] for start in range(0, len(ids), CHUNK))
-    tasks = (_task(store, found, chunk, solver) for chunk in chunks)
+    tasks = (_task(store, found, chunk) for chunk in chunks)
     for results in fan_out(solve_task, tasks, executor):
         _save(store, results, report)
         if progress is not None:
@@ -124,7 +119,7 @@ def solve_task(task: Task) -> list[Result]:
 
 def _solve_one(key: SolutionKey, group: Group, task: Task, known: dict[str, Calibration]) -> Result:
     try:
-        solution = task.solver(group, task.policy, known)
+        solution = solve(group, task.policy, known)
         encoded = encode(group, solution, known)
     except Exception as error:
         # One broken group must not stop the others; it stays stale and is reported by name.
@@ -142,7 +137,7 @@ def _save(store: Store, results: Sequence[Result], report: SolveReport) -> None:
     report.failed += [(item.group, item.problem) for item in results if item.solution is None]
 
 
-def _task(store: Store, dataset: Dataset, ids: Sequence[int], solver: Solver) -> Task:
+def _task(store: Store, dataset: Dataset, ids: Sequence[int]) -> Task:
     with store.read() as session:
         policy = read_dataset(session, dataset.id).policy
         stored = read_groups(session, ids, extras=False).values()
@@ -152,7 +147,7 @@ def _task(store: Store, dataset: Dataset, ids: Sequence[int], solver: Solver) ->
         (SolutionKey(item.id, item.inputs_hash, policy.hash), pack(group_to_json(item.group)))
         for item in stored
     )
-    return Task(groups, policy, known, solver)
+    return Task(groups, policy, known)
 
 
 def _stale(session: Session, dataset_id: int) -> list[int]:

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.errors import NotFoundError, StaleRevisionError
 from app.review.editing.etags import group_etag, said_of, said_part
-from app.review.editing.undo import read_stacks
+from app.review.editing.undo import Stacks, read_stacks
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Finding, Solution
-from app.store.codecs import parse, policy_from_json
 from app.store.digest import digest
 from app.store.groups import StoredGroup, StoredStation, read_groups
-from app.store.models import DatasetModel, VerdictModel
 from app.store.queue import import_findings, is_fixed
 from app.store.solutions import SolutionKey, read_solutions
+from app.store.verdicts import StoredVerdict, read_verdicts
 
 
 @dataclass(frozen=True)
@@ -78,106 +75,115 @@ class GroupState:
     stored: StoredGroup
     """The same group with its rows' keeping."""
 
+
+@dataclass(frozen=True)
+class Record:
+    """A group with all that is kept about it but its solution.
+
+    Attributes:
+        noticed: What imports noticed.
+        verdicts: Everyone's, the newest first.
+        stacks: What can be undone and done again.
+    """
+
+    stored: StoredGroup
+    noticed: tuple[Finding, ...]
+    verdicts: tuple[StoredVerdict, ...]
+    stacks: Stacks
+
     @property
     def solution_key(self) -> SolutionKey:
-        """The key of this state's solution."""
-        return SolutionKey(self.id, self.stored.inputs_hash, self.policy.hash)
+        """The key of the solution of this state."""
+        return SolutionKey(self.stored.id, self.stored.inputs_hash, self.stored.policy.hash)
+
+    @property
+    def said(self) -> str:
+        """What people said: the part of the ETag that a change builds on."""
+        newest = self.newest_verdict
+        verdict_id = 0 if newest is None else newest.id
+        return said_part(self.stored.inputs_hash, self.stored.revision, verdict_id)
+
+    @property
+    def newest_verdict(self) -> StoredVerdict | None:
+        """The verdict that counts, or None."""
+        return next(iter(self.verdicts), None)
+
+    def state(self, solution: Solution | None) -> GroupState:
+        """The group as people see it, with its solution where that is known."""
+        stored = self.stored
+        passes = None if solution is None else solution.passes
+        if solution is not None and self.noticed:
+            solution = replace(solution, findings=solution.findings + self.noticed)
+        verdicts = _last_of_each(_verdict_state(item, stored, passes) for item in self.verdicts)
+        kinds = None if solution is None else [item.kind for item in solution.findings]
+        stations = stored.stations.values()
+        return GroupState(
+            id=stored.id,
+            dataset_id=stored.dataset_id,
+            dataset=stored.dataset,
+            number=stored.number,
+            key=stored.group.key,
+            revision=stored.revision,
+            etag=group_etag(self.said, stored.policy.hash, stored.policy.name, kinds),
+            group=stored.group,
+            view_ids=stored.view_ids,
+            station_ids={item.station.key: item.id for item in stations},
+            station_etags={item.station.key: station_etag(item) for item in stations},
+            solution=solution,
+            policy=stored.policy,
+            verdict=next(iter(verdicts), VerdictState()),
+            verdicts=verdicts,
+            can_undo=self.stacks.can_undo,
+            can_redo=self.stacks.can_redo,
+            stored=stored,
+        )
 
 
-Solutions = Callable[[Session, Sequence[SolutionKey]], Mapping[int, Solution]]
-"""Where solutions come from: the database, or whoever knows them already."""
-
-
-def unsolved(_session: Session, _keys: Sequence[SolutionKey]) -> Mapping[int, Solution]:
-    """No solutions: for callers who only need what people said. The ETag of such a state says so."""
-    return {}
-
-
-def read_state(
-    session: Session, group_id: int, solutions: Solutions = read_solutions
-) -> GroupState:
-    """A group as it is in a session's snapshot.
+def read_record(session: Session, group_id: int) -> Record:
+    """A group's record as it is in a session's snapshot.
 
     Raises:
         NotFoundError: There is no such group.
     """
-    states = read_states(session, [group_id], solutions)
-    if not states:
+    records = read_records(session, [group_id])
+    if not records:
         raise NotFoundError(f"there is no group {group_id}")
-    return states[0]
+    return records[0]
 
 
-def read_states(
-    session: Session,
-    group_ids: list[int],
-    solutions: Solutions = read_solutions,
-) -> list[GroupState]:
-    """Groups of one dataset as they are, in the order asked for; at most a few hundred."""
+def read_records(session: Session, group_ids: Sequence[int]) -> list[Record]:
+    """Records of groups in the order asked for; at most a few hundred."""
     groups = read_groups(session, group_ids)
-    if not groups:
-        return []
-    dataset = session.execute(
-        select(*DatasetModel.__table__.columns).where(
-            DatasetModel.id == next(iter(groups.values())).dataset_id
-        )
-    ).one()
-    policy = policy_from_json(parse(dataset.policy))
-    keys = [SolutionKey(item.id, item.inputs_hash, policy.hash) for item in groups.values()]
-    found = solutions(session, keys)
     noticed = import_findings(session, group_ids)
-    verdicts = _read_verdicts(session, group_ids)
+    verdicts = read_verdicts(session, group_ids)
     stacks = read_stacks(session, group_ids)
     return [
-        _state(
-            item,
-            dataset.name,
-            policy,
-            _with_noticed(found.get(item.id), noticed[item.id]),
-            verdicts.get(item.id, []),
-            stacks[item.id].can_undo,
-            stacks[item.id].can_redo,
+        Record(
+            stored,
+            tuple(Finding(row.kind, row.sentence, view=row.view) for row in noticed[number]),
+            tuple(verdicts.get(number, ())),
+            stacks[number],
         )
-        for item in groups.values()
+        for number, stored in groups.items()
     ]
 
 
-def _state(
-    stored: StoredGroup,
-    dataset: str,
-    policy: Policy,
-    solution: Solution | None,
-    rows: list[Any],
-    can_undo: bool,
-    can_redo: bool,
-) -> GroupState:
-    passes = None if solution is None else solution.passes
-    verdicts = _last_of_each([_verdict_state(row, stored, passes) for row in rows])
-    return GroupState(
-        id=stored.id,
-        dataset_id=stored.dataset_id,
-        dataset=dataset,
-        number=stored.number,
-        key=stored.group.key,
-        revision=stored.revision,
-        etag=_etag(stored, rows[0].id if rows else 0, policy, solution),
-        group=stored.group,
-        view_ids=stored.view_ids,
-        station_ids={item.station.key: item.id for item in stored.stations.values()},
-        station_etags={item.station.key: station_etag(item) for item in stored.stations.values()},
-        solution=solution,
-        policy=policy,
-        verdict=next(iter(verdicts), VerdictState()),
-        verdicts=verdicts,
-        can_undo=can_undo,
-        can_redo=can_redo,
-        stored=stored,
-    )
+def read_state(session: Session, group_id: int) -> GroupState:
+    """A group with its solution as it is in a session's snapshot.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    record = read_record(session, group_id)
+    key = record.solution_key
+    return record.state(read_solutions(session, [key]).get(group_id))
 
 
-def _etag(stored: StoredGroup, verdict_id: int, policy: Policy, solution: Solution | None) -> str:
-    said = said_part(stored.inputs_hash, stored.revision, verdict_id)
-    kinds = None if solution is None else [item.kind for item in solution.findings]
-    return group_etag(said, policy.hash, policy.name, kinds)
+def read_states(session: Session, group_ids: Sequence[int]) -> list[GroupState]:
+    """Groups with their solutions, in the order asked for; at most a few hundred."""
+    records = read_records(session, group_ids)
+    found = read_solutions(session, [record.solution_key for record in records])
+    return [record.state(found.get(record.stored.id)) for record in records]
 
 
 def station_etag(stored: StoredStation) -> str:
@@ -197,41 +203,22 @@ def require_etag(current: str, if_match: str, what: str) -> None:
         )
 
 
-def _read_verdicts(session: Session, group_ids: list[int]) -> dict[int, list[Any]]:
-    statement = (
-        select(*VerdictModel.__table__.columns)
-        .where(VerdictModel.group_id.in_(group_ids))
-        .order_by(VerdictModel.id.desc())
-    )
-    verdicts: dict[int, list[Any]] = {}
-    for row in session.execute(statement):
-        verdicts.setdefault(row.group_id, []).append(row)
-    return verdicts
-
-
-def _verdict_state(row: Any, stored: StoredGroup, passes: bool | None) -> VerdictState:
-    reviewed = row.state != "unreviewed"
+def _verdict_state(given: StoredVerdict, stored: StoredGroup, passes: bool | None) -> VerdictState:
+    reviewed = given.state != "unreviewed"
     return VerdictState(
-        state=row.state,
-        reason=row.reason,
-        note=row.note,
-        actor=row.actor,
-        at=row.at,
-        stale=reviewed and row.inputs_hash != stored.inputs_hash,
-        fixed=is_fixed(row, stored.edited, passes),
-        override=row.override,
+        state=given.state,
+        reason=given.reason,
+        note=given.note,
+        actor=given.actor,
+        at=given.at,
+        stale=reviewed and given.inputs_hash != stored.inputs_hash,
+        fixed=is_fixed(given, stored.edited, passes),
+        override=given.override,
     )
 
 
-def _last_of_each(verdicts: list[VerdictState]) -> list[VerdictState]:
+def _last_of_each(verdicts: Iterable[VerdictState]) -> list[VerdictState]:
     last: dict[str | None, VerdictState] = {}
     for verdict in verdicts:
         last.setdefault(verdict.actor, verdict)
     return list(last.values())
-
-
-def _with_noticed(solution: Solution | None, noticed: Iterable[Any]) -> Solution | None:
-    found = tuple(Finding(item.kind, item.sentence, view=item.view) for item in noticed)
-    if solution is None or not found:
-        return solution
-    return replace(solution, findings=solution.findings + found)

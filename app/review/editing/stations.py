@@ -2,32 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError, NotFoundError
 from app.review.editing.codec import edit_to_json, station_edit_from_json
-from app.review.editing.edit import StationEdit
-from app.review.editing.idempotency import Request, is_repeated, remember
-from app.review.editing.state import require_etag, station_etag
+from app.review.editing.edit import StationEdit, with_station
+from app.review.editing.known import known_calibrations
+from app.review.editing.state import (
+    GroupState,
+    read_record,
+    read_state,
+    require_etag,
+    station_etag,
+)
 from app.review.editing.undo import read_station_stacks
-from app.soccer.group import Station
+from app.soccer.group import Group, Station
+from app.soccer.solution import Calibration
+from app.solving.solve import solve
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
+from app.store.datasets import dataset_name
+from app.store.digest import group_inputs_hash
 from app.store.groups import (
+    StoredGroup,
     StoredStation,
     groups_of_station,
     read_stations,
     refresh_inputs_hashes,
     save_station,
 )
-from app.store.log import Entry, append, read_log
-from app.store.models import DatasetModel, LogModel
+from app.store.log import Entry, append, read_entry
 from app.store.queue import refresh_queue
 from app.store.session import Store
+from app.store.solutions import (
+    EncodedSolution,
+    SolutionKey,
+    insert_solutions,
+)
 
 
 @dataclass(frozen=True)
@@ -53,6 +68,10 @@ class _Change:
     station: Station
 
 
+_Plan = Callable[[Session, StationState], _Change]
+_Trial = tuple[StoredGroup, Group, Mapping[str, Calibration]]
+
+
 def load_station(store: Store, station_id: int) -> StationState:
     """A station as it is now.
 
@@ -70,11 +89,21 @@ def submit_station(
     *,
     if_match: str,
     actor: str,
-    idempotency_key: str | None = None,
+    shown: int | None = None,
+    keep: Keep[GroupState] = keep_nothing,
 ) -> StationState:
     """Save an edit of a static camera; its groups are then stale until they are solved again.
 
     ``recompute.solve_dataset`` solves them; the inputs hashes of all are in step already.
+
+    Args:
+        store: The database.
+        station_id: The station.
+        edit: What to change.
+        if_match: ETag of the station that the edit builds on.
+        actor: Who says so.
+        shown: One of its groups, which is solved and saved with the edit.
+        keep: Keeps the answer, that group, with the edit.
 
     Raises:
         StaleRevisionError: ``if_match`` is not the station's present ETag.
@@ -87,70 +116,105 @@ def submit_station(
         body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(station))}
         return _Change("station_edit", body, edit.apply(station))
 
-    request = Request(idempotency_key, actor, ["station", station_id, edit_to_json(edit)])
-    return _change(store, station_id, plan, if_match, request)
+    return _change(store, station_id, plan, if_match, actor, shown, keep)
 
 
 def undo_station(
-    store: Store, station_id: int, *, if_match: str, actor: str, idempotency_key: str | None = None
+    store: Store,
+    station_id: int,
+    *,
+    if_match: str,
+    actor: str,
+    shown: int | None = None,
+    keep: Keep[GroupState] = keep_nothing,
 ) -> StationState:
     """Take the last edit of a static camera back; raises ConflictError without one."""
-    request = Request(idempotency_key, actor, ["undo", "station", station_id])
-    return _change(store, station_id, _plan_undo, if_match, request)
+    return _change(store, station_id, _plan_undo, if_match, actor, shown, keep)
 
 
 def redo_station(
-    store: Store, station_id: int, *, if_match: str, actor: str, idempotency_key: str | None = None
+    store: Store,
+    station_id: int,
+    *,
+    if_match: str,
+    actor: str,
+    shown: int | None = None,
+    keep: Keep[GroupState] = keep_nothing,
 ) -> StationState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    request = Request(idempotency_key, actor, ["redo", "station", station_id])
-    return _change(store, station_id, _plan_redo, if_match, request)
+    return _change(store, station_id, _plan_redo, if_match, actor, shown, keep)
 
 
 def _change(
     store: Store,
     station_id: int,
-    plan: Callable[[Session, StationState], _Change],
+    plan: _Plan,
     if_match: str,
-    request: Request,
+    actor: str,
+    shown: int | None,
+    keep: Keep[GroupState],
 ) -> StationState:
+    with store.read() as session:
+        state, change = _planned(session, station_id, plan, if_match)
+        if change.station == state.station:
+            return state
+        trial = None if shown is None else _trial(session, shown, change.station)
+    solutions = [] if trial is None else [_solved(*trial)]
     with store.write() as session:
-        state = _read(session, station_id)
-        if not state.station.shared:
-            raise ConflictError(
-                f"station {state.station.key} belongs to one view",
-                hint="Edit the lines of that view instead.",
-            )
-        if not is_repeated(session, request):
-            require_etag(state.etag, if_match, f"camera {state.station.key}")
-            change = plan(session, state)
-            if change.station != state.station:
-                _save(session, state, change, request)
+        # Planned once more: others may have edited it while the group was solved.
+        state, change = _planned(session, station_id, plan, if_match)
+        _save(session, state, change, actor)
+        insert_solutions(session, solutions)
+        refresh_queue(session, state.groups)
+        if shown is not None:
+            keep(read_state(session, shown))(session)
     return load_station(store, station_id)
 
 
-def _save(session: Session, state: StationState, change: _Change, request: Request) -> None:
-    at = now()
+def _planned(
+    session: Session, station_id: int, plan: _Plan, if_match: str
+) -> tuple[StationState, _Change]:
+    state = _read(session, station_id)
+    if not state.station.shared:
+        raise ConflictError(
+            f"station {state.station.key} belongs to one view",
+            hint="Edit the lines of that view instead.",
+        )
+    require_etag(state.etag, if_match, f"camera {state.station.key}")
+    return state, plan(session, state)
+
+
+def _trial(session: Session, group_id: int, station: Station) -> _Trial:
+    """A group with another station, and what is known of its calibrations."""
+    stored = read_record(session, group_id).stored
+    view = next(view for view in stored.group.views if view.station.key == station.key)
+    group = with_station(stored.group, view, station)
+    return stored, group, known_calibrations(session, [group], stored.policy)
+
+
+def _solved(
+    stored: StoredGroup, group: Group, known: Mapping[str, Calibration]
+) -> tuple[SolutionKey, EncodedSolution]:
+    key = SolutionKey(stored.id, group_inputs_hash(group), stored.policy.hash)
+    return key, encode(group, solve(group, stored.policy, known), known)
+
+
+def _save(session: Session, state: StationState, change: _Change, actor: str) -> None:
     save_station(session, state.stored, change.station)
     refresh_inputs_hashes(session, state.groups)
-    entry = Entry(
-        change.kind, request.actor, at, change.body, state.dataset_id, station_id=state.id
-    )
-    (log_id,) = append(session, [entry])
-    remember(session, request, log_id, at)
-    refresh_queue(session, state.groups)
+    entry = Entry(change.kind, actor, now(), change.body, state.dataset_id, station_id=state.id)
+    append(session, [entry])
 
 
 def _read(session: Session, station_id: int) -> StationState:
     stored = read_stations(session, [station_id]).get(station_id)
     if stored is None:
         raise NotFoundError(f"there is no station {station_id}")
-    name = session.scalar(select(DatasetModel.name).where(DatasetModel.id == stored.dataset_id))
     stacks = read_station_stacks(session, station_id)
     return StationState(
         id=stored.id,
         dataset_id=stored.dataset_id,
-        dataset=name or "",
+        dataset=dataset_name(session, stored.dataset_id),
         revision=stored.revision,
         etag=station_etag(stored),
         station=stored.station,
@@ -178,7 +242,7 @@ def _plan_redo(session: Session, state: StationState) -> _Change:
 def _again(
     session: Session, state: StationState, kind: str, log_id: int, *, forward: str, backward: str
 ) -> _Change:
-    (entry,) = read_log(session, LogModel.id == log_id)
+    entry = read_entry(session, log_id)
     body = {"edit": entry.body[forward], "inverse": entry.body[backward], "of": log_id}
     station = station_edit_from_json(body["edit"]).apply(state.station)
     return _Change(kind, body, station)

@@ -1,39 +1,41 @@
 """Submit: an edit of one group, from the state that its author saw to the state that follows.
 
-Load, apply, solve, save. Solving happens before the write transaction, which checks again that
-nobody was faster; the edit's log entry, the revision and the solution are one transaction.
+Read, plan, solve, save: one read transaction and one write transaction. Solving happens between
+them; the second one checks again that nobody was faster, and holds the edit's log entry, the
+revision, the solution, the queue's row and the answer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError, NotFoundError, SharedStationError
 from app.review.editing.codec import edit_from_json, edit_to_json
 from app.review.editing.edit import STATION_EDITS, Edit, need_view
 from app.review.editing.encode import encode
-from app.review.editing.etags import require_unchanged
-from app.review.editing.idempotency import Request, is_repeated, remember
+from app.review.editing.etags import read_etags, read_head, require_said, require_unchanged
 from app.review.editing.known import known_calibrations
-from app.review.editing.solver import Solver
-from app.review.editing.state import GroupState, Solutions, read_state, unsolved
-from app.review.editing.undo import Stacks, read_stacks
+from app.review.editing.state import GroupState, Record, read_record, read_state
 from app.soccer.group import Group
 from app.soccer.solution import Solution
 from app.solving.solve import solve
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
-from app.store.digest import group_inputs_hash
-from app.store.groups import save_group
-from app.store.log import Entry, LogEntry, append, read_log
-from app.store.models import GroupModel, LogModel
-from app.store.queue import refresh_queue
+from app.store.groups import (
+    StoredGroup,
+    group_of_view,
+    next_revision,
+    read_groups,
+    save_revision,
+)
+from app.store.log import Entry, LogEntry, append, group_entries, read_entry
+from app.store.queue import refresh_queue, update_row
 from app.store.session import Store
-from app.store.solutions import SolutionKey, insert_solutions, read_solutions
+from app.store.solutions import EncodedSolution, insert_solutions, read_solutions
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,21 @@ class _Change:
     kind: str
     body: Json
     group: Group
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """A change with all that is saved of it."""
+
+    change: _Change
+    before: Record
+    after: Record
+    solution: Solution
+    encoded: EncodedSolution
+
+
+_Find = Callable[[Session], int]
+_Plan = Callable[[Session, Record], _Change]
 
 
 def load(store: Store, group_id: int) -> GroupState:
@@ -55,6 +72,19 @@ def load(store: Store, group_id: int) -> GroupState:
         return read_state(session, group_id)
 
 
+def current_etag(store: Store, group_id: int) -> str:
+    """The ETag of a group as it is now; nothing else of it is decoded.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    with store.read() as session:
+        found = read_etags(session, [group_id])
+    if group_id not in found:
+        raise NotFoundError(f"there is no group {group_id}")
+    return found[group_id]
+
+
 def submit(
     store: Store,
     group_id: int,
@@ -62,8 +92,7 @@ def submit(
     *,
     if_match: str,
     actor: str,
-    idempotency_key: str | None = None,
-    solver: Solver = solve,
+    keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Save an edit and answer with the group as it is then, solved.
 
@@ -73,27 +102,36 @@ def submit(
         edit: What to change.
         if_match: ETag of the state that the edit builds on.
         actor: Who says so.
-        idempotency_key: The caller's name for this request; sent again it changes nothing.
-        solver: Only tests put another one in.
+        keep: Keeps the answer with the edit.
 
     Raises:
         StaleRevisionError: Somebody else was faster.
         SharedStationError: The edit belongs to a static camera.
         InputError, NotFoundError: The edit does not fit the group.
-        IdempotencyError: The key was used for something else.
         StorageError: Nothing was saved.
     """
+    plan = _plan_edit(lambda _stored: edit)
+    return _change(store, lambda _session: group_id, plan, if_match, actor, keep)
 
-    def plan(_session: Session, state: GroupState) -> _Change:
-        refuse_shared(state, edit)
-        body = {
-            "edit": edit_to_json(edit),
-            "inverse": edit_to_json(edit.inverse(state.group)),
-        }
-        return _Change("edit", body, edit.apply(state.group))
 
-    request = Request(idempotency_key, actor, ["edit", group_id, edit_to_json(edit)])
-    return _change(store, group_id, plan, if_match, request, solver)
+def submit_view(
+    store: Store,
+    view_id: int,
+    edit_of: Callable[[str], Edit],
+    *,
+    if_match: str,
+    actor: str,
+    keep: Keep[GroupState] = keep_nothing,
+) -> GroupState:
+    """``submit`` for a view's id: ``edit_of`` makes the edit from the view's key."""
+
+    def edit(stored: StoredGroup) -> Edit:
+        return edit_of(next(key for key, item in stored.view_ids.items() if item == view_id))
+
+    def find(session: Session) -> int:
+        return group_of_view(session, view_id)
+
+    return _change(store, find, _plan_edit(edit), if_match, actor, keep)
 
 
 def undo(
@@ -102,12 +140,10 @@ def undo(
     *,
     if_match: str,
     actor: str,
-    idempotency_key: str | None = None,
-    solver: Solver = solve,
+    keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Take the last edit of a group back, whoever made it; raises ConflictError without one."""
-    request = Request(idempotency_key, actor, ["undo", group_id])
-    return _change(store, group_id, _plan_undo, if_match, request, solver)
+    return _change(store, lambda _session: group_id, _plan_undo, if_match, actor, keep)
 
 
 def redo(
@@ -116,136 +152,163 @@ def redo(
     *,
     if_match: str,
     actor: str,
-    idempotency_key: str | None = None,
-    solver: Solver = solve,
+    keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    request = Request(idempotency_key, actor, ["redo", group_id])
-    return _change(store, group_id, _plan_redo, if_match, request, solver)
+    return _change(store, lambda _session: group_id, _plan_redo, if_match, actor, keep)
 
 
 def preview(
-    store: Store, group_id: int, edits: Sequence[Edit], *, solver: Solver = solve
-) -> Solution:
-    """The solution as it would be after edits; saves nothing, and shared stations may move."""
+    store: Store, group_id: int, edits_of: Callable[[Group], Sequence[Edit]]
+) -> tuple[Group, Solution]:
+    """The group and its solution as they would be after the edits that ``edits_of`` makes for it.
+
+    Saves nothing, and shared stations may move.
+    """
     with store.read() as session:
-        state = read_state(session, group_id)
-        group = state.group
-        for edit in edits:
+        stored = read_groups(session, [group_id]).get(group_id)
+        if stored is None:
+            raise NotFoundError(f"there is no group {group_id}")
+        group = stored.group
+        for edit in edits_of(group):
             group = edit.apply(group)
-        known = known_calibrations(session, [group], state.policy)
-    return solver(group, state.policy, known)
+        known = known_calibrations(session, [group], stored.policy)
+    return group, solve(group, stored.policy, known)
 
 
 def history(store: Store, group_id: int) -> list[LogEntry]:
     """Everything that was said about a group, oldest first."""
     with store.read() as session:
         # The log remembers groups of datasets that were deleted, too.
-        there = session.scalar(select(GroupModel.id).where(GroupModel.id == group_id))
-        entries = list(read_log(session, LogModel.group_id == group_id))
-    if there is None:
-        raise NotFoundError(f"there is no group {group_id}")
-    return entries
+        if read_head(session, group_id) is None:
+            raise NotFoundError(f"there is no group {group_id}")
+        return group_entries(session, group_id)
 
 
-def solved(store: Store, group_id: int, *, solver: Solver = solve) -> GroupState:
-    """A group as it is now, its solution computed and kept if that was still to do."""
+def load_solved(store: Store, group_id: int) -> GroupState:
+    """A group as it is now, its solution computed if that was still to do; saves nothing."""
     state = load(store, group_id)
     if state.solution is not None:
         return state
+    _, solution = preview(store, group_id, lambda _group: [])
+    return replace(state, solution=solution)
+
+
+def solved(store: Store, group_id: int) -> GroupState:
+    """A group as it is now, its solution computed and kept if that was still to do."""
+    record, solution = read_solved(store, group_id)
+    return record.state(solution)
+
+
+def read_solved(
+    store: Store, group_id: int, *, needed: bool = True
+) -> tuple[Record, Solution | None]:
+    """A group's record and its solution, which is computed and kept where it is needed."""
     with store.read() as session:
-        known = known_calibrations(session, [state.group], state.policy)
-    solution = solver(state.group, state.policy, known)
-    encoded = encode(state.group, solution, known)
+        record = read_record(session, group_id)
+        stored = record.stored
+        solution = read_solutions(session, [record.solution_key]).get(group_id)
+        if solution is not None or not needed:
+            return record, solution
+        known = known_calibrations(session, [stored.group], stored.policy)
+    solution = solve(stored.group, stored.policy, known)
+    encoded = encode(stored.group, solution, known)
     with store.write() as session:
-        insert_solutions(session, [(state.solution_key, encoded)])
+        insert_solutions(session, [(record.solution_key, encoded)])
         refresh_queue(session, [group_id])
-    return load(store, group_id)
+    return record, solution
 
 
-def refuse_shared(state: GroupState, edit: Edit) -> None:
+def refuse_shared(stored: StoredGroup, edit: Edit) -> None:
     """Refuse an edit that belongs to the station when many views share that."""
     if not isinstance(edit, STATION_EDITS):
         return
-    station = need_view(state.group, edit.view).station
+    station = need_view(stored.group, edit.view).station
     if station.shared:
-        raise SharedStationError(edit.view, state.station_ids[station.key], station.key)
+        raise SharedStationError(edit.view, stored.stations[edit.view].id, station.key)
 
 
 def _change(
     store: Store,
-    group_id: int,
-    plan: Callable[[Session, GroupState], _Change],
+    find: _Find,
+    plan: _Plan,
     if_match: str,
-    request: Request,
-    solver: Solver,
+    actor: str,
+    keep: Keep[GroupState],
 ) -> GroupState:
-    with store.read() as session:
-        state = read_state(session, group_id, unsolved)
-        repeated = is_repeated(session, request)
-        if not repeated:
-            require_unchanged(session, group_id, if_match, f"group {state.key}")
-            change = plan(session, state)
-            known = known_calibrations(session, [change.group], state.policy)
-    if repeated or change.group == state.group:
-        return load(store, group_id)
-    solution = solver(change.group, state.policy, known)
+    while True:
+        with store.read() as session:
+            before = read_record(session, find(session))
+            what = f"group {before.stored.group.key}"
+            require_said(session, before.stored.id, before.said, if_match, what)
+            change = plan(session, before)
+            if change.group == before.stored.group:
+                found = read_solutions(session, [before.solution_key])
+                return before.state(found.get(before.stored.id))
+            known = known_calibrations(session, [change.group], before.stored.policy)
+        outcome = _outcome(before, change, solve(change.group, before.stored.policy, known), known)
+        state = outcome.after.state(outcome.solution)
+        kept = keep(state)
+        with store.write() as session:
+            judge = require_unchanged(session, state.id, if_match, what)
+            if judge == before.stored.policy.hash:
+                _save(session, outcome, actor)
+                kept(session)
+                return state
+        # Another policy judges the dataset by now, so another solution belongs to the edit.
+
+
+def _outcome(
+    before: Record, change: _Change, solution: Solution, known: Collection[str]
+) -> _Outcome:
+    stored = next_revision(before.stored, change.group, now())
+    after = replace(before, stored=stored, stacks=before.stacks.then(change.kind))
     encoded = encode(change.group, solution, known)
-    key = SolutionKey(group_id, group_inputs_hash(change.group), state.policy.hash)
-    with store.write() as session:
-        if not is_repeated(session, request):
-            require_unchanged(session, group_id, state.etag, f"group {state.key}")
-            _save(session, state, change, request)
-            insert_solutions(session, [(key, encoded)])
-            refresh_queue(session, [group_id])
-    with store.read() as session:
-        return read_state(session, group_id, _known(key, solution))
+    return _Outcome(change, before, after, solution, encoded)
 
 
-def _known(key: SolutionKey, solution: Solution) -> Solutions:
-    """The solution at hand where the group still is what it was solved as, else the stored one."""
-
-    def solutions(session: Session, keys: Sequence[SolutionKey]) -> Mapping[int, Solution]:
-        if list(keys) == [key]:
-            return {key.group_id: solution}
-        return read_solutions(session, keys)
-
-    return solutions
-
-
-def _save(session: Session, state: GroupState, change: _Change, request: Request) -> None:
-    at = now()
-    save_group(session, state.stored, change.group, at=at)
-    entry = Entry(change.kind, request.actor, at, change.body, state.dataset_id, state.id)
-    (log_id,) = append(session, [entry])
-    remember(session, request, log_id, at)
+def _save(session: Session, outcome: _Outcome, actor: str) -> None:
+    change, after = outcome.change, outcome.after
+    stored = after.stored
+    save_revision(session, outcome.before.stored, stored)
+    entry = Entry(change.kind, actor, stored.changed, change.body, stored.dataset_id, stored.id)
+    append(session, [entry])
+    insert_solutions(session, [(after.solution_key, outcome.encoded)])
+    noticed = [item.kind for item in after.noticed]
+    update_row(session, stored, after.newest_verdict, noticed, outcome.encoded.summary)
 
 
-def _plan_undo(session: Session, state: GroupState) -> _Change:
-    done = _stacks(session, state).done
+def _plan_edit(edit_of: Callable[[StoredGroup], Edit]) -> _Plan:
+    def plan(_session: Session, record: Record) -> _Change:
+        edit, group = edit_of(record.stored), record.stored.group
+        refuse_shared(record.stored, edit)
+        body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(group))}
+        return _Change("edit", body, edit.apply(group))
+
+    return plan
+
+
+def _plan_undo(session: Session, record: Record) -> _Change:
+    done = record.stacks.done
     if not done:
         raise ConflictError("there is nothing to undo in this group")
-    return _again(session, state, "undo", done[-1], forward="inverse", backward="edit")
+    return _again(session, record, "undo", done[-1], forward="inverse", backward="edit")
 
 
-def _plan_redo(session: Session, state: GroupState) -> _Change:
-    undone = _stacks(session, state).undone
+def _plan_redo(session: Session, record: Record) -> _Change:
+    undone = record.stacks.undone
     if not undone:
         raise ConflictError("there is nothing to redo in this group")
-    return _again(session, state, "redo", undone[-1], forward="edit", backward="inverse")
-
-
-def _stacks(session: Session, state: GroupState) -> Stacks:
-    return read_stacks(session, [state.id])[state.id]
+    return _again(session, record, "redo", undone[-1], forward="edit", backward="inverse")
 
 
 def _again(
-    session: Session, state: GroupState, kind: str, log_id: int, *, forward: str, backward: str
+    session: Session, record: Record, kind: str, log_id: int, *, forward: str, backward: str
 ) -> _Change:
-    (entry,) = read_log(session, LogModel.id == log_id)
+    entry = read_entry(session, log_id)
     body = {"edit": entry.body[forward], "inverse": entry.body[backward], "of": log_id}
     try:
-        group = edit_from_json(body["edit"]).apply(state.group)
+        group = edit_from_json(body["edit"]).apply(record.stored.group)
     except NotFoundError as error:
         raise ConflictError(f"this cannot be done any more: {error.message}") from error
     return _Change(kind, body, group)

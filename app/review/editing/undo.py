@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from app.store.models import LogModel
+from app.store.log import group_steps, station_steps
 
 GROUP_KINDS = {"edit": "edit", "undo": "undo", "redo": "redo"}
 STATION_KINDS = {"station_edit": "edit", "station_undo": "undo", "station_redo": "redo"}
@@ -32,45 +31,27 @@ class Stacks:
         """Whether there is an edit to do again."""
         return bool(self.undone)
 
-
-def stacks_of(entries: Iterable[tuple[int, str]]) -> Stacks:
-    """The stacks after entries (id and ``edit``, ``undo`` or ``redo``) in their order.
-
-    An undo moves the last edit over, a redo moves it back, and a fresh edit clears what was
-    undone.
-    """
-    done: list[int] = []
-    undone: list[int] = []
-    for number, kind in entries:
+    def then(self, kind: str, log_id: int = 0) -> Stacks:
+        """The stacks after one more entry: an undo moves the last edit over, a redo moves it
+        back, and a fresh edit clears what was undone."""
         if kind == "edit":
-            done.append(number)
-            undone.clear()
-        elif kind == "undo":
-            undone.append(done.pop())
-        else:
-            done.append(undone.pop())
-    return Stacks(tuple(done), tuple(undone))
+            return Stacks((*self.done, log_id))
+        if kind == "undo":
+            return Stacks(self.done[:-1], (*self.undone, self.done[-1]))
+        return Stacks((*self.done, self.undone[-1]), self.undone[:-1])
 
 
 def read_stacks(session: Session, group_ids: Sequence[int]) -> Mapping[int, Stacks]:
     """The stacks of each group."""
-    statement = (
-        select(LogModel.group_id, LogModel.id, LogModel.kind)
-        .where(LogModel.group_id.in_(group_ids), LogModel.kind.in_(GROUP_KINDS))
-        .order_by(LogModel.id)
-    )
-    entries: dict[int, list[tuple[int, str]]] = {number: [] for number in group_ids}
-    for row in session.execute(statement):
-        entries[row.group_id].append((row.id, GROUP_KINDS[row.kind]))
-    return {number: stacks_of(items) for number, items in entries.items()}
+    stacks = dict.fromkeys(group_ids, Stacks())
+    for row in group_steps(session, group_ids, GROUP_KINDS):
+        stacks[row.group_id] = stacks[row.group_id].then(GROUP_KINDS[row.kind], row.id)
+    return stacks
 
 
 def read_station_stacks(session: Session, station_id: int) -> Stacks:
     """The stacks of a shared station."""
-    statement = (
-        select(LogModel.id, LogModel.kind)
-        .where(LogModel.station_id == station_id, LogModel.kind.in_(STATION_KINDS))
-        .order_by(LogModel.id)
-    )
-    rows = session.execute(statement)
-    return stacks_of((row.id, STATION_KINDS[row.kind]) for row in rows)
+    stacks = Stacks()
+    for row in station_steps(session, station_id, STATION_KINDS):
+        stacks = stacks.then(STATION_KINDS[row.kind], row.id)
+    return stacks

@@ -24,6 +24,7 @@ from app.review.queue.query import parse_query
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
+from app.store.answers import Keep, keep_nothing
 from app.store.predictions import PredictedBox, PredictionSet, read_box, read_boxes
 from app.store.session import Store
 from app.store.views import StoredView, dataset_views, find_view
@@ -173,7 +174,7 @@ def accept_box(
     if_match: str,
     actor: str,
     replace: bool = False,
-    idempotency_key: str | None = None,
+    keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Make one prediction the ball of its view, however sure it is.
 
@@ -184,7 +185,7 @@ def accept_box(
         if_match: ETag of the group's state that the person saw.
         actor: Who accepts it.
         replace: Also where the view has another ball.
-        idempotency_key: The caller's name for this request; sent again it changes nothing.
+        keep: Keeps the answer with the edit.
 
     Returns:
         The group as it is then, solved.
@@ -211,9 +212,7 @@ def accept_box(
     edit = SetBall(view.key, accepted_ball(box, name))
     if not replace:
         _require_free(load(store, view.group_id), edit, if_match)
-    return submit(
-        store, view.group_id, edit, if_match=if_match, actor=actor, idempotency_key=idempotency_key
-    )
+    return submit(store, view.group_id, edit, if_match=if_match, actor=actor, keep=keep)
 
 
 def _require_free(state: GroupState, edit: SetBall, if_match: str) -> None:

@@ -12,6 +12,7 @@ from app.review.exporting.source import LiveSource
 from app.review.importing.carry import FORMAT as CARRY
 from app.review.jobs.jobs import JobProgress, Jobs, Work, counting
 from app.review.versions.version import find_version
+from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.session import Store
@@ -20,7 +21,13 @@ KIND = "export"
 
 
 def request_export(
-    jobs: Jobs, store: Store, folder: ExportFolder, request: Mapping[str, Any], *, actor: str
+    jobs: Jobs,
+    store: Store,
+    folder: ExportFolder,
+    request: Mapping[str, Any],
+    *,
+    actor: str,
+    keep: Keep[Job] = keep_nothing,
 ) -> Job:
     """Write an export, soon; what can be refused is refused at once.
 
@@ -30,6 +37,7 @@ def request_export(
         folder: Where it is written.
         request: The fields of an export request, plain JSON values.
         actor: Who wants it.
+        keep: Keeps the answer with the job.
 
     Raises:
         NotFoundError: There is no such dataset or version.
@@ -52,6 +60,7 @@ def request_export(
         dataset_id=found.id,
         actor=actor,
         request=asked,
+        keep=keep,
     )
 
 

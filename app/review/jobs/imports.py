@@ -9,7 +9,7 @@ from typing import Any
 
 from app.config import Settings
 from app.errors import InputError
-from app.review.datasets.dataset import find_dataset, get_dataset, require_name
+from app.review.datasets.dataset import dataset_id, find_dataset, require_name
 from app.review.importing.folders import resolve_folder
 from app.review.importing.sources import FORMATS, Imported, Source, import_source
 from app.review.jobs.jobs import FailedWithReportError, JobProgress, Jobs, Work
@@ -136,7 +136,7 @@ def _step(progress: JobProgress, sentence: str) -> Callable[[int], None]:
 
 
 def _solve(jobs: Jobs, store: Store, dataset: str, actor: str) -> None:
-    request_solve(jobs, store, get_dataset(store, dataset), actor=actor)
+    request_solve(jobs, store, dataset_id(store, dataset), actor=actor)
 
 
 def _result(imported: Imported, request: ImportRequest) -> Json:

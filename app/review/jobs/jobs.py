@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import structlog
+from sqlalchemy.orm import Session
 
 from app.errors import (
     ConflictError,
@@ -24,6 +25,7 @@ from app.errors import (
     ReviewError,
     StorageError,
 )
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
 from app.store.jobs import (
@@ -169,6 +171,7 @@ class Jobs:
         actor: str,
         request: Json = None,
         once: bool = False,
+        keep: Keep[Job] = keep_nothing,
     ) -> Job:
         """Queue work; not to be called inside a transaction.
 
@@ -180,22 +183,24 @@ class Jobs:
             actor: Who wants it.
             request: What was asked for; a kind that is resumed finds its way from it.
             once: Where a job of this kind waits for this dataset already, answer that one.
+            keep: Keeps the answer, or whatever else belongs to the job, in its transaction.
 
         Raises:
             OverloadedError: Too many jobs wait.
         """
         with self._changed:
-            if once and (known := self._waiting_for(kind, dataset_id)) is not None:
-                return self.get(known.id)
+            known = self._waiting_for(kind, dataset_id) if once else None
             if not once and len(self._waiting) >= self._capacity:
                 raise OverloadedError(
                     f"{len(self._waiting)} jobs wait already", hint="Send it again in a while."
                 )
             new = NewJob(kind, title, actor, dataset_id, request)
             with self._store.write() as session:
-                identity = insert_job(session, new)
-            job = self.get(identity)
-            run = _Run(identity, kind, dataset_id, work, JobProgress(identity, self._closing))
+                job = _need(session, insert_job(session, new) if known is None else known.id)
+                keep(job)(session)
+            if known is not None:
+                return job
+            run = _Run(job.id, kind, dataset_id, work, JobProgress(job.id, self._closing))
             self._waiting.append(run)
             self._wake()
         self._announce(job)
@@ -208,10 +213,7 @@ class Jobs:
             NotFoundError: There is none of that id.
         """
         with self._store.read() as session:
-            job = read_job(session, job_id)
-        if job is None:
-            raise NotFoundError(f"there is no job {job_id}")
-        return job
+            return _need(session, job_id)
 
     def find(
         self,
@@ -403,6 +405,13 @@ class Jobs:
     def _announce(self, job: Job) -> None:
         for listener in self._listeners:
             listener(job)
+
+
+def _need(session: Session, job_id: int) -> Job:
+    job = read_job(session, job_id)
+    if job is None:
+        raise NotFoundError(f"there is no job {job_id}")
+    return job
 
 
 def _columns(place: tuple[int, int | None, str]) -> dict[str, Any]:

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from dataclasses import dataclass
 
-from app.review.datasets.dataset import Dataset, get_dataset, list_datasets
+from sqlalchemy.orm import Session
+
+from app.review.datasets.dataset import get_dataset, list_datasets
 from app.review.editing.recompute import SolveReport, solve_dataset, stale_groups
 from app.review.jobs.jobs import JobProgress, Jobs, Pool, Work, counting
+from app.review.policies.policy import PolicyState, apply_policy
+from app.soccer.policy import Policy
+from app.store.answers import Keep, Kept, keep_nothing
 from app.store.codecs import Json
+from app.store.datasets import dataset_name
 from app.store.jobs import Job
 from app.store.session import Store
 
@@ -18,16 +25,58 @@ NAMED = 20
 """Groups whose solving broke that are named in a result; all are counted."""
 
 
-def request_solve(jobs: Jobs, store: Store, dataset: Dataset, *, actor: str) -> Job:
+@dataclass(frozen=True)
+class Judged:
+    """A dataset under another policy, and the job that solves what that left stale."""
+
+    state: PolicyState
+    job: Job
+
+
+def request_solve(
+    jobs: Jobs, store: Store, dataset_id: int, *, actor: str, keep: Keep[Job] = keep_nothing
+) -> Job:
     """Solve what is stale in a dataset, soon; one job a dataset waits at most."""
+    with store.read() as session:
+        name = dataset_name(session, dataset_id)
     return jobs.submit(
         KIND,
-        f"Solve {dataset.name}",
-        solve_work(store, dataset.id, jobs.pool),
-        dataset_id=dataset.id,
+        f"Solve {name}",
+        solve_work(store, dataset_id, jobs.pool),
+        dataset_id=dataset_id,
         actor=actor,
         once=True,
+        keep=keep,
     )
+
+
+def request_policy(
+    jobs: Jobs,
+    store: Store,
+    dataset_id: int,
+    policy: Policy,
+    *,
+    if_match: str,
+    actor: str,
+    keep: Keep[Judged] = keep_nothing,
+) -> Judged:
+    """Judge a dataset by another policy, and solve what that leaves stale, soon.
+
+    Raises:
+        StaleRevisionError: Somebody else was faster.
+    """
+    judged: list[Judged] = []
+
+    def change(job: Job) -> Kept:
+        def write(session: Session) -> None:
+            state = apply_policy(session, dataset_id, policy, if_match=if_match, actor=actor)
+            judged.append(Judged(state, job))
+            keep(judged[0])(session)
+
+        return write
+
+    request_solve(jobs, store, dataset_id, actor=actor, keep=change)
+    return judged[0]
 
 
 def resume_solving(jobs: Jobs, store: Store) -> None:
@@ -39,7 +88,7 @@ def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
     """Solve whatever an earlier run, of the server or of a command, left undone."""
     for dataset in list_datasets(store):
         if dataset.solved < dataset.groups:
-            request_solve(jobs, store, dataset, actor=actor)
+            request_solve(jobs, store, dataset.id, actor=actor)
 
 
 def solve_work(store: Store, dataset_id: int, pool: Pool | None = None) -> Work:

@@ -12,6 +12,7 @@ from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.review.versions.verify import verify_and_keep
 from app.review.versions.version import Version, find_version, get_version
 from app.soccer.split import Split
+from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.session import Store
@@ -21,7 +22,13 @@ _Step = Callable[[int, int], None]
 
 
 def request_freeze(
-    jobs: Jobs, store: Store, dataset: str, request: FreezeRequest, *, actor: str
+    jobs: Jobs,
+    store: Store,
+    dataset: str,
+    request: FreezeRequest,
+    *,
+    actor: str,
+    keep: Keep[Job] = keep_nothing,
 ) -> Job:
     """Freeze a dataset, soon; what can be refused is refused at once.
 
@@ -37,10 +44,13 @@ def request_freeze(
         dataset_id=found.id,
         actor=actor,
         request=_request_values(request),
+        keep=keep,
     )
 
 
-def request_verify(jobs: Jobs, store: Store, version_id: int, *, actor: str) -> Job:
+def request_verify(
+    jobs: Jobs, store: Store, version_id: int, *, actor: str, keep: Keep[Job] = keep_nothing
+) -> Job:
     """Verify a version, soon."""
     version = get_version(store, version_id)
     return jobs.submit(
@@ -50,6 +60,7 @@ def request_verify(jobs: Jobs, store: Store, version_id: int, *, actor: str) -> 
         dataset_id=version.dataset_id,
         actor=actor,
         request={"version": version_id},
+        keep=keep,
     )
 
 

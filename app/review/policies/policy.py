@@ -49,8 +49,8 @@ def change_policy(
 ) -> PolicyState:
     """Judge a dataset by another policy; what that leaves without a solution is stale.
 
-    The same policy again changes nothing. ``solve_job.request_solve`` solves what is stale;
-    calibrations are known wherever the calibration part of the policy is.
+    The same policy again changes nothing. Calibrations are known wherever the calibration part
+    of the policy is.
 
     Args:
         store: The database.
@@ -64,13 +64,20 @@ def change_policy(
         StaleRevisionError: Somebody else was faster.
     """
     with store.write() as session:
-        state = _read(session, dataset)
-        if if_match is not None:
-            require_etag(state.etag, if_match, f'the policy of "{state.dataset}"')
-        if policy == state.policy:
-            return state
-        save_policy(session, state.dataset_id, policy, actor)
-        return _read(session, state.dataset_id)
+        return apply_policy(session, dataset, policy, if_match=if_match, actor=actor)
+
+
+def apply_policy(
+    session: Session, dataset: str | int, policy: Policy, *, if_match: str | None, actor: str
+) -> PolicyState:
+    """``change_policy`` within a write session."""
+    state = _read(session, dataset)
+    if if_match is not None:
+        require_etag(state.etag, if_match, f'the policy of "{state.dataset}"')
+    if policy == state.policy:
+        return state
+    save_policy(session, state.dataset_id, policy, actor)
+    return _read(session, state.dataset_id)
 
 
 def _read(session: Session, dataset: str | int) -> PolicyState:

@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.queue.query import parse_query
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.group_rows import next_id
 from app.store.models import QueueModel
@@ -42,8 +43,16 @@ def list_saved_views(store: Store, dataset_id: int) -> list[SavedView]:
         return [_saved_view(row, _matching(session, row)) for row in rows]
 
 
-def save_view(store: Store, dataset_id: int, name: str, query: str, *, actor: str) -> SavedView:
-    """Keep a query under a name.
+def save_view(
+    store: Store,
+    dataset_id: int,
+    name: str,
+    query: str,
+    *,
+    actor: str,
+    keep: Keep[SavedView] = keep_nothing,
+) -> SavedView:
+    """Keep a query under a name, and with it, by ``keep``, the answer.
 
     Raises:
         InputError: There is no name, or the query cannot be understood.
@@ -63,7 +72,9 @@ def save_view(store: Store, dataset_id: int, name: str, query: str, *, actor: st
             raise ConflictError(f"a dataset has at most {MAX_VIEWS} saved views")
         identity = next_id(session, SavedViewModel)
         session.execute(insert(SavedViewModel), [{**values, "id": identity, "created": now()}])
-        return _read(session, identity)
+        saved = _read(session, identity)
+        keep(saved)(session)
+    return saved
 
 
 def get_view(store: Store, view_id: int) -> SavedView:
@@ -72,7 +83,7 @@ def get_view(store: Store, view_id: int) -> SavedView:
         return _read(session, view_id)
 
 
-def delete_view(store: Store, view_id: int) -> SavedView:
+def delete_view(store: Store, view_id: int, *, keep: Keep[SavedView] = keep_nothing) -> SavedView:
     """Forget a saved view; returns what it was.
 
     Raises:
@@ -81,6 +92,7 @@ def delete_view(store: Store, view_id: int) -> SavedView:
     with store.write() as session:
         view = _read(session, view_id)
         session.execute(delete(SavedViewModel).where(SavedViewModel.id == view_id))
+        keep(view)(session)
     return view
 
 

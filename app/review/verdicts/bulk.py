@@ -16,21 +16,16 @@ from sqlalchemy.orm import Session
 
 from app.errors import ConflictError
 from app.finite import json_text
-from app.review.editing.idempotency import Request, is_repeated, remember
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdicts.verdict import Verdict, check_verdict
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.group_rows import next_id
 from app.store.log import Entry, append
-from app.store.models import (
-    DatasetModel,
-    GroupModel,
-    IdempotencyModel,
-    QueueModel,
-    VerdictModel,
-)
+from app.store.models import DatasetModel, GroupModel, QueueModel
 from app.store.queue import edited_groups, refresh_verdicts
 from app.store.session import Store
+from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id
 from app.store.view_models import VerdictBatchModel
 
 CHUNK = 500
@@ -141,7 +136,7 @@ def give_verdicts(
     *,
     actor: str,
     expected: int | None = None,
-    idempotency_key: str | None = None,
+    keep: Keep[BatchReport] = keep_nothing,
 ) -> BatchReport:
     """Give a verdict to all groups of a query, as each of them is when its turn comes.
 
@@ -156,20 +151,15 @@ def give_verdicts(
         state: As ``verdict.set_verdict`` takes it, like ``reason`` and ``note``.
         actor: Who says so.
         expected: How many groups ``plan_verdicts`` said would change; refuse another number.
-        idempotency_key: The caller's name for this request; sent again it changes nothing.
+        keep: Keeps the answer with the last verdicts.
 
     Raises:
         InputError: The query or the verdict cannot be.
         ConflictError: Another number of groups would change than the caller expects.
-        IdempotencyError: The key was used for something else.
     """
     verdict = check_verdict(state, reason, note)
-    content = ["verdicts", dataset_id, query, verdict.state, verdict.reason, verdict.note]
-    request = Request(idempotency_key, actor, content)
     where = _where(dataset_id, query)
     with store.read() as session:
-        if is_repeated(session, request):
-            return _again(session, request)
         found = sort_out(queue_rows(session, where), verdict)
     if expected is not None and expected != len(found.change):
         raise ConflictError(
@@ -178,15 +168,17 @@ def give_verdicts(
         )
     if not found.change:
         return BatchReport(None, 0, found.refused)
-    run = BatchRun(dataset_id, query, verdict, request)
+    run = BatchRun(dataset_id, query, verdict, actor)
     ids = [row.group_id for row in found.change]
     for start in range(0, len(ids), CHUNK):
         with store.write() as session:
             chosen = [*where, QueueModel.group_id.in_(ids[start : start + CHUNK])]
             run.save(session, sort_out(queue_rows(session, chosen), verdict).change)
-    with store.write() as session:
-        run.close(session)
-    return BatchReport(run.batch, run.changed, found.refused)
+            if start + CHUNK >= len(ids):
+                run.close(session)
+                report = BatchReport(run.batch, run.changed, found.refused)
+                keep(report)(session)
+    return report
 
 
 def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[Batch]:
@@ -265,14 +257,14 @@ class BatchRun:
         dataset_id: int,
         query: str,
         verdict: Verdict,
-        request: Request,
+        actor: str,
         again: int | None = None,
     ):
         self._again = {} if again is None else {"again": again}
         self.batch: int | None = None
         self.changed = 0
         self._dataset_id, self._query = dataset_id, query
-        self._verdict, self._request = verdict, request
+        self._verdict, self._actor = verdict, actor
         self._spans: list[tuple[int, int]] = []
 
     def save(self, session: Session, rows: Sequence[Any]) -> None:
@@ -280,10 +272,10 @@ class BatchRun:
         if not rows:
             return
         at = now()
-        verdicts = _verdict_rows(session, rows, self._verdict, self._request.actor, at)
-        save_verdicts(session, self._dataset_id, self._request.actor, at, verdicts)
+        verdicts = _verdicts(session, rows, self._verdict, self._actor, at)
+        save_verdicts(session, self._dataset_id, verdicts, actor=self._actor, at=at)
         self.changed += len(verdicts)
-        self._spans.append((verdicts[0]["id"], verdicts[-1]["id"]))
+        self._spans.append((verdicts[0].id, verdicts[-1].id))
         self._save_batch(session, at)
 
     def close(self, session: Session) -> None:
@@ -293,9 +285,8 @@ class BatchRun:
         at = now()
         body = {"batch": self.batch, "q": self._query, "changed": self.changed}
         body |= asdict(self._verdict) | self._again
-        entry = Entry("verdict_batch", self._request.actor, at, body, self._dataset_id)
+        entry = Entry("verdict_batch", self._actor, at, body, self._dataset_id)
         (log_id,) = append(session, [entry])
-        remember(session, self._request, log_id, at)
         mine = VerdictBatchModel.id == self.batch
         session.execute(update(VerdictBatchModel).where(mine).values(log_id=log_id))
 
@@ -307,29 +298,29 @@ class BatchRun:
             return
         self.batch = next_id(session, VerdictBatchModel)
         values |= {"id": self.batch, "dataset_id": self._dataset_id, "at": at}
-        values |= {"actor": self._request.actor, "query": self._query, **asdict(self._verdict)}
+        values |= {"actor": self._actor, "query": self._query, **asdict(self._verdict)}
         session.execute(insert(VerdictBatchModel), [values])
 
 
-def _verdict_rows(
+def _verdicts(
     session: Session, rows: Sequence[Any], verdict: Verdict, actor: str, at: str
-) -> list[dict[str, Any]]:
+) -> list[StoredVerdict]:
     ids = [row.group_id for row in rows]
     heads, edited = _heads(session, ids), edited_groups(session, ids)
-    number = next_id(session, VerdictModel)
+    number = next_verdict_id(session)
     accepts = verdict.state == "accepted"
     return [
-        {
-            "id": number + place,
-            "group_id": row.group_id,
-            "actor": actor,
-            "at": at,
-            **asdict(verdict),
-            "inputs_hash": heads[row.group_id].inputs_hash,
-            "policy_hash": heads[row.group_id].policy_hash,
-            "fixed": bool(accepts and row.passes and row.group_id in edited),
-            "override": (row.gate or "unknown") if accepts and not row.passes else None,
-        }
+        StoredVerdict(
+            id=number + place,
+            group_id=row.group_id,
+            actor=actor,
+            at=at,
+            **vars(verdict),
+            inputs_hash=heads[row.group_id].inputs_hash,
+            policy_hash=heads[row.group_id].policy_hash,
+            fixed=bool(accepts and row.passes and row.group_id in edited),
+            override=(row.gate or "unknown") if accepts and not row.passes else None,
+        )
         for place, row in enumerate(rows)
     ]
 
@@ -345,31 +336,11 @@ def _heads(session: Session, ids: Sequence[int]) -> dict[int, Any]:
 
 
 def save_verdicts(
-    session: Session, dataset_id: int, actor: str, at: str, rows: Sequence[dict[str, Any]]
+    session: Session, dataset_id: int, given: Sequence[StoredVerdict], *, actor: str, at: str
 ) -> None:
     """Insert verdicts, log them under who gives them, and show them in the queue."""
-    session.execute(insert(VerdictModel), rows, execution_options={"render_nulls": True})
-    bodies = [
-        {name: value for name, value in row.items() if name not in ("id", "group_id")}
-        for row in rows
-    ]
-    entries = [
-        Entry("verdict", actor, at, body, dataset_id, row["group_id"])
-        for row, body in zip(rows, bodies, strict=True)
-    ]
-    append(session, entries)
-    refresh_verdicts(session, list({row["group_id"]: None for row in rows}))
-
-
-def _again(session: Session, request: Request) -> BatchReport:
-    """What the same request did the first time."""
-    statement = (
-        select(VerdictBatchModel.id, VerdictBatchModel.changed)
-        .join(IdempotencyModel, IdempotencyModel.log_id == VerdictBatchModel.log_id)
-        .where(IdempotencyModel.key == request.key, IdempotencyModel.actor == request.actor)
-    )
-    row = session.execute(statement).one()
-    return BatchReport(row.id, row.changed, ())
+    insert_verdicts(session, dataset_id, given, actor=actor, at=at)
+    refresh_verdicts(session, list({verdict.group_id: None for verdict in given}))
 
 
 def _batch(row: Any) -> Batch:

@@ -11,10 +11,10 @@ from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError
-from app.review.editing.idempotency import Request
 from app.review.verdicts.bulk import BatchRun, Refusal, queue_rows, sort_out
 from app.review.verdicts.bulk_undo import read_batch
 from app.review.verdicts.verdict import check_verdict
+from app.store.answers import Keep, keep_nothing
 from app.store.models import GroupModel, QueueModel, VerdictModel
 from app.store.session import Store
 from app.store.view_models import VerdictBatchModel
@@ -37,7 +37,9 @@ class RedoReport:
     refused: tuple[Refusal, ...]
 
 
-def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
+def redo_batch(
+    store: Store, batch_id: int, *, actor: str, keep: Keep[RedoReport] = keep_nothing
+) -> RedoReport:
     """Give the verdicts of a batch again after they were taken back.
 
     A group keeps what it has when somebody judged it after the batch was taken back, or edited
@@ -51,9 +53,11 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
         batch = read_batch(session, batch_id)
     spans = _spans(batch)
     verdict = check_verdict(batch.state, batch.reason, batch.note)
-    run = BatchRun(batch.dataset_id, batch.query, verdict, Request(None, actor, []), batch_id)
+    run = BatchRun(batch.dataset_id, batch.query, verdict, actor, batch_id)
     refused: Counter[str] = Counter()
-    for first, last in spans:
+    if not spans:
+        return _report(batch, run, refused)
+    for number, (first, last) in enumerate(spans, 1):
         with store.write() as session:
             ids = _unchanged(session, json.loads(batch.spans), first, last)
             rows = queue_rows(session, [QueueModel.group_id.in_(ids)])
@@ -63,8 +67,14 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
             if run.batch is not None:
                 mine = VerdictBatchModel.id == batch_id
                 session.execute(update(VerdictBatchModel).where(mine).values(redone=run.batch))
-    with store.write() as session:
-        run.close(session)
+            if number == len(spans):
+                run.close(session)
+                report = _report(batch, run, refused)
+                keep(report)(session)
+    return report
+
+
+def _report(batch: Any, run: BatchRun, refused: Counter[str]) -> RedoReport:
     kept = batch.changed - run.changed - refused.total()
     reasons = tuple(Refusal(reason, groups) for reason, groups in refused.items())
     return RedoReport(run.batch, run.changed, kept, reasons)

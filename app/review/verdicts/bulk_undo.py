@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sqlalchemy import select, update
@@ -13,11 +13,11 @@ from sqlalchemy.orm import Session
 from app.errors import ConflictError, NotFoundError
 from app.finite import json_text
 from app.review.verdicts.bulk import save_verdicts
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
-from app.store.group_rows import next_id
 from app.store.log import Entry, append
-from app.store.models import VerdictModel
 from app.store.session import Store
+from app.store.verdicts import StoredVerdict, judged_between, next_verdict_id, read_verdicts
 from app.store.view_models import VerdictBatchModel
 
 
@@ -30,7 +30,9 @@ class UndoReport:
     kept: int
 
 
-def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
+def undo_batch(
+    store: Store, batch_id: int, *, actor: str, keep: Keep[UndoReport] = keep_nothing
+) -> UndoReport:
     """Give every group of a batch the verdict back that it had before.
 
     A group that somebody has judged since keeps that verdict.
@@ -44,21 +46,30 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
     if batch.undone is not None:
         raise ConflictError(f"{batch.undone_by} has taken this batch back already")
     restored, spans = 0, list[tuple[int, int]]()
-    for first, last in json.loads(batch.spans):
+    given: list[tuple[int, int]] = json.loads(batch.spans)
+    for number, (first, last) in enumerate(given, 1):
         with store.write() as session:
-            rows = _restore(session, batch, first, last, actor)
-        restored += len({row["group_id"] for row in rows})
-        spans += [(rows[0]["id"], rows[-1]["id"])] if rows else []
-    kept = batch.changed - restored
-    with store.write() as session:
-        at = now()
-        values = {"undone": at, "undone_by": actor, "undo_spans": json_text(spans)}
-        session.execute(
-            update(VerdictBatchModel).where(VerdictBatchModel.id == batch_id).values(values)
-        )
-        body = {"batch": batch_id, "restored": restored, "kept": kept}
-        append(session, [Entry("verdict_batch_undo", actor, at, body, batch.dataset_id)])
-    return UndoReport(batch_id, restored, kept)
+            verdicts = _restore(session, batch, first, last, actor)
+            restored += len({verdict.group_id for verdict in verdicts})
+            spans += [(verdicts[0].id, verdicts[-1].id)] if verdicts else []
+            if number == len(given):
+                report = UndoReport(batch_id, restored, batch.changed - restored)
+                _close(session, batch, report, spans, actor)
+                keep(report)(session)
+    return report
+
+
+def _close(
+    session: Session, batch: Any, report: UndoReport, spans: list[tuple[int, int]], actor: str
+) -> None:
+    """Say of a batch, and in the log, that it was taken back."""
+    at = now()
+    values = {"undone": at, "undone_by": actor, "undo_spans": json_text(spans)}
+    session.execute(
+        update(VerdictBatchModel).where(VerdictBatchModel.id == batch.id).values(values)
+    )
+    entry = Entry("verdict_batch_undo", actor, at, dict(vars(report)), batch.dataset_id)
+    append(session, [entry])
 
 
 def read_batch(session: Session, batch_id: int) -> Any:
@@ -77,39 +88,30 @@ def read_batch(session: Session, batch_id: int) -> Any:
 
 def _restore(
     session: Session, batch: Any, first: int, last: int, actor: str
-) -> list[dict[str, Any]]:
+) -> list[StoredVerdict]:
     """Take one chunk back; returns the verdicts that do it, of groups not judged since."""
-    given = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
-    statement = select(*VerdictModel.__table__.columns).where(VerdictModel.group_id.in_(given))
-    history: dict[int, list[Any]] = {}
-    for row in session.execute(statement.order_by(VerdictModel.id.desc())):
-        history.setdefault(row.group_id, []).append(row)
-    at, rows = now(), []
-    for verdicts in history.values():
+    at, number = now(), next_verdict_id(session)
+    again: list[StoredVerdict] = []
+    for verdicts in read_verdicts(session, judged_between(session, first, last)).values():
         if first <= verdicts[0].id <= last:
-            rows += _before(verdicts, batch.actor, actor, at)
-    number = next_id(session, VerdictModel)
-    numbered = [{**row, "id": number + place} for place, row in enumerate(rows)]
+            again += _before(verdicts, batch.actor, at)
+    numbered = [replace(item, id=number + place) for place, item in enumerate(again)]
     if numbered:
-        save_verdicts(session, batch.dataset_id, actor, at, numbered)
+        save_verdicts(session, batch.dataset_id, numbered, actor=actor, at=at)
     return numbered
 
 
-def _before(verdicts: Sequence[Any], judge: str, actor: str, at: str) -> list[dict[str, Any]]:
+def _before(verdicts: Sequence[StoredVerdict], judge: str, at: str) -> list[StoredVerdict]:
     """Verdicts that put a group back: its judge's own last one, then the one that counted.
 
     The newest verdict counts, so what counted before is said last.
     """
     newest, earlier = verdicts[0], verdicts[1:]
-    own = next((row for row in earlier if row.actor == judge), None)
-    taken_back = {
-        **newest._mapping,
-        **dict.fromkeys(("reason", "note", "override")),
-        "at": at,
-        "state": "unreviewed",
-        "fixed": False,
-    }
-    again = [taken_back if own is None else dict(own._mapping)]
+    own = next((item for item in earlier if item.actor == judge), None)
+    taken_back = replace(
+        newest, at=at, state="unreviewed", reason=None, note=None, override=None, fixed=False
+    )
+    again = [taken_back if own is None else own]
     if earlier and earlier[0] is not own:
-        again.append(dict(earlier[0]._mapping))
+        again.append(earlier[0])
     return again

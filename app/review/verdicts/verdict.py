@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from sqlalchemy import insert
 from sqlalchemy.orm import Session
 
 from app.errors import InputError
-from app.review.editing.etags import require_unchanged
-from app.review.editing.idempotency import Request, is_repeated, remember
-from app.review.editing.solver import Solver
+from app.review.editing.etags import require_said, require_unchanged
 from app.review.editing.state import GroupState
-from app.review.editing.submit import load, solved
+from app.review.editing.submit import read_solved
 from app.soccer.reasons import MAX_NOTE, REASONS
-from app.solving.solve import solve
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
-from app.store.group_rows import next_id
-from app.store.log import Entry, append
-from app.store.models import VerdictModel
-from app.store.queue import refresh_queue
+from app.store.queue import update_verdict
 from app.store.session import Store
+from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id
 
 STATES = ("unreviewed", "accepted", "rejected", "deferred")
 
@@ -43,8 +38,7 @@ def set_verdict(
     *,
     if_match: str,
     actor: str,
-    idempotency_key: str | None = None,
-    solver: Solver = solve,
+    keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Save a person's verdict on a group as it is; the newest of all people's counts.
 
@@ -56,18 +50,24 @@ def set_verdict(
         StaleRevisionError: The group is not what the person saw.
     """
     verdict = check_verdict(state, reason, note)
-    request = Request(idempotency_key, actor, ["verdict", group_id, state, reason, note])
-    # Accepting weighs the gates, so they must be known.
-    seen = solved(store, group_id, solver=solver) if state == "accepted" else load(store, group_id)
-    override = _override(seen, verdict)
-    _require_seen(seen, verdict)
-    with store.write() as session:
-        if not is_repeated(session, request):
-            require_unchanged(session, group_id, if_match, f"group {seen.key}")
-            # The override was judged on what the person saw, and that has not changed.
-            require_unchanged(session, group_id, seen.etag, f"group {seen.key}")
-            _save(session, seen, verdict, override, request)
-    return load(store, group_id)
+    while True:
+        # Accepting weighs the gates, so they must be known.
+        record, solution = read_solved(store, group_id, needed=state == "accepted")
+        seen = record.state(solution)
+        override = _override(seen, verdict)
+        _require_seen(seen, verdict)
+        with store.write() as session:
+            policy_hash = require_unchanged(session, group_id, if_match, f"group {seen.key}")
+            require_said(session, group_id, record.said, if_match, f"group {seen.key}")
+            # Under another policy other gates may fail.
+            if policy_hash == seen.policy.hash:
+                given = _given(session, seen, verdict, override, actor)
+                insert_verdicts(session, seen.dataset_id, [given], actor=actor, at=given.at)
+                passes = None if solution is None else solution.passes
+                update_verdict(session, record.stored, given, passes)
+                after = replace(record, verdicts=(given, *record.verdicts)).state(solution)
+                keep(after)(session)
+                return after
 
 
 def check_verdict(state: str, reason: str | None, note: str | None) -> Verdict:
@@ -118,28 +118,17 @@ def _require_seen(state: GroupState, verdict: Verdict) -> None:
         )
 
 
-def _save(
-    session: Session,
-    state: GroupState,
-    verdict: Verdict,
-    override: str | None,
-    request: Request,
-) -> None:
-    at = now()
-    values = {
-        "actor": request.actor,
-        "at": at,
-        "state": verdict.state,
-        "reason": verdict.reason,
-        "note": verdict.note,
-        "inputs_hash": state.stored.inputs_hash,
-        "policy_hash": state.policy.hash,
-        "fixed": state.stored.edited and verdict.state == "accepted" and override is None,
-        "override": override,
-    }
-    row = {**values, "id": next_id(session, VerdictModel), "group_id": state.id}
-    session.execute(insert(VerdictModel), [row])
-    entry = Entry("verdict", request.actor, at, values, state.dataset_id, state.id)
-    (log_id,) = append(session, [entry])
-    remember(session, request, log_id, at)
-    refresh_queue(session, [state.id])
+def _given(
+    session: Session, seen: GroupState, verdict: Verdict, override: str | None, actor: str
+) -> StoredVerdict:
+    return StoredVerdict(
+        id=next_verdict_id(session),
+        group_id=seen.id,
+        actor=actor,
+        at=now(),
+        **vars(verdict),
+        inputs_hash=seen.stored.inputs_hash,
+        policy_hash=seen.policy.hash,
+        fixed=seen.stored.edited and verdict.state == "accepted" and override is None,
+        override=override,
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.api.deps import get_idempotency_key, require_if_match
+from app.api.deps import require_if_match
 from app.api.errors import PreconditionRequiredError
 from app.errors import InputError
 
@@ -21,9 +21,3 @@ class TestRequireIfMatch:
     def test_everything_else_is_refused(self, tag: str) -> None:
         with pytest.raises(InputError):
             require_if_match(tag)
-
-
-class TestGetIdempotencyKey:
-    def test_may_be_absent(self) -> None:
-        assert get_idempotency_key(None) is None
-        assert get_idempotency_key("a-1") == "a-1"

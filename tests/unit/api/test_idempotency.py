@@ -15,6 +15,7 @@ from sqlalchemy import update
 from structlog.testing import capture_logs
 
 from app.api import idempotency as module
+from app.api import reply
 from app.api.idempotency import Idempotency
 from app.api.server import Server, listen
 from app.errors import StorageError
@@ -97,17 +98,16 @@ class TestRepetition:
         assert (first.status_code, again.content) == (200, first.content)
         assert len(api.get(path).json()["lines"]["Side line top"]) == 3
 
-    def test_after_a_day_is_a_request_of_its_own_that_still_changes_nothing_twice(
+    def test_after_a_day_is_a_request_of_its_own_that_builds_on_a_state_that_is_gone(
         self, app, api
     ) -> None:
-        accept(api)
-        accept(api, {}, "unreviewed")
+        etag = api.get(f"{API}/groups/1").headers["etag"]
+        accept(api, etag=etag)
         with app.state.services.store.write() as session:
             session.execute(update(AnswerModel).values(at="2020-01-01"))
-        accept(api, {"Idempotency-Key": "two"}, "unreviewed")
-        again = accept(api)
-        assert again.json()["verdict"]["state"] == "unreviewed"
-        assert "idempotency-replayed" not in again.headers
+        again = accept(api, etag=etag)
+        assert (again.status_code, "idempotency-replayed" in again.headers) == (412, False)
+        assert len(api.get(f"{API}/groups/1/history").json()["items"]) == 2
 
 
 class TestKey:
@@ -125,7 +125,7 @@ class TestKey:
 
 
 class TestFailure:
-    def test_an_answer_that_cannot_be_kept_is_given_all_the_same(
+    def test_an_answer_that_cannot_be_kept_after_the_work_is_given_all_the_same(
         self, api, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         def full(*_: object) -> None:
@@ -133,9 +133,27 @@ class TestFailure:
 
         monkeypatch.setattr(module, "keep_answer", full)
         with capture_logs() as logs:
-            assert accept(api).status_code == 200
+            assert api.post(f"{API}/practice", json={}, headers=KEY).status_code == 202
         assert [entry["event"] for entry in logs] == ["an answer could not be kept"]
+
+    def test_work_whose_answer_cannot_be_kept_is_not_done(
+        self, api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def full(*_: object) -> None:
+            raise StorageError("the disk is full")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(reply, "keep_answer", full)
+            assert accept(api).status_code == 503
+        assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"
         assert accept(api).json()["verdict"]["state"] == "deferred"
+
+    def test_of_two_servers_that_answer_the_same_request_one_does_it(
+        self, api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(reply, "keep_answer", lambda *_: False)
+        assert accept(api).status_code == 409
+        assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"
 
     def test_a_database_that_does_not_answer_is_503_and_nothing_is_done(
         self, api, monkeypatch: pytest.MonkeyPatch

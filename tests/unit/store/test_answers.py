@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from sqlalchemy import update
+from sqlalchemy import select, update
 
-from app.store.answers import Answer, find_answer, keep_answer
+from app.store.answers import Answer, find_answer, forget_answers, keep_answer
 from app.store.job_models import AnswerModel
 from app.store.session import Store
 
 ANSWER = Answer("digest", 201, {"etag": '"a"', "content-type": "text/plain"}, b"\x00body" * 9)
 
 
-def keep(store: Store, key: str, actor: str, answer: Answer) -> None:
+def keep(store: Store, key: str, actor: str, answer: Answer) -> bool:
     with store.write() as session:
-        keep_answer(session, key, actor, answer)
+        return keep_answer(session, key, actor, answer)
 
 
 def find(store: Store, key: str, actor: str) -> Answer | None:
@@ -23,18 +23,33 @@ def find(store: Store, key: str, actor: str) -> Answer | None:
 
 class TestKeepAnswer:
     def test_the_first_one_stays(self, store: Store) -> None:
-        keep(store, "k", "ann", ANSWER)
-        keep(store, "k", "ann", Answer("other", 200, {}, b""))
+        assert keep(store, "k", "ann", ANSWER)
+        assert not keep(store, "k", "ann", Answer("other", 200, {}, b""))
         assert find(store, "k", "ann") == ANSWER
 
     def test_another_person_may_use_the_same_key(self, store: Store) -> None:
         keep(store, "k", "ann", ANSWER)
         assert find(store, "k", "bob") is None
 
-    def test_old_ones_are_forgotten(self, store: Store) -> None:
+    def test_an_old_one_is_none_and_gives_way(self, store: Store) -> None:
         keep(store, "old", "ann", ANSWER)
-        with store.write() as session:
-            session.execute(update(AnswerModel).values(at="2020-01-01T00:00:00"))
-        keep(store, "new", "ann", ANSWER)
+        age(store)
         assert find(store, "old", "ann") is None
-        assert find(store, "new", "ann") == ANSWER
+        other = Answer("other", 200, {}, b"")
+        assert keep(store, "old", "ann", other)
+        assert find(store, "old", "ann") == other
+
+
+class TestForgetAnswers:
+    def test_only_old_ones_go(self, store: Store) -> None:
+        keep(store, "old", "ann", ANSWER)
+        age(store)
+        keep(store, "new", "ann", ANSWER)
+        with store.write() as session:
+            forget_answers(session)
+            assert list(session.scalars(select(AnswerModel.key))) == ["new"]
+
+
+def age(store: Store) -> None:
+    with store.write() as session:
+        session.execute(update(AnswerModel).values(at="2020-01-01T00:00:00"))

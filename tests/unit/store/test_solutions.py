@@ -182,5 +182,9 @@ class TestSummary:
         assert (found.value, found.margin, found.error_px, found.min_jac) == (None,) * 4
 
     def test_comes_back_from_its_text(self, group, solution) -> None:
-        encoded = encode_solution(group, solution)
-        assert read_summary(encoded.summary) == summarize(group, solution)
+        summary = encode_solution(group, solution).summary
+        assert (
+            read_summary(value_codec.dumps(value_codec.to_json(summary)))
+            == summary
+            == summarize(group, solution)
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.review.editing.edit import IncludeView
-from app.review.editing.etags import read_etags, read_said
+from app.review.editing.etags import Head, read_etags, read_head
 from app.review.editing.state import GroupState
 from app.review.editing.submit import load, submit
 from app.review.importing.ingest import ingest
@@ -52,8 +52,11 @@ class TestReadEtags:
         assert list(etags_of(store, state.id, 99)) == [state.id]
 
 
-class TestReadSaid:
-    def test_is_the_first_part_of_the_etag(self, store: Store, state: GroupState) -> None:
+class TestReadHead:
+    def test_is_the_first_part_of_the_etag_and_the_policy(
+        self, store: Store, state: GroupState
+    ) -> None:
         with store.read() as session:
-            assert read_said(session, state.id) == state.etag.strip('"').partition("-")[0]
-            assert read_said(session, 99) is None
+            said = state.etag.strip('"').partition("-")[0]
+            assert read_head(session, state.id) == Head(said, state.policy.hash)
+            assert read_head(session, 99) is None

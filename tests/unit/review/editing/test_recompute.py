@@ -7,6 +7,7 @@ from multiprocessing import get_context
 import pytest
 from sqlalchemy import text
 
+from app.review.editing import recompute as module
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset, stale_groups
 from app.review.editing.submit import load, submit
@@ -78,8 +79,9 @@ class TestSolveDataset:
         assert stale_groups(store, "demo") == ids[4:]
         assert solve_dataset(store, "demo").solved == 2
 
-    def test_a_group_that_breaks_the_solver_stops_no_other(self, store, ids) -> None:
-        report = solve_dataset(store, "demo", solver=stumbling)
+    def test_a_group_that_breaks_the_solver_stops_no_other(self, store, ids, monkeypatch) -> None:
+        monkeypatch.setattr(module, "solve", stumbling)
+        report = solve_dataset(store, "demo")
         assert report.solved == 5
         assert report.failed == [("11", "ZeroDivisionError: frame 11")]
         assert stale_groups(store, "demo") == [ids[1]]
@@ -94,7 +96,7 @@ class TestSolveDataset:
             count = session.execute(text("SELECT count(*) FROM calibration")).scalar_one()
         assert count == 3
 
-    def test_a_change_under_way_leaves_the_group_stale(self, store, ids) -> None:
+    def test_a_change_under_way_leaves_the_group_stale(self, store, ids, monkeypatch) -> None:
         def change(group, policy, calibrations):
             if group.key == "12":
                 state = load(store, ids[2])
@@ -103,7 +105,8 @@ class TestSolveDataset:
                     submit(store, ids[2], edit, if_match=state.etag, actor="ann")
             return solve(group, policy, calibrations)
 
-        solve_dataset(store, "demo", solver=change)
+        monkeypatch.setattr(module, "solve", change)
+        solve_dataset(store, "demo")
         state = load(store, ids[2])
         assert state.solution == solve(state.group, state.policy)
         (row,) = list_groups(store, state.dataset_id, "key:12").items

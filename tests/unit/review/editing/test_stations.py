@@ -12,6 +12,7 @@ from app.review.editing.submit import load
 from app.review.queue.listing import list_groups
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.frames import ImagePoint
+from app.solving.solve import solve
 
 EDIT = SetStationLines({"Middle line": (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))})
 
@@ -57,9 +58,18 @@ class TestSubmitStation:
         with pytest.raises(StaleRevisionError):
             change(store, station, SetStationLines({"Circle central": None}))
 
-    def test_the_same_request_again_is_done_once(self, store, station) -> None:
-        first = change(store, station, idempotency_key="k")
-        assert change(store, station, idempotency_key="k") == first
+    def test_the_group_in_view_is_solved_and_kept_with_the_edit(self, store, ids, station) -> None:
+        kept = []
+
+        def keep(state):
+            return lambda session: kept.append((state, session.in_transaction()))
+
+        change(store, station, shown=ids[1], keep=keep)
+        ((shown, within),) = kept
+        assert within
+        assert shown == load(store, ids[1])
+        assert shown.solution == solve(shown.group, shown.policy)
+        assert load(store, ids[0]).solution is None
 
     def test_a_verdict_becomes_stale_and_is_kept(self, store, ids, station) -> None:
         state = load(store, ids[0])

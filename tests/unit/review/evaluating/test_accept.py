@@ -200,12 +200,6 @@ class TestAcceptBox:
         after = accept_box(store, view, box, if_match=cleared.etag, actor="bob", replace=True)
         assert after.group.view("7_1.png").ball.box == Box(20, 300, 14, 14)
 
-    def test_sent_again_it_counts_once(self, store, cleared, predictions) -> None:
-        view, box = cleared.view_ids["7.png"], self.box(store, cleared, 0.9)
-        for _ in range(2):
-            accept_box(store, view, box, if_match=cleared.etag, actor="bob", idempotency_key="once")
-        assert [entry.actor for entry in history(store, cleared.id)].count("bob") == 1
-
     def test_of_a_state_that_is_gone_it_is_refused(self, store, cleared, predictions) -> None:
         view, box = cleared.view_ids["7.png"], self.box(store, cleared, 0.9)
         accept_box(store, view, box, if_match=cleared.etag, actor="bob")

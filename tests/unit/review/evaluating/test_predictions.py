@@ -8,6 +8,7 @@ from sqlalchemy import delete, select
 
 from app.datasets.camera_json import camera_to_json
 from app.errors import ConflictError, InputError, NotFoundError
+from app.review.editing.state import read_record
 from app.review.editing.submit import load
 from app.review.evaluating.predictions import (
     PredictionFiles,
@@ -55,7 +56,8 @@ class TestAddPredictions:
         add_predictions(store, "demo", "yolo", files, actor="ann")
         assert load(store, state.id) == state
         with store.read() as session:
-            assert list(read_solutions(session, [state.solution_key])) == [state.id]
+            key = read_record(session, state.id).solution_key
+            assert list(read_solutions(session, [key])) == [state.id]
 
     def test_keeps_cameras(self, store, state, tmp_path, opposite) -> None:
         (tmp_path / "camera_7.json").write_text(json.dumps(camera_to_json(opposite)))

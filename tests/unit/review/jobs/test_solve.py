@@ -31,7 +31,7 @@ class TestRequestSolve:
     ) -> None:
         fill(make_group(7), make_group(8, shift=300.0), solved=False)
         found = get_dataset(store, "demo")
-        job = request_solve(jobs, store, found, actor="ann")
+        job = request_solve(jobs, store, found.id, actor="ann")
         assert (job.kind, job.dataset, job.result) == ("solve", "demo", None)
         done = jobs.wait(job.id, SECONDS)
         assert done.result == {
@@ -59,7 +59,7 @@ class TestRequestSolve:
         monkeypatch.setattr(solve_job, "WORTH_A_POOL", worth)
         fill(make_group(7), make_group(8), solved=False)
         jobs = Jobs(store, pool=pool)
-        job = request_solve(jobs, store, get_dataset(store, "demo"), actor="ann")
+        job = request_solve(jobs, store, get_dataset(store, "demo").id, actor="ann")
         assert jobs.wait(job.id, SECONDS).result["solved"] == 2
         assert len(pools) == made
         jobs.close()
@@ -70,7 +70,7 @@ class TestRequestSolve:
         fill(make_group(), solved=False)
         report = SolveReport(total=1, failed=[("a/7.png", "ValueError: odd")])
         monkeypatch.setattr(solve_job, "solve_dataset", lambda *_, **__: report)
-        job = request_solve(jobs, store, get_dataset(store, "demo"), actor="ann")
+        job = request_solve(jobs, store, get_dataset(store, "demo").id, actor="ann")
         result = jobs.wait(job.id, SECONDS).result
         assert result["failures"] == [{"group": "a/7.png", "problem": "ValueError: odd"}]
 
@@ -85,7 +85,7 @@ class TestRequestSolve:
         jobs.submit("bulk", "Slow", slow, actor="ann")
         assert started.wait(SECONDS)
         found = get_dataset(store, "demo")
-        ids = {request_solve(jobs, store, found, actor=name).id for name in ("ann", "bob")}
+        ids = {request_solve(jobs, store, found.id, actor=name).id for name in ("ann", "bob")}
         assert len(ids) == 1
         finish.set()
 
@@ -108,7 +108,7 @@ class TestSolveLeftovers:
         first = Jobs(store)
         with monkeypatch.context() as patch:
             patch.setattr(solve_job, "solve_dataset", stopping)
-            job = request_solve(first, store, get_dataset(store, "demo"), actor="ann")
+            job = request_solve(first, store, get_dataset(store, "demo").id, actor="ann")
             assert started.wait(SECONDS)
             first.close()
         second = Jobs(store)

@@ -1,15 +1,24 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
 import pytest
 
 from app.errors import InputError, StaleRevisionError
+from app.review.datasets.dataset import set_policy
 from app.review.editing.edit import SetBall
+from app.review.editing.state import GroupState
 from app.review.editing.submit import history, load, submit, undo
 from app.review.queue.listing import list_groups
+from app.review.verdicts import verdict as module
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
+from app.soccer.policy import PAPER
 from app.soccer.reasons import REASONS
+from app.store.session import Store
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 
@@ -107,7 +116,28 @@ class TestSetVerdict:
         with pytest.raises(StaleRevisionError):
             judge(store, state, "deferred", actor="ben")
 
-    def test_the_same_request_again_is_done_once(self, store, state) -> None:
-        first = judge(store, state, "accepted", idempotency_key="k")
-        assert judge(store, state, "accepted", idempotency_key="k") == first
-        assert len(history(store, state.id)) == 2
+    def test_is_one_read_and_one_durable_commit(
+        self, store: Store, state: GroupState, counted: Callable[..., Any]
+    ) -> None:
+        with counted(store) as cost:
+            judge(store, state, "accepted")
+        assert (cost.reads, cost.writes, cost.commits) == (1, 1, 1)
+        assert cost.statements <= 14
+
+    def test_answers_with_the_group_as_a_reader_gets_it(self, store, state) -> None:
+        after = judge(store, state, "rejected", "sides_confused")
+        assert load(store, state.id) == after
+
+    def test_another_policy_meanwhile_judges_the_verdict(self, store, state, monkeypatch) -> None:
+        read = module.read_solved
+
+        def slow(*arguments, **options):
+            found = read(*arguments, **options)
+            monkeypatch.setattr(module, "read_solved", read)
+            set_policy(store, state.dataset_id, replace(PAPER, min_baseline_m=500.0))
+            return found
+
+        monkeypatch.setattr(module, "read_solved", slow)
+        with pytest.raises(InputError, match="fails a gate"):
+            judge(store, state, "accepted")
+        assert len(history(store, state.id)) == 1

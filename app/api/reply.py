@@ -1,0 +1,91 @@
+"""Reply: the answer to a change, made once, kept in the transaction of its work, and sent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Generic, TypeVar
+
+from fastapi import Depends, Request
+from pydantic import BaseModel
+from sqlalchemy.orm import Session
+from starlette.responses import Response
+
+from app.errors import ConflictError
+from app.store.answers import Answer, Kept, keep_answer
+
+T = TypeVar("T")
+
+ASKED = "touchline.asked"
+"""Where a request's scope says under which key it was sent."""
+KEPT_HEADERS = ("content-type", "etag", "location", "cache-control")
+
+
+@dataclass
+class Asked:
+    """A request under an Idempotency-Key; ``kept`` once its answer is in the database."""
+
+    key: str
+    actor: str
+    digest: str
+    kept: bool = False
+
+
+class Reply(Generic[T]):
+    """The answer to one request.
+
+    Work is given ``keep`` and calls it in its own transaction, so that the answer is in the
+    database exactly when the work is.
+
+    Args:
+        asked: The key of the request, where it has one.
+        make: Makes the answer from what the work came to.
+
+    Attributes:
+        made: The answer that was kept, or None.
+    """
+
+    def __init__(self, asked: Asked | None, make: Callable[[T], Response]):
+        self._asked, self._make = asked, make
+        self.made: Response | None = None
+        self._of: T | None = None
+
+    def keep(self, outcome: T) -> Kept:
+        """Make the answer; what is returned writes it into a transaction."""
+        response = self._make(outcome)
+        self.made, self._of = response, outcome
+        return lambda session: self._save(session, response)
+
+    def of(self, outcome: T) -> Response:
+        """The answer to send: the one that was kept, or a new one where nothing was saved."""
+        return self.made if self.made and self._of is outcome else self._make(outcome)
+
+    def _save(self, session: Session, response: Response) -> None:
+        asked = self._asked
+        if asked is None:
+            return
+        if not keep_answer(session, asked.key, asked.actor, answer_of(asked.digest, response)):
+            raise ConflictError("this very request was answered meanwhile", hint="Send it again.")
+        asked.kept = True
+
+
+def answer_of(digest: str, response: Response) -> Answer:
+    """What is kept of an answer."""
+    headers = {name: response.headers[name] for name in KEPT_HEADERS if name in response.headers}
+    return Answer(digest, response.status_code, headers, bytes(response.body))
+
+
+def document(
+    content: BaseModel, status: int = 200, headers: dict[str, str] | None = None
+) -> Response:
+    """A document as it is sent."""
+    return Response(content.model_dump_json(), status, headers, "application/json")
+
+
+def get_asked(request: Request) -> Asked | None:
+    """The key under which a request was sent, or None."""
+    asked: Asked | None = request.scope.get(ASKED)
+    return asked
+
+
+AskedUnder = Annotated[Asked | None, Depends(get_asked)]
