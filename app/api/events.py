@@ -1,7 +1,7 @@
 """Events: what changed, told to every browser that listens.
 
-A thread of its own looks at the log while somebody listens, so that edits of other processes are
-told too and no request waits for it. Each listener has a bounded queue: one that does not keep up
+A thread of its own looks at the log while somebody listens, so that no request waits for it: when
+this process has committed, and from time to time for what others have. Each listener has a bounded queue: one that does not keep up
 is let go, comes back with the last id that it saw, and misses nothing.
 """
 
@@ -31,8 +31,10 @@ from app.store.session import Store
 
 log = structlog.get_logger("touchline.events")
 
-TICK = 0.15
-"""Seconds between two looks at the log."""
+PAUSE = 0.05
+"""Seconds between two looks at the log while commits follow each other."""
+POLL = 2.0
+"""Seconds until the log is looked at for what other processes have committed."""
 MAX_FEEDS = 100
 """Listeners at a time; a browser has one a window."""
 MAX_WAITING = 1000
@@ -103,6 +105,7 @@ class Events:
         self._thread: threading.Thread | None = None
         self._solutions = 0
         jobs.listen(self._tell_job)
+        store.listen(self._wake.set)
 
     def position(self) -> int:
         """Id of the newest entry of the log."""
@@ -153,20 +156,19 @@ class Events:
     def _tail(self) -> None:
         awake = False
         while not self._closing.is_set():
-            feeds = self._listening()
-            if not feeds:
+            if feeds := self._listening():
+                try:
+                    self._look(feeds, first=not awake)
+                    awake = True
+                except StorageError as error:
+                    log.warning("the log could not be read", error=str(error))
+                except Exception:
+                    log.exception("events could not be told")
+                self._closing.wait(PAUSE)
+            else:
                 awake = False
-                self._wake.wait()
-                self._wake.clear()
-                continue
-            try:
-                self._look(feeds, first=not awake)
-                awake = True
-            except StorageError as error:
-                log.warning("the log could not be read", error=str(error))
-            except Exception:
-                log.exception("events could not be told")
-            self._closing.wait(TICK)
+            self._wake.wait(POLL if feeds else None)
+            self._wake.clear()
 
     def _look(self, feeds: list[Feed], *, first: bool) -> None:
         """Tell each listener what has happened since it was told last."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from sqlalchemy import Engine, text
@@ -27,6 +27,7 @@ class Store:
         self._engine = engine
         self._writer = engine.execution_options(**WRITE)
         self._turn = threading.Lock()
+        self._listeners: list[Callable[[], None]] = []
 
     @staticmethod
     def open(settings: Settings) -> Store:
@@ -64,6 +65,12 @@ class Store:
             session.connection()
             yield session
             session.commit()
+        for listener in self._listeners:
+            listener()
+
+    def listen(self, listener: Callable[[], None]) -> None:
+        """Call a function after each commit of this process; it must be quick."""
+        self._listeners.append(listener)
 
     def close(self) -> None:
         """Close all connections."""

@@ -6,8 +6,9 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from typing import Any
+from unittest.mock import patch
 
 import httpx
 import pytest
@@ -21,6 +22,7 @@ from app.review.editing.edit import IncludeView
 from app.review.editing.submit import load, submit
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.policy import STRICT
+from app.store.session import Store
 
 SECONDS = 20
 EVENTS = "/api/v1/events"
@@ -97,6 +99,39 @@ class TestListen:
                     "actor": "bob",
                 },
             )
+
+    def test_a_commit_of_this_process_is_told_at_once_and_nothing_is_polled(
+        self, app, served, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "POLL", 3600.0)
+        store, (address, _) = app.state.services.store, served
+        with opened(address, dataset="broadcast") as stream:
+            for number, state in ((1, "deferred"), (2, "deferred"), (1, "unreviewed")):
+                etag = load(store, number).etag
+                set_verdict(store, number, state, if_match=etag, actor="bob")
+                assert stream.next()[1]["group"] == number
+
+    def test_what_another_process_commits_is_told_soon(
+        self, app, served, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "POLL", 0.1)
+        address, _ = served
+        with opened(address) as stream, closing(Store.open(app.state.services.settings)) as other:
+            set_policy(other, "static", STRICT, actor="bob")
+            assert stream.next()[1] == {"dataset": "static", "kind": "policy", "actor": "bob"}
+
+    def test_without_a_listener_nothing_is_read(self, app, served) -> None:
+        events, store = app.state.services.events, app.state.services.store
+        with opened(served[0]) as stream:
+            set_policy(store, "static", STRICT, actor="bob")
+            stream.next()
+        end = time.monotonic() + SECONDS
+        while events._feeds and time.monotonic() < end:
+            time.sleep(0.01)
+        with patch.object(events, "_look") as look:
+            set_policy(store, "broadcast", STRICT, actor="bob")
+            time.sleep(0.3)
+        assert not look.called
 
     def test_another_dataset_is_not_told_of(self, app, served) -> None:
         store, (address, _) = app.state.services.store, served
