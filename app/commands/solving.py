@@ -46,7 +46,7 @@ def solve(
 @commands.command()
 def findings(dataset: Dataset, json_: Json = False) -> None:
     """List what a person should look at."""
-    from app.api.findings import finding_values
+    from app.review.queue.findings import finding_values
 
     with opened_store() as store:
         values = list(finding_values(store, dataset))

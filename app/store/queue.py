@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from sqlalchemy import (
     BindParameter,
+    ColumnElement,
     Table,
     and_,
     bindparam,
@@ -23,7 +24,6 @@ from sqlalchemy import (
 from sqlalchemy.orm import Session
 from sqlalchemy.sql.dml import Update
 
-from app.soccer.solution import SOLVER_VERSION
 from app.store.groups import StoredGroup
 from app.store.models import (
     DatasetModel,
@@ -35,7 +35,7 @@ from app.store.models import (
     VerdictModel,
     ViewModel,
 )
-from app.store.solutions import read_summary
+from app.store.solutions import is_current, read_summary
 from app.store.summary import Summary
 from app.store.verdicts import StoredVerdict
 
@@ -143,15 +143,7 @@ def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, Summary | No
     statement = (
         select(*GroupModel.__table__.columns, SolutionModel.summary)
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(
-            SolutionModel,
-            and_(
-                SolutionModel.group_id == GroupModel.id,
-                SolutionModel.inputs_hash == GroupModel.inputs_hash,
-                SolutionModel.policy_hash == DatasetModel.policy_hash,
-                SolutionModel.solver_version == SOLVER_VERSION,
-            ),
-        )
+        .outerjoin(SolutionModel, is_current())
         .where(GroupModel.id.in_(ids))
     )
     return [
@@ -265,3 +257,30 @@ def _computed(summary: Summary | None, noticed: Sequence[str]) -> dict[str, Any]
 
 def _list(items: Sequence[str]) -> str:
     return f",{','.join(dict.fromkeys(items))}," if items else ""
+
+
+def count_with_findings(session: Session, dataset_id: int, kind: str | None) -> int:
+    """How many groups of a dataset have findings (of a kind)."""
+    statement = select(func.count()).select_from(QueueModel)
+    return session.scalar(statement.where(*_with_findings(dataset_id, kind))) or 0
+
+
+def groups_with_findings(
+    session: Session, dataset_id: int, kind: str | None, *, after: int, limit: int
+) -> list[int]:
+    """Ids of groups with findings (of a kind), by number, from the one after ``after``."""
+    statement = (
+        select(QueueModel.group_id)
+        .where(*_with_findings(dataset_id, kind), QueueModel.number > after)
+        .order_by(QueueModel.number)
+        .limit(limit)
+    )
+    return list(session.scalars(statement))
+
+
+def _with_findings(dataset_id: int, kind: str | None) -> list[ColumnElement[bool]]:
+    pattern = "," if kind is None else f",{kind},"
+    return [
+        QueueModel.dataset_id == dataset_id,
+        QueueModel.findings.contains(pattern, autoescape=True),
+    ]

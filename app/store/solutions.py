@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from sqlalchemy import bindparam, select
+from sqlalchemy import ColumnElement, and_, bindparam, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
@@ -17,7 +17,7 @@ from app.finite import json_text
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
 from app.store import value_codec
-from app.store.models import CalibrationModel, GroupModel, SolutionModel
+from app.store.models import CalibrationModel, DatasetModel, GroupModel, SolutionModel
 from app.store.summary import Summary, summarize
 
 _ELSEWHERE = Calibration(source="", camera=None)
@@ -34,6 +34,19 @@ _CALIBRATION = CalibrationModel.__table__
 _CALIBRATIONS = select(*_CALIBRATION.columns).where(
     _CALIBRATION.c.key.in_(bindparam("keys", expanding=True))
 )
+
+
+def is_current() -> ColumnElement[bool]:
+    """Whether a solution is that of its group's present state under its dataset's policy.
+
+    To join ``SolutionModel`` with, where ``GroupModel`` and ``DatasetModel`` are joined already.
+    """
+    return and_(
+        SolutionModel.group_id == GroupModel.id,
+        SolutionModel.inputs_hash == GroupModel.inputs_hash,
+        SolutionModel.policy_hash == DatasetModel.policy_hash,
+        SolutionModel.solver_version == SOLVER_VERSION,
+    )
 
 
 @dataclass(frozen=True)
@@ -208,3 +221,15 @@ def present_bodies(session: Session, ids: Sequence[int], policy_hash: str) -> di
         )
     )
     return {row.group_id: row.body for row in session.execute(statement)}
+
+
+def unsolved_groups(session: Session, dataset_id: int) -> list[int]:
+    """Ids of a dataset's groups without a solution for their present state, in order."""
+    statement = (
+        select(GroupModel.id)
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .outerjoin(SolutionModel, is_current())
+        .where(GroupModel.dataset_id == dataset_id, SolutionModel.id.is_(None))
+        .order_by(GroupModel.number)
+    )
+    return list(session.scalars(statement))

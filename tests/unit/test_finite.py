@@ -22,7 +22,6 @@ from pydantic import BaseModel
 
 import app
 import app.api.schemas as schemas
-from app.api.findings import GroupFindings
 from app.api.schemas.solution import SolutionDocument
 from app.commands.terminal import only_finite, print_json, print_values
 from app.datasets.export_record import ExportRecord
@@ -33,6 +32,7 @@ from app.evaluation.figure_csv import figure_csv
 from app.finite import finite, json_text
 from app.geometry.camera import Camera
 from app.review.exporting.formats import FORMATS, WriteOptions, write_format
+from app.review.queue.findings import GroupFindings
 from app.soccer.solution import BestBall, Finding, Fix, Gate, MarkingFit, Solution, Suspect
 from app.store.jobs import _text as job_text
 from app.store.value_codec import dumps, from_json, to_json

@@ -12,7 +12,7 @@ from app.api.deps import AppServices, Services, get_services
 from app.api.events import Feed, hello
 from app.api.problem import Responses, responses
 from app.api.security.requests import is_head
-from app.review.datasets.dataset import get_dataset
+from app.review.datasets.dataset import dataset_id
 
 router = APIRouter(prefix="/events", tags=["events"])
 
@@ -42,7 +42,7 @@ class Start:
             ),
         ] = None,
     ):
-        self.dataset_id = None if dataset is None else get_dataset(services.store, dataset).id
+        self.dataset_id = None if dataset is None else dataset_id(services.store, dataset)
         newest = services.events.position()
         seen = last_event_id or ""
         known = seen.isascii() and seen.isdigit() and len(seen) < 19 and int(seen) <= newest

@@ -22,7 +22,7 @@ from app.api.schemas.export import (
 )
 from app.api.schemas.job import JobDocument
 from app.errors import ConflictError, NotFoundError
-from app.review.datasets.dataset import get_dataset
+from app.review.datasets.dataset import dataset_id
 from app.review.jobs.exports import KIND, request_export
 from app.store.jobs import Job
 
@@ -75,7 +75,7 @@ def list_exports(
     cursor: Cursor = None,
 ) -> ExportPage:
     """Exports, the newest first, those under way and those that failed too."""
-    found = None if dataset is None else get_dataset(services.store, dataset).id
+    found = None if dataset is None else dataset_id(services.store, dataset)
     jobs = services.jobs.find(
         dataset_id=found, kinds=[KIND], before=parse_cursor(cursor), limit=limit + 1
     )

@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 
 from app.api.deps import AppStore, DatasetQuery
-from app.api.findings import count_groups, read_findings
 from app.api.problem import responses
 from app.api.schemas.queue import FindingList, FindingRow
 from app.errors import InputError
-from app.review.datasets.dataset import get_dataset
+from app.review.datasets.dataset import dataset_id
+from app.review.queue.findings import count_groups, read_findings
 from app.soccer.solution import FINDING_KINDS
 
 router = APIRouter(prefix="/findings", tags=["findings"])
@@ -31,12 +31,12 @@ def list_findings(
     ] = None,
 ) -> FindingList:
     """Findings by number of the group; `total` counts the groups that have some."""
-    found = get_dataset(store, dataset)
+    found = dataset_id(store, dataset)
     after = _number(cursor)
-    groups = read_findings(store, found.id, after=after, limit=limit, kind=kind)
+    groups = read_findings(store, found, after=after, limit=limit, kind=kind)
     rows = [FindingRow.of(group, finding) for group in groups for finding in group.findings]
     following = str(groups[-1].number) if len(groups) == limit else None
-    return FindingList(items=rows, next=following, total=count_groups(store, found.id, kind))
+    return FindingList(items=rows, next=following, total=count_groups(store, found, kind))
 
 
 def _number(cursor: str | None) -> int:

@@ -33,7 +33,7 @@ from app.api.schemas.queue import (
 from app.api.schemas.solution import SolutionDocument
 from app.api.schemas.verdict import VerdictEdit
 from app.errors import InputError, NotFoundError
-from app.review.datasets.dataset import get_dataset
+from app.review.datasets.dataset import dataset_id
 from app.review.editing import submit
 from app.review.editing.state import GroupState
 from app.review.queue import listing as queue
@@ -85,9 +85,9 @@ def list_groups(
     positions are those of this moment and move when groups come to match or match no more. Such a
     page has a `next` too.
     """
-    found = get_dataset(store, dataset)
+    found = dataset_id(store, dataset)
     try:
-        page = queue.list_groups(store, found.id, query, limit, cursor, start)
+        page = queue.list_groups(store, found, query, limit, cursor, start)
     except (OverflowError, UnicodeEncodeError) as error:
         # A forged cursor can hold what the database cannot.
         raise InputError("the cursor is none of ours", pointer="/cursor") from error
@@ -110,7 +110,7 @@ def list_group_ids(
 
     What `id:12,15,19` in a query takes, and what a loop over a whole dataset needs.
     """
-    found = queue.list_ids(store, get_dataset(store, dataset).id, query, limit, start)
+    found = queue.list_ids(store, dataset_id(store, dataset), query, limit, start)
     return GroupIds(ids=list(found.ids), total=found.total)
 
 

@@ -10,7 +10,7 @@ from app.api.deps import AppServices, Id
 from app.api.problem import responses
 from app.api.schemas.job import JobDocument, JobKind, JobPage, JobState
 from app.errors import InputError
-from app.review.datasets.dataset import get_dataset
+from app.review.datasets.dataset import dataset_id
 from app.store.jobs import Job
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
@@ -32,7 +32,7 @@ def list_jobs(
     cursor: Cursor = None,
 ) -> JobPage:
     """Jobs, the newest first."""
-    found = None if dataset is None else get_dataset(services.store, dataset).id
+    found = None if dataset is None else dataset_id(services.store, dataset)
     jobs = services.jobs.find(
         dataset_id=found,
         kinds=[kind] if kind else [],

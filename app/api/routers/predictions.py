@@ -9,7 +9,6 @@ from fastapi import APIRouter, Query, Response
 from app.api.conflicts import current_state
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, IfMatch
 from app.api.jobs import ACCEPTED, accepted
-from app.api.lookup import find_view
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply
 from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document
@@ -27,6 +26,7 @@ from app.api.schemas.prediction import (
     size_of,
 )
 from app.config import Settings
+from app.review.editing.places import find_view
 from app.review.evaluating import predictions as review
 from app.review.evaluating.accept import accept, accept_box, plan_accept
 from app.review.evaluating.group_predictions import group_predictions

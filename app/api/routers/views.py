@@ -18,7 +18,6 @@ from app.api.deps import (
     IfMatch,
     etag_matches,
 )
-from app.api.lookup import FoundView, find_view
 from app.api.problem import Responses, responses
 from app.api.reply import Asked, AskedUnder, Reply
 from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document
@@ -28,6 +27,7 @@ from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.editing.edit import Edit, IncludeView, SetBall, SetCalibrationSource, SetLines
+from app.review.editing.places import FoundView, find_view
 from app.review.editing.submit import submit_view
 from app.soccer.group import Media
 from app.store.media import content_type, read_frame

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,7 +97,12 @@ def get_dataset(store: Store, dataset: str | int) -> Dataset:
 def dataset_id(store: Store, dataset: str | int) -> int:
     """The id of a dataset; raises NotFoundError when there is none."""
     with store.read() as session:
-        row = find_dataset(session, dataset)
+        return need_dataset(session, dataset)
+
+
+def need_dataset(session: Session, dataset: str | int) -> int:
+    """``dataset_id`` within a session."""
+    row = find_dataset(session, dataset)
     if row is None:
         raise NotFoundError(f'there is no dataset "{dataset}"')
     return int(row.id)
@@ -146,13 +151,17 @@ def _policy_values(policy: Policy) -> dict[str, str]:
     return {"policy": canonical(policy_to_json(policy)), "policy_hash": policy.hash}
 
 
-def _datasets(session: Session, rows: Iterable[Any]) -> list[Dataset]:
-    statement = select(
-        QueueModel.dataset_id,
-        QueueModel.status,
-        func.count(),
-        func.sum(cast(QueueModel.solved, Integer)),
-    ).group_by(QueueModel.dataset_id, QueueModel.status)
+def _datasets(session: Session, rows: Sequence[Any]) -> list[Dataset]:
+    statement = (
+        select(
+            QueueModel.dataset_id,
+            QueueModel.status,
+            func.count(),
+            func.sum(cast(QueueModel.solved, Integer)),
+        )
+        .where(QueueModel.dataset_id.in_([row.id for row in rows]))
+        .group_by(QueueModel.dataset_id, QueueModel.status)
+    )
     states: dict[int, Counter[str]] = {}
     for dataset_id, status, groups, solved in session.execute(statement):
         counts = states.setdefault(dataset_id, Counter())

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import and_, bindparam, func, select
+from sqlalchemy import bindparam, func, select
 from sqlalchemy.orm import Session
 
 from app.errors import NotFoundError, StaleRevisionError
@@ -15,6 +15,7 @@ from app.store.codecs import parse
 from app.store.digest import digest
 from app.store.models import DatasetModel, GroupModel, SolutionModel, VerdictModel
 from app.store.queue import import_findings
+from app.store.solutions import is_current
 
 _NEWEST = (
     select(func.max(VerdictModel.id))
@@ -124,15 +125,7 @@ def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
             _NEWEST,
         )
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(
-            SolutionModel,
-            and_(
-                SolutionModel.group_id == GroupModel.id,
-                SolutionModel.inputs_hash == GroupModel.inputs_hash,
-                SolutionModel.policy_hash == DatasetModel.policy_hash,
-                SolutionModel.solver_version == SOLVER_VERSION,
-            ),
-        )
+        .outerjoin(SolutionModel, is_current())
         .where(GroupModel.id.in_(group_ids))
     )
     noticed = import_findings(session, group_ids)

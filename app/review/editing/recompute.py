@@ -9,22 +9,22 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
-from sqlalchemy import and_, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from app.review.datasets.dataset import Dataset, get_dataset, read_dataset
+from app.review.datasets.dataset import Dataset, get_dataset, need_dataset, read_dataset
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.encode import encode
 from app.review.editing.known import calibration_keys
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.soccer.solution import SOLVER_VERSION, Calibration
+from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.solve import solve
 from app.store.codecs import group_from_json, group_to_json, pack, unpack
 from app.store.groups import read_groups, read_stations
-from app.store.models import DatasetModel, GroupModel, SolutionModel, StationModel, ViewModel
+from app.store.models import GroupModel, StationModel, ViewModel
 from app.store.queue import refresh_queue
 from app.store.session import Store
 from app.store.solutions import (
@@ -35,6 +35,7 @@ from app.store.solutions import (
     insert_calibrations,
     insert_solutions,
     read_calibration_bodies,
+    unsolved_groups,
 )
 
 CHUNK = 40
@@ -77,7 +78,7 @@ class Result:
 def stale_groups(store: Store, dataset: str | int) -> list[int]:
     """Ids of groups without a solution for their present state, policy and solver, in order."""
     with store.read() as session:
-        return _stale(session, read_dataset(session, dataset).id)
+        return unsolved_groups(session, need_dataset(session, dataset))
 
 
 def solve_dataset(
@@ -148,25 +149,6 @@ def _task(store: Store, dataset: Dataset, ids: Sequence[int]) -> Task:
         for item in stored
     )
     return Task(groups, policy, known)
-
-
-def _stale(session: Session, dataset_id: int) -> list[int]:
-    statement = (
-        select(GroupModel.id)
-        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(
-            SolutionModel,
-            and_(
-                SolutionModel.group_id == GroupModel.id,
-                SolutionModel.inputs_hash == GroupModel.inputs_hash,
-                SolutionModel.policy_hash == DatasetModel.policy_hash,
-                SolutionModel.solver_version == SOLVER_VERSION,
-            ),
-        )
-        .where(GroupModel.dataset_id == dataset_id, SolutionModel.id.is_(None))
-        .order_by(GroupModel.number)
-    )
-    return list(session.scalars(statement))
 
 
 def _calibrate_shared(store: Store, dataset: Dataset) -> None:

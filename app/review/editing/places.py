@@ -1,14 +1,12 @@
-"""From the id in an address to the group, view or station that it means."""
+"""Places: from the id of a view to the group that it belongs to and where its frame lies."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sqlalchemy import select
-
 from app.errors import NotFoundError
 from app.soccer.group import Media
-from app.store.models import GroupModel, StationModel, ViewModel
+from app.store.groups import view_row
 from app.store.session import Store
 
 
@@ -32,24 +30,8 @@ def find_view(store: Store, view_id: int) -> FoundView:
     Raises:
         NotFoundError: There is none.
     """
-    statement = (
-        select(
-            ViewModel.group_id,
-            ViewModel.key,
-            ViewModel.media_path,
-            ViewModel.media_member,
-            ViewModel.media_frame,
-            StationModel.flipped,
-            StationModel.width,
-            StationModel.shared,
-            GroupModel.key.label("group_key"),
-        )
-        .join(StationModel, StationModel.id == ViewModel.station_id)
-        .join(GroupModel, GroupModel.id == ViewModel.group_id)
-        .where(ViewModel.id == view_id)
-    )
     with store.read() as session:
-        row = session.execute(statement).one_or_none()
+        row = view_row(session, view_id)
     if row is None:
         raise NotFoundError(f"there is no view {view_id}")
     media = None

@@ -6,13 +6,11 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, func, select
-
-from app.review.datasets.dataset import get_dataset
+from app.review.datasets.dataset import dataset_id
 from app.review.editing.state import GroupState, read_states
 from app.soccer.group import Group
 from app.soccer.solution import Finding
-from app.store.models import QueueModel
+from app.store.queue import count_with_findings, groups_with_findings
 from app.store.session import Store
 
 BATCH = 100
@@ -38,42 +36,27 @@ class GroupFindings:
 
 def count_groups(store: Store, dataset_id: int, kind: str | None) -> int:
     """How many groups of a dataset have findings (of a kind)."""
-    statement = select(func.count()).select_from(QueueModel).where(*_where(dataset_id, kind))
     with store.read() as session:
-        return int(session.execute(statement).scalar_one())
+        return count_with_findings(session, dataset_id, kind)
 
 
 def read_findings(
     store: Store, dataset_id: int, *, after: int = 0, limit: int, kind: str | None = None
 ) -> list[GroupFindings]:
     """Findings of up to ``limit`` groups, by number of the group, from the one after ``after``."""
-    statement = (
-        select(QueueModel.group_id)
-        .where(*_where(dataset_id, kind), QueueModel.number > after)
-        .order_by(QueueModel.number)
-        .limit(limit)
-    )
     with store.read() as session:
-        states = read_states(session, list(session.scalars(statement)))
+        ids = groups_with_findings(session, dataset_id, kind, after=after, limit=limit)
+        states = read_states(session, ids)
     return [_group_findings(state, kind) for state in states]
 
 
 def finding_values(store: Store, dataset: str) -> Iterator[dict[str, Any]]:
     """Every finding of a dataset as plain values, in batches, so that memory does not grow."""
-    found = get_dataset(store, dataset)
-    after = 0
-    while groups := read_findings(store, found.id, after=after, limit=BATCH):
+    found, after = dataset_id(store, dataset), 0
+    while groups := read_findings(store, found, after=after, limit=BATCH):
         after = groups[-1].number
         for group in groups:
             yield from group.values
-
-
-def _where(dataset_id: int, kind: str | None) -> list[ColumnElement[bool]]:
-    pattern = "," if kind is None else f",{kind},"
-    return [
-        QueueModel.dataset_id == dataset_id,
-        QueueModel.findings.contains(pattern, autoescape=True),
-    ]
 
 
 def _group_findings(state: GroupState, kind: str | None) -> GroupFindings:
