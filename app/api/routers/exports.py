@@ -63,7 +63,7 @@ def make_export(
 
 
 def _export_answer(job: Job) -> Response:
-    started = ExportJobDocument.of_export(JobDocument.of(job))
+    started = ExportJobDocument.of_export(JobDocument.model_validate(job))
     return document(started, 202, job_address(job))
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 from pydantic import Field
 
-from app.api.findings import GroupFindings
 from app.api.schemas.document import Document
 from app.api.schemas.group import State, image_address
 from app.api.schemas.solution import FailingGate, FindingDocument, FixDocument, OfferDocument
+from app.review.queue.findings import GroupFindings
 from app.review.queue.listing import GroupRow as QueueRow
 from app.soccer.solution import Finding
 from app.store.log import LogEntry
