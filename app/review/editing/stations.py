@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from app.errors import ConflictError, NotFoundError
 from app.review.editing.codec import edit_to_json, station_edit_from_json
 from app.review.editing.edit import StationEdit, with_station
+from app.review.editing.encode import encode
 from app.review.editing.known import known_calibrations
 from app.review.editing.state import (
     GroupState,
