@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from sqlalchemy import ColumnElement, func, not_, or_, select
+from sqlalchemy import ColumnElement, false, func, not_, or_, select
 from sqlalchemy.orm import Session
 
 from app.store.models import LogModel, QueueModel
 
 _CURRENT = not_(QueueModel.stale)
-_QUALIFIES = or_(QueueModel.passes.is_(True), QueueModel.override == QueueModel.gate)
+_OVERRIDDEN = func.coalesce(QueueModel.override == QueueModel.gate, false())
 """An override speaks of the gate that failed then, of no other that fails now."""
+_QUALIFIES = or_(QueueModel.passes.is_(True), _OVERRIDDEN)
 
 
 def newest_word(session: Session, dataset_id: int) -> str | None:

@@ -19,6 +19,7 @@ class TestExportedGroups:
             ({"solved": False}, {"unsolved": 1}),
             ({"passes": False, "gate": "jac", "override": "jac"}, {}),
             ({"passes": False, "gate": "jac", "override": "tau"}, {"failing": 1}),
+            ({"passes": False, "gate": "jac", "override": None}, {"failing": 1}),
         ],
     )
     def test_an_accepted_group_goes_out_or_says_why_not(self, filled, values, left_out) -> None:
