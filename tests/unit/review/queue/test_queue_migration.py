@@ -24,6 +24,8 @@ def as_before(store: Store) -> None:
     """Take back what migration 0005 does, and what came after it."""
     with store.write() as session:
         session.execute(text("DROP TABLE version_check"))
+        session.execute(text("ALTER TABLE solution DROP COLUMN facts"))
+        session.execute(text("CREATE TABLE idempotency (key TEXT)"))
         session.execute(text("ALTER TABLE view DROP COLUMN left_out"))
         for name in (*PLACES, "pictures"):
             session.execute(text(f"ALTER TABLE queue DROP COLUMN {name}"))

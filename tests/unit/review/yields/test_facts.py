@@ -16,7 +16,8 @@ def wanted(store: Store) -> list[Wanted]:
     """Every solution there is, the oldest first."""
     columns = (SolutionModel.group_id, SolutionModel.inputs_hash, SolutionModel.id)
     with store.read() as session:
-        return [Wanted(*row) for row in session.execute(select(*columns)).all()]
+        rows = session.execute(select(*columns).order_by(SolutionModel.id))
+        return [Wanted(*row) for row in rows]
 
 
 @pytest.fixture(params=["kept", "not kept"])
