@@ -22,10 +22,11 @@ export async function request(path, options) {
 }
 
 /**
- * The same with the ETag of what was answered, for what is replaced as a whole.
+ * The same with the ETag of what was answered, for what is replaced as a whole, and whether it is
+ * what an earlier sending of the same request was answered.
  *
  * @param {string} path @param {RequestOptions} [options]
- * @returns {Promise<{json: any, etag: string}>}
+ * @returns {Promise<{json: any, etag: string, replayed: boolean}>}
  */
 export async function requestTagged(path, { method = 'GET', body, etag, key, signal } = {}) {
 	/** @type {Record<string, string>} */
@@ -44,7 +45,8 @@ export async function requestTagged(path, { method = 'GET', body, etag, key, sig
 	}
 	const json = await response.json().catch(() => null);
 	if (!response.ok) throw new ApiError(response.status, json);
-	return { json, etag: response.headers.get('etag') ?? '' };
+	const { headers: said } = response;
+	return { json, etag: said.get('etag') ?? '', replayed: said.get('idempotency-replayed') === 'true' };
 }
 
 /** A frame, as it lies on the server. @param {string} url absolute @returns {Promise<Blob>} */

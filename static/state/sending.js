@@ -3,7 +3,7 @@
 
 import { computed, signal } from '@preact/signals';
 
-import { request } from '../api/client.js';
+import { getGroup, requestTagged } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
 import { adopt, claimTab, outbox } from './outbox.js';
 
@@ -77,7 +77,9 @@ export async function wake() {
 async function send({ id, path, method, body, etag, ...rest }) {
 	const item = { id, path, method, body, etag, ...rest };
 	try {
-		const answer = await request(path, { method, body, etag, key: id });
+		const { json, replayed } = await requestTagged(path, { method, body, etag, key: id });
+		// What an earlier page was answered is old by now.
+		const answer = replayed ? await getGroup(item.group) : json;
 		isAway.value = false;
 		wasRefused.value = false;
 		savedAt.value = Date.now();

@@ -65,6 +65,33 @@ class TestOutbox:
         assert screen.document()["views"][0]["balls"][0]["box"][0] == box[0] - 5
         leave_as_found(page, [], edited=chain[0])
 
+    def test_an_answer_that_comes_again_brings_nothing_old_back(
+        self, open_page: OpenPage, console: Any
+    ) -> None:
+        screen, chain = at_last_groups(open_page, console)
+        page = screen.page
+
+        def occluded() -> bool:
+            return bool(screen.document()["views"][0]["balls"][0]["occluded"])
+
+        before = occluded()
+        # The server hears of the edit, the page never of its answer.
+        page.route("**/api/v1/views/**", lambda route: route.fetch() and None)
+        screen.press("1", "q")
+        while occluded() == before:
+            page.wait_for_timeout(50)
+        present = page.request.get(f"/api/v1/groups/{chain[0]}")
+        undo = {"If-Match": present.headers["etag"]}
+        assert page.request.post(f"/api/v1/groups/{chain[0]}/undo", headers=undo).ok
+        page.unroute_all()
+        page.reload()
+        screen.saved()
+        assert occluded() == before
+        screen.press("1", "q")
+        screen.saved()
+        assert occluded() != before
+        leave_as_found(page, [], edited=chain[0])
+
     def test_an_unsent_edit_can_be_undone(self, open_page: OpenPage, console: Any) -> None:
         screen, _ = at_last_groups(open_page, console)
         page = screen.page
