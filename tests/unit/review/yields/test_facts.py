@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sqlalchemy import select
+from sqlalchemy import select, text, update
 
 from app.review.editing.edit import SetBall
 from app.review.editing.submit import load, submit
@@ -20,12 +20,20 @@ def wanted(store: Store) -> list[Wanted]:
         return [Wanted(*row) for row in rows]
 
 
+def forget_facts(store: Store) -> None:
+    """Leave the solutions as they were before facts were kept beside them."""
+    with store.write() as session:
+        session.execute(text("DROP TRIGGER solution_refuses_update"))
+        session.execute(update(SolutionModel).values(facts=None))
+
+
 @pytest.fixture(params=["kept", "not kept"])
-def solved(request, store, fill, make_group, make_static, monkeypatch) -> list[int]:
+def solved(request, store, fill, make_group, make_static) -> list[int]:
     """Groups solved with facts beside their solutions, or as before there were any."""
+    groups: list[int] = fill(make_group(7), make_static(10), make_group(8))
     if request.param == "not kept":
-        monkeypatch.setattr("app.review.editing.encode.facts_to_bytes", lambda _facts: None)
-    return fill(make_group(7), make_static(10), make_group(8))
+        forget_facts(store)
+    return groups
 
 
 class TestReadFacts:
@@ -49,12 +57,12 @@ class TestReadFacts:
         assert table.group_id.tolist() == [solved[0]]
 
     def test_facts_that_were_not_kept_are_made_only_for_the_group_as_it_is(
-        self, store, fill, make_group, monkeypatch
+        self, store, fill, make_group
     ) -> None:
-        monkeypatch.setattr("app.review.editing.encode.facts_to_bytes", lambda _facts: None)
         (group,) = fill(make_group(7))
         edit = SetBall("7.png", None)
         submit(store, group, edit, if_match=load(store, group).etag, actor="ann")
         before, after = wanted(store)
+        forget_facts(store)
         assert read_facts(store, [before]).groups == 0
         assert read_facts(store, [after]).group_id.tolist() == [group]
