@@ -5,15 +5,12 @@ from __future__ import annotations
 import shutil
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from fastapi import FastAPI
-from sqlalchemy import event
 from starlette.types import ASGIApp
 
 from app.api.application import create_app
@@ -184,40 +181,3 @@ def app(only_app: FastAPI, prepared_home: Path, tmp_path: Path) -> Iterator[Fast
 def api(app: FastAPI, client_of) -> TestClient:
     """A client of the whole application."""
     return client_of(app)
-
-
-@dataclass
-class Cost:
-    """What went to the database: transactions of either kind, commits of writes, statements."""
-
-    reads: int = 0
-    writes: int = 0
-    commits: int = 0
-    statements: int = 0
-
-
-@pytest.fixture
-def counted() -> Callable[[Store], AbstractContextManager[Cost]]:
-    """Counts what goes to a database: ``with counted(store) as cost``."""
-
-    @contextmanager
-    def run(store: Store) -> Iterator[Cost]:
-        cost, engine = Cost(), store._engine
-
-        def execute(_connection: Any, _cursor: Any, statement: str, *_: Any) -> None:
-            cost.reads += statement == "BEGIN"
-            cost.writes += statement == "BEGIN IMMEDIATE"
-            cost.statements += not statement.startswith("BEGIN")
-
-        def commit(connection: Any) -> None:
-            cost.commits += bool(connection.get_execution_options().get("touchline_write"))
-
-        event.listen(engine, "before_cursor_execute", execute)
-        event.listen(engine, "commit", commit)
-        try:
-            yield cost
-        finally:
-            event.remove(engine, "before_cursor_execute", execute)
-            event.remove(engine, "commit", commit)
-
-    return run

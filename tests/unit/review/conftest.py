@@ -5,8 +5,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, closing, contextmanager
-from dataclasses import dataclass
+from contextlib import closing
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 import pysqlite3.dbapi2 as sqlite
 import pytest
-from sqlalchemy import event, select
+from sqlalchemy import select
 
 from app.config import Settings
 from app.geometry.camera import Camera
@@ -247,40 +246,3 @@ def state(store: Store, fill: Fill, make_group: MakeGroup) -> GroupState:
 def opposite() -> Camera:
     """A camera on the far side of the pitch."""
     return OPPOSITE
-
-
-@dataclass
-class Cost:
-    """What went to the database: transactions of either kind, commits of writes, statements."""
-
-    reads: int = 0
-    writes: int = 0
-    commits: int = 0
-    statements: int = 0
-
-
-@pytest.fixture
-def counted() -> Callable[[Store], AbstractContextManager[Cost]]:
-    """Counts what goes to a database: ``with counted(store) as cost``."""
-
-    @contextmanager
-    def run(store: Store) -> Iterator[Cost]:
-        cost, engine = Cost(), store._engine
-
-        def execute(_connection: Any, _cursor: Any, statement: str, *_: Any) -> None:
-            cost.reads += statement == "BEGIN"
-            cost.writes += statement == "BEGIN IMMEDIATE"
-            cost.statements += not statement.startswith("BEGIN")
-
-        def commit(connection: Any) -> None:
-            cost.commits += bool(connection.get_execution_options().get("touchline_write"))
-
-        event.listen(engine, "before_cursor_execute", execute)
-        event.listen(engine, "commit", commit)
-        try:
-            yield cost
-        finally:
-            event.remove(engine, "before_cursor_execute", execute)
-            event.remove(engine, "commit", commit)
-
-    return run
