@@ -8,6 +8,8 @@ import { markShare } from './sizes.js';
 /** @import {ImagePoint, Viewport} from '../geometry/viewport.js' */
 /** @typedef {{colour: string, width: number, dash?: number[], halo?: boolean, closed?: boolean}} Stroke */
 
+/** Captions and tools stand along the upper border of a panel, CSS pixels. */
+export const UPPER_BORDER = 48;
 /** Thinner lines are not told apart by their colour, CSS pixels. */
 const THINNEST = 1.1;
 /** Below this share words are smaller too. */

@@ -5,7 +5,7 @@ import { gradeOfResidual } from '../geometry/residual.js';
 import { toScreen } from '../geometry/viewport.js';
 import { colours } from '../lib/colours.js';
 import { fixed } from '../lib/format.js';
-import { label, shareOf, strokeLine } from './pen.js';
+import { label, shareOf, strokeLine, UPPER_BORDER } from './pen.js';
 
 /** @import {Scene} from './scene.js' */
 
@@ -13,8 +13,6 @@ const RADIUS = 3.4;
 const SHORTEST_WHISKER = 2;
 /** Longer than this a whisker shows its residual as it is: it is seen well enough, CSS pixels. */
 const LONG_WHISKER = 40;
-/** Captions and tools stand there, CSS pixels. */
-const UPPER_BORDER = 48;
 
 /** From the projected line through the annotated point, `gain` times as long as it is where it would else be hard to see. */
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */

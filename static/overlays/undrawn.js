@@ -5,7 +5,7 @@ import { piecesOf } from '../geometry/polyline.js';
 import { toScreen } from '../geometry/viewport.js';
 import { colours } from '../lib/colours.js';
 import { shortMarking } from '../lib/format.js';
-import { heightOf, label, strokeLines, widthOf } from './pen.js';
+import { heightOf, label, strokeLines, UPPER_BORDER, widthOf } from './pen.js';
 
 /** @import {Scene} from './scene.js' */
 
@@ -14,8 +14,6 @@ const STUB = 24;
 const RING = 13;
 /** Of words from the line, CSS pixels. */
 const BESIDE = 22;
-/** Captions and tools stand there, CSS pixels. */
-const UPPER_BORDER = 48;
 /** Panels narrower than this have no room for names. */
 const ROOMY = 420;
 

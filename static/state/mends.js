@@ -125,7 +125,7 @@ export const mendIndex = computed(() => Math.min(chosen.value, mends.value.lengt
 export const mend = computed(() => mends.value[mendIndex.value] ?? null);
 
 /** The finding that the card speaks about; null where it speaks of something else. */
-export const told = computed(() => {
+export const toldFinding = computed(() => {
 	const findings = solution.value?.findings ?? [];
 	const meant = mend.value;
 	if (!meant?.title) return findings[0] ?? null;

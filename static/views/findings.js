@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 
 import { findingTitle } from '../state/advice.js';
-import { mends, told } from '../state/mends.js';
+import { mends, toldFinding } from '../state/mends.js';
 import { focusView } from '../state/workspace.js';
 import { Letter } from './letter.js';
 import { carryOut } from './mend_actions.js';
@@ -33,7 +33,7 @@ function Finding({ group, finding }) {
 
 /** @param {{group: GroupDocument, solution: SolutionJson}} props */
 export function Findings({ group, solution }) {
-	const findings = solution.findings.filter((finding) => finding !== told.value);
+	const findings = solution.findings.filter((finding) => finding !== toldFinding.value);
 	if (findings.length === 0) return null;
 	const more = findings.length < solution.findings.length;
 	return html`

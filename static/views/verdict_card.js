@@ -6,7 +6,7 @@ import { html } from 'htm/preact';
 import { ballOf } from '../geometry/preview.js';
 import { capital, words } from '../lib/format.js';
 import { findingTitle } from '../state/advice.js';
-import { mend, told } from '../state/mends.js';
+import { mend, toldFinding } from '../state/mends.js';
 import { REASONS } from '../state/reasons.js';
 import { isBlind } from '../state/verdicts.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
@@ -82,12 +82,12 @@ function spread(solution) {
 
 /** Drawn lines that the cameras do without, red in the pictures though nothing fails. @param {GroupDocument} group @param {SolutionJson} solution */
 function unused(group, solution) {
-	const told = group.views.flatMap((view) => {
+	const sentences = group.views.flatMap((view) => {
 		const markings = solution.views.find((one) => one.view === view.key)?.calibration.markings ?? [];
 		const names = markings.filter(({ marking, used, outcome }) => view.lines[marking] && (!used || outcome !== 'tp')).map(({ marking }) => `“${marking}”`);
 		return names.length ? [`${names.join(' and ')} of ${view.letter} ${names.length > 1 ? 'do' : 'does'} not fit, which fails no gate: its row under Lines leads to the point.`] : [];
 	});
-	return told.join(' ');
+	return sentences.join(' ');
 }
 
 /** @param {VerdictJson} verdict */
@@ -102,7 +102,7 @@ function verdictText({ state, reason, note, by }) {
 /** @param {{group: GroupDocument, solution: SolutionJson | null, live: boolean}} props */
 export function VerdictCard({ group, solution, live }) {
 	const { tone, over, title, text } = headline(group, solution, mend.value);
-	const sure = told.value?.confidence ?? null;
+	const sure = toldFinding.value?.confidence ?? null;
 	const { verdict } = group;
 	return html`
 		<section class="card verdict-card" data-tone=${tone === 'ok' && isBlind(group) ? 'warn' : tone} data-live=${live} aria-label="Result">
