@@ -1,8 +1,9 @@
 """Events: what changed, told to every browser that listens.
 
 A thread of its own looks at the log while somebody listens, so that no request waits for it: when
-this process has committed, and from time to time for what others have. Each listener has a bounded queue: one that does not keep up
-is let go, comes back with the last id that it saw, and misses nothing.
+this process has committed, and from time to time for what others have. Each listener has a bounded
+queue: one that does not keep up is let go, comes back with the last id that it saw, and misses
+nothing.
 """
 
 from __future__ import annotations
