@@ -15,6 +15,7 @@ TITLES: Mapping[int, tuple[str, str]] = {
     403: ("forbidden", "Another site sent this request"),
     404: ("not-found", "There is no such thing"),
     405: ("method-not-allowed", "This resource does not do that"),
+    408: ("timeout", "The request did not come in time"),
     409: ("conflict", "The request does not fit the present state"),
     412: ("stale", "Somebody else changed it first"),
     413: ("too-large", "The request is too large"),

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 import uvicorn
 from fastapi import FastAPI
 
+from app.api.connections import Connection
 from app.errors import InputError
 
 
@@ -63,7 +64,10 @@ def run(app: FastAPI, server: socket.socket) -> None:
     """Serve until the process is told to stop."""
     config = uvicorn.Config(
         app,
-        log_level="warning",
+        http=Connection,
+        ws="none",
+        # What a stranger sends must not fill the log: malformed bytes are answered, not logged.
+        log_level="error",
         access_log=False,
         server_header=False,
         # Nobody stands in front of a local server: forwarded addresses would be invented.
