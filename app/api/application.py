@@ -6,13 +6,16 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+from anyio.to_thread import current_default_thread_limiter
 from fastapi import FastAPI
 
 from app.api.deps import LOCAL_USER, Services
 from app.api.errors import install_handlers
 from app.api.idempotency import Idempotency
+from app.api.metrics import install_metrics
 from app.api.openapi import describe
 from app.api.pages import install_pages
+from app.api.request_log import RequestLog
 from app.api.routers import (
     bulk,
     datasets,
@@ -41,8 +44,9 @@ from app.api.routers import (
 from app.api.security.bodies import MAX_JSON_BYTES, JsonBodies
 from app.api.security.failures import Failures
 from app.api.security.headers import SecurityHeaders
+from app.api.security.lanes import THREADS, Gates, Lanes
 from app.api.security.origin import KnownHosts, SameOrigin
-from app.api.security.requests import HeadAsGet, OneRange
+from app.api.security.requests import HeadAsGet, OneLength, OneRange
 from app.api.site import STATIC, Site
 from app.config import Settings
 from app.datasets.manifest import software_version
@@ -116,7 +120,9 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None =
 
 def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
     """The first one added is the innermost."""
+    gates = Gates()
     app.add_middleware(Idempotency, actor=LOCAL_USER)
+    app.add_middleware(Lanes, gates=gates)
     app.add_middleware(OneRange)
     app.add_middleware(HeadAsGet)
     app.add_middleware(
@@ -124,15 +130,18 @@ def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
         max_bytes=min(MAX_JSON_BYTES, settings.max_upload_bytes),
         streamed=frozenset({f"{PREFIX}/uploads"}),
     )
+    app.add_middleware(OneLength)
     app.add_middleware(SameOrigin)
     app.add_middleware(KnownHosts, allowed=settings.allowed_hosts)
-    health.install_metrics(app)
+    install_metrics(app, gates)
     app.add_middleware(Failures)
+    app.add_middleware(RequestLog)
     app.add_middleware(SecurityHeaders, policy=site.policy)
 
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    current_default_thread_limiter().total_tokens = THREADS
     app.state.services.start()
     yield
     app.state.services.close()

@@ -12,6 +12,7 @@ import asyncio
 import threading
 from collections import deque
 from collections.abc import AsyncIterator
+from dataclasses import dataclass, replace
 
 import structlog
 from fastapi.sse import ServerSentEvent
@@ -44,16 +45,30 @@ RETRY_MS = 1000
 """How long a browser waits before it comes back."""
 
 
+@dataclass
+class Counts:
+    """Listeners since the server started; ``resumed`` ones came back with the last id they saw."""
+
+    open: int = 0
+    opened: int = 0
+    resumed: int = 0
+    lost: int = 0
+
+
 class Feed:
     """One listener: what it has not been told yet.
 
     Args:
         dataset_id: Tell of this dataset alone; None: of all.
         position: Id of the log entry up to which it knows everything.
+
+    Attributes:
+        lost: It did not keep up and was let go.
     """
 
     def __init__(self, dataset_id: int | None, position: int):
         self.dataset_id, self.position = dataset_id, position
+        self.lost = False
         self._events: deque[ServerSentEvent] = deque()
         self._loop = asyncio.get_running_loop()
         self._ready, self._ended = asyncio.Event(), False
@@ -89,7 +104,8 @@ class Feed:
             return
 
     def _take(self, events: list[ServerSentEvent], ended: bool) -> None:
-        self._ended = self._ended or ended or len(self._events) + len(events) > MAX_WAITING
+        self.lost = self.lost or len(self._events) + len(events) > MAX_WAITING
+        self._ended = self._ended or ended or self.lost
         if not self._ended:
             self._events.extend(events)
         self._ready.set()
@@ -105,6 +121,7 @@ class Events:
         self._wake, self._closing = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
         self._solutions = 0
+        self._counts = Counts()
         jobs.listen(self._tell_job)
         store.listen(self._wake.set)
 
@@ -113,8 +130,14 @@ class Events:
         with self._store.read() as session:
             return newest_entry(session)
 
-    def subscribe(self, dataset_id: int | None, position: int) -> Feed:
-        """Begin to listen; on the event loop.
+    @property
+    def counts(self) -> Counts:
+        """Listeners since the start."""
+        with self._lock:
+            return replace(self._counts, open=len(self._feeds))
+
+    def subscribe(self, dataset_id: int | None, position: int, *, resumed: bool = False) -> Feed:
+        """Begin to listen, or go on where an earlier stream ended; on the event loop.
 
         Raises:
             OverloadedError: Too many listen, or the server stops.
@@ -124,6 +147,8 @@ class Events:
             if len(self._feeds) >= MAX_FEEDS or self._closing.is_set():
                 raise OverloadedError("too many windows listen for events")
             self._feeds.add(feed)
+            self._counts.opened += 1
+            self._counts.resumed += resumed
             if self._thread is None:
                 self._thread = threading.Thread(target=self._tail, name="events", daemon=True)
                 self._thread.start()
@@ -134,6 +159,7 @@ class Events:
         """Listen no more."""
         with self._lock:
             self._feeds.discard(feed)
+            self._counts.lost += feed.lost
 
     def open_jobs(self, dataset_id: int | None) -> list[ServerSentEvent]:
         """Jobs that are under way, for whoever begins to listen."""

@@ -15,6 +15,10 @@ from app.store.engine import WRITE, make_engine, reported, require_pragmas
 from app.store.home import make_home
 from app.store.migrate import KNOWN_REVISIONS, SCHEMA_REVISION, migrate, schema_revision
 
+TURN_SECONDS = 10.0
+"""How long a thread waits for the writes of others in its process; SQLite waits for other
+processes (``busy_timeout``)."""
+
 
 class Store:
     """The database of one home: short read transactions, and one write at a time.
@@ -58,8 +62,11 @@ class Store:
         """A session that holds the database's write lock from its start and commits at its end.
 
         Threads of one process wait for their turn here, processes in SQLite. It does not nest.
+
+        Raises:
+            StorageError: Others were writing all the while; nothing was changed.
         """
-        with self._turn, reported(self.settings), Session(self._writer) as session:
+        with self._own_turn(), reported(self.settings), Session(self._writer) as session:
             # Take the lock before anything is read, so that what is read is still true when it
             # is written.
             session.connection()
@@ -67,6 +74,18 @@ class Store:
             session.commit()
         for listener in self._listeners:
             listener()
+
+    @contextmanager
+    def _own_turn(self) -> Iterator[None]:
+        if not self._turn.acquire(timeout=TURN_SECONDS):
+            raise StorageError(
+                "other changes are still being written; this one was not saved",
+                hint="Try again in a moment.",
+            )
+        try:
+            yield
+        finally:
+            self._turn.release()
 
     def listen(self, listener: Callable[[], None]) -> None:
         """Call a function after each commit of this process; it must be quick."""

@@ -45,13 +45,13 @@ class Start:
         self.dataset_id = None if dataset is None else dataset_id(services.store, dataset)
         newest = services.events.position()
         seen = last_event_id or ""
-        known = seen.isascii() and seen.isdigit() and len(seen) < 19 and int(seen) <= newest
-        self.position = int(seen) if known else newest
+        self.resumed = seen.isascii() and seen.isdigit() and len(seen) < 19 and int(seen) <= newest
+        self.position = int(seen) if self.resumed else newest
 
 
 async def begin(services: AppServices, start: Annotated[Start, Depends()]) -> AsyncIterator[Feed]:
     """A feed for as long as the request lasts."""
-    feed = services.events.subscribe(start.dataset_id, start.position)
+    feed = services.events.subscribe(start.dataset_id, start.position, resumed=start.resumed)
     try:
         yield feed
     finally:

@@ -23,9 +23,11 @@ def host_name(host: str) -> str:
 
 
 def same_origin(origin: str, host: str, scheme: str) -> bool:
-    """Whether an Origin header names the very host (and port) that the request was sent to."""
+    """Whether an Origin header names the very scheme, host and port that the request was sent to."""
     match = _ORIGIN.fullmatch(origin.lower())
-    return match is not None and _with_port(match[2], match[1]) == _with_port(host, scheme)
+    if match is None or match[1] != scheme:
+        return False
+    return _with_port(match[2], scheme) == _with_port(host, scheme)
 
 
 def _with_port(host: str, scheme: str) -> str:

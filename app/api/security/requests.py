@@ -1,4 +1,4 @@
-"""Requests brought into the one form that the routes expect: HEAD as GET, one Range or none."""
+"""Requests brought into the one form that the routes expect: one length, one Range, HEAD as GET."""
 
 from __future__ import annotations
 
@@ -35,6 +35,21 @@ class HeadAsGet:
 def is_head(scope: Scope) -> bool:
     """Whether a request that looks like GET was HEAD: what has no end must end at once."""
     return bool(scope.get(_HEAD))
+
+
+class OneLength:
+    """Refuses a request that says twice how long it is: proxies differ in whom they believe."""
+
+    def __init__(self, app: ASGIApp):
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        names = {name for name, _ in scope["headers"]} if scope["type"] == "http" else set()
+        if {b"content-length", b"transfer-encoding"} <= names:
+            problem = make_problem(400, "Content-Length and Transfer-Encoding exclude each other")
+            await problem_response(problem, {"Connection": "close"})(scope, receive, send)
+            return
+        await self.app(scope, receive, send)
 
 
 class OneRange:

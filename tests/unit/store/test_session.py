@@ -3,6 +3,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pysqlite3.dbapi2 as sqlite
@@ -115,6 +116,16 @@ class TestWrite:
         for thread in threads:
             thread.join()
         assert len(names(store)) == 20
+
+    def test_a_turn_that_does_not_come_is_a_storage_error(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.store.session.TURN_SECONDS", 0.01)
+        refused = pytest.raises(StorageError, match="other changes are still being written")
+        with store.write(), ThreadPoolExecutor(1) as other, refused:
+            other.submit(add, store, "late").result()
+        add(store, "after")
+        assert names(store) == ["after"]
 
     def test_a_full_disk_is_a_storage_error_and_reads_go_on(self, store: Store) -> None:
         add(store, "before")

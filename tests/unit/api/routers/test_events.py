@@ -242,6 +242,11 @@ class TestFeed:
             feed.offer([module.hello(1)] * 3)
             with pytest.raises(EOFError):
                 stream.next()
+        end = time.monotonic() + SECONDS
+        while not app.state.services.events.counts.lost and time.monotonic() < end:
+            time.sleep(0.01)
         set_policy(store, "broadcast", STRICT, actor="bob")
         with opened(address, {"Last-Event-ID": seen}) as stream:
             assert stream.next()[1]["dataset"] == "broadcast"
+            counts = app.state.services.events.counts
+            assert (counts.open, counts.opened, counts.resumed, counts.lost) == (1, 2, 1, 1)

@@ -58,6 +58,10 @@ class TestSameOrigin:
     def test_everything_else_is_another_one(self, origin: str) -> None:
         assert not same_origin(origin, "127.0.0.1:8000", "http")
 
+    def test_another_scheme_is_another_one_on_the_same_port_too(self) -> None:
+        assert not same_origin("https://127.0.0.1:8000", "127.0.0.1:8000", "http")
+        assert same_origin("https://127.0.0.1:8000", "127.0.0.1:8000", "https")
+
 
 @pytest.fixture
 def guarded(plain_app: FastAPI, client_of):

@@ -1,0 +1,103 @@
+"""Metrics: what Prometheus reads of one server, besides the durations of its requests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fastapi import FastAPI
+from prometheus_client import CollectorRegistry
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+from prometheus_fastapi_instrumentator import Instrumentator
+
+from app.api.deps import Services
+from app.api.security.lanes import Gates
+from app.errors import StorageError
+from app.review.jobs.vitals import Home, read_home
+
+
+def install_metrics(app: FastAPI, gates: Gates) -> None:
+    """Count requests by route, each application for itself, and watch its services."""
+    registry = app.state.metrics = CollectorRegistry()
+    registry.register(ServerCollector(app.state.services, gates))
+    instrumentator = Instrumentator(
+        registry=registry, excluded_handlers=["/metrics", "/healthz", "/readyz"]
+    )
+    instrumentator.instrument(app)
+
+
+class ServerCollector(Collector):
+    """Reads the server's own numbers when it is asked; those of the database while it answers."""
+
+    def __init__(self, services: Services, gates: Gates):
+        self._services, self._gates = services, gates
+
+    def describe(self) -> Iterator[Metric]:
+        """Nothing beforehand: what there is is read when it is asked for."""
+        return iter(())
+
+    def collect(self) -> Iterator[Metric]:
+        """Every number of this moment."""
+        yield from self._lanes()
+        yield from self._streams()
+        try:
+            home = read_home(self._services.store)
+        except StorageError:
+            yield _gauge("database_up", "1 while the database answers.", 0)
+            return
+        yield _gauge("database_up", "1 while the database answers.", 1)
+        yield from _home(home)
+
+    def _lanes(self) -> Iterator[Metric]:
+        gates = self._gates.all
+        busy = {gate.lane.name: gate.busy for gate in gates}
+        yield _gauges("lane_busy", "Requests at work, by kind.", "lane", busy)
+        waiting = {gate.lane.name: gate.waiting for gate in gates}
+        yield _gauges("lane_waiting", "Requests that wait for their turn.", "lane", waiting)
+        refused = {gate.lane.name: gate.refused for gate in gates}
+        yield _counter("lane_refused", "Requests that were told to come back.", "lane", refused)
+
+    def _streams(self) -> Iterator[Metric]:
+        counts = self._services.events.counts
+        yield _gauge("event_streams", "Windows that listen for events.", counts.open)
+        ended = {"opened": counts.opened, "resumed": counts.resumed, "lost": counts.lost}
+        text = "Event streams that were opened, came back, or were let go for being too slow."
+        yield _counter("event_stream", text, "what", ended)
+
+
+def _home(home: Home) -> Iterator[Metric]:
+    vitals = home.vitals
+    yield _gauge("groups", "Groups of all datasets.", vitals.groups)
+    yield _gauge("unsolved_groups", "Groups that wait to be solved.", vitals.unsolved)
+    yield _gauge(
+        "oldest_unsolved_seconds",
+        "How long the oldest group waits to be solved.",
+        home.oldest_unsolved_seconds,
+    )
+    yield _gauge("log_entries", "Entries of the log of changes.", vitals.entries)
+    yield _gauges("file_bytes", "Size of the database's files.", "file", home.file_bytes)
+    yield _gauge("disk_free_bytes", "Room on the disk of the home.", home.free_bytes)
+    jobs = GaugeMetricFamily(
+        "touchline_jobs", "Jobs on record, by kind and state.", labels=["kind", "state"]
+    )
+    for (kind, state), number in sorted(vitals.jobs.items()):
+        jobs.add_metric([kind, state], number)
+    yield jobs
+
+
+def _gauge(name: str, text: str, value: float) -> Metric:
+    return GaugeMetricFamily(f"touchline_{name}", text, value=value)
+
+
+def _gauges(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
+    family = GaugeMetricFamily(f"touchline_{name}", text, labels=[label])
+    for key, value in values.items():
+        family.add_metric([key], value)
+    return family
+
+
+def _counter(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
+    family = CounterMetricFamily(f"touchline_{name}", text, labels=[label])
+    for key, value in values.items():
+        family.add_metric([key], value)
+    return family

@@ -1,0 +1,57 @@
+"""The request log: one line for each change, under an id that its other lines carry as well."""
+
+from __future__ import annotations
+
+import time
+import uuid
+
+import structlog
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.api.security.origin import SAFE_METHODS
+
+log = structlog.get_logger("touchline.requests")
+
+HEADER = "X-Request-ID"
+"""Tells the caller under which id the log speaks of its request."""
+
+
+class RequestLog:
+    """Names each request; logs those that change something, and those that the server failed.
+
+    With the Idempotency-Key of the browser's click and the ETag of what was committed, an edit can
+    be followed from one to the other.
+    """
+
+    def __init__(self, app: ASGIApp):
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        name, start = uuid.uuid4().hex[:16], time.perf_counter()
+        status, etag = 0, None
+
+        async def watch(message: Message) -> None:
+            nonlocal status, etag
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                headers[HEADER] = name
+                status, etag = message["status"], headers.get("etag")
+            await send(message)
+
+        with structlog.contextvars.bound_contextvars(request=name):
+            await self.app(scope, receive, watch)
+            if scope["method"] in SAFE_METHODS and status < 500:
+                return
+            log.info(
+                "request answered",
+                method=scope["method"],
+                path=scope["path"],
+                status=status,
+                milliseconds=round(1000 * (time.perf_counter() - start), 1),
+                key=Headers(scope=scope).get("idempotency-key"),
+                etag=etag,
+            )

@@ -1,0 +1,161 @@
+"""Lanes: how many requests of a kind are at work at a time, and how many may wait.
+
+Threads are few. A request waits for its turn on the event loop, where waiting costs next to
+nothing, so that changes behind a held write lock never take the threads that reads need.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import anyio
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.api.problem import make_problem, problem_response
+from app.api.security.origin import SAFE_METHODS
+
+PATIENCE = 10.0
+"""Seconds that a request waits for its turn."""
+RETRY_SECONDS = "2"
+
+
+@dataclass(frozen=True)
+class Lane:
+    """Requests of one kind.
+
+    Args:
+        name: What they are called in the metrics.
+        width: How many are at work at a time, each in a thread of its own.
+        queue: How many more may wait for their turn.
+    """
+
+    name: str
+    width: int
+    queue: int
+
+
+READS = Lane("reads", 16, 200)
+CHANGES = Lane("changes", 8, 100)
+"""One at a time is written; the others read, solve and encode meanwhile."""
+PREVIEWS = Lane("previews", 4, 100)
+"""Questions that are answered by solving and change nothing."""
+IMAGES = Lane("images", 6, 200)
+UPLOADS = Lane("uploads", 8, 8)
+LANES = (READS, CHANGES, PREVIEWS, IMAGES, UPLOADS)
+THREADS = sum(lane.width for lane in LANES) + 6
+"""A thread for each request at work, and some for files of the browser application."""
+
+_API = re.compile(r"/api/v\d+/")
+_STREAM = re.compile(r"/events$")
+_IMAGE = re.compile(r"/(?:image|figures/[^/]+)$")
+_SOLVING = re.compile(r"/(?:preview|influence|remedies|yield)$")
+_UPLOAD = re.compile(r"/uploads$")
+
+
+def lane_of(method: str, path: str) -> Lane | None:
+    """The lane of a request; None where it needs no thread for long."""
+    if not _API.match(path) or _STREAM.search(path):
+        return None
+    if _SOLVING.search(path):
+        return PREVIEWS
+    if method in SAFE_METHODS:
+        return IMAGES if _IMAGE.search(path) else READS
+    return UPLOADS if method == "POST" and _UPLOAD.search(path) else CHANGES
+
+
+class Gate:
+    """The door of one lane: who is at work, who waits, and how many were turned away."""
+
+    def __init__(self, lane: Lane):
+        self.lane = lane
+        self.waiting = self.refused = 0
+        self._free = anyio.Semaphore(lane.width, fast_acquire=True)
+
+    @property
+    def busy(self) -> int:
+        """How many are at work."""
+        return self.lane.width - self._free.value
+
+    async def enter(self) -> bool:
+        """Wait for a turn; False where too many wait, or it took too long."""
+        if self._free.value:
+            await self._free.acquire()
+            return True
+        if self.waiting >= self.lane.queue:
+            self.refused += 1
+            return False
+        self.waiting += 1
+        try:
+            with anyio.move_on_after(PATIENCE):
+                await self._free.acquire()
+                return True
+        finally:
+            self.waiting -= 1
+        self.refused += 1
+        return False
+
+    def leave(self) -> None:
+        """Let the next one in."""
+        self._free.release()
+
+
+class Gates:
+    """The doors of all lanes of one server."""
+
+    def __init__(self) -> None:
+        self.all = tuple(Gate(lane) for lane in LANES)
+        self._of = {gate.lane: gate for gate in self.all}
+
+    def of(self, scope: Scope) -> Gate | None:
+        """The door that a request goes through, if any."""
+        if scope["type"] != "http":
+            return None
+        lane = lane_of(scope["method"], scope["path"])
+        return None if lane is None else self._of[lane]
+
+
+class Lanes:
+    """Lets each request wait for its turn; 503 where too many of its kind wait already.
+
+    The turn ends when the answer begins: sending it to a slow client takes nobody's place.
+    """
+
+    def __init__(self, app: ASGIApp, gates: Gates):
+        self.app, self._gates = app, gates
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        gate = self._gates.of(scope)
+        if gate is None:
+            await self.app(scope, receive, send)
+            return
+        if not await gate.enter():
+            problem = make_problem(
+                503,
+                f"the server is busy with other {gate.lane.name}",
+                hint="Nothing was done. Send it again in a moment.",
+            )
+            await problem_response(problem, {"Retry-After": RETRY_SECONDS})(scope, receive, send)
+            return
+        turn = _Turn(gate)
+
+        async def watch(message: Message) -> None:
+            turn.end()
+            await send(message)
+
+        try:
+            await self.app(scope, receive, watch)
+        finally:
+            turn.end()
+
+
+class _Turn:
+    """One request's turn; it ends once."""
+
+    def __init__(self, gate: Gate):
+        self._gate: Gate | None = gate
+
+    def end(self) -> None:
+        if self._gate is not None:
+            self._gate.leave()
+            self._gate = None

@@ -1,0 +1,176 @@
+"""Lanes: who gets a turn, who waits, and who is told to come back."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+from starlette.types import Receive, Scope, Send
+
+from app.api.application import PREFIX
+from app.api.security import lanes
+from app.api.security.lanes import CHANGES, IMAGES, PREVIEWS, READS, UPLOADS, Gates, Lanes, lane_of
+
+
+class TestLaneOf:
+    @pytest.mark.parametrize(
+        ("method", "path", "lane"),
+        [
+            ("GET", "/groups/1", READS),
+            ("HEAD", "/groups/1", READS),
+            ("PATCH", "/views/1/ball", CHANGES),
+            ("DELETE", "/uploads/a", CHANGES),
+            ("POST", "/datasets/a/verdicts", CHANGES),
+            ("POST", "/groups/1/preview", PREVIEWS),
+            ("GET", "/views/1/influence", PREVIEWS),
+            ("POST", "/datasets/a/yield", PREVIEWS),
+            ("GET", "/views/1/image", IMAGES),
+            ("GET", "/evaluations/1/figures/precision.svg", IMAGES),
+            ("POST", "/uploads", UPLOADS),
+            ("GET", "/uploads", READS),
+            ("GET", "/events", None),
+        ],
+    )
+    def test_is_told_by_method_and_path(self, method: str, path: str, lane: Any) -> None:
+        assert lane_of(method, PREFIX + path) == lane
+
+    @pytest.mark.parametrize("path", ["/", "/healthz", "/static/main.js", "/review/3"])
+    def test_pages_and_health_wait_for_nobody(self, path: str) -> None:
+        assert lane_of("GET", path) is None
+
+    def test_every_route_that_changes_something_has_one(self, api: TestClient) -> None:
+        document = api.get(f"{PREFIX}/openapi.json").json()["paths"]
+        routes = [(method.upper(), path) for path, item in document.items() for method in item]
+        assert [
+            (method, path)
+            for method, path in routes
+            if method != "GET" and lane_of(method, path) not in (CHANGES, PREVIEWS, UPLOADS)
+        ] == []
+
+
+class Work:
+    """An application whose requests end when they are told to."""
+
+    def __init__(self) -> None:
+        self.begun: list[str] = []
+        self.may_answer, self.may_end = asyncio.Event(), asyncio.Event()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        self.begun.append(scope["path"])
+        await self.may_answer.wait()
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await self.may_end.wait()
+
+
+class Service:
+    """Requests against ``Lanes`` without a socket."""
+
+    def __init__(self) -> None:
+        self.work, self.gates = Work(), Gates()
+        self.lanes = Lanes(self.work, self.gates)
+        self.statuses: list[int] = []
+        self.tasks: list[asyncio.Task[None]] = []
+
+    def ask(self, method: str, path: str) -> None:
+        scope = {"type": "http", "method": method, "path": PREFIX + path, "headers": []}
+
+        async def send(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                self.statuses.append(message["status"])
+
+        async def run() -> None:
+            await self.lanes(scope, receive_nothing, send)
+
+        self.tasks.append(asyncio.create_task(run()))
+
+    async def settle(self) -> None:
+        """Let every task go as far as it can."""
+        for _ in range(20):
+            await asyncio.sleep(0)
+
+    async def end(self) -> None:
+        self.work.may_answer.set()
+        self.work.may_end.set()
+        await asyncio.gather(*self.tasks)
+
+
+async def receive_nothing() -> Any:
+    return {"type": "http.disconnect"}
+
+
+def run(test: Callable[[Service], Awaitable[None]]) -> None:
+    async def inside() -> None:
+        await test(Service())
+
+    asyncio.run(inside())
+
+
+class TestLanes:
+    def test_changes_that_wait_leave_reads_alone(self) -> None:
+        async def test(service: Service) -> None:
+            for _ in range(CHANGES.width + 5):
+                service.ask("PATCH", "/views/1")
+            service.ask("GET", "/groups/1")
+            await service.settle()
+            assert len(service.work.begun) == CHANGES.width + 1
+            assert service.work.begun[-1].endswith("/groups/1")
+            gate = service.gates.of({"type": "http", "method": "PUT", "path": PREFIX + "/x"})
+            assert gate is not None and (gate.busy, gate.waiting) == (CHANGES.width, 5)
+            await service.end()
+            assert service.statuses == [200] * (CHANGES.width + 6)
+            assert (gate.busy, gate.waiting, gate.refused) == (0, 0, 0)
+
+        run(test)
+
+    def test_one_more_than_may_wait_is_told_to_come_back(self) -> None:
+        async def test(service: Service) -> None:
+            for _ in range(UPLOADS.width + UPLOADS.queue + 1):
+                service.ask("POST", "/uploads")
+            await service.settle()
+            assert service.statuses == [503]
+            await service.end()
+
+        run(test)
+
+    def test_nobody_waits_for_ever(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(lanes, "PATIENCE", 0.01)
+
+        async def test(service: Service) -> None:
+            for _ in range(PREVIEWS.width + 1):
+                service.ask("POST", "/groups/1/preview")
+            while not service.statuses:
+                await asyncio.sleep(0.01)
+            assert service.statuses == [503]
+            await service.end()
+
+        run(test)
+
+    def test_a_turn_ends_when_the_answer_begins(self) -> None:
+        async def test(service: Service) -> None:
+            for _ in range(IMAGES.width):
+                service.ask("GET", "/views/1/image")
+            await service.settle()
+            service.work.may_answer.set()
+            await service.settle()
+            service.ask("GET", "/views/2/image")
+            await service.settle()
+            assert service.work.begun[-1].endswith("/views/2/image")
+            await service.end()
+
+        run(test)
+
+    def test_an_application_that_breaks_gives_its_turn_back(self) -> None:
+        async def broken(scope: Scope, receive: Receive, send: Send) -> None:
+            raise KeyError
+
+        async def test(service: Service) -> None:
+            service.lanes.app = broken
+            service.ask("GET", "/groups/1")
+            with pytest.raises(KeyError):
+                await service.end()
+            assert [gate.busy for gate in service.gates.all] == [0] * 5
+
+        run(test)

@@ -1,0 +1,68 @@
+"""The request log: who asked for what, and what became of it."""
+
+from __future__ import annotations
+
+import pytest
+import structlog
+from fastapi import FastAPI
+from starlette.responses import Response
+from starlette.testclient import TestClient
+
+from app.api.request_log import RequestLog
+
+
+@pytest.fixture
+def logged(plain_app: FastAPI, client_of) -> TestClient:
+    """An application that says something of its own while it changes a thing."""
+
+    @plain_app.put("/thing")
+    def change() -> Response:
+        structlog.get_logger("thing").info("saved")
+        return Response(headers={"ETag": '"after"'})
+
+    @plain_app.get("/thing")
+    def read() -> str:
+        return "thing"
+
+    @plain_app.get("/broken")
+    def fail() -> Response:
+        return Response(status_code=503)
+
+    plain_app.add_middleware(RequestLog)
+    return client_of(plain_app)
+
+
+@pytest.fixture
+def lines():
+    """What is logged, with the values that belong to the request."""
+    with structlog.testing.capture_logs([structlog.contextvars.merge_contextvars]) as found:
+        yield found
+
+
+def test_a_change_is_one_line_from_the_click_to_the_new_state(logged, lines) -> None:
+    answer = logged.put("/thing", headers={"Idempotency-Key": "click-1"})
+    saved, told = lines
+    assert (saved["event"], saved["request"]) == ("saved", answer.headers["x-request-id"])
+    assert told["milliseconds"] >= 0
+    assert {
+        name: told[name] for name in ("request", "method", "path", "status", "key", "etag")
+    } == {
+        "request": answer.headers["x-request-id"],
+        "method": "PUT",
+        "path": "/thing",
+        "status": 200,
+        "key": "click-1",
+        "etag": '"after"',
+    }
+
+
+def test_what_only_reads_is_logged_where_the_server_failed(logged, lines) -> None:
+    assert logged.get("/thing").status_code == 200
+    assert lines == []
+    logged.get("/broken")
+    assert [(line["path"], line["status"]) for line in lines] == [("/broken", 503)]
+
+
+def test_every_request_has_a_name_of_its_own(logged) -> None:
+    names = {logged.get("/thing").headers["x-request-id"] for _ in range(3)}
+    assert len(names) == 3
