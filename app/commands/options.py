@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -39,14 +38,14 @@ def read_settings(**given: object) -> Settings:
 
 
 def require_local(settings: Settings) -> None:
-    """Refuse an address that other machines reach, unless the operator named the hosts."""
+    """Refuse an address that other machines reach: there are no accounts that would keep them out."""
     from app.api.server import is_local
 
-    if not is_local(settings.host) and "TOUCHLINE_ALLOWED_HOSTS" not in os.environ:
+    if not is_local(settings.host):
         raise typer.BadParameter(
             f"{settings.host} can be reached by other machines, and this version has no accounts: "
-            "everybody who reaches it may change everything. Use 127.0.0.1, or set "
-            "TOUCHLINE_ALLOWED_HOSTS to the names that it shall answer to."
+            "everybody who reaches it could change everything. Use 127.0.0.1, and a proxy that "
+            "asks who is there; TOUCHLINE_ALLOWED_HOSTS lists the names that it forwards."
         )
 
 
