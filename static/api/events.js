@@ -1,65 +1,54 @@
 // @ts-check
 /**
- * What the server tells by itself: one stream for the whole page, open while somebody listens and
- * looks. A browser opens six connections to a server in all its windows together, so a window that
- * nobody sees gives its own back.
+ * What the server tells by itself, for the whole page: read while somebody listens and looks.
  */
 
 import { signal } from '@preact/signals';
+import { readStream } from './shared_stream.js';
 
 /** @typedef {'group' | 'job' | 'dataset'} EventKind */
 /** @typedef {{heard: (data: any) => void, missed: () => void}} Listener */
 
 const KINDS = /** @type {const} */ (['group', 'job', 'dataset']);
-const AGAIN = 5000;
 
 /** Whether the server can tell; where it cannot, ask. Left as it is while nobody looks. */
 export const connected = signal(false);
 
-/** @type {Map<EventKind, Set<Listener>>} */
+/** @type {Map<string, Set<Listener>>} */
 const listeners = new Map(KINDS.map((kind) => [kind, new Set()]));
-/** @type {EventSource | null} */
-let source = null;
-/** @type {ReturnType<typeof setTimeout> | undefined} */
-let retry;
+/** @type {(() => void) | null} */
+let end = null;
 /** Whether there was a stream before the next one: between the two something may have happened. */
 let resumes = false;
 
 const isHeard = () => [...listeners.values()].some((set) => set.size > 0);
 
-/** @param {EventKind} kind @param {MessageEvent} event */
-function tell(kind, event) {
-	const data = JSON.parse(event.data);
+/** @param {string} kind @param {string} text */
+function told(kind, text) {
+	const data = JSON.parse(text);
 	for (const { heard } of [...(listeners.get(kind) ?? [])]) heard(data);
 }
 
-function opened() {
+/** @param {boolean} late */
+function opened(late) {
 	connected.value = true;
-	const late = resumes ? [...listeners.values()].flatMap((set) => [...set]) : [];
+	const behind = resumes || late ? [...listeners.values()].flatMap((set) => [...set]) : [];
 	resumes = true;
-	for (const { missed } of late) missed();
+	for (const { missed } of behind) missed();
+}
+
+function lost() {
+	connected.value = false;
 }
 
 function open() {
-	clearTimeout(retry);
-	if (source || document.hidden || !isHeard()) return;
-	const stream = new EventSource('/api/v1/events');
-	source = stream;
-	stream.onopen = opened;
-	stream.onerror = () => {
-		connected.value = false;
-		// The browser tries again by itself, but not after an answer that is no stream.
-		if (stream.readyState !== EventSource.CLOSED || source !== stream) return;
-		source = null;
-		retry = setTimeout(open, AGAIN);
-	};
-	for (const kind of KINDS) stream.addEventListener(kind, (event) => tell(kind, event));
+	if (end || document.hidden || !isHeard()) return;
+	end = readStream(KINDS, { opened, lost, told });
 }
 
 function rest() {
-	clearTimeout(retry);
-	source?.close();
-	source = null;
+	end?.();
+	end = null;
 }
 
 function follow() {
