@@ -5,7 +5,7 @@ BIN := .venv/bin
 export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
-.PHONY: setup run test test-python test-browser check bench mutate paper chromium clean
+.PHONY: setup run test test-python test-browser check bench mutate torture paper chromium clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready static/node_modules/.ready
@@ -49,6 +49,9 @@ bench: setup
 
 mutate: setup
 	$(BIN)/python -m tests.mutate
+
+torture: setup
+	$(BIN)/python -m tests.torture
 
 paper: setup
 	$(BIN)/python -m tests.paper

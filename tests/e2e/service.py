@@ -44,7 +44,7 @@ def run_touchline(home: Path, *lines: str, seconds: float = COMMAND_SECONDS) -> 
 @contextmanager
 def serving(home: Path) -> Iterator[str]:
     """Address of a server over a home."""
-    port = _free_port()
+    port = free_port()
     address = f"http://127.0.0.1:{port}"
     with (home / "server.log").open("wb") as log:
         process = subprocess.Popen(
@@ -75,7 +75,8 @@ def _environment(home: Path, port: int = 0) -> dict[str, str]:
     return {**os.environ, "TOUCHLINE_HOME": str(home), "TOUCHLINE_PORT": str(port)}
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A port that nobody listens on at this moment."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -1,0 +1,133 @@
+"""A short form of ``make torture``, and proof that each part sees what it is there to see."""
+
+from __future__ import annotations
+
+import random
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.torture import commands, crowd, kills, power
+from tests.torture.power import Acknowledge, Sync, Unlink, Write, cut_power, disk_at, parse
+
+
+@pytest.fixture(scope="module")
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with a small solved dataset for each of two people; to be copied."""
+    folder = tmp_path_factory.mktemp("torture")
+    kills.prepare(folder / "home", folder, clients=2, groups=2)
+    return folder / "home"
+
+
+@pytest.fixture
+def home(prepared: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(prepared, tmp_path / "home"))
+
+
+class TestKills:
+    def test_what_was_acknowledged_is_there_once_after_the_server_was_killed(
+        self, home: Path
+    ) -> None:
+        found = kills.torture(home, kills=1, edits=24, clients=2, seed=1)
+        assert (found.kills, found.faults) == (1, [])
+        assert found.acknowledged >= 24
+
+    def test_a_change_that_is_not_in_the_log_is_seen(self, home: Path) -> None:
+        people = [
+            kills.Client("http://127.0.0.1:1", f"client{number}", number, bool)
+            for number in range(2)
+        ]
+        for person in people:
+            # Nobody works: each ends where it would begin.
+            person._http.close()
+        assert kills.compare(home, people) == []
+        people[1].said["edit"] += 1
+        assert kills.compare(home, people) == [
+            "client1: 1 of edit acknowledged, 0 in the log",
+        ]
+
+
+@pytest.mark.skipif(shutil.which("strace") is None, reason="strace records what is synced")
+class TestPower:
+    def test_what_was_acknowledged_is_there_after_the_power_was_cut(
+        self, home: Path, tmp_path: Path
+    ) -> None:
+        steps = power.record(home, 4)
+        found = cut_power(home, tmp_path / "cut", steps, cuts=20, seed=1)
+        assert (found.acknowledged, found.cuts, found.faults) == (4, 20, [])
+
+    def test_a_weaker_promise_loses_changes_and_is_seen(self, home: Path, tmp_path: Path) -> None:
+        steps = power.record(home, 4, "NORMAL")
+        assert cut_power(home, tmp_path / "cut", steps, cuts=20, seed=1).faults
+
+
+STEPS = (
+    Write("touchline.db", 2, b"XX"),
+    Sync("touchline.db"),
+    Write("touchline.db", 0, b"Y" * 1024),
+    Acknowledge(),
+    Unlink("touchline.db-wal"),
+)
+BEFORE = {"touchline.db": b"abcdef", "touchline.db-wal": b"w"}
+
+
+def outcomes(cut: int) -> set[tuple[bytes | None, bool]]:
+    """The database, and whether its write-ahead log is there, in whatever a cut may leave."""
+    found = (disk_at(BEFORE, STEPS, cut, random.Random(seed)) for seed in range(200))
+    return {(files.get("touchline.db"), "touchline.db-wal" in files) for files in found}
+
+
+class TestDiskAt:
+    def test_what_was_synced_is_certain(self) -> None:
+        assert outcomes(2) == {(b"abXXef", True)}
+
+    def test_what_was_not_synced_may_be_there_whole_torn_or_not_at_all(self) -> None:
+        torn = b"Y" * 512
+        assert outcomes(4) == {(b"abXXef", True), (torn, True), (b"Y" * 1024, True)}
+
+    def test_a_file_that_was_taken_away_may_be_there_again(self) -> None:
+        assert {present for _, present in outcomes(5)} == {True, False}
+
+
+class TestParse:
+    def test_reads_what_strace_says_of_the_database_alone(self) -> None:
+        def text(value: str) -> str:
+            return '"' + "".join(f"\\x{byte:02x}" for byte in value.encode()) + '"'
+
+        lines = [
+            f"7  openat(AT_FDCWD, {text('/home/touchline.db-wal')}, O_RDWR|O_CREAT, 0644) = 4",
+            f"7  openat(AT_FDCWD, {text('/elsewhere/touchline.db')}, O_RDWR, 0644) = 5",
+            f"7  pwrite64(4, {text('ab')}, 2, 32)  = 2",
+            f"7  pwrite64(5, {text('ab')}, 2, 32)  = 2",
+            "7  fsync(4)                          = 0",
+            f'7  write(1, {text("acknowledged")[:-1]}\\x0a", 13) = 13',
+            "7  ftruncate(4, 100)                 = 0",
+            f"7  unlink({text('/home/touchline.db-wal')}) = 0",
+            f"7  unlink({text('/home/touchline.db-journal')}) = -1 ENOENT (No such file)",
+            "7  close(4)                          = 0",
+            "7  fsync(4)                          = 0",
+        ]
+        assert list(parse(lines, Path("/home"))) == [
+            Write("touchline.db-wal", 32, b"ab"),
+            Sync("touchline.db-wal"),
+            Acknowledge(),
+            Write("touchline.db-wal", 100, None),
+            Unlink("touchline.db-wal"),
+        ]
+
+
+class TestCommands:
+    def test_an_import_that_was_killed_ends_the_same_the_second_time(self, tmp_path: Path) -> None:
+        found = commands.torture(
+            tmp_path / "commands", kills=1, groups=2, seed=2, commands=commands.COMMANDS[:1]
+        )
+        assert (found.kills, found.commands, found.faults) == (1, 1, [])
+
+
+class TestCrowd:
+    def test_people_on_the_same_groups_lose_no_change_and_meet_no_error(self, home: Path) -> None:
+        found = crowd.crowd(home, people=4, seconds=2, think=0, seed=1)
+        assert found.faults == []
+        assert found.changes > 0
+        assert found.lines()[0].startswith("4 people, 2 s: ")

@@ -1,0 +1,97 @@
+"""``make torture``: kills, power cuts, killed commands and a crowd; 1 where anything was lost."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+from tests.torture import commands, crowd, kills, power
+
+SEED = 20260101
+
+
+def main() -> int:
+    """Run what is asked for; 1 where anything was lost."""
+    parser = argparse.ArgumentParser(prog="python -m tests.torture", description=__doc__)
+    parser.add_argument("--kills", type=int, default=60, help="of the server (60)")
+    parser.add_argument("--edits", type=int, default=30_000, help="acknowledged changes (30000)")
+    parser.add_argument("--clients", type=int, default=4, help="people who work at once (4)")
+    parser.add_argument("--cuts", type=int, default=400, help="of the power (400)")
+    parser.add_argument("--command-kills", type=int, default=5, help="of each command (5)")
+    parser.add_argument("--groups", type=int, default=120, help="that commands work on (120)")
+    parser.add_argument("--people", type=int, default=50, help="who annotate at once (50)")
+    parser.add_argument("--seconds", type=float, default=120, help="for how long (120)")
+    parser.add_argument("--think", type=float, default=3, help="mean seconds between requests (3)")
+    parser.add_argument("--seed", type=int, default=SEED)
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="touchline-torture-") as name:
+        folder = Path(name)
+        parts = (_kills, _cuts, _commands, _crowd)
+        faults = [fault for part in parts for fault in part(folder, asked)]
+    for fault in faults:
+        print(f"FAULT {fault}")
+    return 1 if faults else 0
+
+
+def _kills(folder: Path, asked: argparse.Namespace) -> list[str]:
+    home = folder / "home"
+    kills.prepare(home, folder / "files", clients=asked.clients, groups=12)
+    found = kills.torture(
+        home,
+        kills=asked.kills,
+        edits=asked.edits,
+        clients=asked.clients,
+        seed=asked.seed,
+        tell=print,
+    )
+    print(
+        f"{found.kills} kills, {found.acknowledged} changes acknowledged, "
+        f"{found.repeated} requests sent again: {len(found.faults)} faults"
+    )
+    return found.faults
+
+
+def _cuts(folder: Path, asked: argparse.Namespace) -> list[str]:
+    home = folder / "power"
+    kills.prepare(home, folder / "power-files", clients=1, groups=2)
+    steps = power.record(home, 60)
+    found = power.cut_power(home, folder / "cut", steps, cuts=asked.cuts, seed=asked.seed)
+    # The same with a weaker promise must lose something, else the cuts show nothing.
+    weak = power.record(home, 60, "NORMAL")
+    lost = power.cut_power(home, folder / "cut", weak, cuts=asked.cuts, seed=asked.seed)
+    print(
+        f"{found.cuts} power cuts among {found.acknowledged} acknowledged changes: "
+        f"{len(found.faults)} faults; with synchronous=NORMAL {len(lost.faults)}"
+    )
+    return found.faults if lost.faults else [*found.faults, "the planted fault was not seen"]
+
+
+def _commands(folder: Path, asked: argparse.Namespace) -> list[str]:
+    found = commands.torture(
+        folder / "commands",
+        kills=asked.command_kills,
+        groups=asked.groups,
+        seed=asked.seed,
+        tell=print,
+    )
+    print(f"{found.commands} commands, {found.kills} kills: {len(found.faults)} faults")
+    return found.faults
+
+
+def _crowd(folder: Path, asked: argparse.Namespace) -> list[str]:
+    home = folder / "crowd"
+    kills.prepare(home, folder / "crowd-files", clients=1, groups=60)
+    faults = []
+    for people in (1, asked.people):
+        found = crowd.crowd(
+            home, people=people, seconds=asked.seconds, think=asked.think, seed=asked.seed
+        )
+        print("\n".join(found.lines()))
+        faults += found.faults
+    return faults
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,151 @@
+"""Commands that are killed and given again end as if nothing had happened."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sqlalchemy import text
+
+from app.config import Settings
+from app.review.editing.doctor import examine
+from app.store.session import Store
+from tests.e2e.service import ROOT, SERVE, run_touchline
+
+COMMANDS = (
+    "import soccernet-v3 {tree} --dataset torture",
+    "solve --dataset torture --workers 2",
+    "freeze first --dataset torture --groups passing",
+    "export --dataset torture --version first --format soccernet-v3d {out}",
+    "datasets delete torture --yes",
+)
+"""One after the other, each on what the last one left."""
+CONTENTS = {
+    "groups": "SELECT key, inputs_hash, source_hash FROM groups ORDER BY key",
+    "solutions": "SELECT g.key, s.inputs_hash, s.policy_hash, s.summary, hex(s.body)"
+    " FROM solution s JOIN groups g ON g.id = s.group_id ORDER BY 1, 2, 3",
+    "calibrations": "SELECT key, hex(body) FROM calibration ORDER BY key",
+    "queue": "SELECT key, solved, passes, findings, value FROM queue ORDER BY key",
+    "versions": "SELECT name, hash FROM version ORDER BY name",
+    "log": "SELECT kind, count(*) FROM log GROUP BY kind ORDER BY kind",
+}
+"""What must be the same; times and ids may differ."""
+
+
+@dataclass
+class Report:
+    """What a run came to; ``faults`` are sentences, none where all is well."""
+
+    kills: int = 0
+    commands: int = 0
+    faults: list[str] = field(default_factory=list)
+
+
+def torture(
+    folder: Path,
+    *,
+    kills: int,
+    groups: int,
+    seed: int,
+    commands: tuple[str, ...] = COMMANDS,
+    tell: Callable[[str], None] = lambda _sentence: None,
+) -> Report:
+    """Give each command once undisturbed, and once with that many kills before it may end.
+
+    Args:
+        folder: Where homes and files go; what is in it is replaced.
+        kills: How often each command is killed with SIGKILL, at random moments.
+        groups: Size of the dataset.
+        seed: Decides about the moments.
+        commands: Which ones, in order.
+        tell: Called with each sentence worth reading.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    tree = folder / "tree"
+    calm, killed = folder / "calm", folder / "killed"
+    run_touchline(calm, "migrate", f"sample --groups {groups} --labels-only {tree}")
+    shutil.copytree(calm, killed)
+    report, chance = Report(), random.Random(seed)
+    for command in commands:
+        start = time.monotonic()
+        refusal = _run(calm, _filled(command, tree, calm))
+        if refusal:
+            raise AssertionError(f"{command}: {refusal}")
+        seconds = time.monotonic() - start
+        for _ in range(kills):
+            _run(
+                killed, _filled(command, tree, killed), kill_after=chance.uniform(0.1, 1) * seconds
+            )
+            report.kills += 1
+        # One that was done when it was killed may say so: what counts is what is there.
+        refusal = _run(killed, _filled(command, tree, killed))
+        report.commands += 1
+        name = command.split(" ", 1)[0]
+        found = [f"{name}: {fault} {refusal}".strip() for fault in _differences(calm, killed)]
+        report.faults += found
+        tell(f"{name} after {kills} kills: {'; '.join(found) or 'the same'}")
+    return report
+
+
+def _filled(command: str, tree: Path, home: Path) -> str:
+    return command.format(tree=tree, out=home / "out")
+
+
+def _run(home: Path, command: str, kill_after: float | None = None) -> str:
+    """Run a command, to its end or until it is killed; returns why it was refused, if it was."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", SERVE, *command.split(" ")],
+        cwd=ROOT,
+        env={**os.environ, "TOUCHLINE_HOME": str(home)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        _, errors = process.communicate(timeout=kill_after)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+        return ""
+    return errors if process.returncode else ""
+
+
+def _differences(calm: Path, killed: Path) -> list[str]:
+    """What the two homes do not have in common, and what the doctor finds."""
+    one, two = _contents(calm), _contents(killed)
+    faults = [f"{name} differ" for name in one if one[name] != two[name]]
+    store = Store.open(Settings(home=killed))
+    try:
+        return faults + [check.sentence for check in examine(store) if not check.ok]
+    finally:
+        store.close()
+
+
+def _contents(home: Path) -> dict[str, str]:
+    """A digest of each table, and of each exported file."""
+    store = Store.open(Settings(home=home))
+    try:
+        with store.read() as session:
+            found = {
+                name: _digest(str(session.execute(text(statement)).all()).encode())
+                for name, statement in CONTENTS.items()
+            }
+    finally:
+        store.close()
+    out = home / "out"
+    files = sorted(path for path in out.rglob("*") if path.is_file()) if out.exists() else []
+    return {**found, **{str(path.relative_to(out)): _digest(path.read_bytes()) for path in files}}
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
