@@ -194,7 +194,7 @@ class Client(threading.Thread):
                 raise TimeoutError(f"{method} {path} was not answered")
             time.sleep(0.02)
         if not answer.is_success:
-            raise AssertionError(f"{method} {path}: {answer.status_code} {answer.text}")
+            raise AssertionError(f"{method} {path}: {answer.status_code} {answer.text[:300]}")
         self.acknowledged += method != "GET"
         found: dict[str, Any] = answer.json()
         return found
@@ -243,7 +243,10 @@ def torture(
             while acknowledged() < wanted and not failed():
                 time.sleep(0.01)
             if report.kills < kills:
-                time.sleep(chance.uniform(0, 0.2))
+                if chance.random() < 0.5:
+                    time.sleep(chance.uniform(0, 0.2))
+                else:
+                    _await_write(home)
                 server.kill()
                 report.kills += 1
                 tell(f"{report.kills} kills, {acknowledged()} changes acknowledged")
@@ -263,6 +266,15 @@ def torture(
     report.repeated = sum(person.repeated for person in people)
     report.faults = [person.fault for person in people if person.fault] + compare(home, people)
     return report
+
+
+def _await_write(home: Path) -> None:
+    """Wait until something is being written: what is killed then is often saved but not answered."""
+    path = home / "touchline.db-wal"
+    deadline = time.monotonic() + 2.0
+    before = path.stat().st_mtime_ns
+    while path.stat().st_mtime_ns == before and time.monotonic() < deadline:
+        pass
 
 
 def compare(home: Path, people: list[Client]) -> list[str]:
