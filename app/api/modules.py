@@ -28,6 +28,7 @@ MEDIA_TYPES = {
 LIBRARY_TYPES = frozenset({".css", ".js", ".json", ".map", ".mjs", ".wasm", ".woff2"})
 """Libraries bring pages and pictures of their own, which are not ours to serve."""
 FOR_GOOD = "public, max-age=31536000, immutable"
+REVALIDATED = "no-cache"
 
 
 class Modules(StaticFiles):

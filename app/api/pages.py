@@ -5,8 +5,9 @@ from __future__ import annotations
 from fastapi import APIRouter, FastAPI, Request, Response
 from starlette.convertors import StringConvertor, register_url_convertor
 from starlette.exceptions import HTTPException
+from starlette.types import Receive, Scope, Send
 
-from app.api.modules import FOR_GOOD, Modules
+from app.api.modules import FOR_GOOD, REVALIDATED, Modules
 from app.api.site import IndexPage, Site
 
 PAGES = (
@@ -54,13 +55,15 @@ def install_pages(app: FastAPI, site: Site) -> None:
 
     def page(request: Request) -> Response:
         index = found()
-        headers = {"ETag": index.etag, "Cache-Control": "no-cache"}
+        headers = {"ETag": index.etag, "Cache-Control": REVALIDATED}
         if index.etag in request.headers.get("if-none-match", ""):
             return Response(status_code=304, headers=headers)
         return Response(index.html, media_type="text/html", headers=headers)
 
-    def styles() -> Response:
-        return Response(found().styles, media_type="text/css", headers={"Cache-Control": FOR_GOOD})
+    def styles(version: str) -> Response:
+        content = found().styles
+        headers = {"Cache-Control": FOR_GOOD if version == site.version else REVALIDATED}
+        return Response(content, media_type="text/css", headers=headers)
 
     def elsewhere(request: Request) -> Response:
         """People who mistyped an address are told so by the page, programs by a problem."""
@@ -77,8 +80,14 @@ def install_pages(app: FastAPI, site: Site) -> None:
 
 
 def _install_modules(app: FastAPI, site: Site) -> None:
-    kept = Modules(site.folder, FOR_GOOD)
-    app.mount("/assets/{version}", kept, name="assets")
-    app.mount("/static", Modules(site.folder, "no-cache"), name="static")
+    kept, fresh = Modules(site.folder, FOR_GOOD), Modules(site.folder, REVALIDATED)
+
+    async def versioned(scope: Scope, receive: Receive, send: Send) -> None:
+        """A page of an earlier version goes on, but nobody keeps our files under its address."""
+        present = scope["path_params"]["version"] == site.version
+        await (kept if present else fresh)(scope, receive, send)
+
+    app.mount("/assets/{version}", versioned, name="assets")
+    app.mount("/static", fresh, name="static")
     if index := site.index():
         kept.warm(index.modules)

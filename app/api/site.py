@@ -82,6 +82,11 @@ class Site:
             self._version = self._page = None
         return self._page
 
+    @property
+    def version(self) -> str | None:
+        """The version of the page that was asked for last."""
+        return self._version
+
     def _folder_version(self) -> str:
         """Digest of the times and sizes of our own files and of the libraries' lock file."""
         digest = hashlib.sha256()

@@ -63,6 +63,9 @@ class TestPages:
         assert "immutable" in answer.headers["cache-control"]
         (static_folder / "main.js").write_text("// another version\n")
         assert address() != first
+        for stale in (first, first.replace("main.js", "all.css"), "/assets/another/main.js"):
+            answer = pages_client.get(stale)
+            assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-cache")
 
     def test_style_sheets_come_as_one_in_the_order_of_the_page(
         self, pages_client, static_folder: Path
