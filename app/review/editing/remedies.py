@@ -10,7 +10,6 @@ import numpy as np
 
 from app.review.editing.edit import Edit, SetLines
 from app.review.editing.fixes import Offer, ball_at, edit_of_fix, offers, rank, sentence
-from app.review.editing.solver import Solver
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View
 from app.soccer.policy import Policy
@@ -73,16 +72,13 @@ class _Idea:
     """What a person would draw; None: the fix itself is the edit."""
 
 
-def find_remedies(
-    group: Group, policy: Policy, solution: Solution, *, solver: Solver = solve
-) -> list[Remedy]:
+def find_remedies(group: Group, policy: Policy, solution: Solution) -> list[Remedy]:
     """What would make a group pass, the gentlest first; nothing for a group that passes.
 
     Args:
         group: The group as it is.
         policy: The thresholds.
         solution: Its solution under that policy.
-        solver: Only tests put another one in.
     """
     failing = solution.first_failing
     if failing is None:
@@ -90,7 +86,7 @@ def find_remedies(
     known = {view.calibration_key: view.calibration for view in solution.views}
     found = []
     for idea in _distinct(group, solution, failing)[:MOST_TRIALS]:
-        remedy = _try(group, policy, solution, failing, idea, known, solver)
+        remedy = _try(group, policy, solution, failing, idea, known)
         if remedy is not None:
             found.append((not remedy.passes, rank(idea.fix), remedy))
     return [remedy for *_, remedy in sorted(found, key=lambda item: item[:2])]
@@ -103,13 +99,12 @@ def _try(
     failing: Gate,
     idea: _Idea,
     known: dict[str, Calibration],
-    solver: Solver,
 ) -> Remedy | None:
     """The remedy, or None where the edit changes nothing for the better."""
     edit = idea.trial or edit_of_fix(group, idea.fix, idea.point)
     if edit is None:
         return None
-    then = solver(edit.apply(group), policy, known)
+    then = solve(edit.apply(group), policy, known)
     gate = next(gate for gate in then.gates if gate.name == failing.name)
     if not then.passes and not _is_nearer(failing, gate, solution, then, idea.fix.view):
         return None

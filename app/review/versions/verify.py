@@ -14,7 +14,6 @@ from sqlalchemy.orm import Session
 
 from app.errors import JobCancelled, ReviewError, StorageError
 from app.review.datasets.fan_out import fan_out
-from app.review.editing.solver import Solver
 from app.review.versions.version import (
     Version,
     calibration_names,
@@ -129,7 +128,6 @@ class VerifyTask:
     known: Mapping[str, bytes]
     policy: Policy
     splitter: Splitter
-    solver: Solver
 
 
 def verify(
@@ -137,8 +135,6 @@ def verify(
     version_id: int,
     executor: Executor | None = None,
     progress: Progress | None = None,
-    *,
-    solver: Solver = solve,
 ) -> VerifyReport:
     """Compute a version from its frozen annotations and compare all of it.
 
@@ -150,7 +146,6 @@ def verify(
         version_id: The version.
         executor: Where chunks are solved; None: here.
         progress: Called after each chunk; an error that it raises ends the run.
-        solver: Only tests put another one in; a function of a module, so that it travels.
 
     Raises:
         NotFoundError: There is no such version.
@@ -163,7 +158,7 @@ def verify(
         report.add(list(_version_differences(session, version)))
         matches = version_matches(session, version.id)
     done = 0
-    for results in fan_out(verify_task, _Tasks(store, version, matches, solver), executor):
+    for results in fan_out(verify_task, _Tasks(store, version, matches), executor):
         for found in results:
             report.add(found)
             report.equal += not found
@@ -180,7 +175,6 @@ def verify_and_keep(
     progress: Progress | None = None,
     *,
     actor: str,
-    solver: Solver = solve,
 ) -> VerifyReport:
     """``verify``, with what comes of it kept with the version.
 
@@ -190,7 +184,7 @@ def verify_and_keep(
     with store.read() as session:
         read_version(session, version_id)
     try:
-        report = verify(store, version_id, executor, progress, solver=solver)
+        report = verify(store, version_id, executor, progress)
     except JobCancelled:
         raise
     except Exception as error:
@@ -222,8 +216,8 @@ class _Tasks:
     Each is read in a transaction of its own: what is frozen does not change in between.
     """
 
-    def __init__(self, store: Store, version: Version, matches: set[str], solver: Solver):
-        self._store, self._version, self._solver = store, version, solver
+    def __init__(self, store: Store, version: Version, matches: set[str]):
+        self._store, self._version = store, version
         self._splitter = Splitter.of(version.split, matches)
         self._shared: dict[str, bytes] = {}
 
@@ -250,7 +244,7 @@ class _Tasks:
         said = (json_of(frozen[row.said or ""]) for row in sound)
         known = self._known([thaw_group(value, _stations(value, frozen)) for value in said])
         policy = self._version.policy
-        return VerifyTask(rows, frozen, known, policy, self._splitter, self._solver)
+        return VerifyTask(rows, frozen, known, policy, self._splitter)
 
     def _known(self, groups: Sequence[Group]) -> dict[str, bytes]:
         """Calibrations of the static cameras of groups, each computed once."""
@@ -329,7 +323,7 @@ def _split_differences(row: VersionGroup, group: Group, splitter: Splitter) -> I
 def _solution_differences(
     row: VersionGroup, group: Group, task: VerifyTask, known: Mapping[str, Calibration]
 ) -> Iterator[Difference]:
-    encoded = encode_solution(group, task.solver(group, task.policy, known))
+    encoded = encode_solution(group, solve(group, task.policy, known))
     pairs = [("", task.frozen[row.solution or ""], encoded.body)]
     for key, body in sorted(encoded.calibrations.items()):
         frozen = task.frozen.get(CALIBRATION + key)

@@ -11,6 +11,7 @@ from sqlalchemy import text
 from app.errors import NotFoundError
 from app.review.editing.edit import SetBall
 from app.review.editing.submit import load, submit
+from app.review.versions import verify as verify_module
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.review.versions.verify import verify
 from app.soccer.solution import Solution
@@ -67,16 +68,20 @@ class TestVerify:
         submit(store, 1, SetBall("7.png", None), if_match=state.etag, actor="ben")
         assert verify(store, version.id).ok
 
-    def test_one_bit_is_a_difference_with_its_place(self, store, version) -> None:
-        report = verify(store, version.id, solver=one_bit_off)
+    def test_one_bit_is_a_difference_with_its_place(self, store, version, monkeypatch) -> None:
+        monkeypatch.setattr(verify_module, "solve", one_bit_off)
+        report = verify(store, version.id)
         assert not report.ok
         assert (report.equal, report.groups) == (3, 4)
         places = {item.place for item in report.differences}
         assert "ball.point.0" in places
         assert {item.group[-5:] for item in report.differences} == {"8.png"}
 
-    def test_a_group_that_breaks_does_not_hide_the_others(self, store, version) -> None:
-        report = verify(store, version.id, solver=broken)
+    def test_a_group_that_breaks_does_not_hide_the_others(
+        self, store, version, monkeypatch
+    ) -> None:
+        monkeypatch.setattr(verify_module, "solve", broken)
+        report = verify(store, version.id)
         assert [item.now for item in report.differences] == ["ZeroDivisionError: "] * 4
 
     @pytest.mark.parametrize("prefix", ["said:", "station:", "solution:", "calibration:"])

@@ -40,9 +40,10 @@ class TestVerifyAndKeep:
         assert (kept.report["ok"], kept.report["equal"]) == (True, 2)
         assert [item.verified for item in list_versions(store, "demo")] == [kept]
 
-    def test_differences_take_its_place_and_are_named(self, store, version) -> None:
+    def test_differences_take_its_place_and_are_named(self, store, version, monkeypatch) -> None:
         verify_and_keep(store, version.id, actor="ben")
-        verify_and_keep(store, version.id, actor="eve", solver=beside)
+        monkeypatch.setattr(verify_module, "solve", beside)
+        verify_and_keep(store, version.id, actor="eve")
         kept = get_version(store, version.id).verified
         assert (kept.actor, kept.report["ok"], kept.report["equal"]) == ("eve", False, 0)
         assert "ball.point.0" in {item["place"] for item in kept.report["differences"]}
