@@ -17,12 +17,12 @@ const STATIC = [
 
 /** @type {ImportFormat[]} */
 export const IMPORT_FORMATS = [
-	{ name: 'soccernet-v3', label: 'SoccerNet-v3', note: 'a tree or zip with Labels-v3.json', options: [] },
-	{ name: 'soccernet-v3d', label: 'SoccerNet-v3D', note: 'Labels-v3D.json or SNv3D.csv with its splits', options: [CALIBRATION] },
+	{ name: 'soccernet-v3', label: 'SoccerNet-v3', note: 'a folder or zip with Labels-v3.json', options: [] },
+	{ name: 'soccernet-v3d', label: 'SoccerNet-v3D', note: 'Labels-v3D.json or SNv3D.csv', options: [CALIBRATION] },
 	{ name: 'issia', label: 'ISSIA', note: 'XGTF ground truth of the static cameras', options: STATIC, lines: true },
 	{ name: 'issia-3d', label: 'ISSIA-3D', note: 'ISSIA-3D.csv and issia_calibration.json', options: STATIC, lines: true },
 	{ name: 'sn-calibration', label: 'sn-calibration', note: 'a JSON of lines for each frame', options: [CALIBRATION, SIZE] },
-	{ name: 'cameras', label: 'Cameras', note: 'camera JSON for frames that are there', options: [] },
+	{ name: 'cameras', label: 'Cameras', note: 'camera JSON for known frames', options: [] },
 	{ name: 'gamestate', label: 'sn-gamestate', note: 'Labels-GameState.json', options: [CALIBRATION] },
 	{ name: 'coco', label: 'COCO', note: 'as Touchline exports it', options: [CALIBRATION] },
 	{ name: 'parquet', label: 'Parquet', note: 'as Touchline exports it', options: [] },

@@ -64,7 +64,7 @@ function LinesField({ source, change }) {
 /** @param {{format: string, choose: (format: string) => void}} props */
 function FormatChoice({ format, choose }) {
 	return html`
-		<fieldset class="choice import__formats">
+		<fieldset class="choice import__choice">
 			<legend>Format</legend>
 			${IMPORT_FORMATS.map(({ name, label, note }) => html`
 				<label key=${name}><input type="radio" name="format" checked=${format === name} onChange=${() => choose(name)} /><span>${label}<small>${note}</small></span></label>`)}

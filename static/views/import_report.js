@@ -41,7 +41,7 @@ function WithoutPicture({ report, dry, dataset }) {
 	return html`
 		<p data-grade="warn">
 			${dry ? which : html`<a href=${queueAddress(dataset, 'pictures:none')}>${which}</a>`}.
-			Nobody can look at them, so accepting one needs a note. Are the frames (for SoccerNet, Frames-v3.zip) beside the labels?
+			Nobody can look at ${groups === 1 ? 'it' : 'them'}, so accepting ${groups === 1 ? 'it' : 'one'} needs a note. Are the frames (for SoccerNet, Frames-v3.zip) beside the labels?
 		</p>
 	`;
 }

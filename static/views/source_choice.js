@@ -96,10 +96,10 @@ export function SourceChoice({ onSource, guess }) {
 		onSource(next === 'folder' && folder ? { folder } : null);
 	}
 	return html`
-		<fieldset class="choice choice--row">
+		<fieldset class="choice import__choice">
 			<legend>Source</legend>
 			<label><input type="radio" name="source" checked=${kind === 'upload'} onChange=${() => change('upload')} /><span>A file on this computer<small>zip, JSON or CSV</small></span></label>
-			<label><input type="radio" name="source" checked=${kind === 'folder'} onChange=${() => change('folder')} /><span>A folder on the server<small>frames are read where they lie</small></span></label>
+			<label><input type="radio" name="source" checked=${kind === 'folder'} onChange=${() => change('folder')} /><span>A folder on the server<small>frames stay where they are</small></span></label>
 		</fieldset>
 		${kind === 'upload'
 			? html`<${UploadField} id="import-file" label="File" onUploaded=${(/** @type {UploadJson | null} */ sent) => {
