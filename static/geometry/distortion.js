@@ -35,7 +35,7 @@ export function distort([x, y], coefficients) {
  * @param {number[]} coefficients
  * @returns {[number, number, number, number]}
  */
-export function distortJacobian([x, y], coefficients) {
+function distortJacobian([x, y], coefficients) {
 	const [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4] = coefficients;
 	const r2 = x * x + y * y;
 	const r4 = r2 * r2;

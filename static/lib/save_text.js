@@ -2,7 +2,7 @@
 /** Files that the browser makes itself. */
 
 /** Let the person save bytes as a file. @param {string} name @param {Blob} blob */
-export function saveBlob(name, blob) {
+function saveBlob(name, blob) {
 	const url = URL.createObjectURL(blob);
 	const link = document.createElement('a');
 	link.href = url;

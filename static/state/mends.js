@@ -98,7 +98,7 @@ function isSame(a, b) {
  * @param {GroupDocument} shown @param {SolutionJson | null} solved @param {readonly Remedy[]} helping
  * @returns {Mend[]}
  */
-export function mendsOf(shown, solved, helping) {
+function mendsOf(shown, solved, helping) {
 	if (!solved) return [];
 	const missing = missingBalls(shown, solved);
 	const short = solved.first_failing?.gate === 'ball';

@@ -124,7 +124,7 @@ export const standing = computed(() => {
  * @param {Neighbours & {id: number, q: string}} at @param {Walk} walked @param {readonly number[]} done @param {string} key
  * @returns {Standing}
  */
-export function standingOf(at, walked, done, key) {
+function standingOf(at, walked, done, key) {
 	if (walked.key !== key) return { place: at.index === null ? null : at.index + 1, total: at.total, done: 0, left: null };
 	const { ids, total } = walked;
 	const known = ids.indexOf(at.id);

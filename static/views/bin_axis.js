@@ -20,7 +20,7 @@ function isPowerOfTen(value) {
  *
  * @param {Bins} bins @returns {{at: number, text: string}[]}
  */
-export function ticksOf({ edges, log, open_high: beyond }) {
+function ticksOf({ edges, log, open_high: beyond }) {
 	const last = edges.length - 1;
 	const said = (/** @type {number} */ edge) => `${short(edges[edge])}${beyond && edge === last ? '+' : ''}`;
 	const shown = edges.flatMap((value, edge) => ((log ? isPowerOfTen(value) : edge === 0 || edge === last) ? [edge] : []));

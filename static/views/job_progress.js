@@ -12,7 +12,7 @@ import { isOver, shareOf } from '../state/jobs.js';
 /** @import {JobJson} from '../api/jobs.js' */
 
 /** @param {JobJson} job @returns {string} */
-export function jobText(job) {
+function jobText(job) {
 	if (job.state === 'failed') return capital(job.problem?.detail ?? 'It failed.');
 	if (job.state === 'done') return '';
 	if (job.sentence) return job.sentence;
@@ -29,7 +29,7 @@ export function toneOf(job) {
 }
 
 /** @param {{job: JobJson}} props */
-export function Meter({ job }) {
+function Meter({ job }) {
 	const share = shareOf(job);
 	const state = job.state === 'failed' ? 'failed' : share === null ? 'unknown' : 'known';
 	return html`

@@ -33,7 +33,7 @@ function panelOf(letter) {
 }
 
 /** Bring some points of a view into sight. @param {ViewJson} view @param {ImagePoint[]} points @param {number} most */
-export function showPlace(view, points, most = BALL_SCALE) {
+function showPlace(view, points, most = BALL_SCALE) {
 	if (points.length === 0) return;
 	// A view that was not on screen is there with the next frame.
 	requestAnimationFrame(() => {

@@ -16,7 +16,7 @@ function Unit({ unit }) {
 }
 
 /** A round step, about two hundred from end to end. @param {number} low @param {number} high */
-export function stepOf(low, high) {
+function stepOf(low, high) {
 	const rough = (high - low) / 200;
 	const power = 10 ** Math.floor(Math.log10(rough));
 	const round = [1, 2, 5, 10].find((n) => n * power >= rough * 0.999) ?? 10;

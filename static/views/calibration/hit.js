@@ -39,7 +39,7 @@ export function pointAt(lines, viewport, at, preferred) {
  * @param {Size} size of the image
  * @returns {string | null}
  */
-export function lineAt(lines, fits, viewport, at, size) {
+function lineAt(lines, fits, viewport, at, size) {
 	let best = { marking: /** @type {string | null} */ (null), distance: LINE_REACH };
 	/** @param {string} marking @param {PointJson[]} polyline */
 	const consider = (marking, polyline) => {

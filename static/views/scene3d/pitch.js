@@ -38,7 +38,7 @@ export function segments(points, { colour, width, dashed = false, opacity = 1 })
 }
 
 /** A polyline as segments. @param {readonly number[][]} line @returns {number[][]} */
-export function chained(line) {
+function chained(line) {
 	return line.slice(1).flatMap((point, i) => [[...line[i]], [...point]]);
 }
 

@@ -27,7 +27,7 @@ const FARTHEST = 1200;
 const LOWEST = 0.01;
 const HIGHEST = Math.PI / 2 - 0.001;
 /** Vertical field of view of the free camera, radians. */
-export const FIELD = (38 * Math.PI) / 180;
+const FIELD = (38 * Math.PI) / 180;
 const NEAR = 0.1;
 const FAR = 2000;
 
