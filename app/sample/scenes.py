@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -24,7 +24,7 @@ from app.sample.faults import (
     plan_fault,
     spoil_view,
 )
-from app.sample.fixture import Fixture, group_counts, make_fixture
+from app.sample.fixture import Fixture, make_fixture
 from app.sample.instant import (
     BALL_DIAMETER,
     Instant,
@@ -60,23 +60,6 @@ class Stage:
     numbers: tuple[int, ...]
     seed: int
     groups: int
-
-
-def make_scenes(groups: int, seed: int, faults: bool = True) -> list[Scene]:
-    """All scenes of a sample; ``iterate_scenes`` gives them one match at a time.
-
-    Args:
-        groups: How many groups.
-        seed: The same seed gives the same scenes.
-        faults: Plant one fault in about a third of the groups.
-    """
-    return list(iterate_scenes(groups, seed, faults))
-
-
-def iterate_scenes(groups: int, seed: int, faults: bool = True) -> Iterator[Scene]:
-    """The scenes of ``make_scenes``, of which no more than one match is in memory."""
-    for match, count in enumerate(group_counts(groups)):
-        yield from make_match(match, count, seed, faults)
 
 
 def make_match(

@@ -8,12 +8,12 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.sample.scene import Scene
-from app.sample.scenes import make_scenes
-from app.sample.table1 import paper_table_1
 from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, BestBall, Solution
 from app.solving.solve import solve
+from tests.bench.boxes import paper_table_1
 from tests.bench.table import print_table
+from tests.scenes import make_scenes
 
 GROUPS = 150
 SEED = 7

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 
 from app.sample.render import render
-from app.sample.scenes import make_scenes
 from app.soccer.policy import PAPER
 from app.solving.calibrate import calibrate
+from tests.scenes import make_scenes
 
 SEED = 20260101
 GAIN = 20.0

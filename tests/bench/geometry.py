@@ -12,7 +12,6 @@ from scipy.optimize import least_squares
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.damped_solve import solve_damped
-from app.geometry.rotation import rotation_looking
 from app.geometry.smallest_singular import smallest_singular_vectors
 from app.geometry.triangulation import triangulate_pairs
 from app.soccer.annotation import make_lines
@@ -23,6 +22,7 @@ from app.solving.jaccard import project_markings
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
 from tests.bench.table import print_table
+from tests.rotation import rotation_looking
 
 SIZE = ImageSize(960, 540)
 PAIRS = 1_000_000

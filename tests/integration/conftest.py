@@ -22,7 +22,7 @@ import pytest
 
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.sample.scene import Scene
-from app.sample.scenes import make_scenes
+from tests.scenes import make_scenes
 
 COMMAND = "from app.cli import main; main()"
 

@@ -14,7 +14,7 @@ import httpx
 import pytest
 
 from app.config import Settings
-from app.review.datasets.dataset import create_dataset
+from app.review.importing.ingest import ensure_dataset
 from app.store.session import Store
 from tests.integration.conftest import COMMAND, environment
 
@@ -25,7 +25,7 @@ SECONDS = 30
 def server(tmp_path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """Address and process of a server over a home with an empty dataset ``demo``."""
     store = Store.open(Settings(home=tmp_path))
-    create_dataset(store, "demo")
+    ensure_dataset(store, "demo", "ann")
     store.close()
     process = subprocess.Popen(
         [sys.executable, "-c", COMMAND, "serve", "--port", "0"],

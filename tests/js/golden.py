@@ -21,10 +21,10 @@ from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.geometry.sphere import optimal_diameter, tight_box
 from app.geometry.triangulation import parallax_angle, triangulate_pairs
 from app.sample.scene import Scene
-from app.sample.scenes import make_scenes
 from app.soccer.annotation import BallAnnotation
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
+from tests.scenes import make_scenes
 
 FILE = Path(__file__).with_name("golden.json")
 SEED = 4

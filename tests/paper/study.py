@@ -12,10 +12,10 @@ from app.review.editing.recompute import solve_dataset
 from app.review.evaluating.frames import Truth, live_truth
 from app.review.importing.ingest import ingest
 from app.sample.scene import Scene
-from app.sample.scenes import make_scenes
 from app.soccer.frames import Box
 from app.store.session import Store
 from tests.paper.simulated import SimulatedDetector, camera_from_noisy_lines, looseness
+from tests.scenes import make_scenes
 
 GROUPS, SEED = 120, 20_260_101
 DATASET = "paper"

@@ -12,7 +12,6 @@ import pytest
 from app.config import Settings
 from app.datasets.issia_reader import IssiaOptions, open_issia
 from app.datasets.report import Report
-from app.review.datasets.dataset import create_dataset
 from app.review.editing.recompute import solve_dataset
 from app.review.exporting.export import export
 from app.review.importing.ingest import ingest
@@ -77,7 +76,6 @@ class TestExport:
     def test_every_annotated_frame_is_a_row_and_the_manifest_counts_them(self, groups, tmp_path):
         few = [group for group in groups if len(group.views) >= 2][:40]
         store = Store.open(Settings(home=tmp_path / "home"))
-        create_dataset(store, "issia", policy=PAPER, actor="test")
         ingest(store, "issia", few, source=str(DATA), actor="test")
         solve_dataset(store, "issia")
         out = tmp_path / "out"

@@ -16,7 +16,7 @@ import pytest
 
 from app.cli import main
 from app.datasets.sn_calibration_writer import lines_to_json
-from app.sample.scenes import make_scenes
+from tests.scenes import make_scenes
 
 Run = Callable[..., tuple[int, str, str]]
 

@@ -11,8 +11,8 @@ from typing import Any
 from sqlalchemy import ColumnElement, Integer, cast, func, insert, select, update
 from sqlalchemy.orm import Session
 
-from app.errors import ConflictError, InputError, NotFoundError
-from app.soccer.policy import PAPER, Policy
+from app.errors import InputError, NotFoundError
+from app.soccer.policy import Policy
 from app.store.clock import now
 from app.store.codecs import canonical, parse, policy_from_json, policy_to_json
 from app.store.group_rows import next_id
@@ -38,22 +38,6 @@ class Dataset:
     rejected: int
     deferred: int
     unreviewed: int
-
-
-def create_dataset(
-    store: Store, name: str, *, policy: Policy = PAPER, actor: str = "local"
-) -> Dataset:
-    """Make an empty dataset.
-
-    Raises:
-        InputError: The name is empty, too long or has characters that files cannot have.
-        ConflictError: There is one of that name.
-    """
-    with store.write() as session:
-        if find_dataset(session, name) is not None:
-            raise ConflictError(f'there is a dataset "{name}" already')
-        identity = insert_dataset(session, name, policy, actor)
-    return get_dataset(store, identity)
 
 
 def insert_dataset(session: Session, name: str, policy: Policy, actor: str) -> int:
@@ -116,18 +100,8 @@ def read_dataset(session: Session, dataset: str | int) -> Dataset:
     return _datasets(session, [row])[0]
 
 
-def set_policy(
-    store: Store, dataset: str | int, policy: Policy, *, actor: str = "local"
-) -> Dataset:
-    """Judge a dataset by another policy; what that leaves without a solution is stale."""
-    with store.write() as session:
-        found = read_dataset(session, dataset)
-        save_policy(session, found.id, policy, actor)
-        return read_dataset(session, found.id)
-
-
 def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -> None:
-    """``set_policy`` within a write session."""
+    """Judge a dataset by another policy; what that leaves without a solution is stale."""
     values = _policy_values(policy)
     session.execute(update(DatasetModel).where(DatasetModel.id == dataset_id).values(values))
     body = {"policy": policy_to_json(policy)}

@@ -49,14 +49,8 @@ def ingest_spare(
     return report
 
 
-def read_spare(store: Store, dataset: str | int) -> Iterator[SpareFrame]:
-    """The spare frames of a dataset, by camera and frame as texts."""
-    with store.read() as session:
-        yield from spare_frames(session, read_dataset(session, dataset).id)
-
-
 def spare_frames(session: Session, dataset_id: int) -> Iterator[SpareFrame]:
-    """The same within a session's snapshot."""
+    """The spare frames of a dataset, by camera and frame as texts."""
     for row in spare_rows(session, dataset_id):
         yield SpareFrame(row.camera, row.frame, extras_from_json(unpack(row.extras)))
 

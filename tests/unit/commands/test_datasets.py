@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 
 from app.cli import app
 from app.config import Settings
-from app.review.datasets.dataset import create_dataset, list_datasets
+from app.review.datasets.dataset import list_datasets
+from app.review.importing.ingest import ensure_dataset
 from app.store.session import Store
 
 
@@ -21,7 +22,7 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Store]:
     monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path))
     store = Store.open(Settings())
     for name in ("one", "two"):
-        create_dataset(store, name)
+        ensure_dataset(store, name, "ann")
     yield store
     store.close()
 

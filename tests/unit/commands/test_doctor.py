@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from app.cli import app
 from app.config import Settings
-from app.review.datasets.dataset import create_dataset
+from app.review.importing.ingest import ensure_dataset
 from app.store.home import server_lock
 from app.store.session import Store
 
@@ -22,7 +22,7 @@ def settings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Settings:
     settings = Settings(home=tmp_path / "home")
     monkeypatch.setenv("TOUCHLINE_HOME", str(settings.home))
     store = Store.open(settings)
-    create_dataset(store, "demo")
+    ensure_dataset(store, "demo", "ann")
     store.close()
     return settings
 

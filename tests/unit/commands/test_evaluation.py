@@ -16,8 +16,8 @@ from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.review.editing.recompute import solve_dataset
 from app.review.evaluating.evaluation import tables_of
 from app.review.importing.ingest import ingest
-from app.sample.scenes import make_scenes
 from app.store.session import Store
+from tests.scenes import make_scenes
 
 
 @pytest.fixture(scope="module")

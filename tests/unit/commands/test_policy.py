@@ -12,7 +12,7 @@ import pytest
 
 from app.cli import main
 from app.config import Settings
-from app.review.datasets.dataset import create_dataset
+from app.review.importing.ingest import ensure_dataset
 from app.soccer.policy import PAPER, STRICT
 from app.store.session import Store
 
@@ -26,7 +26,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
         monkeypatch.delenv(name)
     monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
     store = Store.open(Settings(home=tmp_path / "home"))
-    create_dataset(store, "demo")
+    ensure_dataset(store, "demo", "ann")
     store.close()
 
     def command(*arguments: object) -> tuple[int, str, str]:

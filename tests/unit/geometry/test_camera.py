@@ -4,7 +4,8 @@ import pytest
 
 from app.errors import DegenerateGeometryError, ShapeError
 from app.geometry.camera import Camera
-from app.geometry.rotation import rotation_from_pan_tilt_roll, rotation_looking
+from app.geometry.rotation import rotation_from_pan_tilt_roll
+from tests.rotation import rotation_looking
 
 
 def main_camera(**changes) -> Camera:

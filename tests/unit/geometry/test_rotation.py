@@ -3,11 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.geometry.rotation import (
-    pan_tilt_roll_from_rotation,
-    rotation_from_pan_tilt_roll,
-    rotation_looking,
-)
+from app.geometry.rotation import pan_tilt_roll_from_rotation, rotation_from_pan_tilt_roll
 
 ANGLE = st.floats(-3.1, 3.1)
 
@@ -50,15 +46,3 @@ class TestPanTiltRollFromRotation:
         rotation = rotation_from_pan_tilt_roll(0.4, 0.0, 0.3)
         pan, tilt, roll = pan_tilt_roll_from_rotation(rotation)
         assert (pan, tilt, roll) == pytest.approx((0.7, 0.0, 0.0))
-
-
-class TestRotationLooking:
-    def test_the_target_lies_on_the_optical_axis_and_the_horizon_is_level(self):
-        position, target = np.array([3.0, 60.0, -15.0]), np.array([-20.0, 5.0, 0.0])
-        rotation = rotation_looking(position, target)
-        in_camera = rotation @ (target - position)
-        assert np.allclose(in_camera[:2], 0.0, atol=1e-12)
-        assert in_camera[2] > 0
-        assert np.isclose(np.linalg.det(rotation), 1.0)
-        assert rotation[0, 2] == 0.0
-        assert rotation[1, 2] > 0  # image y and pitch z both point down

@@ -3,8 +3,8 @@ import pytest
 
 from app.errors import DegenerateGeometryError
 from app.geometry.camera import Camera
-from app.geometry.rotation import rotation_looking
 from app.geometry.sphere import optimal_diameter, position_from_diameter, tight_box
+from tests.rotation import rotation_looking
 
 BALL = 0.226
 PLACE = np.array([5.0, 55.0, -12.0])

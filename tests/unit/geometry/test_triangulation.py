@@ -6,7 +6,6 @@ import pytest
 
 from app.errors import DegenerateGeometryError, ShapeError
 from app.geometry.camera import Camera
-from app.geometry.rotation import rotation_looking
 from app.geometry.smallest_singular import smallest_singular_vectors
 from app.geometry.triangulation import (
     moved_points,
@@ -14,6 +13,7 @@ from app.geometry.triangulation import (
     point_covariance,
     triangulate_pairs,
 )
+from tests.rotation import rotation_looking
 
 
 def camera_at(*position: float) -> Camera:

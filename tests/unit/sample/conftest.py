@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.sample.scene import Scene
-from app.sample.scenes import make_scenes
+from tests.scenes import make_scenes
 
 SEED = 20_260_101
 

@@ -15,11 +15,11 @@ from app.sample.faults import (
     spoil_view,
 )
 from app.sample.scene import FAULT_KINDS, PlantedFault, Scene
-from app.sample.scenes import make_scenes
 from app.sample.views import PITCH
 from app.soccer.annotation import make_lines
 from app.soccer.group import View
 from app.soccer.pitch import MARKINGS, twin_marking
+from tests.scenes import make_scenes
 
 
 def _with_fault(scenes: list[Scene], kind: str) -> Iterator[tuple[Scene, PlantedFault, View]]:

@@ -1,15 +1,14 @@
 from __future__ import annotations
 
-from itertools import islice
-
 import numpy as np
 import pytest
 
 from app.sample.cameras import MIN_PARALLAX, parallax
 from app.sample.scene import Scene
-from app.sample.scenes import ball_box, iterate_scenes, make_match, make_scenes
+from app.sample.scenes import ball_box, make_match
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
+from tests.scenes import make_scenes
 
 
 class TestMakeScenes:
@@ -58,16 +57,6 @@ class TestMakeScenes:
                 errors.append(np.linalg.norm(np.subtract(solution.ball.point, scene.truth.ball)))
         assert len(errors) >= 11
         assert np.median(errors) < 0.10
-
-
-class TestIterateScenes:
-    def test_a_large_sample_begins_without_being_made(self):
-        scenes = list(islice(iterate_scenes(12_764, 5), 3))
-        assert [scene.group.key.rsplit("/", 1)[1] for scene in scenes] == [
-            "0.png",
-            "1.png",
-            "2.png",
-        ]
 
 
 class TestMakeMatch:

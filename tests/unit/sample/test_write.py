@@ -11,9 +11,9 @@ import pytest
 from app.datasets.report import Report
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.errors import InputError
-from app.sample.scenes import make_scenes
 from app.sample.truth import read_truth
 from app.sample.write import write_sample
+from tests.scenes import make_scenes
 
 
 def _digests(root: Path) -> dict[str, str]:

@@ -7,11 +7,11 @@ from hypothesis import HealthCheck, settings
 
 from app.geometry.camera import Camera
 from app.geometry.polyline import clip_polyline
-from app.geometry.rotation import rotation_looking
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
+from tests.rotation import rotation_looking
 
 # ``make mutate`` runs a test several times in one process, each time from a new instance.
 settings.register_profile(

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from app.geometry.camera import Camera
-from app.geometry.rotation import rotation_looking
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Station, View
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Calibration, MarkingFit
+from tests.rotation import rotation_looking
 
 SIZE = ImageSize(1920, 1080)
 

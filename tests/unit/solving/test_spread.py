@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.geometry.camera import Camera
-from app.geometry.rotation import rotation_looking
 from app.geometry.triangulation import triangulate_pairs
 from app.soccer.frames import ImagePoint
 from app.soccer.policy import PAPER
@@ -25,6 +24,7 @@ from app.solving.spread import (
 )
 from app.solving.triangulate import Sight
 from app.solving.verdict import judge
+from tests.rotation import rotation_looking
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, SIZE, given_view
 from tests.unit.solving.random_groups import random_policy, random_views
 

@@ -17,11 +17,11 @@ from fastapi import FastAPI
 
 from app.api import events as module
 from app.api.server import Server, listen
-from app.review.datasets.dataset import set_policy
 from app.review.editing.edit import IncludeView
 from app.review.editing.submit import load, submit
+from app.review.policies.policy import change_policy
 from app.review.verdicts.verdict import set_verdict
-from app.soccer.policy import STRICT
+from app.soccer.policy import PAPER, STRICT
 from app.store.session import Store
 
 SECONDS = 20
@@ -117,19 +117,19 @@ class TestListen:
         monkeypatch.setattr(module, "POLL", 0.1)
         address, _ = served
         with opened(address) as stream, closing(Store.open(app.state.services.settings)) as other:
-            set_policy(other, "static", STRICT, actor="bob")
+            change_policy(other, "static", STRICT, if_match=None, actor="bob")
             assert stream.next()[1] == {"dataset": "static", "kind": "policy", "actor": "bob"}
 
     def test_without_a_listener_nothing_is_read(self, app, served) -> None:
         events, store = app.state.services.events, app.state.services.store
         with opened(served[0]) as stream:
-            set_policy(store, "static", STRICT, actor="bob")
+            change_policy(store, "static", STRICT, if_match=None, actor="bob")
             stream.next()
         end = time.monotonic() + SECONDS
         while events._feeds and time.monotonic() < end:
             time.sleep(0.01)
         with patch.object(events, "_look") as look:
-            set_policy(store, "broadcast", STRICT, actor="bob")
+            change_policy(store, "broadcast", STRICT, if_match=None, actor="bob")
             time.sleep(0.3)
         assert not look.called
 
@@ -151,9 +151,10 @@ class TestListen:
         judged = set_verdict(store, 2, "deferred", if_match=load(store, 2).etag, actor="bob")
         with opened(address, {"Last-Event-ID": last}) as stream:
             assert stream.next()[1]["etag"] == judged.etag
-        for odd in ("x", "-1", "9" * 30, "999999"):
-            with opened(address, {"Last-Event-ID": odd}) as stream:
-                set_policy(store, "static", STRICT, actor="bob")
+        odd = ("x", "-1", "9" * 30, "999999")
+        for last, policy in zip(odd, (STRICT, PAPER, STRICT, PAPER), strict=True):
+            with opened(address, {"Last-Event-ID": last}) as stream:
+                change_policy(store, "static", policy, if_match=None, actor="bob")
                 assert stream.next() == (
                     "dataset",
                     {"dataset": "static", "kind": "policy", "actor": "bob"},
@@ -179,7 +180,7 @@ class TestListen:
     def test_a_solution_that_arrives_is_told(self, app, served) -> None:
         services, (address, _) = app.state.services, served
         with opened(address, dataset="broadcast") as stream:
-            set_policy(services.store, "broadcast", STRICT, actor="bob")
+            change_policy(services.store, "broadcast", STRICT, if_match=None, actor="bob")
             assert stream.next()[0] == "dataset"
             from app.review.editing.recompute import solve_dataset
 
@@ -219,7 +220,7 @@ class TestStop:
     def test_open_streams_end_and_the_server_stops_soon(self, app, served) -> None:
         address, server = served
         with opened(address) as stream:
-            set_policy(app.state.services.store, "static", STRICT, actor="bob")
+            change_policy(app.state.services.store, "static", STRICT, if_match=None, actor="bob")
             stream.next()
             start = time.monotonic()
             server.should_exit = True
@@ -235,7 +236,7 @@ class TestFeed:
         monkeypatch.setattr(module, "MAX_WAITING", 2)
         store, (address, _) = app.state.services.store, served
         with opened(address) as stream:
-            set_policy(store, "static", STRICT, actor="bob")
+            change_policy(store, "static", STRICT, if_match=None, actor="bob")
             stream.next()
             seen = stream.last_id
             feed = next(iter(app.state.services.events._feeds))
@@ -245,7 +246,7 @@ class TestFeed:
         end = time.monotonic() + SECONDS
         while not app.state.services.events.counts.lost and time.monotonic() < end:
             time.sleep(0.01)
-        set_policy(store, "broadcast", STRICT, actor="bob")
+        change_policy(store, "broadcast", STRICT, if_match=None, actor="bob")
         with opened(address, {"Last-Event-ID": seen}) as stream:
             assert stream.next()[1]["dataset"] == "broadcast"
             counts = app.state.services.events.counts

@@ -7,7 +7,6 @@ from sqlalchemy import text
 
 from app.errors import StorageError
 from app.geometry.camera import Camera
-from app.review.datasets.dataset import set_policy
 from app.review.editing.edit import IncludeView, SetBall, SetLines, SetStationLines
 from app.review.editing.ledger import read_ledger
 from app.review.editing.replay import rebuild, replay
@@ -16,6 +15,7 @@ from app.review.editing.submit import load, redo, submit, undo
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import ingest
 from app.review.importing.spare import SpareFrame, ingest_spare
+from app.review.policies.policy import change_policy
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint
@@ -52,7 +52,7 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
     )
     spare = [SpareFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
     ingest_spare(store, "demo", spare, source="spare", actor="ann")
-    set_policy(store, "demo", STRICT, actor="ann")
+    change_policy(store, "demo", STRICT, if_match=None, actor="ann")
     return store
 
 

@@ -17,12 +17,12 @@ from app.errors import (
     SharedStationError,
     StaleRevisionError,
 )
-from app.review.datasets.dataset import set_policy
 from app.review.editing import state as state_module
 from app.review.editing import submit as submit_module
 from app.review.editing.edit import IncludeView, SetBall, SetBalls, SetLines
 from app.review.editing.state import GroupState
 from app.review.editing.submit import history, load, preview, redo, solved, submit, undo
+from app.review.policies.policy import change_policy
 from app.review.queue.listing import list_groups
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
@@ -116,7 +116,7 @@ class TestSubmit:
     ) -> None:
         def slow(group, policy, calibrations):
             monkeypatch.setattr(submit_module, "solve", solve)
-            set_policy(store, state.dataset_id, STRICT)
+            change_policy(store, state.dataset_id, STRICT, if_match=None, actor="ann")
             return solve(group, policy, calibrations)
 
         monkeypatch.setattr(submit_module, "solve", slow)

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from app.errors import InputError, NotFoundError
-from app.review.datasets.dataset import create_dataset, set_policy
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
 from app.review.exporting.export import FORMATS, export
+from app.review.importing.ingest import ensure_dataset
+from app.review.policies.policy import change_policy
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -78,7 +79,7 @@ class TestExport:
         judge(store, three[0], "accepted")
         judge(store, three[2], "accepted", note="seen on video")
         wide = replace(PAPER, name="wide", min_baseline_m=1000.0)
-        set_policy(store, "demo", wide)
+        change_policy(store, "demo", wide, if_match=None, actor="ann")
         solve_dataset(store, "demo")
         judge(store, three[0], "accepted", note="the baseline is known")
         report = export(store, "demo", "soccernet-v3d", tmp_path / "out")
@@ -145,7 +146,7 @@ class TestExport:
         assert verdicts == {"7": "accepted", "8": "accepted (stale)", "9": "unreviewed"}
 
     def test_an_empty_dataset_has_nothing_either(self, store, tmp_path) -> None:
-        create_dataset(store, "demo")
+        ensure_dataset(store, "demo", "ann")
         with pytest.raises(InputError, match="holds no groups"):
             export(store, "demo", "cameras", tmp_path / "out", everything=True)
 

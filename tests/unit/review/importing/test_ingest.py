@@ -6,13 +6,13 @@ import pytest
 from sqlalchemy import text
 
 from app.errors import NotFoundError
-from app.review.datasets.dataset import create_dataset, get_dataset, list_datasets
+from app.review.datasets.dataset import get_dataset, list_datasets
 from app.review.editing.edit import IncludeView, SetBall, SetLines, SetStationLines
 from app.review.editing.state import GroupState
 from app.review.editing.stations import load_station, submit_station
 from app.review.editing.submit import history, load, submit, undo
 from app.review.importing.cameras import ingest_cameras
-from app.review.importing.ingest import ingest
+from app.review.importing.ingest import ensure_dataset, ingest
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Media
@@ -99,9 +99,9 @@ class TestIngest:
         assert list_datasets(store) == []
 
     def test_a_dataset_that_is_there_is_filled(self, store, make_group) -> None:
-        made = create_dataset(store, "demo")
+        made = ensure_dataset(store, "demo", "ann")
         again(store, make_group(7))
-        assert get_dataset(store, "demo").id == made.id
+        assert get_dataset(store, "demo").id == made
 
     def test_an_import_that_was_killed_is_taken_up_where_it_ended(
         self, store, make_group, monkeypatch

@@ -10,14 +10,14 @@ from sqlalchemy import select
 
 from app.datasets.cameras_writer import write_cameras
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
-from app.review.datasets.dataset import get_dataset, list_datasets
+from app.review.datasets.dataset import dataset_id, get_dataset, list_datasets
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
 from app.review.exporting.export import export
 from app.review.importing.ingest import BATCH, ingest
 from app.review.importing.sources import FORMATS, Source, import_source
-from app.review.importing.spare import SpareFrame, ingest_spare, read_spare
+from app.review.importing.spare import SpareFrame, ingest_spare, spare_frames
 from app.review.queue.listing import list_groups
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImageSize
@@ -145,7 +145,8 @@ class TestThereAndBack:
         spare = SpareFrame("cam2", "99", Extras(boxes=(person,)))
         ingest_spare(store, "demo", [spare], source="test", actor="ann")
         again = there_and_back(store, "issia", tmp_path / out)
-        assert list(read_spare(store, "again")) == [spare]
+        with store.read() as session:
+            assert list(spare_frames(session, dataset_id(store, "again"))) == [spare]
         for key, group in groups_of(store, "demo").items():
             views = [replace(view, media=None) for view in group.views]
             assert list(again[key].views) == views

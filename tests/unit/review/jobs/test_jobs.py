@@ -11,7 +11,7 @@ import pytest
 from structlog.testing import capture_logs
 
 from app.errors import ConflictError, InputError, JobCancelled, NotFoundError, OverloadedError
-from app.review.datasets.dataset import create_dataset
+from app.review.importing.ingest import ensure_dataset
 from app.review.jobs import jobs as module
 from app.review.jobs.jobs import JobProgress, Jobs
 from app.store.codecs import Json
@@ -63,8 +63,8 @@ def submit(jobs: Jobs, work: Callable[[JobProgress], Json], **options: Any) -> J
 
 class TestSubmit:
     def test_what_the_work_returns_is_the_result(self, jobs: Jobs, store: Store) -> None:
-        found = create_dataset(store, "demo")
-        job = submit(jobs, lambda progress: {"n": 3}, dataset_id=found.id, request={"a": 1})
+        found = ensure_dataset(store, "demo", "ann")
+        job = submit(jobs, lambda progress: {"n": 3}, dataset_id=found, request={"a": 1})
         assert (job.state, job.dataset, job.request) == ("waiting", "demo", {"a": 1})
         done = jobs.wait(job.id, SECONDS)
         assert (done.state, done.result, done.problem) == ("done", {"n": 3}, None)
@@ -106,7 +106,7 @@ class TestSubmit:
     def test_what_waits_already_is_not_queued_twice_but_what_runs_is(
         self, jobs: Jobs, store: Store
     ) -> None:
-        one, other = create_dataset(store, "one").id, create_dataset(store, "other").id
+        one, other = ensure_dataset(store, "one", "ann"), ensure_dataset(store, "other", "ann")
         first = Gate()
         running = submit(jobs, first, kind="solve", dataset_id=one, once=True)
         assert first.started.wait(SECONDS)
@@ -213,7 +213,7 @@ class TestCancel:
             jobs.cancel(job.id + 1)
 
     def test_all_of_a_dataset_are_ended_and_no_others(self, jobs: Jobs, store: Store) -> None:
-        one, other = create_dataset(store, "one").id, create_dataset(store, "other").id
+        one, other = ensure_dataset(store, "one", "ann"), ensure_dataset(store, "other", "ann")
         gate = Gate()
         running = submit(jobs, gate, dataset_id=one)
         assert gate.started.wait(SECONDS)
@@ -288,7 +288,7 @@ class TestClose:
 
 class TestFind:
     def test_gives_the_newest_first_page_by_page(self, jobs: Jobs, store: Store) -> None:
-        one = create_dataset(store, "one").id
+        one = ensure_dataset(store, "one", "ann")
         made = [submit(jobs, lambda _: None, dataset_id=one).id for _ in range(2)]
         last = submit(jobs, lambda _: None, kind="export")
         jobs.wait(last.id, SECONDS)

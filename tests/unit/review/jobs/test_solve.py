@@ -8,8 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from app.review.datasets.dataset import create_dataset, get_dataset
+from app.review.datasets.dataset import get_dataset
 from app.review.editing.recompute import SolveReport, stale_groups
+from app.review.importing.ingest import ensure_dataset
 from app.review.jobs import solve as solve_job
 from app.review.jobs.jobs import JobProgress, Jobs
 from app.review.jobs.solve import request_solve, resume_solving, solve_leftovers
@@ -75,7 +76,7 @@ class TestRequestSolve:
         assert result["failures"] == [{"group": "a/7.png", "problem": "ValueError: odd"}]
 
     def test_one_job_a_dataset_waits_at_most(self, jobs: Jobs, store: Store) -> None:
-        create_dataset(store, "demo")
+        ensure_dataset(store, "demo", "ann")
         started, finish = threading.Event(), threading.Event()
 
         def slow(progress: JobProgress) -> None:

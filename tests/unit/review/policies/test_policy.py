@@ -6,9 +6,10 @@ import pytest
 from sqlalchemy import func, select, text
 
 from app.errors import NotFoundError, StaleRevisionError
-from app.review.datasets.dataset import create_dataset, get_dataset
+from app.review.datasets.dataset import get_dataset, insert_dataset
 from app.review.editing import recompute
 from app.review.editing.recompute import solve_dataset, stale_groups
+from app.review.importing.ingest import ensure_dataset
 from app.review.policies.policy import change_policy, read_policy
 from app.review.policies.text import policy_with
 from app.review.queue.listing import list_groups
@@ -42,7 +43,8 @@ def calibrations(monkeypatch: pytest.MonkeyPatch) -> list[object]:
 
 class TestReadPolicy:
     def test_begins_with_the_policy_that_the_dataset_was_made_with(self, store: Store) -> None:
-        create_dataset(store, "demo", policy=STRICT, actor="ann")
+        with store.write() as session:
+            insert_dataset(session, "demo", STRICT, "ann")
         state = read_policy(store, "demo")
         assert (state.policy, state.version) == (STRICT, 1)
         assert [(item.version, item.policy, item.actor) for item in state.history] == [
@@ -52,7 +54,7 @@ class TestReadPolicy:
             read_policy(store, "nothing")
 
     def test_reads_a_few_entries_however_long_the_log(self, store: Store) -> None:
-        create_dataset(store, "demo")
+        ensure_dataset(store, "demo", "ann")
         with store.read() as session:
             plan = session.execute(
                 text(
@@ -65,8 +67,8 @@ class TestReadPolicy:
 
 class TestChangePolicy:
     def test_counts_versions_and_keeps_those_before(self, store: Store) -> None:
-        create_dataset(store, "demo")
-        create_dataset(store, "other")
+        ensure_dataset(store, "demo", "ann")
+        ensure_dataset(store, "other", "ann")
         for policy in (STRICT, TIGHT, STRICT):
             etag = read_policy(store, "demo").etag
             state = change_policy(store, "demo", policy, if_match=etag, actor="bob")
@@ -76,14 +78,14 @@ class TestChangePolicy:
         assert read_policy(store, "other").version == 1
 
     def test_the_same_again_changes_nothing(self, store: Store) -> None:
-        create_dataset(store, "demo")
+        ensure_dataset(store, "demo", "ann")
         first = change_policy(store, "demo", STRICT, if_match=None, actor="ann")
         entries = count(store, LogModel)
         assert change_policy(store, "demo", STRICT, if_match=None, actor="ann") == first
         assert count(store, LogModel) == entries
 
     def test_who_was_slower_is_told(self, store: Store) -> None:
-        create_dataset(store, "demo")
+        ensure_dataset(store, "demo", "ann")
         etag = read_policy(store, "demo").etag
         first = change_policy(store, "demo", STRICT, if_match=etag, actor="ann")
         with pytest.raises(StaleRevisionError) as caught:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from app.review.datasets.dataset import create_dataset, get_dataset, set_policy
+from app.review.datasets.dataset import get_dataset
 from app.review.editing.edit import IncludeView, SetStationCalibration
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.stations import load_station, submit_station
 from app.review.editing.submit import load, submit
+from app.review.importing.ingest import ensure_dataset
+from app.review.policies.policy import change_policy
 from app.review.queue import changes as module
 from app.review.queue.changes import (
     Change,
@@ -63,9 +65,9 @@ class TestReadChanges:
         }
 
     def test_a_policy_changes_the_dataset(self, store: Store) -> None:
-        create_dataset(store, "demo")
+        ensure_dataset(store, "demo", "ann")
         before = newest(store)
-        set_policy(store, "demo", STRICT, actor="ann")
+        change_policy(store, "demo", STRICT, if_match=None, actor="ann")
         (told,) = since(store, before)
         assert (told.dataset, told.kind, told.group_id) == ("demo", "policy", None)
 
@@ -73,7 +75,7 @@ class TestReadChanges:
         self, store: Store, fill, make_group, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(module, "MANY", 2)
-        create_dataset(store, "demo")
+        ensure_dataset(store, "demo", "ann")
         before = newest(store)
         fill(*(make_group(number) for number in range(1, 4)), solved=False)
         told = since(store, before)
@@ -85,7 +87,7 @@ class TestReadChanges:
     ) -> None:
         monkeypatch.setattr(module, "FAR", 1)
         for name in ("one", "two", "three"):
-            create_dataset(store, name)
+            ensure_dataset(store, name, "ann")
         told = since(store, 0)
         assert {(item.dataset, item.kind) for item in told} == {
             (name, "everything") for name in ("one", "two", "three")

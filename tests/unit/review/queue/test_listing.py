@@ -8,8 +8,8 @@ import pytest
 from sqlalchemy import insert
 
 from app.errors import InputError, NotFoundError
-from app.review.datasets.dataset import create_dataset
 from app.review.editing.submit import load
+from app.review.importing.ingest import ensure_dataset
 from app.review.queue.listing import GroupRow, list_groups, list_ids, neighbours
 from app.review.queue.progress import summary
 from app.review.queue.query import SORTS
@@ -79,7 +79,7 @@ def dataset(store: Store, once) -> int:
 
 def fill_queue(store: Store, count: int) -> int:
     """A dataset of rows made up; returns its id."""
-    dataset = create_dataset(store, "big").id
+    dataset = ensure_dataset(store, "big", "ann")
     rows = queue_rows(count)
     groups = [
         {
@@ -301,6 +301,6 @@ class TestSummary:
         assert found.counts[-1] == len(rows) > 0
 
     def test_an_empty_dataset_has_zeros(self, store) -> None:
-        found = summary(store, create_dataset(store, "empty").id)
+        found = summary(store, ensure_dataset(store, "empty", "ann"))
         assert (found.groups, found.solved, found.unreviewed) == (0, 0, 0)
         assert set(found.histograms["jac"].counts) == {0}

@@ -4,7 +4,7 @@ import pytest
 from sqlalchemy import update
 
 from app.errors import InputError
-from app.review.datasets.dataset import create_dataset
+from app.review.importing.ingest import ensure_dataset
 from app.review.queue.listing import list_groups
 from app.review.queue.statistics import MEASURES, X_EDGES, Y_EDGES, statistics
 from app.store.models import QueueModel
@@ -76,6 +76,6 @@ class TestStatistics:
             statistics(spread, 1, "colour:red")
 
     def test_an_empty_dataset_has_empty_bars(self, store) -> None:
-        found = statistics(store, create_dataset(store, "empty").id)
+        found = statistics(store, ensure_dataset(store, "empty", "ann"))
         assert found.groups == 0
         assert all(histogram.series == () for histogram in found.histograms)

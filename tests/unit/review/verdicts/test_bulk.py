@@ -11,12 +11,12 @@ from sqlalchemy import insert, text
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError, InputError, NotFoundError
-from app.review.datasets.dataset import create_dataset
 from app.review.editing.edit import SetBall
 from app.review.editing.ledger import read_ledger
 from app.review.editing.replay import replay
 from app.review.editing.state import VerdictState
 from app.review.editing.submit import load, submit
+from app.review.importing.ingest import ensure_dataset
 from app.review.queue.listing import list_groups
 from app.review.verdicts import bulk
 from app.review.verdicts.bulk import give_verdicts, list_batches, plan_verdicts
@@ -263,7 +263,7 @@ class TestManyGroups:
 
 
 def _many(store: Store, count: int) -> None:
-    create_dataset(store, "many")
+    ensure_dataset(store, "many", "ann")
     rows = [
         {
             "id": number,

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from app.errors import InputError, StaleRevisionError
-from app.review.datasets.dataset import set_policy
 from app.review.editing.edit import SetBall
 from app.review.editing.state import GroupState
 from app.review.editing.submit import history, load, submit, undo
+from app.review.policies.policy import change_policy
 from app.review.queue.listing import list_groups
 from app.review.verdicts import verdict as module
 from app.review.verdicts.verdict import set_verdict
@@ -134,7 +134,13 @@ class TestSetVerdict:
         def slow(*arguments, **options):
             found = read(*arguments, **options)
             monkeypatch.setattr(module, "read_solved", read)
-            set_policy(store, state.dataset_id, replace(PAPER, min_baseline_m=500.0))
+            change_policy(
+                store,
+                state.dataset_id,
+                replace(PAPER, min_baseline_m=500.0),
+                if_match=None,
+                actor="ann",
+            )
             return found
 
         monkeypatch.setattr(module, "read_solved", slow)

@@ -3,11 +3,10 @@ from __future__ import annotations
 import pytest
 
 from app.errors import InputError
-from app.review.datasets.dataset import create_dataset
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
-from app.review.importing.ingest import ingest
+from app.review.importing.ingest import ensure_dataset, ingest
 from app.review.verdicts.verdict import set_verdict
 from app.review.versions.diff import changelog, diff_versions
 from app.review.versions.freeze import FreezeRequest, freeze
@@ -85,7 +84,7 @@ class TestDiffVersions:
         assert (len(values["added"]), values["counts"]["added"]) == (1, 2)
 
     def test_two_datasets_cannot_be_compared(self, store, two, make_group) -> None:
-        create_dataset(store, "other")
+        ensure_dataset(store, "other", "ann")
         ingest(store, "other", [make_group(7)], source="test", actor="ann")
         solve_dataset(store, "other")
         other = freeze(store, "other", FreezeRequest("v1", groups="passing"), actor="ann")

@@ -6,12 +6,12 @@ import pytest
 from sqlalchemy import delete, func, select, text
 
 from app.errors import ConflictError, InputError
-from app.review.datasets.dataset import set_policy
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import replay
 from app.review.editing.submit import load, submit
 from app.review.importing.ingest import ingest
+from app.review.policies.policy import change_policy
 from app.review.queue.listing import list_groups
 from app.review.verdicts.verdict import set_verdict
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
@@ -131,7 +131,9 @@ class TestFreeze:
             case "reason":
                 judge(store, judged[1], "rejected", "sides_confused", "look at the box")
             case "policy":
-                set_policy(store, "demo", replace(STRICT, max_height_m=39.0))
+                change_policy(
+                    store, "demo", replace(STRICT, max_height_m=39.0), if_match=None, actor="ann"
+                )
                 solve_dataset(store, "demo")
                 judge(store, judged[2], "accepted", note="seen on video")
         split = Split("camera", test_cameras=("7.png",)) if change == "split" else Split()
@@ -188,7 +190,7 @@ class TestFreeze:
     def test_what_is_not_solved_is_not_guessed(self, store, judged) -> None:
         with store.write() as session:
             session.execute(delete(SolutionModel))
-        set_policy(store, "demo", STRICT)
+        change_policy(store, "demo", STRICT, if_match=None, actor="ann")
         with pytest.raises(ConflictError, match="2 groups have no solution"):
             frozen(store)
 

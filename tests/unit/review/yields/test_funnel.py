@@ -9,16 +9,16 @@ import pytest
 
 from app.config import Settings
 from app.errors import NotFoundError
-from app.review.datasets.dataset import create_dataset, get_dataset, set_policy
+from app.review.datasets.dataset import get_dataset
 from app.review.editing.edit import IncludeView, SetBall
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
-from app.review.importing.ingest import ingest
+from app.review.importing.ingest import ensure_dataset, ingest
+from app.review.policies.policy import change_policy
 from app.review.queue.listing import list_groups
 from app.review.yields.funnel import WITHOUT_EFFECT, Yield, get_yield
 from app.review.yields.store import YieldStore
 from app.review.yields.table import YieldTable
-from app.sample.scenes import make_scenes
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Group
@@ -28,6 +28,7 @@ from app.solving.solve import solve
 from app.solving.spread import MeanSpread
 from app.solving.verdict import PASSES, Verdict, judge, view_jac
 from app.store.session import Store
+from tests.scenes import make_scenes
 
 SEEDS = 9
 
@@ -254,7 +255,7 @@ class TestGetYield:
             assert [gate.passed for gate in again.gates] == [gate.passed for gate in old.gates]
 
     def test_an_empty_dataset_yields_nothing(self, store) -> None:
-        create_dataset(store, "demo")
+        ensure_dataset(store, "demo", "ann")
         found = get_yield(YieldStore(store), 1)
         counted(found)
         assert found.groups == 0
@@ -293,12 +294,12 @@ class TestYieldStore:
         fill(make_group(7), make_group(8))
         yields = YieldStore(store)
         before = yields.snapshot(1)
-        set_policy(store, "demo", replace(STRICT, max_sigma_m=1e-6))
+        change_policy(store, "demo", replace(STRICT, max_sigma_m=1e-6), if_match=None, actor="ann")
         found = get_yield(yields, 1)
         assert (found.unsolved, found.passing) == (0, 0)
         assert yields.snapshot(1).table is before.table
         other = replace(PAPER, calibration=CalibrationPolicy(robust_scale_px=3.0))
-        set_policy(store, "demo", other)
+        change_policy(store, "demo", other, if_match=None, actor="ann")
         assert get_yield(yields, 1).unsolved == 2
 
     def test_nothing_is_read_again_while_nothing_changes(self, filled) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.evaluation.overlap import iou, size_error_percent
 from app.sample.scene import SceneTruth
 from app.soccer.ball_boxes import ball_boxes
 from app.soccer.frames import Box
@@ -58,25 +59,6 @@ def paper_table_1(
     return [_row("annotated", annotated), _row("optimized", optimized)]
 
 
-def box_iou(a: Box, b: Box) -> float:
-    """Intersection over union of two boxes.
-
-    Example:
-        >>> box_iou(Box(0, 0, 2, 2), Box(1, 0, 2, 2))
-        0.3333333333333333
-    """
-    width = min(a.x + a.width, b.x + b.width) - max(a.x, b.x)
-    height = min(a.y + a.height, b.y + b.height) - max(a.y, b.y)
-    shared = max(width, 0.0) * max(height, 0.0)
-    return shared / (a.width * a.height + b.width * b.height - shared)
-
-
-def size_error_percent(box: Box, careful: Box) -> float:
-    """|d - d_careful| in per cent of the careful box's diagonal."""
-    diagonal = float(np.hypot(careful.width, careful.height))
-    return 100.0 * abs(box.diameter - careful.diameter) / diagonal
-
-
 def _boxes(group: Group, solution: Solution, truth: SceneTruth) -> Iterable[tuple[Box, Box, Box]]:
     """Annotated, optimised and true box of every view that has them."""
     for view in group.views:
@@ -90,7 +72,7 @@ def _row(name: str, pairs: list[tuple[Box, Box]]) -> BoxRow:
         return BoxRow(name, 0.0, 0.0, 0)
     return BoxRow(
         boxes=name,
-        iou=float(np.mean([box_iou(box, careful) for box, careful in pairs])),
+        iou=float(np.mean([iou(box, careful) for box, careful in pairs])),
         size_error_percent=float(np.mean([size_error_percent(*pair) for pair in pairs])),
         count=len(pairs),
     )

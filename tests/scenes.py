@@ -1,0 +1,16 @@
+"""Scenes of the sample, all of them at once."""
+
+from __future__ import annotations
+
+from app.sample.fixture import group_counts
+from app.sample.scene import Scene
+from app.sample.scenes import make_match
+
+
+def make_scenes(groups: int, seed: int, faults: bool = True) -> list[Scene]:
+    """The scenes that ``write_sample`` draws for the same numbers."""
+    return [
+        scene
+        for match, count in enumerate(group_counts(groups))
+        for scene in make_match(match, count, seed, faults)
+    ]
