@@ -27,11 +27,13 @@ def sample(
         Path | None, typer.Argument(help="Folder; with --dataset, by default one in the home.")
     ] = None,
     groups: Annotated[int, typer.Option(min=1, help="How many groups.")] = SAMPLE_GROUPS,
-    labels_only: Annotated[bool, typer.Option("--labels-only", help="No frames.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Another number, another dataset.")] = (
+    labels_only: Annotated[
+        bool, typer.Option("--labels-only", help="Write labels without frames.")
+    ] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed; another one gives other groups.")] = (
         SAMPLE_SEED
     ),
-    no_faults: Annotated[bool, typer.Option("--no-faults", help="Nothing planted.")] = False,
+    no_faults: Annotated[bool, typer.Option("--no-faults", help="Plant no faults.")] = False,
     dataset: Annotated[
         str | None,
         typer.Option(help="Import and solve it, too, under this name; done once, nothing more."),
@@ -73,13 +75,7 @@ def practice(
 
     settings = read_settings()
     with opened_store(settings) as store, show_progress("Making the practice groups") as progress:
-        made = make_practice_dataset(
-            store,
-            settings,
-            lambda done, total, _: progress(done, total),
-            again=again,
-            actor="local",
-        )
+        made = make_practice_dataset(store, settings, progress, again=again, actor="local")
     print_values(made, json_)
 
 

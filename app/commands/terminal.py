@@ -6,14 +6,13 @@ import logging
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from typing import Any
 
 from app.finite import finite, json_text
+from app.progress import Progress
 
-Progress = Callable[..., None]
-"""Called with how many are done and, where it is known, how many there are."""
 MAX_MISSING = 20
 """Missing images that are named in a table."""
 MIN_SECONDS = 0.1
@@ -23,29 +22,23 @@ MIN_SECONDS = 0.1
 @contextmanager
 def show_progress(what: str) -> Iterator[Progress]:
     """A bar on stderr while something runs; without a terminal, nothing."""
+    from rich import progress as rich
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
 
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
+        rich.TextColumn("{task.description}"),
+        rich.BarColumn(),
+        rich.MofNCompleteColumn(),
+        rich.TimeElapsedColumn(),
+        rich.TimeRemainingColumn(),
     )
     console = Console(stderr=True)
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+    with rich.Progress(*columns, console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=None)
         last = 0.0
 
-        def progress(done: int, total: int | None = None) -> None:
+        # A bar has no room for sentences.
+        def progress(done: int, total: int | None = None, _sentence: str = "") -> None:
             nonlocal last
             if done == total or time.monotonic() - last > MIN_SECONDS:
                 last = time.monotonic()

@@ -12,6 +12,7 @@ from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.frame import Frame
 from app.evaluation.table import Cell, Column, Frames, Row, Table
 from app.geometry.camera import Camera
+from app.progress import Progress
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.score import SHARE_ABOVE, FrameScore, score, score_frame
 
@@ -26,18 +27,17 @@ COLUMNS = (
 JAC_LIMITS = np.arange(0, 101) / 100
 Scores = dict[int, FrameScore | None]
 """By id of the frame; None: annotated lines, and no camera."""
-Step = Callable[[int], None]
 
 
 def score_cameras(
-    frames: Sequence[Frame], cameras: Mapping[int, Camera], step: Step | None = None
+    frames: Sequence[Frame], cameras: Mapping[int, Camera], progress: Progress | None = None
 ) -> Scores:
     """Every frame with lines against its camera; a static camera's same lines are measured once."""
     scores: Scores = {}
     known: dict[tuple[str, Camera], FrameScore] = {}
     for number, frame in enumerate(frames):
-        if step is not None:
-            step(number)
+        if progress is not None:
+            progress(number)
         if not frame.lines:
             continue
         camera = cameras.get(frame.id)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from app.evaluation import sensitivity
@@ -19,9 +19,8 @@ from app.evaluation.place import measure_frame
 from app.evaluation.result import Evaluation, FrameResult
 from app.evaluation.table import Table
 from app.geometry.camera import Camera
+from app.progress import Progress, telling
 from app.soccer.frames import Box
-
-Progress = Callable[[int, int | None, str], None]
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ def evaluate(
         options: How it is judged.
         progress: Called with steps done, steps in all and a sentence.
     """
-    say = progress or (lambda _done, _total, _sentence: None)
+    say = progress or (lambda _done, _total=None, _sentence="": None)
     resamples = Resamples.draw([item.match for item in frames], options.resamples, options.seed)
     scores = _score(frames, inputs, say)
     judged = judge(frames, inputs.detections or {}, options.boxes)
@@ -115,8 +114,10 @@ def _score(frames: Sequence[Frame], inputs: Inputs, say: Progress) -> tuple[Scor
     own = {frame.id: frame.camera for frame in frames if frame.camera is not None}
     total = 2 * len(frames)
     sentence = "Measuring cameras"
-    predicted = score_cameras(frames, inputs.cameras, lambda done: say(done, total, sentence))
-    oracle = score_cameras(frames, own, lambda done: say(len(frames) + done, total, sentence))
+    first = telling(say, sentence, total=total)
+    second = telling(say, sentence, start=len(frames), total=total)
+    predicted = score_cameras(frames, inputs.cameras, first)
+    oracle = score_cameras(frames, own, second)
     return predicted, oracle
 
 

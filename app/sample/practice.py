@@ -7,7 +7,6 @@ ordinary sample does not know them.
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import cv2
 from app.datasets.match_frames import ARCHIVE
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.finite import json_text
+from app.progress import Progress
 from app.sample.faults import FaultPlan
 from app.sample.render import render
 from app.sample.scene import Scene
@@ -28,9 +28,6 @@ MATCH_GROUPS = 800
 """Groups that the match of the lessons has; most of them are never made."""
 CLEAN = "clean"
 """Kind of a lesson without a fault."""
-
-Progress = Callable[[int, int], None]
-"""Called with the frames that are drawn and their total."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from app.datasets.match_frames import ARCHIVE
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import InputError
 from app.finite import json_text
+from app.progress import Progress
 from app.sample.fixture import group_counts, make_fixture
 from app.sample.render import render
 from app.sample.scenes import make_match
@@ -31,8 +32,6 @@ GROUPS_PER_JOB = 3
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 """A fixed date, so that the same sample is the same bytes."""
 
-Progress = Callable[[int, int], None]
-"""Called with the groups that are done and their total."""
 J = TypeVar("J")
 R = TypeVar("R")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from itertools import chain
@@ -23,6 +23,7 @@ from app.datasets.sn_calibration_reader import read_line_files
 from app.errors import DatasetFormatError, InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
+from app.progress import Progress
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -62,7 +63,7 @@ def calibrate_files(
     labels: str = "checked",
     with_leave_one_out: bool = False,
     executor: Executor,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Write a camera file for each line file, and what was noticed on the way.
 
@@ -117,7 +118,7 @@ def score_files(
     *,
     size: ImageSize,
     without: Path | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Measure camera files against line files.
 

@@ -5,13 +5,14 @@ Killed anywhere it loses nothing but the chunks in hand.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from app.progress import Progress
 from app.review.datasets.dataset import Dataset, get_dataset, need_dataset, read_dataset
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.encode import encode
@@ -40,9 +41,6 @@ from app.store.solutions import (
 
 CHUNK = 40
 """Groups a task: a second of work, or a few when lines must be calibrated."""
-
-Progress = Callable[[int, int], None]
-"""Called with the number of groups done and the number that were to do."""
 
 
 @dataclass

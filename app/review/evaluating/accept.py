@@ -7,13 +7,14 @@ came from. Until then no solve has seen it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sqlalchemy.orm import Session
 
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import box_problem
+from app.progress import Progress
 from app.review.datasets.dataset import read_dataset
 from app.review.editing.edit import SetBall, need_view
 from app.review.editing.etags import require_unchanged, said_of
@@ -39,8 +40,6 @@ REASONS = {
     "the_same": "the view has this very ball already",
     "not_a_ball": "the prediction cannot be a ball in this image",
 }
-
-Progress = Callable[[int, int | None, str], None]
 
 
 @dataclass(frozen=True)

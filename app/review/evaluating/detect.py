@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +12,7 @@ from sqlalchemy.orm import Session
 from app.config import Settings
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
 from app.evaluation.frame import Detection
+from app.progress import Progress
 from app.review.datasets.dataset import read_dataset
 from app.review.evaluating.onnx_model import OnnxModel
 from app.review.evaluating.predictions import (
@@ -32,8 +32,6 @@ from app.store.views import StoredView, dataset_views
 MIN_SCORE = 0.05
 MOST = 20
 """Detections of a frame that are kept."""
-
-Progress = Callable[[int, int | None, str], None]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +23,7 @@ from app.evaluation.figure import Figure
 from app.evaluation.frame import BOX_KINDS, Detection
 from app.evaluation.result import NUMBERS, Evaluation, FrameResult
 from app.evaluation.table import Table
+from app.progress import Progress
 from app.review.datasets.dataset import Dataset, read_dataset
 from app.review.evaluating.careful_boxes import careful_boxes
 from app.review.evaluating.frames import LIVE_RULES, Truth, live_truth, version_truth
@@ -53,8 +54,6 @@ from app.store.value_codec import from_json, to_json
 MAX_PAGE = 500
 MAX_NAME = 100
 _SET_PINS = ("id", "name", "digest", "source", "unknown")
-
-Progress = Callable[[int, int | None, str], None]
 
 
 @dataclass(frozen=True)

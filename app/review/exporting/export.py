@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from app.datasets.issia import FramePersons
 from app.datasets.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
 from app.datasets.output import output_tree
 from app.errors import InputError
+from app.progress import Progress
 from app.review.datasets.dataset import read_dataset
 from app.review.datasets.licence import licence_of
 from app.review.exporting.formats import (
@@ -35,9 +36,6 @@ from app.soccer.ball_boxes import BOX_KINDS
 from app.store.session import Store
 
 IMAGES = ("none", "copy", "link")
-
-Progress = Callable[[int, int], None]
-"""Called with the number of groups done and the number that are exported."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ are not carried: they lie elsewhere on each machine.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from sqlalchemy.orm import Session
 from app.datasets.manifest import Manifest, write_manifest
 from app.datasets.output import output_tree
 from app.finite import json_text
+from app.progress import Progress
 from app.review.datasets.dataset import Dataset, read_dataset
 from app.review.datasets.licence import licence_text
 from app.review.editing.lineage import Lineage, Lineages, station_lineage
@@ -44,8 +45,6 @@ FORMAT_VERSION = 1
 HEAD, STATIONS, GROUPS, SPARE = "touchline.json", "stations.jsonl", "groups.jsonl", "spare.jsonl"
 EDIT_KINDS = ("edit", "undo", "redo", "station_edit", "station_undo", "station_redo")
 _BATCH = 200
-
-Progress = Callable[[int, int], None]
 
 
 def carry_out(

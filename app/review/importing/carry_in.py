@@ -18,6 +18,7 @@ from sqlalchemy.orm import Session
 from app.datasets.archive import FileTree, Limits, open_tree
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, InputError
+from app.progress import Progress
 from app.review.datasets.dataset import find_dataset, insert_dataset
 from app.review.editing.lineage import Lineages, base_digest, station_lineage
 from app.review.importing.carry import GROUPS, SPARE, STATIONS
@@ -44,7 +45,6 @@ from app.store.queue import refresh_queue
 from app.store.session import Store
 
 BATCH = 200
-Progress = Callable[[int], None]
 T = TypeVar("T")
 
 

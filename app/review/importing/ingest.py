@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from sqlalchemy.orm import Session
 
+from app.progress import Progress
 from app.review.datasets.dataset import find_dataset, insert_dataset
 from app.review.editing.shared_stations import SharedStations
 from app.review.editing.upstream import KIND, Kept, follow_group
@@ -29,9 +30,6 @@ from app.store.session import Store
 
 BATCH = 200
 """Groups a transaction: one import holds the writers up for a fraction of a second at a time."""
-
-Progress = Callable[[int], None]
-"""Called with the number of groups done so far."""
 
 
 @dataclass

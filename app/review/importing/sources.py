@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -23,6 +23,7 @@ from app.datasets.sn_calibration import DEFAULT_SIZE
 from app.datasets.sn_calibration_reader import read_sn_calibration
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
+from app.progress import Progress
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.carry_in import carry_in
 from app.review.importing.ingest import IngestReport, ingest
@@ -34,8 +35,6 @@ from app.store.session import Store
 
 FORMATS: tuple[str, ...] = get_args(ImportFormat)
 STATIC = ("issia", "issia-3d")
-
-Progress = Callable[[int], None]
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from app.config import Settings
 from app.errors import InputError
+from app.progress import Progress
 from app.review.datasets.dataset import dataset_id, find_dataset, require_name
 from app.review.importing.folders import resolve_folder
 from app.review.importing.sources import FORMATS, Imported, Source, import_source
@@ -131,8 +132,11 @@ def import_work(
     return work
 
 
-def _step(progress: JobProgress, sentence: str) -> Callable[[int], None]:
-    return lambda done: progress(done, None, f"{sentence} {done:,} groups so far.")
+def _step(progress: JobProgress, sentence: str) -> Progress:
+    def step(done: int, _total: int | None = None, _sentence: str = "") -> None:
+        progress(done, None, f"{sentence} {done:,} groups so far.")
+
+    return step
 
 
 def _solve(jobs: Jobs, store: Store, dataset: str, actor: str) -> None:

@@ -25,6 +25,7 @@ from app.errors import (
     ReviewError,
     StorageError,
 )
+from app.progress import Progress
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
@@ -79,9 +80,14 @@ class FailedWithReportError(ReviewError):
         self.result = result
 
 
-def counting(progress: JobProgress, what: str) -> Callable[[int, int], None]:
+def counting(progress: JobProgress, what: str) -> Progress:
     """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``."""
-    return lambda done, total: progress(done, total, f"{done:,} of {total:,} {what}")
+
+    def count(done: int, total: int | None = None, _sentence: str = "") -> None:
+        of = "" if total is None else f" of {total:,}"
+        progress(done, total, f"{done:,}{of} {what}")
+
+    return count
 
 
 class JobProgress:

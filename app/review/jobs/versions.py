@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from app.errors import NotFoundError
@@ -18,7 +17,6 @@ from app.store.jobs import Job
 from app.store.session import Store
 
 FREEZE, VERIFY = "freeze", "verify"
-_Step = Callable[[int, int], None]
 
 
 def request_freeze(
@@ -89,8 +87,8 @@ def freeze_work(store: Store, dataset_id: int, request: FreezeRequest, actor: st
     """The work of freezing; its result names the version."""
 
     def work(progress: JobProgress) -> Json:
-        step = _step(progress, f"Freezing {request.name}.")
-        return version_result(freeze(store, dataset_id, request, actor=actor, progress=step))
+        progress(0, None, f"Freezing {request.name}.")
+        return version_result(freeze(store, dataset_id, request, actor=actor, progress=progress))
 
     return work
 
@@ -99,8 +97,8 @@ def verify_work(store: Store, version_id: int, actor: str) -> Work:
     """The work of verifying; its result is the report, which the version keeps, too."""
 
     def work(progress: JobProgress) -> Json:
-        step = _step(progress, f"Verifying {get_version(store, version_id).name}.")
-        report = verify_and_keep(store, version_id, progress=step, actor=actor)
+        progress(0, None, f"Verifying {get_version(store, version_id).name}.")
+        report = verify_and_keep(store, version_id, progress=progress, actor=actor)
         return {"version_id": version_id, **report.values()}
 
     return work
@@ -114,11 +112,6 @@ def version_result(version: Version) -> dict[str, Any]:
         "hash": version.hash,
         "counts": dict(version.counts),
     }
-
-
-def _step(progress: JobProgress, sentence: str) -> _Step:
-    progress(0, None, sentence)
-    return lambda done, total: progress(done, total)
 
 
 def _request_values(request: FreezeRequest) -> Json:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 from app.config import Settings
 from app.datasets.match_frames import ARCHIVE
 from app.errors import ConflictError, NotFoundError
+from app.progress import Progress, telling
 from app.review.datasets.dataset import find_dataset
 from app.review.datasets.delete import delete_dataset
 from app.review.editing.recompute import solve_dataset
@@ -30,9 +30,6 @@ from app.store.session import Store
 KIND = "practice"
 DATASET = "practice"
 """Name of the dataset, and of its folder in the home."""
-
-Step = Callable[[int, int, str], None]
-"""Called with what is done, what there is to do, and a sentence."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,7 @@ def practice_work(store: Store, settings: Settings, *, again: bool, actor: str) 
 
 
 def make_practice_dataset(
-    store: Store, settings: Settings, step: Step, *, again: bool = False, actor: str
+    store: Store, settings: Settings, progress: Progress, *, again: bool = False, actor: str
 ) -> dict[str, Json]:
     """Draw, import and solve the lessons; done once, nothing more unless ``again``.
 
@@ -124,14 +121,13 @@ def make_practice_dataset(
         return {"dataset": DATASET, "groups": len(ids), "first": ids[0], "made": False}
     folder = settings.home / DATASET
     if not _is_drawn(settings):
-        write_practice(folder, lambda done, total: step(done, total, "Drawing the pictures."))
+        write_practice(folder, telling(progress, "Drawing the pictures."))
     if again and ids:
         delete_dataset(store, DATASET, confirm=DATASET, actor=actor)
-    step(0, 1, "Reading the groups.")
+    progress(0, 1, "Reading the groups.")
     source = Source("soccernet-v3", folder.resolve(), name="the practice groups")
     import_source(store, DATASET, source, settings, None, actor=actor)
-    total = len(LESSONS)
-    solve_dataset(store, DATASET, None, lambda done, _: step(done, total, "Solving the groups."))
+    solve_dataset(store, DATASET, None, telling(progress, "Solving the groups."))
     ids = _group_ids(store)
     return {"dataset": DATASET, "groups": len(ids), "first": ids[0], "made": True}
 

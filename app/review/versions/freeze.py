@@ -7,7 +7,7 @@ version's own row come last, in one. Killed anywhere and started again it ends i
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
+from app.progress import Progress
 from app.review.datasets.dataset import Dataset, read_dataset
 from app.review.datasets.licence import licence_text
 from app.review.versions.membership import RULES, Candidate, read_candidates, require_solved
@@ -48,9 +49,6 @@ MAX_LICENCE = 100_000
 NO_SPLIT = "none"
 """What counts call groups and views that are in no split, or in two."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
-
-Progress = Callable[[int, int], None]
-"""Called with the number of groups done and the number that there are."""
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field
 from itertools import islice
@@ -13,6 +13,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from app.errors import JobCancelled, ReviewError, StorageError
+from app.progress import Progress
 from app.review.datasets.fan_out import fan_out
 from app.review.versions.version import (
     Version,
@@ -51,9 +52,6 @@ NAMED = 200
 UNEXPECTED = "something went wrong inside the server; its log says what"
 _A_GROUP = 10
 """Of them, in one group."""
-
-Progress = Callable[[int, int], None]
-"""Called with the number of groups done and the number that there are."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,39 @@
+"""Progress: how a long piece of work tells whoever started it how far it is."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class Progress(Protocol):
+    """Called every now and then with how much is done.
+
+    It may raise (``errors.JobCancelled``) to end the work there.
+    """
+
+    def __call__(self, done: int, total: int | None = None, sentence: str = "", /) -> None:
+        """Tell how far the work is.
+
+        Args:
+            done: How much is done, in the unit that the work counts.
+            total: How much there is to do; None: as told before, or not known.
+            sentence: What is being done; empty: as told before.
+        """
+
+
+def telling(
+    progress: Progress, sentence: str, *, start: int = 0, total: int | None = None
+) -> Progress:
+    """A progress for one part of some work: its counts go on from ``start``, under a sentence.
+
+    Args:
+        progress: Hears of the whole work.
+        sentence: What the part does.
+        start: How much was done before the part.
+        total: How much there is to do in the whole work; None: as the part says.
+    """
+
+    def tell(done: int, of: int | None = None, _sentence: str = "") -> None:
+        progress(start + done, of if total is None else total, sentence)
+
+    return tell
