@@ -19,6 +19,7 @@ from app.commands import (
     files,
     lines,
     policy,
+    predictions,
     sample,
     service,
     solving,
@@ -34,7 +35,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for part in (service, sample, files, solving, lines, versions, evaluation, doctor):
+for part in (service, sample, files, solving, lines, versions, evaluation, predictions, doctor):
     app.add_typer(part.commands)
 app.add_typer(datasets.commands, name="datasets")
 app.add_typer(policy.commands, name="policy")

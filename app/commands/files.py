@@ -9,9 +9,17 @@ from typing import Annotated
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Dataset, Json, read_settings, typed_source
+from app.commands.options import (
+    Dataset,
+    Json,
+    parse_cameras,
+    parse_frame_offset,
+    parse_size,
+    read_settings,
+)
 from app.commands.terminal import complain, print_export, print_import, show_progress
 from app.datasets.format_names import ExportFormat, ImportFormat
+from app.soccer.frames import ImageSize
 
 commands = typer.Typer()
 
@@ -55,7 +63,10 @@ def import_(
         str, typer.Option(metavar="2,6", help="ISSIA: cameras whose videos are mirrored.")
     ] = "",
     size: Annotated[
-        str | None, typer.Option("--size", metavar="WxH", help="Default 960x540; ISSIA 1920x1080.")
+        ImageSize | None,
+        typer.Option(
+            "--size", parser=parse_size, metavar="WxH", help="Default 960x540; ISSIA 1920x1080."
+        ),
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would happen, and keep nothing.")
@@ -67,17 +78,17 @@ def import_(
     FORMAT is soccernet-v3, soccernet-v3d, issia, issia-3d, sn-calibration, cameras, gamestate,
     coco, parquet or touchline; docs/formats.md says what each of them holds.
     """
-    source = typed_source(
-        format_,
-        path,
-        lines=lines,
-        calibration=calibration.value,
-        frame_offset=frame_offset,
-        flip=flip,
-        size=size,
-    )
-    from app.review.importing.sources import import_source
+    from app.review.importing.sources import Source, import_source
 
+    source = Source(
+        format_,
+        path.resolve(),
+        size=size,
+        lines=None if lines is None else lines.resolve(),
+        calibration=calibration.value,
+        frame_offset=parse_frame_offset(frame_offset),
+        flipped=parse_cameras(flip),
+    )
     settings = read_settings()
     with opened_store(settings) as store, show_progress("Importing") as progress:
         imported = import_source(store, dataset, source, settings, progress, dry_run=dry_run)

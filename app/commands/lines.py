@@ -9,10 +9,14 @@ from typing import Annotated
 import typer
 
 from app.commands.opened import process_pool
-from app.commands.options import Json, Size, Workers, parse_size, read_settings
+from app.commands.options import Json, Size, Workers, read_settings
 from app.commands.terminal import print_values, show_progress
 
 commands = typer.Typer()
+
+LineFiles = Annotated[
+    Path, typer.Argument(metavar="IN", exists=True, help="Folder or zip of line files.")
+]
 
 
 class Labels(StrEnum):
@@ -24,14 +28,14 @@ class Labels(StrEnum):
 
 @commands.command()
 def calibrate(
-    source: Annotated[Path, typer.Argument(metavar="IN", exists=True)],
-    out: Annotated[Path, typer.Argument(metavar="OUT")],
-    size: Size = "960x540",
+    source: LineFiles,
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder or zip for camera files.")],
+    size: Size,
     labels: Annotated[Labels, typer.Option(help="checked leaves out wrong labels.")] = (
         Labels.CHECKED
     ),
     leave_one_out: Annotated[
-        bool, typer.Option("--leave-one-out", help="Drop each marking in turn, too.")
+        bool, typer.Option("--leave-one-out", help="Also calibrate without each marking in turn.")
     ] = False,
     workers: Workers = None,
     json_: Json = False,
@@ -44,7 +48,7 @@ def calibrate(
         result = calibrate_files(
             source,
             out,
-            size=parse_size(size),
+            size=size,
             labels=labels.value,
             with_leave_one_out=leave_one_out,
             executor=executor,
@@ -55,9 +59,13 @@ def calibrate(
 
 @commands.command()
 def score(
-    lines: Annotated[Path, typer.Argument(metavar="LINES", exists=True)],
-    cameras: Annotated[Path, typer.Argument(metavar="CAMERAS", exists=True)],
-    size: Size = "960x540",
+    lines: Annotated[
+        Path, typer.Argument(metavar="LINES", exists=True, help="Folder or zip of line files.")
+    ],
+    cameras: Annotated[
+        Path, typer.Argument(metavar="CAMERAS", exists=True, help="Folder or zip of camera files.")
+    ],
+    size: Size,
     without: Annotated[
         Path | None,
         typer.Option(exists=True, dir_okay=False, help="findings.json: leave those markings out."),
@@ -68,19 +76,17 @@ def score(
     from app.review.datasets.batch import score_files
 
     with show_progress("Scoring") as progress:
-        result = score_files(
-            lines, cameras, size=parse_size(size), without=without, progress=progress
-        )
+        result = score_files(lines, cameras, size=size, without=without, progress=progress)
     print_values(result, json_)
 
 
 @commands.command()
 def pitch(
-    source: Annotated[Path, typer.Argument(metavar="IN", exists=True)],
-    size: Size = "960x540",
+    source: LineFiles,
+    size: Size,
     json_: Json = False,
 ) -> None:
     """Estimate the size of a pitch from line files of one match."""
     from app.review.datasets.batch import estimate_pitch_of_files
 
-    print_values(estimate_pitch_of_files(source, size=parse_size(size)), json_)
+    print_values(estimate_pitch_of_files(source, size=size), json_)

@@ -7,16 +7,52 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-if TYPE_CHECKING:
-    from pathlib import Path
+from app.soccer.frames import ImageSize
 
+if TYPE_CHECKING:
     from app.config import Settings
-    from app.review.importing.sources import Source
-    from app.soccer.frames import ImageSize
+
+
+def parse_size(text: str) -> ImageSize:
+    """A size as it is typed: ``960x540``."""
+    match = re.fullmatch(r"([1-9]\d{0,4})[xX]([1-9]\d{0,4})", text)
+    if match is None:
+        raise typer.BadParameter(f'"{text}" is not a size; write it as 960x540')
+    return ImageSize(int(match[1]), int(match[2]))
+
+
+def parse_cameras(text: str) -> frozenset[int]:
+    """Numbers of cameras as they are typed: ``2,6``."""
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    if not all(part.isascii() and part.isdigit() for part in parts):
+        raise typer.BadParameter(f'"{text}" is not a list of cameras; write it as 2,6')
+    return frozenset(int(part) for part in parts)
+
+
+def parse_frame_offset(text: str) -> int | dict[int, int]:
+    """A frame offset as it is typed: ``8``, or ``1=8,2=9`` by camera."""
+    if re.fullmatch(r"-?\d{1,6}", text):
+        return int(text)
+    pairs = [re.fullmatch(r"(\d{1,3})=(-?\d{1,6})", part.strip()) for part in text.split(",")]
+    found = [(int(pair[1]), int(pair[2])) for pair in pairs if pair]
+    if len(found) < len(pairs):
+        raise typer.BadParameter(f'"{text}" is not an offset; write 8, or 1=8,2=9 by camera')
+    return dict(found)
+
 
 Dataset = Annotated[str, typer.Option("--dataset", help="Name of the dataset.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout.")]
-Size = Annotated[str, typer.Option("--size", metavar="WxH", help="Size of the annotated images.")]
+Size = Annotated[
+    ImageSize,
+    typer.Option(
+        "--size",
+        parser=parse_size,
+        metavar="WxH",
+        default_factory=lambda: "960x540",
+        show_default="960x540",
+        help="Size of the annotated images.",
+    ),
+]
 Workers = Annotated[
     int | None, typer.Option("--workers", min=1, help="Processes; default: all cores.")
 ]
@@ -47,56 +83,3 @@ def require_local(settings: Settings) -> None:
             "everybody who reaches it could change everything. Use 127.0.0.1, and a proxy that "
             "asks who is there; TOUCHLINE_ALLOWED_HOSTS lists the names that it forwards."
         )
-
-
-def typed_source(
-    format_: str,
-    path: Path,
-    *,
-    lines: Path | None,
-    calibration: str,
-    frame_offset: str,
-    flip: str,
-    size: str | None,
-) -> Source:
-    """What an import reads, from the texts of a command line."""
-    from app.review.importing.sources import Source
-
-    return Source(
-        format_,
-        path.resolve(),
-        size=None if size is None else parse_size(size),
-        lines=None if lines is None else lines.resolve(),
-        calibration=calibration,
-        frame_offset=parse_frame_offset(frame_offset),
-        flipped=parse_cameras(flip),
-    )
-
-
-def parse_size(text: str) -> ImageSize:
-    """``960x540``."""
-    from app.soccer.frames import ImageSize
-
-    match = re.fullmatch(r"([1-9]\d{0,4})[xX]([1-9]\d{0,4})", text)
-    if match is None:
-        raise typer.BadParameter(f'"{text}" is not a size; write it as 960x540')
-    return ImageSize(int(match[1]), int(match[2]))
-
-
-def parse_cameras(text: str) -> frozenset[int]:
-    """``2,6``."""
-    parts = [part.strip() for part in text.split(",") if part.strip()]
-    if not all(part.isascii() and part.isdigit() for part in parts):
-        raise typer.BadParameter(f'"{text}" is not a list of cameras; write it as 2,6')
-    return frozenset(int(part) for part in parts)
-
-
-def parse_frame_offset(text: str) -> int | dict[int, int]:
-    """``8``, or ``1=8,2=9`` by camera."""
-    if re.fullmatch(r"-?\d{1,6}", text):
-        return int(text)
-    pairs = [re.fullmatch(r"(\d{1,3})=(-?\d{1,6})", part.strip()) for part in text.split(",")]
-    found = [(int(pair[1]), int(pair[2])) for pair in pairs if pair]
-    if len(found) < len(pairs):
-        raise typer.BadParameter(f'"{text}" is not an offset; write 8, or 1=8,2=9 by camera')
-    return dict(found)

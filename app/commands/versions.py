@@ -42,9 +42,9 @@ class Groups(StrEnum):
 def freeze(
     dataset: Dataset,
     name: Annotated[
-        str | None, typer.Argument(help="Of the version; default: the next vN.")
+        str | None, typer.Argument(help="Name of the version; default: the next vN.")
     ] = None,
-    named: Annotated[str | None, typer.Option("--name", help="The same.")] = None,
+    named: Annotated[str | None, typer.Option("--name", help="The name, as an option.")] = None,
     note: Annotated[str, typer.Option(help="What a reader should know.")] = "",
     licence: Annotated[str, typer.Option(help="Licence text; default: that of the sources.")] = "",
     licence_file: Annotated[
@@ -53,10 +53,16 @@ def freeze(
     groups: Annotated[
         Groups, typer.Option(help="accepted by people, or whatever is passing and not rejected.")
     ] = Groups.ACCEPTED,
-    split: Annotated[SplitKind, typer.Option(help="Of train and test.")] = SplitKind.GIVEN,
-    seed: Annotated[int, typer.Option(min=0, help="Of a split by match.")] = 0,
-    test_share: Annotated[float, typer.Option(help="Of the matches, in a split by match.")] = 0.2,
-    test_cameras: Annotated[str, typer.Option(metavar="1,2", help="In a split by camera.")] = "1,2",
+    split: Annotated[
+        SplitKind, typer.Option(help="How it is split into train and test.")
+    ] = SplitKind.GIVEN,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of a split by match.")] = 0,
+    test_share: Annotated[
+        float, typer.Option(help="Share of the matches that go to test, in a split by match.")
+    ] = 0.2,
+    test_cameras: Annotated[
+        str, typer.Option(metavar="1,2", help="Cameras that go to test, in a split by camera.")
+    ] = "1,2",
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Count, and save nothing.")] = False,
     json_: Json = False,
 ) -> None:
@@ -124,9 +130,8 @@ def verify(
     json_: Json = False,
 ) -> None:
     """Compute a version from scratch and compare it bit for bit; exit code 1 where it differs."""
-    from app.errors import NotFoundError
     from app.review.versions.verify import verify_and_keep
-    from app.review.versions.version import find_version, list_versions
+    from app.review.versions.version import find_version, newest_version
 
     settings = read_settings()
     with (
@@ -134,10 +139,10 @@ def verify(
         executor_of(workers or settings.workers) as executor,
         show_progress("Verifying") as progress,
     ):
-        known = list_versions(store, dataset)
-        if not known:
-            raise NotFoundError(f'"{dataset}" has no version yet', hint="Freeze one first.")
-        chosen = known[0] if version is None else find_version(store, dataset, version)
+        if version is None:
+            chosen = newest_version(store, dataset)
+        else:
+            chosen = find_version(store, dataset, version)
         report = verify_and_keep(store, chosen.id, executor, progress, actor="local")
     print_values(report.values(), json_)
     if not report.ok:

@@ -217,6 +217,23 @@ def get_predictions(store: Store, set_id: int) -> PredictionSet:
         return read_set(session, set_id)
 
 
+def find_predictions(store: Store, dataset: str | int, name: str) -> PredictionSet:
+    """The set of a dataset with that name or id.
+
+    Raises:
+        NotFoundError: There is none; the hint names those that there are.
+    """
+    known = list_predictions(store, dataset)
+    found = next((item for item in known if name in (item.name, str(item.id))), None)
+    if found is None:
+        names = ", ".join(item.name for item in known[:10])
+        raise NotFoundError(
+            f'there is no file and no set of predictions "{name}"',
+            hint=f"Sets: {names}." if names else None,
+        )
+    return found
+
+
 def delete_predictions(store: Store, set_id: int) -> None:
     """Throw a set away; evaluations of it stay, and so do balls that were accepted from it.
 

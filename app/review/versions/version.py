@@ -104,6 +104,18 @@ def find_version(store: Store, dataset: str | int, version: str) -> Version:
     return fitting[0]
 
 
+def newest_version(store: Store, dataset: str | int) -> Version:
+    """The version of a dataset that was frozen last.
+
+    Raises:
+        NotFoundError: Nothing was frozen yet.
+    """
+    found = list_versions(store, dataset)
+    if not found:
+        raise NotFoundError(f'"{dataset}" has no version yet', hint="Freeze one first.")
+    return found[0]
+
+
 def next_name(store: Store, dataset: str | int) -> str:
     """The next free name of the kind v1, v2, ..."""
     names = {item.name for item in list_versions(store, dataset)}

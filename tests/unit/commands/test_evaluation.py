@@ -8,7 +8,6 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from app.cli import app
-from app.commands.evaluation import guess_format
 from app.config import Settings
 from app.datasets.report import Report
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
@@ -169,18 +168,6 @@ class TestAccept:
         values = json.loads(done.stdout)
         assert values["views"] == 0
         assert values["refused"]["annotated"] > 0
-
-
-class TestGuessFormat:
-    @pytest.mark.parametrize(
-        ("name", "format_"), [("a.json", "coco"), ("a.csv", "csv"), ("labels/7.txt", "yolo")]
-    )
-    def test_goes_by_the_ending(self, tmp_path, name, format_) -> None:
-        path = tmp_path / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_text("x")
-        assert guess_format(path) == format_
-        assert guess_format(path.parent) == format_
 
 
 class TestTables:

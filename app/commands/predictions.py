@@ -1,0 +1,141 @@
+"""Commands on predictions: predictions, accept, detect."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.commands.opened import opened_store
+from app.commands.options import Dataset, Json, Workers, read_settings
+from app.commands.terminal import complain, print_json, print_values, say, show_progress
+
+if TYPE_CHECKING:
+    from app.store.predictions import PredictionSet
+
+commands = typer.Typer()
+
+Query = Annotated[
+    str, typer.Option("--query", help="Which groups, in the query language of the queue.")
+]
+
+
+@commands.command("predictions")
+def list_(dataset: Dataset, json_: Json = False) -> None:
+    """List the sets of predictions of a dataset, newest first."""
+    from app.review.evaluating.predictions import list_predictions
+
+    with opened_store() as store:
+        found = list_predictions(store, dataset)
+    if json_:
+        print_json([vars(item) for item in found])
+        return
+    for item in found:
+        counts = f"{item.boxes:8} boxes in {item.frames} frames, {item.cameras} cameras"
+        say(f"{item.name:24} {item.format:8} {item.created[:19]} {counts}")
+
+
+@commands.command()
+def accept(
+    dataset: Dataset,
+    predictions: Annotated[str, typer.Argument(help="Name of a set of predictions.")],
+    query: Query = "",
+    min_score: Annotated[
+        float, typer.Option(min=0, max=1, help="Predictions with a lower score are not taken.")
+    ] = 0.0,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Also where a view has another ball.")
+    ] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Count, and change nothing.")] = False,
+    json_: Json = False,
+) -> None:
+    """Make annotations of predictions: an edit each, which can be undone.
+
+    The surest prediction of each view is taken, where it has no ball yet.
+    """
+    from app.review.evaluating.accept import AcceptRequest, plan_accept
+    from app.review.evaluating.accept import accept as run_accept
+    from app.review.evaluating.predictions import find_predictions
+
+    with opened_store() as store, show_progress("Accepting") as progress:
+        chosen = find_predictions(store, dataset, predictions)
+        request = AcceptRequest(chosen.id, query, None, min_score, replace)
+        if dry_run:
+            plan = plan_accept(store, dataset, request)
+            values = {"views": len(plan.changes), "groups": plan.groups, "refused": plan.refused}
+        else:
+            report = run_accept(store, dataset, request, actor="local", progress=progress)
+            values = vars(report)
+    print_values(values, json_)
+
+
+@commands.command()
+def detect(
+    dataset: Dataset,
+    model: Annotated[Path, typer.Option("--model", help="MODEL.onnx, as Ultralytics exports it.")],
+    name: Annotated[
+        str | None,
+        typer.Option(help="Name of the set of predictions; default: that of the model."),
+    ] = None,
+    query: Query = "",
+    missing: Annotated[bool, typer.Option("--missing", help="Only views without a ball.")] = False,
+    min_score: Annotated[
+        float, typer.Option(min=0, max=1, help="Detections with a lower score are not kept.")
+    ] = 0.05,
+    category: Annotated[
+        int | None,
+        typer.Option(min=0, help="The class that is the ball, where there are several."),
+    ] = None,
+    side: Annotated[
+        int | None,
+        typer.Option(
+            min=32, max=4096, help="Side of the model's input in pixels, where it is variable."
+        ),
+    ] = None,
+    workers: Workers = None,
+    json_: Json = False,
+) -> None:
+    """Let a detector look for balls; what it finds stays a prediction until somebody accepts it."""
+    from app.review.evaluating.detect import DetectRequest
+    from app.review.evaluating.detect import detect as run_detect
+    from app.review.evaluating.onnx_model import OnnxModel
+
+    settings = read_settings()
+    opened = OnnxModel.open(
+        model, category=category, side=side, threads=workers or settings.workers
+    )
+    with opened_store() as store, show_progress("Detecting") as progress:
+        request = DetectRequest(name or model.stem, query, missing, min_score)
+        found = run_detect(store, dataset, opened, request, actor="local", progress=progress)
+    if json_:
+        print_json(vars(found))
+        return
+    say(f"{found.boxes} boxes in {found.frames} of {found.report['looked_at']} frames")
+    _print_problems(found)
+    say(
+        f"They stay predictions; touchline accept --dataset {dataset} {found.name} takes them over."
+    )
+
+
+def print_set(found: PredictionSet) -> None:
+    """What was read into a set, and what could not be read."""
+    say(
+        f"{found.source}: {found.boxes} boxes in {found.frames} frames, {found.cameras} cameras, "
+        f"{found.unknown} unknown frames (predictions {found.name})"
+    )
+    if found.report.get("without_score"):
+        say(f"  {found.report['without_score']} boxes have no score and count as sure")
+    for item in found.report.get("unknown_frames", [])[:5]:
+        complain(f"  {item['frame']} {item['problem']}")
+    _print_problems(found)
+
+
+def _print_problems(found: PredictionSet) -> None:
+    problems = found.report["problems"]
+    for item in problems[:5]:
+        place = ", ".join(str(item[part]) for part in ("file", "record", "field") if item[part])
+        complain(f"  {place}: {item['problem']}")
+    rest = len(problems) - 5 + found.report["more_problems"]
+    if rest > 0:
+        complain(f"  and {rest} more problems")

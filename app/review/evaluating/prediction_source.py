@@ -1,0 +1,157 @@
+"""Prediction sources: files to read predictions from, or a set of them that is there already."""
+
+from __future__ import annotations
+
+import re
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from app.datasets.archive import open_tree
+from app.datasets.report import Report
+from app.errors import NotFoundError
+from app.progress import Progress
+from app.review.evaluating.evaluation import EvaluationRequest, run_evaluation
+from app.review.evaluating.predictions import PredictionFiles, add_predictions, find_predictions
+from app.review.versions.version import find_version
+from app.soccer.frames import ImageSize
+from app.store.evaluations import StoredEvaluation
+from app.store.predictions import PredictionSet
+from app.store.session import Store
+
+ENDINGS = ((".csv", "csv"), (".json", "coco"), (".txt", "yolo"))
+"""Formats of predictions by the endings of their files; where several are there, the first."""
+AUTO = "auto"
+"""In place of a format: go by the endings."""
+
+
+@dataclass(frozen=True)
+class PredictionSource:
+    """Ball boxes, cameras or both.
+
+    Attributes:
+        boxes: File, folder or zip of ball boxes, or the name of a set that is there; None: cameras
+            alone.
+        format: ``auto``, ``coco``, ``yolo`` or ``csv``.
+        images: The COCO document that numbers in ``coco`` results refer to, or None.
+        category: The class that is the ball, where the file has several.
+        size: Size of the images that boxes in pixels refer to, where that is not the annotated.
+        cameras: Folder or zip of SoccerNet camera JSON, or None.
+        cameras_size: Size of the images of the cameras, where that is not the annotated.
+    """
+
+    boxes: str | None
+    format: str = AUTO
+    images: Path | None = None
+    category: int | None = None
+    size: ImageSize | None = None
+    cameras: Path | None = None
+    cameras_size: ImageSize | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether it names nothing at all."""
+        return self.boxes is None and self.cameras is None
+
+
+@dataclass(frozen=True)
+class EvaluatedSources:
+    """An evaluation, and the sets that were made or found for it."""
+
+    evaluation: StoredEvaluation
+    sets: tuple[PredictionSet, ...]
+
+
+def evaluate_sources(
+    store: Store,
+    dataset: str | int,
+    request: EvaluationRequest,
+    *,
+    predictions: PredictionSource,
+    careful: PredictionSource,
+    version: str | None,
+    actor: str,
+    progress: Progress | None = None,
+) -> EvaluatedSources:
+    """Read predictions and careful boxes into sets, and evaluate them.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        request: What to evaluate; its sets and its version are filled in.
+        predictions: Predicted boxes and cameras, or empty.
+        careful: Careful boxes, or empty.
+        version: Name, id or hash of a frozen version; None: the dataset as it is now.
+        actor: Who asks.
+        progress: Called as the evaluation goes on.
+
+    Raises:
+        NotFoundError: There is no such dataset, version, file or set.
+        InputError: A file cannot be used, or nothing is left to evaluate.
+    """
+    pinned = None if version is None else find_version(store, dataset, version).id
+    found, drawn = (
+        None if source.is_empty else prediction_set(store, dataset, source, actor=actor)
+        for source in (predictions, careful)
+    )
+    request = replace(
+        request,
+        predictions=None if found is None else found.id,
+        careful=None if drawn is None else drawn.id,
+        version=pinned,
+    )
+    evaluation = run_evaluation(store, dataset, request, actor=actor, progress=progress)
+    return EvaluatedSources(evaluation, tuple(item for item in (found, drawn) if item is not None))
+
+
+def prediction_set(
+    store: Store, dataset: str | int, source: PredictionSource, *, actor: str
+) -> PredictionSet:
+    """The set of a source: read from its files now, or found under its name.
+
+    Files that were read before, in the same way, give the set that they gave then.
+
+    Raises:
+        NotFoundError: There is neither a file nor a set of that name.
+        InputError: A file cannot be used.
+    """
+    path = None if source.boxes is None else Path(source.boxes)
+    if path is not None and not path.exists():
+        if source.cameras is not None:
+            raise NotFoundError(f"there is no file {path}")
+        return find_predictions(store, dataset, str(source.boxes))
+    format_ = source.format
+    if path is not None and format_ == AUTO:
+        format_ = guess_format(path)
+    files = PredictionFiles(
+        path,
+        format_,
+        images=source.images,
+        cameras=source.cameras,
+        category=source.category,
+        size=source.size,
+        cameras_size=source.cameras_size,
+    )
+    named = path or source.cameras
+    assert named is not None
+    return add_predictions(store, dataset, set_name(named), files, actor=actor, reuse=True)
+
+
+def guess_format(path: Path) -> str:
+    """The format of predictions by the endings of their files; ``coco`` where none tells it."""
+    tree = open_tree(path, Report())
+    if tree is None:
+        return "coco"
+    with closing(tree):
+        endings = {Path(item).suffix.lower() for item in tree.names()}
+    return next((format_ for ending, format_ in ENDINGS if ending in endings), "coco")
+
+
+def set_name(path: Path) -> str:
+    """A file's name as the name of a set: ASCII letters and digits, else ``-``.
+
+    Example:
+        >>> set_name(Path("runs/best model.json"))
+        'best-model'
+    """
+    return re.sub(r"[^A-Za-z0-9]", "-", path.stem).strip("-")[:80] or "predictions"
