@@ -29,7 +29,7 @@ class Labels(StrEnum):
 @commands.command()
 def calibrate(
     source: LineFiles,
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder or zip for camera files.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder for camera files.")],
     size: Size,
     labels: Annotated[Labels, typer.Option(help="checked leaves out wrong labels.")] = (
         Labels.CHECKED

@@ -18,7 +18,7 @@ from app.sample.look import Colour, Look
 from app.sample.pose import pose_people
 from app.sample.props import draw_ball, draw_frame, draw_net
 from app.sample.scene import Scene
-from app.sample.score_bug import draw_score_bug
+from app.sample.scoreboard import draw_scoreboard
 from app.sample.shadows import shadow_mask
 from app.sample.surface import Bowl, Eye, Turf, shade
 from app.sample.textures import board_atlas, noise_tiles
@@ -47,7 +47,7 @@ def render(scene: Scene, view_key: str) -> Image:
     image = _develop(image, np.random.default_rng([look.seed, number]))
     main = scene.group.views[0]
     time = str(main.extras.metadata[IMAGE]["gameTime"])
-    draw_score_bug(image, scene.fixture, time, main.key == view_key)
+    draw_scoreboard(image, scene.fixture, time, main.key == view_key)
     return image
 
 

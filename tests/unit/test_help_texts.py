@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
@@ -20,25 +19,49 @@ from tests.docs.pages import (
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
-    accept accepted address answers archive body boxes budget bulk camera cameras changes clock
-    compare contents corner count cover datasets delete difference digest edit export exports
-    fan fields first folder folders format formats frames fresh geometry guide history home image
-    images import imports in index init jobs key keys kind known labels large last lesson lessons
-    lines link list logs look make many members membership missing model models more name names
-    nearest new of onnx options order out pages part parse parts past path pitch place policies
-    predictions progress query read reader recompute result rows score sample share shared size
-    solve solver sources spread state stations statistics status store submit summary table tables
-    text texts train truth undo use value values versions view views warm wide words write yields
-    ball balls box best bounds score start starts find findings sides solved observations gates
-    jaccard resect triangulate calibrate annotation group solution policy soccer reviewers verdicts
-    etags idempotency codec cache diff facts remedies source merge licence detect evaluations fixes influence exact jobs
+    3d accept action actions address adjust adjustments advice ahead annotate answers app
+    application archive archives arrays arrival ask axis bar bars batches best binned bodies
+    body boxes bulk button buttons cache calibrate canvas caption card cards cell changes chart
+    chip choice chooser class cli client clock codec codecs colours comparison completion config
+    confirm contact cross csv curve damped delete deps details detect diagram dialog diff doctor
+    document documents drags drawing editor empty encode engine environment estimator etags
+    evaluate event events exact export exports facets facts failures fan faults fields figure
+    figures files finite fixes fixture folder folders form format formats frozen gestures
+    glossary grid guess guide header headers health heat help histograms history hit home hooks
+    idempotency if image images import imports in info init insight items jaccard json key keys
+    known konva last latest lazy least legend lesson lessons letter licence list listing live
+    look loupe main map markdown marks match matrix meant membership menu merge migrate mini
+    missing model models modules name names navigation neighbours nested notice nudge numbers
+    object observability onnx open openapi opened options order origin output overlap page pages
+    paint palette panel parquet parse parts patch pen pins pitch pixel place places png pointer
+    policies popover pose preview problem progress props query rail reader reasons recompute
+    record remedies render reply report requests resect resource result revert reviewers
+    rotation router row rows run runs sample save scale scene scene3d scenes score scoreboard
+    sending server service session sets shadows shared sheet singular site smallest solve
+    solving source sources sphere spill spread squares stage staging standpoints starts state
+    statistics steps storage store submit summary surface swap tab table tables term terminal
+    text textures threshold ticks tools triangulate truth types undo undrawn upload uploads v3
+    v3d viewport viewports virtual walk warm what when words workspace write writer zip
 """
 PLAIN = frozenset(PLAIN_WORDS.split())
-"""Words of file names that everybody knows; any other has to stand in the glossary."""
+"""Words of file names that are plain English, or that every programmer knows; any other has to stand
+in the glossary."""
 
 
 def ids() -> set[str]:
     return {word["id"] for section in sections() for word in section["words"]}
+
+
+def glossary_words() -> list[str]:
+    """What the glossary explains: its words as they are read, and the names that texts refer to."""
+    words = [word for section in sections() for word in section["words"]]
+    return [text.lower() for word in words for text in (word["word"], word["id"])]
+
+
+def source_files(tree: str) -> list[Path]:
+    """The Python and JavaScript files of a part of the product."""
+    found = (path for ending in ("py", "js") for path in (ROOT / tree).rglob(f"*.{ending}"))
+    return [path.relative_to(ROOT) for path in found if "node_modules" not in path.parts]
 
 
 class TestPages:
@@ -84,13 +107,16 @@ class TestGlossary:
         missing = {kind for kind in kinds if f"finding:{kind}" not in ids()}
         assert not {kind for kind in missing if kind in _finding_kinds()}
 
-    @pytest.mark.parametrize("folder", ["soccer", "solving", "review"])
-    def test_every_domain_word_of_a_file_name_is_explained(self, folder: str):
-        said = json.dumps([section["words"] for section in sections()]).lower()
-        files = [path.stem for path in (ROOT / "app" / folder).glob("*.py")]
-        words = {word for stem in files for word in stem.split("_") if len(word) > 2}
-        unknown = {word for word in words - PLAIN if word.rstrip("s") not in said}
-        assert not unknown, "put them into static/help/glossary.json"
+    @pytest.mark.parametrize("tree", ["app", "static"])
+    def test_every_domain_word_of_a_file_name_is_explained(self, tree: str):
+        heads = {part for word in glossary_words() for part in re.findall(r"[a-z0-9]+", word)}
+        unknown = {
+            word: str(path)
+            for path in source_files(tree)
+            for word in path.stem.strip("_").split("_")
+            if not {word, word.rstrip("s"), f"{word}s"} & (heads | PLAIN)
+        }
+        assert not unknown, "put them into static/help/glossary.json, or name the files otherwise"
 
     @pytest.mark.parametrize("word", ["carry", "spare", "lineage", "ledger", "upstream"])
     def test_the_words_of_moving_data_are_explained(self, word: str):
@@ -100,6 +126,14 @@ class TestGlossary:
 def _finding_kinds() -> set[str]:
     text = (ROOT / "app" / "solving" / "findings.py").read_text(encoding="utf-8")
     return set(re.findall(r'"([a-z]+_[a-z_]+)"', text))
+
+
+class TestArchitecture:
+    def test_every_file_that_its_map_names_is_there(self):
+        text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+        named = re.findall(r"`((?:app|static|migrations)/[^`<*]*)`", text)
+        assert len(named) >= 15
+        assert [name for name in named if not (ROOT / name).exists()] == []
 
 
 class TestReadme:

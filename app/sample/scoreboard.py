@@ -1,4 +1,4 @@
-"""Score bug: the small caption that tells a broadcast still from a photograph."""
+"""Scoreboard: the small caption that tells a broadcast still from a photograph."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DARK = (44, 34, 28)
 LIGHT = (240, 240, 240)
 
 
-def draw_score_bug(image: Image, fixture: Fixture, game_time: str, is_main: bool) -> None:
+def draw_scoreboard(image: Image, fixture: Fixture, game_time: str, is_main: bool) -> None:
     """Teams, score and time on the main camera; a small mark on replays."""
     if not is_main:
         _cell(image, LEFT, 84, "REPLAY", (36, 36, 190), LIGHT)
