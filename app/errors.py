@@ -134,7 +134,7 @@ class StorageError(ReviewError):
 
 
 class OverloadedError(ReviewError):
-    """As much waits as may wait; later it can be taken."""
+    """The server has as much work as it takes; later it takes more."""
 
 
 class JobCancelled(Exception):  # noqa: N818

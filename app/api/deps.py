@@ -70,7 +70,7 @@ class Services:
 
 
 def get_services(request: Request) -> Services:
-    """The services of the application that answers."""
+    """The services of the running application."""
     services: Services = request.app.state.services
     return services
 

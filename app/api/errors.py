@@ -113,7 +113,7 @@ async def _validation_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     details = error.errors()
     if any(detail["loc"][0] == "path" for detail in details):
-        return problem_response(make_problem(404, "nothing has such an id"))
+        return problem_response(make_problem(404, "there is nothing with such an id"))
     errors = [
         FieldProblem(pointer=_pointer(detail["loc"]), detail=_sentence(detail["msg"]))
         for detail in details[:20]
@@ -150,7 +150,7 @@ async def _http_exception(request: Request, error: Exception) -> Response:
 async def _database_error(request: Request, error: Exception) -> Response:
     """The database was busy or failed; the transaction is rolled back and nothing is saved."""
     problem = make_problem(
-        503, "the database did not take the request", hint="Nothing was saved. Try again."
+        503, "the database could not carry out the request", hint="Nothing was saved. Try again."
     )
     log.error("database error", instance=problem.instance, exc_info=error)
     return problem_response(problem, {"Retry-After": RETRY_SECONDS})

@@ -185,7 +185,7 @@ class _Request:
         return {"type": "http.request", "body": b"".join(self._body), "more_body": False}
 
     def digest(self) -> str:
-        """Of method, address and body; the same JSON in another order is the same."""
+        """Digest of method, address and body; the same JSON in another order gives the same one."""
         place = (self.scope["method"], self.scope["path"], self.scope["query_string"].decode())
         if self.streamed:
             body = self._sum.hexdigest()

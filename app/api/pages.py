@@ -34,7 +34,7 @@ PAGES = (
 
 
 class _Elsewhere(StringConvertor):
-    """Paths below none of the folders that programs ask; those that are no page of ours."""
+    """Paths outside the REST interface and the static files that are no page of the application."""
 
     NAME = "elsewhere"
     regex = r"(?!(?:api|static|assets)(?:/|$)).*"

@@ -65,7 +65,9 @@ class Reply(Generic[T]):
         if asked is None:
             return
         if not keep_answer(session, asked.key, asked.actor, answer_of(asked.digest, response)):
-            raise ConflictError("this very request was answered meanwhile", hint="Send it again.")
+            raise ConflictError(
+                "the same request was answered in the meantime", hint="Send it again."
+            )
         asked.kept = True
 
 

@@ -1,4 +1,4 @@
-"""Commands on datasets: list them, and delete one with all that hangs on it."""
+"""Commands on datasets: list them, and delete one with everything that belongs to it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def delete(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
     json_: Json = False,
 ) -> None:
-    """Delete a dataset with all that hangs on it; cannot be undone.
+    """Delete a dataset with everything that belongs to it; cannot be undone.
 
     Groups, annotations, verdicts, solutions, versions, predictions and evaluations go; the files
     that it was imported from, exports and the log stay.

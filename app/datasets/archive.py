@@ -402,7 +402,7 @@ def _is_hidden(name: str) -> bool:
 
 
 def files_inside(names: list[str], folder: str) -> set[str]:
-    """Of sorted names, those below a folder, by their name from there on."""
+    """The names below a folder among sorted ones, each without that folder."""
     first = bisect_left(names, folder)
     last = bisect_left(names, folder + chr(0x10FFFF))
     return {name[len(folder) :] for name in names[first:last]}

@@ -126,7 +126,7 @@ def _image(kept: Mapping[str, Any], view: View, number: int, group: Group) -> di
 
 
 def _annotations(kept: Mapping[str, Any], view: View) -> Iterator[dict[str, Any]]:
-    """Of one image: people, balls, the pitch, and what else there was."""
+    """The annotations of one image: people, balls, the pitch, and what else there was."""
     for box in view.extras.boxes:
         annotation = box.get(METADATA)
         made = dict(annotation) if isinstance(annotation, dict) else _person(box)

@@ -233,7 +233,7 @@ class StateReader:
         box, point = value.get("box"), value.get("point")
         out_of_view = value.get("out_of_view") is True
         if (box is None) == (point is None) and not out_of_view:
-            raise ValueError("has a ball that is not one of box and point")
+            raise ValueError("has a ball with both a box and a point, or with neither")
         return BallAnnotation(
             box=None if box is None else self.box(box),
             point=None if point is None else self._point(point),

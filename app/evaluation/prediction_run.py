@@ -120,7 +120,7 @@ class PredictionRun:
 def box_problem(box: Box, size: ImageSize) -> str | None:
     """Why a box cannot be a ball in an image, in words; None where it can."""
     if not (box.width > 0 and box.height > 0):
-        return "is not wider and higher than nothing"
+        return "needs a width and a height above zero"
     image = f"the image of {size.width} x {size.height} pixels"
     # Numbers that are none compare as false, and end here, too.
     if not (box.width <= size.width and box.height <= size.height):

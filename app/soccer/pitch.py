@@ -110,7 +110,7 @@ class Arc:
 
     @property
     def is_full(self) -> bool:
-        """Whether it closes on itself."""
+        """Whether the marking is a full circle."""
         return self.last - self.first >= 2 * math.pi - 1e-12
 
 

@@ -134,7 +134,7 @@ class MeanSpread:
     def covariances(
         self, valid: BoolArray, groups: IntArray, points: FloatArray, policy: Policy
     ) -> FloatArray:
-        """Of the means of the valid pairs of some groups, square metres, shape (N, 3, 3).
+        """Covariance of the mean of the valid pairs of each group, square metres, shape (N, 3, 3).
 
         Args:
             valid: Pairs that count, shape (P,).

@@ -23,13 +23,13 @@ def digest(value: Json) -> str:
 
 
 def station_digest(station: Station) -> str:
-    """Of size, lines, given camera and which of the two counts."""
+    """Digest of size, lines, given camera and which of the two counts."""
     value = station_to_json(station)
     return digest([value["size"], value["lines"], value["given"], value["calibration"]])
 
 
 def view_digest(view: View) -> str:
-    """Of the view's key, its balls and whether it takes part; its station has its own.
+    """Digest of a view's key, its balls and whether it takes part; its station has its own.
 
     Why it was left out changes nothing that is computed, so it has no part in this.
     """
@@ -37,7 +37,7 @@ def view_digest(view: View) -> str:
 
 
 def inputs_hash(pitch: Pitch, views: Iterable[tuple[str, str]]) -> str:
-    """Of all that solving a group reads, from (view digest, station digest) in order of views.
+    """Digest of what solving a group reads, from (view digest, station digest) in order of views.
 
     Made of digests, so that a station shared by a thousand groups costs a thousand short sums.
     """
@@ -51,7 +51,7 @@ def group_inputs_hash(group: Group) -> str:
 
 
 def source_hash(group: Group) -> str:
-    """Of everything that a dataset says about a group, media and extras too.
+    """Digest of everything that a dataset says about a group, media and extras too.
 
     A shared station counts by its key alone: it is compared once, not once a group.
     """

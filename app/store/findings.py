@@ -21,7 +21,7 @@ def group_findings(session: Session, group_id: int) -> list[Noticed]:
 
 
 def groups_told(session: Session, ids: Collection[int], sentence: str) -> set[int]:
-    """Those of the groups of which a sentence is told as a whole."""
+    """The groups among them that have a finding about the whole group."""
     model = ImportFindingModel
     statement = select(model.group_id).where(
         model.group_id.in_(list(ids)), model.view.is_(None), model.sentence == sentence

@@ -5,7 +5,7 @@ import { request } from './client.js';
 
 /** @import {Counts} from './types.js' */
 
-/** Delete a dataset with all that hangs on it. @param {number} id @param {string} name typed by the person */
+/** Delete a dataset with everything that belongs to it. @param {number} id @param {string} name typed by the person */
 export function deleteDataset(id, name) {
 	return request(`/datasets/${id}`, { method: 'DELETE', body: { confirm: name } });
 }

@@ -10,7 +10,7 @@ const NUMBERS = /** @type {{[field: string]: string}} */ ({
 	error_percent: 'the same, % of the diagonal', sigma: 'uncertainty of the ball, m',
 	parallax: 'largest angle between rays, °', size_ratio: 'box against expected diameter',
 	height: 'ball above the grass, m', distance: 'from the first view to the ball, m', box: 'diameter of the ball’s box, px',
-	x: 'ball along the pitch, m', y: 'ball across the pitch, m', margin: 'left at the gate that fails or nearly does: 0.1 is 10 % of its threshold, below 0 fails', value: 'the margin without its sign: small where a small mistake decides',
+	x: 'ball along the pitch, m', y: 'ball across the pitch, m', margin: 'how far the deciding gate is from its threshold: 0.1 is 10 % of it, below 0 fails', value: 'the margin without its sign: small where a small mistake decides',
 	views: 'how many views', number: 'place in the dataset',
 });
 const FINDINGS = [

@@ -32,7 +32,7 @@ const GROUPS = /** @type {{name: FreezeRequest['groups'], label: string, note: s
 const SPLITS = /** @type {{kind: SplitRequest['kind'], label: string, note: string}[]} */ ([
 	{ kind: 'given', label: 'As given', note: 'the split of the source' },
 	{ kind: 'match', label: 'By match', note: 'drawn with a seed; no match is on both sides' },
-	{ kind: 'camera', label: 'By camera', note: 'some static cameras test' },
+	{ kind: 'camera', label: 'By camera', note: 'some static cameras are for testing' },
 ]);
 
 /** @param {{split: SplitRequest, change: (split: SplitRequest) => void}} props */
@@ -49,10 +49,10 @@ function SplitFields({ split, change }) {
 		${split.kind === 'match' ? html`
 			<div class="form__columns">
 				<div class="form__row"><label for="split-seed">Seed</label><input class="field" id="split-seed" type="number" step="1" min="0" value=${split.seed} onChange=${(/** @type {Event} */ event) => change({ ...split, seed: Math.trunc(Number(valueOf(event))) })} /></div>
-				<div class="form__row"><label for="split-share">Share of matches that test</label><input class="field" id="split-share" type="number" step="0.05" min="0.01" max="0.99" value=${split.test_share} onChange=${(/** @type {Event} */ event) => change({ ...split, test_share: Number(valueOf(event)) })} /></div>
+				<div class="form__row"><label for="split-share">Share of matches for testing</label><input class="field" id="split-share" type="number" step="0.05" min="0.01" max="0.99" value=${split.test_share} onChange=${(/** @type {Event} */ event) => change({ ...split, test_share: Number(valueOf(event)) })} /></div>
 			</div>` : null}
 		${split.kind === 'camera' ? html`
-			<div class="form__row"><label for="split-cameras">Cameras that test</label><input class="field" id="split-cameras" value=${(split.test_cameras ?? []).join(' ')} onChange=${(/** @type {Event} */ event) => change({ ...split, test_cameras: valueOf(event).split(/[\s,]+/).filter(Boolean) })} /><small>Keys of views, for example cam1 cam2</small></div>` : null}
+			<div class="form__row"><label for="split-cameras">Test cameras</label><input class="field" id="split-cameras" value=${(split.test_cameras ?? []).join(' ')} onChange=${(/** @type {Event} */ event) => change({ ...split, test_cameras: valueOf(event).split(/[\s,]+/).filter(Boolean) })} /><small>Keys of views, for example cam1 cam2</small></div>` : null}
 	`;
 }
 

@@ -134,7 +134,7 @@ export function ImportPage() {
 							<label for="import-dataset">Dataset</label>
 							<input class="field" id="import-dataset" list="known-datasets" maxlength="100" autocomplete="off" value=${dataset} onInput=${(/** @type {Event} */ event) => setDataset(valueOf(event))} />
 							<datalist id="known-datasets">${(datasets.value ?? []).map((one) => html`<option key=${one.id} value=${one.name}></option>`)}</datalist>
-							<small>A new name makes a new dataset. An import into one that is there follows its source; what people edited stays.</small>
+							<small>A new name makes a new dataset. An import into an existing one brings what its files have changed; what people edited stays.</small>
 						</div>
 						<${FormatChoice} format=${format} choose=${setFormat} />
 						<${SourceChoice} onSource=${setSource} guess=${(/** @type {string} */ guessed) => { if (IMPORT_FORMATS.some((one) => one.name === guessed)) setFormat(guessed); }} />

@@ -37,7 +37,7 @@ export function MendBox({ group, solution }) {
 					</button>` : null}
 			</p>
 			${reason?.name === 'not_same_instant' ? html`
-				<p class="mend__hint">To compare players and clock: <kbd>H</kbd> bares the pictures, <kbd>1</kbd> <kbd>1</kbd> and <kbd>2</kbd> show one alone, <kbd>0</kbd> all.</p>` : null}
+				<p class="mend__hint">To compare players and clock: <kbd>H</kbd> hides what is drawn on the pictures, <kbd>1</kbd> <kbd>1</kbd> and <kbd>2</kbd> show one alone, <kbd>0</kbd> all.</p>` : null}
 			${reason ? html`
 				<p class="mend__reject">
 					${offered ? 'If that is not it: ' : 'Nothing here mends it: '}

@@ -64,7 +64,7 @@ export function SaveState() {
 	const text = quick ? (savedAt.value === null ? 'No changes' : `Saved ${ago(savedAt.value, now)}`) : words(now);
 	const title = state !== 'away' ? '' : lasting.value
 		? 'Kept in this browser and sent when the server can be reached'
-		: 'This browser keeps nothing: do not close the page';
+		: 'This browser cannot keep what is not sent yet: do not close the page';
 	return html`
 		<${ConflictLink} />
 		<span class="save" data-state=${quick ? 'saved' : state} data-unsaved=${unsaved.value} title=${title}>

@@ -257,7 +257,7 @@ const VIEW = [
 
 /** @type {Binding[]} */
 const EDIT = [
-	{ keys: ['n'], label: 'Draw a ball, a marking, or a point more', group: 'Edit', run: () => startDrawing() },
+	{ keys: ['n'], label: 'Draw a ball, a marking, or one more point', group: 'Edit', run: () => startDrawing() },
 	{
 		keys: ['Enter'], label: 'Put a point at the pointer', group: 'Edit', shown: 'hidden',
 		when: isDrawing, run: drawHere,

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 
 /** @import {PolicyField, Threshold as Value} from '../api/policies.js' */
 
-const OFF = 'Not asked: tick the box to ask it';
+const OFF = 'This threshold is off: tick the box to use it';
 
 /** Units that stand beside a number in few characters. */
 const UNITS = /** @type {{[unit: string]: string}} */ ({ '% of diagonal': '%', degrees: '°', share: '' });

@@ -21,7 +21,7 @@ from app.review.verdicts import bulk, bulk_redo, bulk_undo
 
 router = APIRouter(tags=["verdicts"])
 
-DryRun = Annotated[bool, Query(description="Only say what would happen.")]
+DryRun = Annotated[bool, Query(description="Only report what would happen.")]
 
 
 @router.post(

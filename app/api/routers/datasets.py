@@ -54,9 +54,9 @@ def delete_dataset(
     request: DatasetDeletion,
     services: AppServices,
     actor: Actor,
-    dry_run: Annotated[bool, Query(description="Only say what would go.")] = False,
+    dry_run: Annotated[bool, Query(description="Only report what would be deleted.")] = False,
 ) -> DeletedDocument:
-    """Delete a dataset with all that hangs on it; `confirm` is its name, else 409.
+    """Delete a dataset with everything that belongs to it; `confirm` is its name, else 409.
 
     Its jobs are cancelled first. Cannot be undone; the log of what was said stays.
     """

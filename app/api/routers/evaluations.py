@@ -6,7 +6,9 @@ from enum import StrEnum
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel
 
+from app.api.cursor import parse_cursor
 from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import Responses, responses
@@ -20,7 +22,7 @@ from app.api.schemas.evaluation import (
     TableDocument,
 )
 from app.api.schemas.job import JobDocument
-from app.errors import InputError, NotFoundError
+from app.errors import NotFoundError
 from app.evaluation.comparison import FIELDS
 from app.evaluation.figure import FIGURES
 from app.evaluation.figure_csv import figure_csv, table_csv
@@ -42,26 +44,25 @@ PLACE_ERROR = CompareField("error_m")
 Limit = Annotated[int, Query(ge=1, le=review.MAX_PAGE)]
 Cursor = Annotated[str | None, Query(max_length=20, description="`next` of the page before.")]
 Bound = Annotated[float | None, Query(ge=-1e9, le=1e9, allow_inf_nan=False)]
-FIGURE_FILES: Responses = {
-    200: {
-        "description": "The figure: its values as JSON or CSV, or drawn as PNG.",
-        "content": {
-            "application/json": {"schema": {"$ref": "#/components/schemas/FigureDocument"}},
-            "text/csv": {"schema": {"type": "string"}},
-            "image/png": {"schema": {"type": "string", "format": "binary"}},
-        },
-    }
-}
+JSON_FILE, CSV_FILE, PNG_FILE = "application/json", "text/csv", "image/png"
 
-TABLE_FILES: Responses = {
-    200: {
-        "description": "The table: as JSON, or as CSV with intervals and denominators.",
-        "content": {
-            "application/json": {"schema": {"$ref": "#/components/schemas/TableDocument"}},
-            "text/csv": {"schema": {"type": "string"}},
-        },
-    }
-}
+
+def _files(description: str, document: str, *others: str) -> Responses:
+    """What a route answers that gives a document as JSON, and as files of other types."""
+    schema: dict[str, object] = {"$ref": f"#/components/schemas/{document}"}
+    content: dict[str, object] = {JSON_FILE: {"schema": schema}}
+    for kind in others:
+        text = {"type": "string"}
+        content[kind] = {"schema": text if kind == CSV_FILE else {**text, "format": "binary"}}
+    return {200: {"description": description, "content": content}}
+
+
+FIGURE_FILES = _files(
+    "The figure: its values as JSON or CSV, or drawn as PNG.", "FigureDocument", CSV_FILE, PNG_FILE
+)
+TABLE_FILES = _files(
+    "The table: as JSON, or as CSV with intervals and denominators.", "TableDocument", CSV_FILE
+)
 
 
 @router.get(
@@ -130,15 +131,13 @@ def get_figure(
 ) -> Response:
     """One figure of an evaluation; 404 where the evaluation has no such figure."""
     found = review.get_figure(store, evaluation, str(figure))
+    name = f"touchline-{evaluation}-{figure}.{ending}"
     if ending == "json":
-        document = FigureDocument.model_validate(found)
-        return Response(document.model_dump_json(), media_type="application/json")
-    name = f'attachment; filename="touchline-{evaluation}-{figure}.{ending}"'
+        return _json(FigureDocument.model_validate(found))
     if ending == "csv":
-        headers = {"Content-Disposition": name}
-        return Response(figure_csv(found), media_type="text/csv; charset=utf-8", headers=headers)
-    inline = {"Content-Disposition": name.replace("attachment", "inline")}
-    return Response(figure_png(found), media_type="image/png", headers=inline)
+        return _csv(figure_csv(found), name)
+    shown = {"Content-Disposition": f'inline; filename="{name}"'}
+    return Response(figure_png(found), media_type=PNG_FILE, headers=shown)
 
 
 @router.get(
@@ -160,11 +159,8 @@ def get_table(
             f'evaluation {evaluation} has no table "{table}"', hint=f"It has {', '.join(tables)}."
         )
     if ending == "json":
-        document = TableDocument.model_validate(found)
-        return Response(document.model_dump_json(), media_type="application/json")
-    name = f'attachment; filename="touchline-{evaluation}-{table}.csv"'
-    headers = {"Content-Disposition": name}
-    return Response(table_csv(found), media_type="text/csv; charset=utf-8", headers=headers)
+        return _json(TableDocument.model_validate(found))
+    return _csv(table_csv(found), f"touchline-{evaluation}-{table}.csv")
 
 
 @router.get(
@@ -193,7 +189,7 @@ def list_frames(
     query = review.FrameQuery(
         None if field is None else str(field), low, high, missing, match, str(sort or "")
     )
-    return review.list_frames(store, evaluation, query, limit, _place(cursor))
+    return review.list_frames(store, evaluation, query, limit, parse_cursor(cursor) or 0)
 
 
 @router.get(
@@ -214,12 +210,13 @@ def compare_evaluations(
 ) -> ComparisonDocument:
     """How this evaluation differs from another of the same dataset; changes are this minus that."""
     found = review.compare(store, other, evaluation, str(field))
-    return ComparisonDocument.of(found, limit, _place(cursor))
+    return ComparisonDocument.of(found, limit, parse_cursor(cursor) or 0)
 
 
-def _place(cursor: str | None) -> int:
-    if cursor is None:
-        return 0
-    if not (cursor.isascii() and cursor.isdigit() and len(cursor) < 10):
-        raise InputError("the cursor is none of ours", pointer="/cursor")
-    return int(cursor)
+def _json(document: BaseModel) -> Response:
+    return Response(document.model_dump_json(), media_type=JSON_FILE)
+
+
+def _csv(text: str, name: str) -> Response:
+    saved = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return Response(text, media_type=f"{CSV_FILE}; charset=utf-8", headers=saved)

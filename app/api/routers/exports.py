@@ -9,11 +9,12 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Path, Response
 from starlette.responses import FileResponse
 
+from app.api.cursor import parse_cursor
 from app.api.deps import Actor, AppServices, Services
 from app.api.jobs import ACCEPTED, job_address
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, Reply, document
-from app.api.routers.jobs import Cursor, DatasetFilter, Limit, parse_cursor
+from app.api.routers.jobs import Cursor, DatasetFilter, Limit
 from app.api.schemas.export import (
     ExportDocument,
     ExportJobDocument,

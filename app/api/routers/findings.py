@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query
 
+from app.api.cursor import parse_cursor
 from app.api.deps import AppStore, DatasetQuery
 from app.api.problem import responses
 from app.api.schemas.queue import FindingList, FindingRow
-from app.errors import InputError
 from app.review.datasets.dataset import dataset_id
 from app.review.queue.findings import count_groups, read_findings
 from app.soccer.solution import FINDING_KINDS
@@ -32,16 +32,8 @@ def list_findings(
 ) -> FindingList:
     """Findings by number of the group; `total` counts the groups that have some."""
     found = dataset_id(store, dataset)
-    after = _number(cursor)
+    after = parse_cursor(cursor) or 0
     groups = read_findings(store, found, after=after, limit=limit, kind=kind)
     rows = [FindingRow.of(group, finding) for group in groups for finding in group.findings]
     following = str(groups[-1].number) if len(groups) == limit else None
     return FindingList(items=rows, next=following, total=count_groups(store, found, kind))
-
-
-def _number(cursor: str | None) -> int:
-    if cursor is None:
-        return 0
-    if not (cursor.isascii() and cursor.isdigit() and len(cursor) <= 18):
-        raise InputError("the cursor is none of ours", pointer="/cursor")
-    return int(cursor)

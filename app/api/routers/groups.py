@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from app.api.conflicts import current_state
+from app.api.cursor import foreign_cursor
 from app.api.deps import (
     MAX_ID,
     Actor,
@@ -32,7 +33,7 @@ from app.api.schemas.queue import (
 )
 from app.api.schemas.solution import SolutionDocument
 from app.api.schemas.verdict import VerdictEdit
-from app.errors import InputError, NotFoundError
+from app.errors import NotFoundError
 from app.review.datasets.dataset import dataset_id
 from app.review.editing import submit
 from app.review.editing.state import GroupState
@@ -90,7 +91,7 @@ def list_groups(
         page = queue.list_groups(store, found, query, limit, cursor, start)
     except (OverflowError, UnicodeEncodeError) as error:
         # A forged cursor can hold what the database cannot.
-        raise InputError("the cursor is none of ours", pointer="/cursor") from error
+        raise foreign_cursor() from error
     return GroupPage(
         items=[GroupRow.of(row) for row in page.items], next=page.next, total=page.total
     )

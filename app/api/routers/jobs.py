@@ -6,10 +6,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
+from app.api.cursor import parse_cursor
 from app.api.deps import AppServices, Id
 from app.api.problem import responses
 from app.api.schemas.job import JobDocument, JobKind, JobPage, JobState
-from app.errors import InputError
 from app.review.datasets.dataset import dataset_id
 from app.store.jobs import Job
 
@@ -56,16 +56,3 @@ def get_job(job: Id, services: AppServices) -> Job:
 def cancel_job(job: Id, services: AppServices) -> Job:
     """End a job: one that waits at once, one that runs at its next step; 409 when it is over."""
     return services.jobs.cancel(job)
-
-
-def parse_cursor(cursor: str | None) -> int | None:
-    """The id that a cursor stands for.
-
-    Raises:
-        InputError: It is none of ours.
-    """
-    if cursor is None:
-        return None
-    if not (cursor.isascii() and cursor.isdigit() and len(cursor) < 19):
-        raise InputError("the cursor is none of ours", pointer="/cursor")
-    return int(cursor)

@@ -106,7 +106,9 @@ def wanted(change: PolicyChange, present: Policy) -> Policy:
     """
     if change.yaml is not None:
         if change.name is not None or change.values is not None:
-            raise InputError("a YAML text stands alone", pointer="/yaml")
+            raise InputError(
+                "send a YAML text alone, without a name and without thresholds", pointer="/yaml"
+            )
         try:
             return policy_from_yaml(change.yaml)
         except InputError as error:

@@ -89,7 +89,9 @@ def add_predictions(
         **responses(404, 409, 413, 415),
         **ACCEPTED,
         202: {**ACCEPTED[202], "model": JobDocument},
-        200: {"description": "Of a dry run, or of views that were named."},
+        200: {
+            "description": "What a dry run found, or what was accepted in views that were named."
+        },
     },
 )
 def accept_predictions(

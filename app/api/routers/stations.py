@@ -167,9 +167,9 @@ def _shown_group(state: StationState, group: int | None) -> int:
     """The group to answer with.
 
     Raises:
-        NotFoundError: The station takes part in no such group.
+        NotFoundError: No view of that group is from the station.
     """
     chosen = group if group is not None else next(iter(state.groups), None)
     if chosen is None or chosen not in state.groups:
-        raise NotFoundError(f"camera {state.station.key} takes part in no such group")
+        raise NotFoundError(f"camera {state.station.key} has no view in that group")
     return chosen

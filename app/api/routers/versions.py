@@ -44,7 +44,7 @@ def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
     responses={
         **responses(404, 409, 413, 415),
         **ACCEPTED,
-        200: {"model": FreezePlanDocument, "description": "Of a dry run: what would be frozen."},
+        200: {"model": FreezePlanDocument, "description": "After a dry run: what would be frozen."},
     },
 )
 def freeze_version(
@@ -100,7 +100,9 @@ def get_diff(
     version: Id,
     store: AppStore,
     against: Annotated[int, Query(ge=1, le=MAX_ID, description="Id of the older version.")],
-    limit: Annotated[int, Query(ge=0, le=10_000, description="Most items of each list.")] = 500,
+    limit: Annotated[
+        int, Query(ge=0, le=10_000, description="Largest number of items in each list.")
+    ] = 500,
 ) -> VersionDiffDocument:
     """What changed in a version against another: groups added, dropped, moved, and why."""
     return VersionDiffDocument.of(diff_versions(store, against, version), limit)

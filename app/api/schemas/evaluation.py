@@ -44,7 +44,7 @@ class EvaluationBody(BaseModel):
         default="optimized", description="Which box of the dataset is the truth."
     )
     min_score: Annotated[float, Field(ge=0, le=1)] = Field(
-        default=0.0, description="Detections below take no part in localisation."
+        default=0.0, description="Detections with a lower score take no part in localisation."
     )
 
     @model_validator(mode="after")
@@ -54,7 +54,7 @@ class EvaluationBody(BaseModel):
         return self
 
     def value(self) -> EvaluationRequest:
-        """What is asked for."""
+        """The request as the review floor takes it."""
         return EvaluationRequest(**self.model_dump())
 
 

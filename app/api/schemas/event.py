@@ -6,18 +6,20 @@ from pydantic import BaseModel, Field
 
 
 class GroupEvent(BaseModel):
-    """A group is not what it was; whoever shows another ETag reads it again."""
+    """A group has changed; whoever shows it under another ETag reads it again."""
 
     group: int
     dataset: str | None
     etag: str | None
-    kind: str = Field(description="As in the history of the group, or `solved`.")
+    kind: str = Field(
+        description="What happened: a kind as in the history of the group, or `solved`."
+    )
     actor: str | None
 
 
 class DatasetEvent(BaseModel):
-    """A dataset as a whole is not what it was: its policy, its groups, or that it is there."""
+    """A dataset as a whole has changed: its policy, its groups, or whether it exists."""
 
-    dataset: str | None = Field(description="Its name; null when it is gone.")
+    dataset: str | None = Field(description="Name of the dataset; null when it is deleted.")
     kind: str
     actor: str | None

@@ -58,7 +58,9 @@ class ExportDocument(BaseModel):
     created: datetime
     content: str | None = Field(description="Address of the zip, once it is ready.")
     bytes: int | None
-    counts: dict[str, int] | None = Field(description="As the format counts.")
+    counts: dict[str, int] | None = Field(
+        description="What was written, by kind: groups, views, boxes and so on."
+    )
     left_out: dict[str, int] | None = Field(
         description="Accepted groups that are not in it, by reason: stale, failing, unsolved."
     )

@@ -30,7 +30,7 @@ class ImportPlace(BaseModel):
         return self
 
     def values(self) -> dict[str, str]:
-        """The one that is set."""
+        """The place that was given, by its kind."""
         return {"upload": self.upload} if self.upload else {"folder": self.folder or ""}
 
 
@@ -40,7 +40,8 @@ class ImportOptions(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     calibration: Literal["given", "lines"] = Field(
-        default="given", description="Which one counts where a view has a camera and lines."
+        default="given",
+        description="Which calibration counts where a view has a given camera and lines.",
     )
     frame_offset: Offset | dict[Camera, Offset] = Field(
         default=8, description="ISSIA: XGTF frame minus video frame, for all or by camera."
@@ -77,10 +78,12 @@ class ImportBody(BaseModel):
     format: ImportFormat
     source: ImportPlace
     options: ImportOptions = ImportOptions()
-    dry_run: StrictBool = Field(default=False, description="Say what would happen, keep nothing.")
+    dry_run: StrictBool = Field(
+        default=False, description="Report what an import would do, and save nothing."
+    )
 
     def value(self) -> ImportRequest:
-        """What review carries out; only what was said."""
+        """The import as the review floor takes it; options that were not given are left out."""
         options: dict[str, Any] = self.options.model_dump(
             mode="json", exclude_defaults=True, exclude={"lines"}
         )
@@ -107,6 +110,6 @@ class FolderDocument(Document):
     """What is in a folder that the operator allows; without a path, the folders themselves."""
 
     path: str
-    format: str | None = Field(description="What it most likely holds.")
+    format: str | None = Field(description="Format that its files most likely have.")
     items: list[FolderEntry]
     more: bool = Field(description="Whether there is more than is listed.")

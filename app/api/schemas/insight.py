@@ -15,7 +15,7 @@ class RemedyEdit(FixDocument):
     """An edit as findings propose it, or a point moved."""
 
     point: XY | None = Field(
-        description="Where `move_point` puts its point, or `look_ball` would see the ball."
+        description="Where `move_point` puts its point, or where the ball of `look_ball` would be."
     )
 
 
@@ -29,8 +29,8 @@ class RemedyDocument(Document):
     offers: list[OfferDocument] = Field(
         description="Edits that carry it out; none where a person has to look or draw."
     )
-    value: float | None = Field(description="What the gate would measure.")
-    passes: bool = Field(description="Whether the whole group would pass.")
+    value: float | None = Field(description="The gate's value after the edit.")
+    passes: bool = Field(description="Whether the whole group would pass after the edit.")
 
     @model_validator(mode="before")
     @classmethod
@@ -50,13 +50,14 @@ class InfluenceDocument(Document):
     """What the camera would be without one marking."""
 
     marking: str
-    jac: Jac | None = Field(description="Of the view as it is, by gamma in per cent.")
+    jac: Jac | None = Field(description="JaC of the view as it is, by gamma in per cent.")
     jac_without: Jac | None = Field(
-        description="Of the other markings, by a camera that never saw this one."
+        description="JaC of the other markings, with a camera that is calibrated without this one."
     )
     largest_px: float | None
     largest_px_without: float | None = Field(
-        description="Distance of its points from a camera that never saw them."
+        description="Distance of its points from the marking, with a camera that is calibrated "
+        "without them."
     )
 
 

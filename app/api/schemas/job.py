@@ -28,13 +28,13 @@ class JobDocument(Document):
 
     id: int
     kind: JobKind
-    title: str = Field(description="What it is, for people.")
-    dataset: str | None = Field(description="Name of its dataset.")
+    title: str = Field(description="What the job does, in a sentence.")
+    dataset: str | None = Field(description="Name of the dataset that it works on.")
     state: JobState
     done: int
     total: int | None = Field(description="How much there is to do; null while that is unknown.")
-    sentence: str = Field(description="What it is at, for people.")
-    result: Any = Field(description="What came of it; depends on the kind.")
+    sentence: str = Field(description="What the job is doing now, in a sentence.")
+    result: Any = Field(description="The result; its fields depend on the kind.")
     problem: JobProblem | None
     created: datetime
     started: datetime | None

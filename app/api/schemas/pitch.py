@@ -15,9 +15,11 @@ class MarkingShape(BaseModel):
     """A marking: a segment between two points, or an arc on the grass."""
 
     marking: str
-    twin: str = Field(description="What it becomes when the pitch is turned by 180 degrees.")
+    twin: str = Field(
+        description="The marking that takes its place when the pitch is turned by 180 degrees."
+    )
     kind: Literal["segment", "arc"]
-    start: XYZ | None = Field(default=None, description="Of a segment, metres.")
+    start: XYZ | None = Field(default=None, description="Ends of a segment, metres.")
     end: XYZ | None = None
     center: tuple[float, float] | None = Field(default=None, description="Of an arc, metres.")
     radius: float | None = None

@@ -47,11 +47,12 @@ class PolicyChange(BaseModel):
         default=None,
         min_length=1,
         max_length=80,
-        description="Of the new policy. A shipped one's name alone chooses that.",
+        description="Name of the new policy. The name of a shipped policy alone chooses that one.",
     )
     values: dict[str, Any] | None = Field(
         default=None,
-        description="Thresholds that shall differ, those of `calibration` nested in it.",
+        description="Thresholds that differ from the present policy; those of `calibration` are "
+        "nested in it.",
     )
     yaml: str | None = Field(
         default=None,
@@ -83,7 +84,7 @@ class PolicyStateDocument(Document):
     values: dict[str, Any] = Field(
         description="Every threshold by name; those of the calibration's part in `calibration`."
     )
-    yaml: str = Field(description="The same for a file.")
+    yaml: str = Field(description="The whole policy as YAML, to be kept in a file.")
     history: list[PolicyVersionDocument]
 
     @staticmethod
@@ -115,14 +116,18 @@ class ShippedPolicyDocument(Document):
 class PolicyFieldDocument(Document):
     """What a threshold is called and between which ends it lies, for forms."""
 
-    name: str = Field(description="Those of the calibration's part are dotted.")
+    name: str = Field(
+        description="Name of the threshold; those of the calibration begin with `calibration.`."
+    )
     label: str
     unit: str
-    default: float | bool | None = Field(description="In `paper`; null asks for nothing.")
+    default: float | bool | None = Field(
+        description="Value in the policy `paper`; null: the threshold is off."
+    )
     minimum: float | None
     maximum: float | None
     choices: list[float] = Field(description="Values to offer; empty: any between the ends.")
-    gate: str | None = Field(description="The gate that it decides.")
+    gate: str | None = Field(description="The gate that asks for it.")
     optional: bool = Field(description="Whether it can be null.")
 
 

@@ -12,7 +12,7 @@ LessonState = Literal["open", "mended", "right", "almost", "wrong"]
 
 
 class PracticeBody(BaseModel):
-    """How to begin."""
+    """How the practice begins."""
 
     again: bool = Field(
         default=False, description="Forget verdicts and edits of the lessons and begin again."

@@ -32,7 +32,10 @@ class PredictionRequest(BaseModel):
         },
     )
 
-    name: Annotated[str, Field(min_length=1, max_length=100, description="Unique in its dataset.")]
+    name: Annotated[
+        str,
+        Field(min_length=1, max_length=100, description="Name of the set; unique in its dataset."),
+    ]
     format: Literal["coco", "yolo", "csv"] = "coco"
     upload: Upload | None = None
     images_upload: Upload | None = Field(
@@ -50,7 +53,11 @@ class PredictionRequest(BaseModel):
         description="Width and height of the images that boxes in pixels refer to; null: the "
         "annotated size of each frame.",
     )
-    cameras_size: Size | None = Field(default=None, description="The same for the cameras.")
+    cameras_size: Size | None = Field(
+        default=None,
+        description="Width and height of the images of the cameras; null: the annotated size of "
+        "each frame.",
+    )
 
     @model_validator(mode="after")
     def _something(self) -> PredictionRequest:
@@ -80,7 +87,7 @@ class PredictionReport(BaseModel):
     """What reading the files met; lists are cut after 100 entries, counts are whole."""
 
     read: int = Field(default=0, description="Boxes that the file holds.")
-    without_score: int = Field(default=0, description="Boxes that count as sure.")
+    without_score: int = Field(default=0, description="Boxes without a score; they count as sure.")
     other_classes: int = 0
     unknown_boxes: int = 0
     unknown_frames: list[UnknownFrame] = []
@@ -196,10 +203,10 @@ class AcceptBody(BaseModel):
     dataset: Annotated[str, Field(max_length=200, description="Name or id.")]
     predictions: Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
     q: Annotated[str, Field(max_length=1000)] | None = Field(
-        default=None, description="Groups, as in the queue; accepted by a job."
+        default=None, description="Query of the queue that chooses groups; a job accepts them."
     )
     views: Annotated[list[ViewId], Field(min_length=1, max_length=MAX_VIEWS)] | None = Field(
-        default=None, description="These views, accepted at once."
+        default=None, description="Ids of views; their predictions are accepted at once."
     )
     min_score: Annotated[float, Field(ge=0, le=1)] = 0.0
     replace: StrictBool = Field(
@@ -214,7 +221,7 @@ class AcceptBody(BaseModel):
         return self
 
     def value(self) -> AcceptRequest:
-        """What is asked for."""
+        """The request as the review floor takes it."""
         views = None if self.views is None else tuple(self.views)
         return AcceptRequest(self.predictions, self.q, views, self.min_score, self.replace)
 
@@ -245,7 +252,7 @@ class AcceptOutcome(BaseModel):
 
     @staticmethod
     def planned(plan: AcceptPlan) -> AcceptOutcome:
-        """Of a dry run."""
+        """The document of a dry run."""
         sample = [
             AcceptedView(
                 view=item.view_id,
@@ -267,7 +274,7 @@ class AcceptOutcome(BaseModel):
 
     @staticmethod
     def done(report: AcceptReport) -> AcceptOutcome:
-        """Of what was done."""
+        """The document of what was done."""
         return AcceptOutcome(
             dry_run=False,
             changed=report.views,

@@ -17,7 +17,9 @@ class ViewPreview(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     lines: LineEdits = Field(default_factory=dict)
-    ball: BallEdit | None = Field(default=None, description="null: no ball; absent: as it is.")
+    ball: BallEdit | None = Field(
+        default=None, description="null: the view has no ball; absent: the ball stays as it is."
+    )
     included: StrictBool | None = None
 
 

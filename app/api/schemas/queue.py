@@ -52,7 +52,7 @@ class GroupRow(Document):
     size_ratio: float | None
     height_m: float | None
     distance_m: float | None = Field(
-        description="Of the ball from the camera of the first view that it comes from."
+        description="Distance of the ball from the camera of the first view that it comes from."
     )
     box_px: float | None = Field(
         description="Diameter of the ball there: annotated, or, of a point, as optimised."
@@ -158,7 +158,7 @@ class LogEntryDocument(Document):
     actor: str
     kind: str
     body: dict[str, Any] | None = Field(
-        description="What was said; null for imports, which the group itself tells."
+        description="The edit or verdict as it was given; null for imports."
     )
 
     @staticmethod

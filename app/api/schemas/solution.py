@@ -137,7 +137,9 @@ class BallFitDocument(Document):
     exact_box: XYWH | None
     size_ratio: float | None
     depth_m: float | None
-    monocular: XYZ | None = Field(description="Where this view alone puts the ball.")
+    monocular: XYZ | None = Field(
+        description="The ball as this view alone places it, from the size of its box."
+    )
     monocular_error_m: float | None
     depth_per_px_m: float | None = Field(
         description="Metres of depth of the monocular ball for a pixel of diameter."
@@ -190,7 +192,7 @@ class Ball3DDocument(Document):
     """The triangulated ball; pitch frame, metres, z down."""
 
     point: XYZ
-    height_m: float = Field(description="Above the grass: -z.")
+    height_m: float = Field(description="Height of the ball above the grass, metres.")
     sigma_m: Measured
     covariance: list[Measured] = Field(description="3 x 3, row by row, square metres.")
     parallax_degrees: Measured
@@ -201,7 +203,7 @@ class BestBallDocument(Document):
     """The maximum-likelihood ball over all views; pitch frame, metres, z down."""
 
     point: XYZ
-    height_m: float = Field(description="Above the grass: -z.")
+    height_m: float = Field(description="Height of the ball above the grass, metres.")
     sigma_m: Measured
     covariance: list[Measured] = Field(description="3 x 3, row by row, square metres.")
     views: list[str]

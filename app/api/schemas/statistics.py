@@ -22,7 +22,7 @@ class StatisticsHistogram(Document):
     label: str = Field(validation_alias=AliasPath("measure", "label"))
     unit: str = Field(validation_alias=AliasPath("measure", "unit"))
     field: str = Field(
-        validation_alias=AliasPath("measure", "field"), description="Its field in queries."
+        validation_alias=AliasPath("measure", "field"), description="Name of the field in queries."
     )
     edges: list[float] = Field(
         validation_alias=AliasPath("measure", "edges"),
@@ -51,7 +51,7 @@ class PositionsDocument(Document):
     x_edges: list[float] = Field(description="Metres along the length, from the centre mark.")
     y_edges: list[float] = Field(description="Metres across, towards the main cameras.")
     counts: list[list[int]] = Field(description="A row for each cell of y, in it one for each x.")
-    outside: int = Field(description="Balls beyond the outermost cells.")
+    outside: int = Field(description="Balls that lie outside all cells.")
 
 
 class MatchShare(Document):

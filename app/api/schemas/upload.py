@@ -17,7 +17,7 @@ class UploadDocument(BaseModel):
     bytes: int
     created: datetime
     kept: bool = Field(description="Whether a dataset reads frames from it; it then stays.")
-    format: str | None = Field(description="What it most likely holds, to import it as.")
+    format: str | None = Field(description="Format that it most likely has.")
 
     @staticmethod
     def of(upload: Upload, guessed: str | None) -> UploadDocument:

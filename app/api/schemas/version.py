@@ -36,9 +36,12 @@ class SplitChoice(BaseModel):
     kind: Literal["given", "match", "camera"] = Field(
         default="given", description="As the dataset says; drawn by match; by camera (ISSIA)."
     )
-    seed: StrictInt = Field(default=0, ge=0, le=2**53, description="Of the draw by match.")
+    seed: StrictInt = Field(default=0, ge=0, le=2**53, description="Seed of the draw by match.")
     test_share: Annotated[
-        float, Field(gt=0, lt=1, description="Of the matches, in the draw by match.")
+        float,
+        Field(
+            gt=0, lt=1, description="Share of the matches that go to test, in the draw by match."
+        ),
     ] = 0.2
     test_cameras: Annotated[list[Camera], Field(min_length=1, max_length=100)] = list(TEST_CAMERAS)
 
@@ -70,7 +73,7 @@ class VersionRequest(BaseModel):
     dry_run: StrictBool = Field(default=False, description="Count, and freeze nothing.")
 
     def value(self) -> FreezeRequest:
-        """What the freeze is asked for."""
+        """The request as the review floor takes it."""
         return FreezeRequest(self.name, self.note, self.licence, self.split.value(), self.groups)
 
 
@@ -79,7 +82,7 @@ class FreezePlanDocument(Document):
 
     groups: int
     left_out: dict[str, int] = Field(description="Why the other groups do not enter.")
-    unsolved: int = Field(description="Of those, how many have to be solved first.")
+    unsolved: int = Field(description="How many of the groups that enter have to be solved first.")
 
 
 class FrozenDifferenceDocument(Document):
@@ -96,14 +99,14 @@ class VerificationDocument(Document):
 
     at: datetime
     actor: str
-    solver_version: str = Field(description="Of the solver that computed it again.")
+    solver_version: str = Field(description="Version of the solver that computed it again.")
     ok: bool = Field(description="Whether everything came out as it was frozen.")
-    problem: str | None = Field(description="Why nothing came of it, where it failed.")
+    problem: str | None = Field(description="Why the verification failed, where it did.")
     sentence: str
     groups: int | None = Field(description="Groups of the version; null where it failed.")
     equal: int | None = Field(description="Groups that came out as they were frozen.")
-    different: int | None = Field(description="Values that did not.")
-    differences: list[FrozenDifferenceDocument] = Field(description="The first of them.")
+    different: int | None = Field(description="Values that came out differently.")
+    differences: list[FrozenDifferenceDocument] = Field(description="The first of these values.")
 
     @model_validator(mode="before")
     @classmethod
@@ -225,7 +228,7 @@ class VersionDiffDocument(BaseModel):
 
     older: VersionName
     newer: VersionName
-    same: bool = Field(description="Whether the hashes are equal.")
+    same: bool = Field(description="Whether both versions have the same hash.")
     counts: dict[str, int]
     lines: list[str] = Field(description="In sentences.")
     added: list[PassageDocument]

@@ -103,7 +103,9 @@ class DistanceYield(Document):
         serialization_alias="from",
         description="Metres; null, as `to` is, for groups without a ball.",
     )
-    high: float | None = Field(serialization_alias="to", description="null: without an end.")
+    high: float | None = Field(
+        serialization_alias="to", description="Upper end of the bin; null: there is none."
+    )
     groups: int
     passing: int
 
@@ -137,7 +139,7 @@ class Leakage(Document):
 class YieldDocument(Document):
     """What a policy lets through, gate by gate."""
 
-    policy: PolicyDocument = Field(description="The policy that is judged by here.")
+    policy: PolicyDocument = Field(description="The policy with which the groups are judged here.")
     groups: int
     passing: int
     unsolved: int = Field(description="Not solved yet under the present calibration.")
@@ -155,5 +157,6 @@ class YieldDocument(Document):
     gained: int = Field(description="Groups that pass and do not under the present policy.")
     lost: int = Field(description="Groups that pass under the present policy and do not here.")
     needs_solving: list[str] = Field(
-        description="Fields that were asked for and whose effect only solving again can tell."
+        description="Thresholds that were changed and whose effect is known only after solving "
+        "again."
     )

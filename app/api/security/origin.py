@@ -37,7 +37,7 @@ def _with_port(host: str, scheme: str) -> str:
 
 
 class KnownHosts:
-    """Refuses a request whose Host is none of ours, so that DNS rebinding reaches nothing."""
+    """Refuses a request for another host name than this server's: DNS rebinding reaches nothing."""
 
     def __init__(self, app: ASGIApp, allowed: Iterable[str]):
         self.app = app

@@ -1,4 +1,4 @@
-"""Deleting a dataset: everything that hangs on it goes, the log stays and says so.
+"""Deleting a dataset: everything that belongs to it goes, the log stays and says so.
 
 See docs/decisions/0008-deleting-a-dataset.md.
 """
@@ -59,7 +59,7 @@ _COUNTED = {
 
 @dataclass(frozen=True)
 class DatasetContents:
-    """What hangs on a dataset; ``counts`` by groups, views, verdicts, versions and so on."""
+    """What belongs to a dataset; ``counts`` by groups, views, verdicts, versions and so on."""
 
     id: int
     name: str
@@ -79,7 +79,7 @@ def read_contents(store: Store, dataset: str | int) -> DatasetContents:
 def delete_dataset(
     store: Store, dataset: str | int, *, confirm: str, actor: str
 ) -> DatasetContents:
-    """Delete a dataset with all that hangs on it; returns what that was.
+    """Delete a dataset with everything that belongs to it; returns what that was.
 
     What was computed goes first, in short transactions: killed in between, it is computed again.
     What was said goes at the end, all at once. The log keeps every entry and gains one.
@@ -129,7 +129,7 @@ def _count(session: Session, table: Table, identity: int) -> int:
 
 
 def _belongs(table: Table, identity: int) -> ColumnElement[bool]:
-    """Whether a row hangs on the dataset: by its own column, its group's or its station's."""
+    """Whether a row belongs to the dataset: by its own column, its group's or its station's."""
     if "dataset_id" in table.c:
         return table.c.dataset_id == identity
     stations = select(StationModel.id).where(StationModel.dataset_id == identity)

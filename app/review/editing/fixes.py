@@ -49,7 +49,7 @@ def rank(fix: Fix) -> int:
 
 
 def sentence(group: Group, fix: Fix, moved_px: float = 0.0) -> str:
-    """What would have to be so, to be read after "would pass if"."""
+    """The condition under which the group passes, to be read after "would pass if"."""
     letter = chr(ord("A") + [view.key for view in group.views].index(fix.view or ""))
     return _words(_ACTIONS[fix.action].sentence, fix, letter=letter, px=moved_px)
 

@@ -92,7 +92,7 @@ class Ledger:
         return replace(record.head, views=tuple(views))
 
     def inputs_hash(self, group_id: int) -> str:
-        """Of all that solving the group reads."""
+        """Digest of everything that solving the group reads."""
         return group_inputs_hash(self.group(group_id))
 
 

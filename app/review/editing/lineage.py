@@ -57,7 +57,7 @@ class StationLineage:
 
 
 def base_digest(group: Group) -> str:
-    """Of all that a dataset says about a group but its media; shared stations are their own."""
+    """Digest of what a dataset says about a group, without media and shared stations."""
     views = [
         [
             view_digest(view),

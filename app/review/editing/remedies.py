@@ -42,7 +42,7 @@ class Remedy:
     Attributes:
         gate: The gate that fails now.
         view: View that is edited.
-        sentence: What would have to be so, to be read after "would pass if".
+        sentence: The condition under which the group passes, to be read after "would pass if".
         fix: The edit, or (``draw_marking``, ``look_ball``) where a person should look and draw.
         point: Where ``move_point`` puts its point and ``look_ball`` would see the ball, pixels;
             None for other actions.

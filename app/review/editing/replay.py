@@ -70,7 +70,7 @@ def apply_entry(ledger: Ledger, entry: LogEntry, number: int = 0) -> None:
 
 
 def rebuild(store: Store) -> int:
-    """Write groups, views, stations and what hangs on them anew from the log.
+    """Write groups, views, stations and what belongs to them anew from the log.
 
     Datasets, verdicts, solutions and the log itself stay. Returns the number of groups.
     """

@@ -146,7 +146,10 @@ def _problem(row: StoredView, problem: str) -> dict[str, Any]:
 
 def _nothing_seen(rows: list[StoredView], problems: list[dict[str, Any]]) -> InputError:
     if not rows:
-        return InputError("no view has a camera that fits, so there is nothing to triangulate")
+        return InputError(
+            "no view is to be looked at: the query finds none, or all that it finds have a ball",
+            hint="Ask with another query, or without --missing.",
+        )
     return InputError(
         f"none of the {len(rows)} frames could be read: {problems[0]['problem']}",
         hint="Import the dataset with its frames.",

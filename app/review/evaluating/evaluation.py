@@ -58,7 +58,7 @@ _SET_PINS = ("id", "name", "digest", "source", "unknown")
 
 @dataclass(frozen=True)
 class EvaluationRequest:
-    """What to evaluate.
+    """What to evaluate, and against which truth.
 
     Attributes:
         name: For people; empty: named after the predictions.

@@ -51,7 +51,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
 
 @dataclass(frozen=True)
 class PredictionFiles:
-    """What to read.
+    """Files of predictions, and how to read them.
 
     Attributes:
         path: File, folder or zip of ball boxes, or None.

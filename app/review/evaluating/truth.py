@@ -28,7 +28,7 @@ class AcceptedTruth:
 
     @staticmethod
     def count(frames: Sequence[Frame], boxes: str, name: str | None) -> AcceptedTruth:
-        """Of the frames that have a box of a kind; ``name``: of the set that is evaluated."""
+        """Count over frames that have a box of that kind; ``name`` is that of the evaluated set."""
         judged = [frame.predicted_by for frame in frames if boxes in frame.boxes]
         return AcceptedTruth(
             sum(map(bool, judged)),

@@ -105,7 +105,7 @@ def frame_layout(format: str) -> FrameName:  # noqa: A002
 
 
 def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
-    """Which ball box stands where, for a format that holds a chosen one."""
+    """Which kind of ball box the files hold, for a format that has a choice."""
     if format not in WITH_BOXES:
         return {}
     # optimized_d is defined around the centre of the annotated box.

@@ -38,7 +38,7 @@ class ExportSource(Protocol):
 
     @property
     def date(self) -> str:
-        """Of the manifest."""
+        """The date that the manifest gives."""
 
     @property
     def version(self) -> str | None:
@@ -81,7 +81,7 @@ class LiveSource:
         return {**policy_settings(self._found.policy, SOLVER_VERSION), "groups": groups}
 
     def stamp(self) -> dict[str, Json]:
-        """Nothing but what the records say."""
+        """Nothing: the records say everything."""
         return {}
 
     def items(self) -> Iterator[Item]:

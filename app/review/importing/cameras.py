@@ -74,8 +74,8 @@ def ingest_cameras(
         if len(fitting) == 1:
             known.append((fitting[0], cameras[name]))
         else:
-            several = "several views are" if fitting else "no view is"
-            report.problems.append(f'camera "{name}": {several} called so')
+            views = "several views have" if fitting else "no view has"
+            report.problems.append(f'camera "{name}": {views} this name')
     for start in range(0, len(known), BATCH):
         with attempt(store, keep=not dry_run) as session:
             batch = known[start : start + BATCH]

@@ -44,7 +44,7 @@ FOLLOW, STAY, CONFLICT, UPSTREAM = "follow", "stay", "conflict", "upstream"
 
 
 def decide(here: Side, there: Side) -> str:
-    """What becomes of a unit here.
+    """What becomes of a unit (a view or a camera) in this installation.
 
     Returns:
         ``follow``: take the other's; ``stay``: nothing to do; ``conflict``: both edited it and

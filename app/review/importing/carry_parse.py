@@ -61,7 +61,7 @@ def read_head(tree: FileTree) -> CarriedHead:
     """What the file says of itself.
 
     Raises:
-        DatasetFormatError: It is none of ours, or of a newer kind.
+        DatasetFormatError: It is no export of Touchline, or one of a newer kind.
     """
     shown = tree.shown(HEAD)
     if HEAD not in tree.names():
@@ -111,7 +111,7 @@ def parse_station(value: Json) -> CarriedStation:
         station = _station(_mapping(value)["station"])
         base = station if value["base"] is None else _station(value["base"])
         if not (station.shared and base.shared and station.key == base.key):
-            raise InputError("is not one static camera")
+            raise InputError("names two static cameras, or one that is not static")
         return CarriedStation(station, base, _states(value["states"]), _log(value["log"]))
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, ReviewError) as error:
         raise _problem(error) from error
@@ -127,7 +127,7 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> CarriedGroup:
         group = _group(_mapping(value)["group"], shared)
         base = group if value["base"] is None else _group(value["base"], shared)
         if group.key != base.key:
-            raise InputError("is not one group")
+            raise InputError("names two groups")
         return CarriedGroup(
             group=group,
             base=base,

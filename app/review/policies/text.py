@@ -189,9 +189,9 @@ class _PlainLoader(yaml.SafeLoader):
         for key, _ in node.value:
             problem = None
             if not isinstance(key, yaml.ScalarNode):
-                problem = "this is no name"
+                problem = "the name of a threshold must be text"
             elif key.value in seen:
-                problem = f'"{key.value}" stands there twice'
+                problem = f'"{key.value}" is given twice'
             if problem is not None:
                 raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
             seen.add(key.value)

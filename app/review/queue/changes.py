@@ -131,7 +131,7 @@ def _told(session: Session, found: Iterable[_Found]) -> list[Change]:
 
 
 def _merged(found: Iterable[_Found]) -> list[_Found]:
-    """Of each group the last word, of each dataset the last one of each kind, in order."""
+    """The last change of each group, and the last one of each kind of each dataset, in order."""
     last = {
         (item.dataset_id, item.group_id, "" if item.group_id else item.kind): item for item in found
     }

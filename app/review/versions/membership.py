@@ -38,7 +38,7 @@ class Candidate:
 
     @property
     def overrides(self) -> bool:
-        """Whether it enters against a gate."""
+        """Whether the group enters although a gate fails."""
         return self.why is None and self.verdict is not None and bool(self.verdict["override"])
 
 

@@ -50,7 +50,7 @@ class Heads:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A dataset's table with what hangs on it, all of one state.
+    """A dataset's table with what is computed from it, all of one state.
 
     Attributes:
         policy: The present one.

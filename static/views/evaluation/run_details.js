@@ -23,7 +23,7 @@ const COUNTS = [
 	['groups', 'groups'], ['matches', 'matches'], ['frames', 'frames'], ['judged', 'frames judged'], ['balls', 'with a ball'],
 	['with_3d_ball', 'with a 3D ball'], ['without_ball', 'without a ball'], ['detections', 'detections'], ['frames_with_detections', 'frames with detections'],
 	['detections_not_judged', 'detections not judged'], ['predicted_cameras', 'predicted cameras'], ['careful_boxes', 'careful boxes'],
-	['unknown_predictions_frames', 'unknown frames'], ['accepted_predictions', 'balls accepted from predictions'], ['gone', 'frames gone since'],
+	['unknown_predictions_frames', 'unknown frames'], ['accepted_predictions', 'balls accepted from predictions'], ['gone', 'frames deleted since'],
 ];
 /** Those that say nothing when they are zero. */
 const OPTIONAL = new Set(['predicted_cameras', 'careful_boxes', 'accepted_predictions', 'gone', 'unknown_predictions_frames', 'detections_not_judged']);

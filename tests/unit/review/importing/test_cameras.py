@@ -49,8 +49,8 @@ class TestIngestCameras:
         report = attach(store, {"7": opposite, "99": opposite})
         assert report.changed == 0
         assert report.problems == [
-            'camera "7": several views are called so',
-            'camera "99": no view is called so',
+            'camera "7": several views have this name',
+            'camera "99": no view has this name',
         ]
 
     def test_the_camera_stays_when_the_labels_are_imported_again(
