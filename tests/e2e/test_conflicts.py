@@ -129,7 +129,7 @@ class TestLiveUpdates:
 
 
 class TestConflict:
-    def test_mine_can_be_kept(self, both: tuple[Screen, Screen], console: Any) -> None:
+    def test_my_edit_can_be_kept(self, both: tuple[Screen, Screen], console: Any) -> None:
         console.expect("412")
         mine, theirs = both
         x = box(mine)[0]
@@ -144,7 +144,7 @@ class TestConflict:
             mine.number("A", "error")
         )
 
-    def test_theirs_can_be_taken(self, both: tuple[Screen, Screen], console: Any) -> None:
+    def test_their_edit_can_be_taken(self, both: tuple[Screen, Screen], console: Any) -> None:
         console.expect("412")
         mine, theirs = both
         bar = meet(mine, theirs, lambda: move_ball(theirs, -6))

@@ -52,9 +52,7 @@ def blind(labels_file: Path, tmp_path: Path, server: str) -> Iterator[Path]:
 
 
 class TestImportOfNothing:
-    def test_has_failed_in_red_and_leads_nowhere_false(
-        self, open_page: OpenPage, tmp_path: Path
-    ) -> None:
+    def test_fails_in_red_and_offers_no_queue(self, open_page: OpenPage, tmp_path: Path) -> None:
         empty = tmp_path / "empty.zip"
         with ZipFile(empty, "w") as archive:
             archive.writestr("readme.txt", "nothing")
@@ -81,7 +79,7 @@ class TestImportOfNothing:
 
 
 class TestGroupsWithoutAPicture:
-    def test_are_marked_and_accepted_only_with_a_note(
+    def test_are_counted_after_the_import_and_accepted_only_with_a_note(
         self, open_page: OpenPage, blind: Path
     ) -> None:
         page = open_page("/import")

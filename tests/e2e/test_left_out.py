@@ -115,7 +115,9 @@ class TestInstants:
         screen.press("Escape")
         expect(chip).to_have_count(0)
 
-    def test_where_there_are_none_it_says_so(self, review: Callable[..., Screen]) -> None:
+    def test_a_dataset_without_neighbouring_frames_says_so(
+        self, review: Callable[..., Screen]
+    ) -> None:
         screen = review(0)
         screen.press(".")
         expect(screen.page.locator(".bar")).to_contain_text(
@@ -130,7 +132,7 @@ class TestInstants:
 
 
 class TestVersions:
-    def test_what_verifying_said_is_still_there_after_a_reload(self, open_page: OpenPage) -> None:
+    def test_the_result_of_verifying_survives_a_reload(self, open_page: OpenPage) -> None:
         page = open_page("/datasets/sample/versions")
         page.get_by_role("button", name="Freeze a version").first.click()
         page.get_by_label("Passing").check()

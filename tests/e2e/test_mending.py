@@ -280,7 +280,9 @@ class TestMissingBall:
         screen.saved()
         assert len(one.document()["views"][1]["balls"]) == 1
 
-    def test_not_visible_is_one_key_too(self, bench: Callable[..., Bench]) -> None:
+    def test_saying_that_a_ball_is_not_visible_takes_one_key(
+        self, bench: Callable[..., Bench]
+    ) -> None:
         one = bench(3)
         one.change(2, "/ball", None)
         screen = one.open()

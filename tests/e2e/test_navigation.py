@@ -57,7 +57,7 @@ class TestFarKeys:
         screen.press("c")
         stands(page, queue, 1)
 
-    def test_they_stop_at_the_ends_and_say_so(self, page: Page) -> None:
+    def test_far_keys_stop_at_the_ends_of_the_queue_and_say_so(self, page: Page) -> None:
         queue = ids(page, QUERY)
         screen = at(page, queue[8], QUERY)
         screen.press("v")

@@ -115,7 +115,7 @@ def predicted(open_page: OpenPage) -> Iterator[Predicted]:
 
 
 class TestMarks:
-    def test_are_drawn_pointed_at_listed_and_hidden(self, predicted: Predicted) -> None:
+    def test_predictions_are_drawn_pointed_at_listed_and_hidden(self, predicted: Predicted) -> None:
         screen = predicted.open()
         page, view = predicted.page, screen.document()["views"][0]
         page.wait_for_function(f"{COUNT_PREDICTED} > 20")
@@ -139,7 +139,7 @@ class TestMarks:
         expect(page.locator(".bars")).to_contain_text("Predictions are hidden. B shows")
         assert screen.document()["views"][0]["balls"] == []
 
-    def test_of_no_set_nothing_is_shown(self, open_page: OpenPage) -> None:
+    def test_without_a_prediction_set_nothing_is_shown(self, open_page: OpenPage) -> None:
         page = open_page(None)
         with page.expect_response("**/predictions") as answer:
             page.goto(f"/review/{passing(page, 0)}")
@@ -149,7 +149,9 @@ class TestMarks:
 
 
 class TestAccept:
-    def test_by_key_and_taken_back_after_a_reload(self, predicted: Predicted) -> None:
+    def test_a_prediction_is_accepted_by_key_and_taken_back_after_a_reload(
+        self, predicted: Predicted
+    ) -> None:
         screen = predicted.open()
         page = predicted.page
         screen.press("y")

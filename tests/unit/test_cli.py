@@ -169,7 +169,9 @@ class TestSolve:
 
 
 class TestFindings:
-    def test_are_a_list_of_plain_values(self, run: Run, line_files: Path) -> None:
+    def test_findings_are_printed_as_a_list_of_plain_values(
+        self, run: Run, line_files: Path
+    ) -> None:
         run("import", "sn-calibration", line_files, "--dataset", "sn")
         run("solve", "--dataset", "sn", "--workers", "1")
         code, out, _ = run("findings", "--dataset", "sn", "--json")
@@ -216,7 +218,7 @@ class TestExport:
 
 
 class TestMigrate:
-    def test_says_where_the_schema_is(self, run: Run, tmp_path: Path) -> None:
+    def test_prints_the_schema_that_the_database_has_now(self, run: Run, tmp_path: Path) -> None:
         code, out, _ = run("migrate")
         assert code == 0
         assert out.startswith("schema ")
@@ -299,5 +301,5 @@ class TestSample:
             assert (code, report["written"]) == (0, written)
             assert known.items() <= report.items()
 
-    def test_needs_to_know_where_to(self, run: Run) -> None:
+    def test_without_a_folder_or_a_dataset_it_is_wrong_usage(self, run: Run) -> None:
         assert run("sample")[0] == 2

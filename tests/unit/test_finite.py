@@ -126,7 +126,7 @@ def bad(request: pytest.FixtureRequest) -> float:
 
 
 class TestFinite:
-    def test_replaces_at_any_depth_and_nothing_else(self, bad: float) -> None:
+    def test_replaces_infinite_numbers_at_any_depth_and_nothing_else(self, bad: float) -> None:
         value = {"a": [1.5, (bad, "inf")], "b": {"c": bad}, "d": True, "e": 3}
         assert finite(value) == {"a": [1.5, [None, "inf"]], "b": {"c": None}, "d": True, "e": 3}
 

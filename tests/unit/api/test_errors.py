@@ -111,7 +111,7 @@ class TestReviewErrors:
         index = next(i for i, (e, _) in enumerate(CASES) if isinstance(e, SharedStationError))
         assert client.get(f"/raise/{index}").json()["station"] == 7
 
-    def test_what_may_pass_says_when_to_ask_again(self, client) -> None:
+    def test_a_temporary_failure_says_when_to_ask_again(self, client) -> None:
         for index, (_, status) in enumerate(CASES):
             sent = "retry-after" in client.get(f"/raise/{index}").headers
             assert sent == (status in (429, 503, 507))
@@ -144,7 +144,7 @@ class TestValidationErrors:
         pointers = {error["pointer"] for error in problem["errors"]}
         assert pointers == {"/lines/Middle line/0/x", "/lines/Middle line/0/y", "/more"}
 
-    def test_what_was_sent_is_not_echoed(self, client) -> None:
+    def test_the_answer_does_not_repeat_what_was_sent(self, client) -> None:
         assert "<script>" not in str(self.problem(client, {"lines": "<script>"}))
 
     def test_a_parameter_is_named(self, client) -> None:

@@ -70,7 +70,7 @@ class TestRepetition:
         assert "Idempotency-Key" in answer.json()["detail"]
         assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "deferred"
 
-    def test_of_what_was_refused_is_tried_again(self, api) -> None:
+    def test_a_refused_request_can_be_sent_again_under_its_key(self, api) -> None:
         assert accept(api, etag='"stale-0"').status_code == 412
         assert accept(api).status_code == 200
 
@@ -117,7 +117,7 @@ class TestKey:
         assert answer.status_code == 400
         assert answer.json()["detail"].startswith("Idempotency-Key must be")
 
-    def test_is_taken_by_every_route_that_changes_something(self, app) -> None:
+    def test_every_route_that_changes_something_takes_a_key(self, app) -> None:
         for path, operations in app.openapi()["paths"].items():
             for method, operation in operations.items():
                 names = [item["name"] for item in operation["parameters"]]

@@ -49,7 +49,7 @@ class TestModules:
             "a" * 300 + ".js",
         ],
     )
-    def test_everything_else_is_not_there(self, pages_client, path: str) -> None:
+    def test_hidden_and_unknown_files_are_404(self, pages_client, path: str) -> None:
         answer = pages_client.get(f"/static/{path}")
         assert answer.status_code == 404
 

@@ -100,7 +100,7 @@ class TestPages:
         index.write_text('<link rel="stylesheet" href="/static/css/none.css">')
         assert pages_client.get("/").status_code == 404
 
-    def test_who_has_the_page_is_told_so(self, pages_client) -> None:
+    def test_a_browser_that_has_the_page_gets_304(self, pages_client) -> None:
         tag = pages_client.get("/").headers["etag"]
         again = pages_client.get("/groups", headers={"If-None-Match": tag})
         assert (again.status_code, again.content) == (304, b"")

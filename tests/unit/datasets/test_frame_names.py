@@ -28,7 +28,7 @@ class TestFlatFrame:
 
 
 class TestSplitFolder:
-    def test_says_it_as_yolo_does(self) -> None:
+    def test_uses_the_names_of_yolo_and_trains_without_a_split(self) -> None:
         splits = ("train", "valid", "test", "challenge", "")
         assert [split_folder(split) for split in splits] == [
             "train", "val", "test", "test", "train",

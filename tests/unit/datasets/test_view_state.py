@@ -71,7 +71,7 @@ class TestStateReader:
         assert caught.value.field == (name if name != "given" else "tilt_degrees")
 
     @pytest.mark.parametrize("pitch", [[1, 2], "x", [105]])
-    def test_a_pitch_that_is_none_is_refused(self, soccer_group: Make, pitch: Any) -> None:
+    def test_an_impossible_pitch_is_refused(self, soccer_group: Make, pitch: Any) -> None:
         with pytest.raises(DatasetFormatError, match="pitch"):
             read({**head_to_json(soccer_group()), "pitch": pitch}).head()
 
@@ -83,5 +83,5 @@ class TestExtras:
         assert extras_to_json(Extras()) is None
         assert extras_from_json(None) == Extras()
 
-    def test_what_is_none_of_it_is_left_out(self) -> None:
+    def test_values_that_are_no_extras_are_left_out(self) -> None:
         assert extras_from_json({"boxes": [1, {"a": 1}], "metadata": []}) == Extras(({"a": 1},))

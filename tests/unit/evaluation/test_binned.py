@@ -49,7 +49,7 @@ class TestErrorFigure:
             assert sum(behind.low <= place < behind.high for place in places) == 1
 
     @pytest.mark.parametrize("bins", [DISTANCE, PARALLAX, SIZE])
-    def test_of_nothing_is_an_empty_figure(self, bins) -> None:
+    def test_without_values_the_figure_is_empty(self, bins) -> None:
         points, middle = error_figure([RESULT], bins).panels[0].series
         assert points.x == middle.x == ()
 

@@ -38,6 +38,6 @@ class TestResamples:
         assert cell.high - cell.low == pytest.approx(0.4, abs=0.08)
         assert cell.low < 5 < cell.high
 
-    def test_of_nothing_there_is_no_mean_but_a_denominator(self) -> None:
+    def test_without_values_there_is_no_mean_but_a_denominator(self) -> None:
         cell = Resamples.draw(["a", "b"]).mean([], [], of=7)
         assert (cell.value, cell.count, cell.of) == (None, 0, 7)

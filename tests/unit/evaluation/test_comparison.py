@@ -16,7 +16,7 @@ def table(name: str, value: float | None, row: str = "all") -> Table:
 
 
 class TestDifferingPins:
-    def test_names_what_makes_numbers_others(self) -> None:
+    def test_names_the_pins_that_make_numbers_incomparable(self) -> None:
         pins = {"state": "a", "software_version": "1", "name": "x", "careful": {"digest": "d"}}
         assert differing_pins(pins, {**pins, "name": "y"}) == ()
         other = {**pins, "state": "b", "software_version": "2", "careful": {"digest": "e"}}
@@ -36,7 +36,7 @@ class TestCompareTables:
         assert [item.change for item in found] == [None, None, None]
         assert [item.first is None for item in found] == [False, True, True]
 
-    def test_none_is_no_zero(self) -> None:
+    def test_a_missing_number_is_not_taken_for_zero(self) -> None:
         assert compare_tables([table("t", None)], [table("t", 0.5)])[0].change is None
 
 

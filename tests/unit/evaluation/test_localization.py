@@ -48,7 +48,7 @@ class TestLocalizationTable:
 
 
 class TestPrecisionDistance:
-    def test_counts_what_lies_nearer(self, frames) -> None:
+    def test_counts_frames_with_a_smaller_error(self, frames) -> None:
         (panel,) = precision_distance(frames, predicted=False).panels
         curve, everywhere = panel.series
         at = dict(zip(curve.x, curve.y, strict=True))

@@ -96,7 +96,7 @@ class TestTable:
         assert table.cell("size", "correlation").value == pytest.approx(1)
         assert (table.rows[0].cells[0].count, table.rows[0].cells[0].of) == (4, 9)
 
-    def test_of_nothing_is_empty_and_no_error(self) -> None:
+    def test_without_balls_the_table_is_empty(self) -> None:
         assert sensitivity_table([], 0).cell("shift", "median_m").value is None
 
 

@@ -18,7 +18,7 @@ def output(*columns: list[float]) -> np.ndarray:
 
 
 class TestLetterbox:
-    def test_lies_in_the_middle(self) -> None:
+    def test_the_picture_lies_in_the_middle_of_the_input(self) -> None:
         assert (BOX.scale, BOX.left, BOX.top) == (0.5, 0, 140)
 
     def test_of_an_odd_border_the_smaller_half_comes_first(self) -> None:
@@ -86,7 +86,7 @@ class TestSuppress:
 
 
 class TestBallCategory:
-    def test_is_the_one_that_is_called_so(self) -> None:
+    def test_is_the_only_class_called_a_ball_or_the_only_class_at_all(self) -> None:
         assert ball_category(["person", "sports ball"]) == 1
         assert ball_category(["anything"]) == 0
         assert ball_category(["ball", "sports ball"]) is None

@@ -4,7 +4,7 @@ from app.geometry.polyline import clip_polyline, distance_to_polyline
 
 
 class TestClipPolyline:
-    def test_what_lies_inside_stays(self):
+    def test_a_line_inside_the_image_is_unchanged(self):
         line = np.array([[1.0, 1.0], [5.0, 5.0]])
         assert np.array_equal(clip_polyline(line, 10, 10), line)
 
@@ -43,6 +43,6 @@ class TestDistanceToPolyline:
         assert np.allclose(distances, [3.0, 5.0, 2.0])
         assert np.allclose(nearest, [[4.0, 0.0], [0.0, 0.0], [10.0, 5.0]])
 
-    def test_one_point_is_a_polyline_too(self):
+    def test_a_single_point_is_a_polyline(self):
         distances, _ = distance_to_polyline(np.array([[3.0, 4.0]]), np.zeros((1, 2)))
         assert np.allclose(distances, [5.0])

@@ -82,7 +82,7 @@ class TestCameraFromParameters:
 
 
 class TestDistances:
-    def test_points_on_the_curves_have_none(self):
+    def test_points_on_their_curve_have_distance_zero(self):
         assert distances(TRUTH, CURVES, sightings(0.0), HALF_DIAGONAL).max() < 1e-6
 
     def test_a_point_aside_has_its_offset(self):

@@ -36,7 +36,7 @@ class TestPositionFromDiameter:
         found = position_from_diameter(level, np.zeros(2), 10.0, BALL)
         assert np.allclose(found, [0.0, 0.0, 22.6])
 
-    def test_a_ball_without_size_is_nowhere(self):
+    def test_a_ball_without_size_has_no_position(self):
         with pytest.raises(DegenerateGeometryError):
             position_from_diameter(camera(), np.zeros(2), 0.0, BALL)
 

@@ -83,7 +83,7 @@ class TestMovedPoints:
             expected = triangulate_pairs(P_a, P_b, *seen)
             assert np.array_equal(moved[:, view, axis, way], expected)
 
-    def test_of_no_pair_there_is_nothing(self):
+    def test_without_pairs_the_result_is_empty(self):
         none = np.empty((0, 2))
         found = moved_points(np.empty((0, 3, 4)), np.empty((0, 3, 4)), none, none, 0.5)
         assert found.shape == (0, 2, 2, 2, 3)

@@ -48,6 +48,6 @@ class TestCameraSigma:
         focals = [one.focal_length[0] for one in drawn]
         assert sigma.focal_px == pytest.approx(np.std(focals), rel=0.06)
 
-    def test_a_given_camera_and_open_lines_have_none(self) -> None:
+    def test_a_given_camera_and_a_view_without_camera_have_no_sigma(self) -> None:
         assert camera_sigma(calibration(None)) is None
         assert camera_sigma(Calibration(source="lines", camera=None)) is None

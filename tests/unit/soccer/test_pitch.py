@@ -59,7 +59,7 @@ class TestTwinMarking:
         assert apart.min(axis=0).max() < 0.9
 
     @pytest.mark.parametrize("marking", MARKINGS)
-    def test_twice_is_the_marking_itself(self, marking):
+    def test_the_twin_of_the_twin_is_the_marking_itself(self, marking):
         assert twin_marking(twin_marking(marking)) == marking
 
 

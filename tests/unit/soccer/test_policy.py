@@ -41,7 +41,7 @@ class TestThresholds:
         inner = {f"{CALIBRATION}.{item.name}" for item in fields(CalibrationPolicy)}
         assert {threshold.name for threshold in THRESHOLDS} == own | inner
 
-    def test_those_of_the_gates_come_first_and_in_their_order(self):
+    def test_thresholds_of_gates_come_first_and_in_the_order_of_the_gates(self):
         subjects = list(dict.fromkeys(threshold.subject for threshold in THRESHOLDS))
         assert subjects == [subject for subject in SUBJECTS if subject in subjects]
         gates = list(dict.fromkeys(item.gate for item in THRESHOLDS if item.gate))

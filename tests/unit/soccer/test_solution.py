@@ -25,10 +25,10 @@ class TestMarginOf:
         assert margin_of(0.75, 0.75) == 0.0
         assert margin_of(22.0, 22.0, at_most=True) == 0.0
 
-    def test_there_is_no_share_of_nothing(self):
+    def test_a_threshold_of_zero_or_none_has_no_margin(self):
         assert margin_of(3.0, 0.0) is None
         assert margin_of(3.0, None) is None
 
-    def test_what_is_not_finite_has_no_share(self):
+    def test_a_value_that_is_not_finite_has_no_margin(self):
         assert margin_of(math.inf, 22.0, at_most=True) is None
         assert margin_of(math.nan, 0.75) is None

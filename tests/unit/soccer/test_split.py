@@ -11,10 +11,10 @@ CAMERAS = ("cam1", "cam3")
 
 class TestSplit:
     @pytest.mark.parametrize("split", [Split(), Split("match", 7, 0.5), Split("camera")])
-    def test_its_values_make_it_again(self, split: Split) -> None:
+    def test_a_split_is_rebuilt_from_its_values(self, split: Split) -> None:
         assert Split.of(split.values()).values() == split.values()
 
-    def test_only_what_counts_is_among_its_values(self) -> None:
+    def test_its_values_hold_only_what_its_kind_uses(self) -> None:
         assert Split("given", seed=3).values() == {"kind": "given"}
         assert Split("match", seed=3).values() == {"kind": "match", "seed": 3, "test_share": 0.2}
 
@@ -22,7 +22,7 @@ class TestSplit:
         "split",
         [Split("dice"), Split("match", test_share=1.0), Split("camera", test_cameras=())],
     )
-    def test_the_impossible_is_refused(self, split: Split) -> None:
+    def test_an_impossible_split_is_refused(self, split: Split) -> None:
         with pytest.raises(InputError):
             split.check()
 

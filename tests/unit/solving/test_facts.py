@@ -87,7 +87,7 @@ class TestGroupFacts:
         expected = triangulate_pairs(MAIN.P[None], BEHIND_GOAL.P[None], *pixels)
         assert facts.pair_moved[:, 1, 1, 1] == pytest.approx(expected, abs=1e-6)
 
-    def test_a_ball_that_was_put_where_the_others_see_it_is_none(self):
+    def test_an_inferred_ball_counts_as_no_ball(self):
         put = BallAnnotation(point=ImagePoint(9.0, 9.0), inferred=True)
         view = replace(given_view("a", MAIN, BALL), balls=(put,))
         facts = group_facts([view], [Calibration("given", MAIN)])
@@ -109,11 +109,11 @@ class TestJoin:
 
     @given(SEEDS, st.integers(1, 5))
     @settings(max_examples=15, deadline=None)
-    def test_it_does_not_matter_what_is_joined_first(self, seeds, first):
+    def test_the_order_of_joining_does_not_matter(self, seeds, first):
         parts = random_facts(seeds)
         assert same(join([join([NOTHING, *parts[:first]]), *parts[first:]]), join(parts))
 
-    def test_all_groups_are_the_facts_themselves(self):
+    def test_selecting_every_group_gives_the_facts_unchanged(self):
         whole = join(random_facts([1, 2, 3]))
         assert same(whole.only(np.ones(3, bool)), whole)
         assert same(whole.only(np.zeros(3, bool)), NOTHING)

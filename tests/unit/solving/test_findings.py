@@ -66,7 +66,7 @@ class TestSeveralBalls:
         assert (item.kind, item.view, item.number, item.threshold) == ("several_balls", "b", 2, 1)
         assert item.fix == Fix("pick_ball", "b")
 
-    def test_one_out_of_view_is_not_another(self) -> None:
+    def test_a_ball_marked_out_of_view_is_no_second_ball(self) -> None:
         of = made("ab")
         two = replace(of.views[1], balls=(*of.views[1].balls, BallAnnotation(out_of_view=True)))
         assert found(of.with_view(two)) == ()
@@ -87,7 +87,7 @@ class TestViewDisagrees:
         assert item.fix == Fix("exclude_view", "c")
         assert f"35.0 px apart at best, {TAU:.1f} px are allowed" in item.sentence
 
-    def test_one_that_was_not_judged_is_not(self) -> None:
+    def test_a_view_that_was_not_judged_does_not_disagree(self) -> None:
         views = [solved("a"), solved("b"), solved("c", included=False)]
         assert found(made("abc"), pairs=self.PAIRS[:1], views=views) == ()
 
@@ -105,7 +105,7 @@ class TestBallSize:
         assert (item.number, item.threshold) == (ratio, limit)
 
     @pytest.mark.parametrize("ratio", [2.0, 0.5, 1.0, None])
-    def test_up_to_twice_is_not(self, ratio: float | None) -> None:
+    def test_a_box_up_to_twice_the_size_is_no_finding(self, ratio: float | None) -> None:
         assert found(made("ab"), views=[solved("a"), solved("b", ratio)]) == ()
 
     def test_a_view_in_no_valid_pair_says_nothing_of_its_box(self) -> None:
@@ -161,7 +161,7 @@ class TestSidesSwapped:
         assert (finding.number, finding.threshold, finding.confidence) == (None, 2.0, 1.0)
         assert "within 2.0 px" in finding.sentence
 
-    def test_with_one_it_is_the_number(self) -> None:
+    def test_the_error_as_labelled_is_the_number_of_the_finding(self) -> None:
         assert _sides_swapped(Swap("7_1.png", 80.0, 2.0, 0.9)).number == pytest.approx(80.0)
 
     def test_a_main_camera_on_the_far_side_has_no_numbers_and_says_where_it_stands(self) -> None:

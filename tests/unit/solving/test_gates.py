@@ -134,7 +134,7 @@ class TestTwoViews:
         found = gates([seen("A"), seen("B"), seen("C", **LOW)], left_out=("D",))["two_views"]
         assert found == Gate("two_views", True, 2.0, 2, 0.0, "2 of 4")
 
-    def test_says_of_each_missing_view_why(self):
+    def test_says_why_each_view_does_not_count(self):
         views = [seen("A"), seen("B", **LOW), seen("C", **NO_CAMERA), seen("D", **LOW)]
         found = gates(views, ("jac", "two_views"), left_out=("E", "F"))["two_views"]
         sentence = (

@@ -121,7 +121,7 @@ class TestJaccard:
     def test_is_the_share_of_what_was_found(self):
         assert jaccard({"a": "tp", "b": "fp", "c": "fn", "d": "tp", "e": "fn"}) == 0.4
 
-    def test_of_nothing_is_zero(self):
+    def test_without_markings_it_is_zero(self):
         assert jaccard({}) == 0.0
 
     @given(st.lists(st.sampled_from(["tp", "fp", "fn"]), min_size=1))

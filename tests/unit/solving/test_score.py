@@ -16,7 +16,7 @@ class TestScore:
     def test_three_quarters_is_not_above_three_quarters(self):
         assert score([FrameScore((0.75, 1.0, 1.0), 1.0, ())]).share == 0.0
 
-    def test_nothing_is_zero(self):
+    def test_without_frames_every_score_is_zero(self):
         total = score([])
         assert (total.completeness, total.share, total.error_median_px) == (0.0, 0.0, None)
 

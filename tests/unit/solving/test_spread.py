@@ -33,14 +33,14 @@ DIAGONAL = np.array([CLICK_DIAGONAL])
 
 
 class TestClickVariance:
-    def test_is_that_of_the_policy_at_full_high_definition(self):
+    def test_is_the_policys_value_at_the_diagonal_of_full_hd(self):
         policy = replace(PAPER, click_sigma_px=3.0, box_sigma_share=0.5)
         assert click_variance(DIAGONAL, np.array([0.0]), policy) == pytest.approx(9.0)
         assert click_variance(DIAGONAL / 2, np.array([0.0]), policy) == pytest.approx(2.25)
         assert click_variance(DIAGONAL, np.array([8.0]), policy) == pytest.approx(9.0 + 16.0)
 
     @given(st.floats(0.01, 9.0), st.floats(0.0, 60.0))
-    def test_one_alone_has_the_bits_of_a_python_float(self, click, diameter):
+    def test_a_single_value_has_the_bits_of_a_python_float(self, click, diameter):
         policy = replace(PAPER, click_sigma_px=click)
         sigma = float(np.hypot(click * CLICK_DIAGONAL / CLICK_DIAGONAL, 0.04 * diameter))
         assert click_variance(DIAGONAL, np.array([diameter]), policy).tolist() == [sigma**2]
@@ -70,7 +70,7 @@ class TestLongestSigma:
         spread = turn @ np.diag([9.0, 1.0, 4.0]) @ turn.T
         assert longest_sigma(spread[None]) == pytest.approx([3.0])
 
-    def test_where_nothing_is_known_it_is_infinite(self):
+    def test_an_unknown_covariance_has_an_infinite_sigma(self):
         spreads = np.stack([np.full((3, 3), np.nan), np.eye(3)])
         assert longest_sigma(spreads).tolist() == [np.inf, 1.0]
         assert is_within(spreads, 2.0).tolist() == [False, True]
@@ -84,7 +84,7 @@ class TestIsWithin:
         limit = share * float(np.median(longest_sigma(spreads)))
         assert np.array_equal(is_within(spreads, limit), longest_sigma(spreads) <= limit)
 
-    def test_the_very_value_is_within(self):
+    def test_a_limit_equal_to_the_sigma_is_met(self):
         root = np.random.default_rng(4).normal(size=(50, 3, 3))
         for spread in (root @ root.transpose(0, 2, 1))[:, None]:
             (sigma,) = longest_sigma(spread)
@@ -103,7 +103,7 @@ class TestMeanSpread:
         verdict = judge(facts, policy, spread)
         return spread.covariances(verdict.valid, np.array([0]), verdict.point, policy)[0]
 
-    def test_is_what_noisy_clicks_scatter(self):
+    def test_is_the_scatter_of_noisy_clicks(self):
         policy = replace(PAPER, box_sigma_share=0.0, click_sigma_px=1.5)
         rng, cameras = np.random.default_rng(1), (MAIN, BEHIND_GOAL, OPPOSITE)
         bare = [replace(camera, distortion=np.zeros(12)) for camera in cameras]
@@ -130,7 +130,7 @@ class TestMeanSpread:
 
     @given(st.lists(st.integers(0, 1000), min_size=2, max_size=6))
     @settings(max_examples=30, deadline=None)
-    def test_what_is_kept_of_other_policies_changes_no_bit(self, seeds):
+    def test_results_kept_for_other_policies_change_no_bit(self, seeds):
         facts = join([group_facts(*random_views(seed)) for seed in range(60)])
         kept = MeanSpread(facts)
         for seed in seeds:

@@ -65,7 +65,7 @@ class TestSight:
 
 
 class TestSightsOf:
-    def test_are_the_views_with_camera_and_ball(self):
+    def test_views_with_camera_and_ball_give_a_line_of_sight(self):
         a, b = given_view("a", MAIN, BALL), given_view("b", BEHIND_GOAL, BALL)
         first, second = sights(a, b)
         assert (first.view, second.view) == ("a", "b")
@@ -74,11 +74,11 @@ class TestSightsOf:
         assert first.size == SIZE
         assert (first.camera, second.camera) == (MAIN, BEHIND_GOAL)
 
-    def test_one_that_is_left_out_is_none_and_stops_no_other(self):
+    def test_a_view_that_is_left_out_gives_none_and_stops_no_other(self):
         a, b = given_view("a", MAIN, BALL), given_view("b", BEHIND_GOAL, BALL)
         assert [one.view for one in sights(replace(a, included=False), b)] == ["b"]
 
-    def test_one_without_a_camera_is_none(self):
+    def test_a_view_without_a_camera_gives_none(self):
         a, b = given_view("a", MAIN, BALL), given_view("b", BEHIND_GOAL, BALL)
         assert [one.view for one in sights(a, b, cameras=(None, BEHIND_GOAL))] == ["b"]
 
@@ -92,7 +92,7 @@ class TestSightsOf:
             (BallAnnotation(),),
         ],
     )
-    def test_one_without_a_single_ball_that_was_seen_is_none(self, balls):
+    def test_a_view_without_exactly_one_visible_ball_gives_none(self, balls):
         a, b = given_view("a", MAIN, BALL), given_view("b", BEHIND_GOAL, BALL)
         assert [one.view for one in sights(replace(a, balls=balls), b)] == ["b"]
 
@@ -181,7 +181,7 @@ class TestMeet:
         crossing = looks_at("c", ALONG_Y, (0.0, 0.0, 0.0)), looks_at("d", ALONG_X, (0.0, 0.0, 0.0))
         assert [item.a.view for item in meet([parallel, crossing])] == ["c"]
 
-    def test_nothing_meets_in_no_couple(self):
+    def test_without_couples_there_are_no_meetings(self):
         assert meet([]) == []
 
     def test_a_point_behind_a_camera_is_measured_and_not_in_front(self):
@@ -211,7 +211,7 @@ class TestMeet:
 
 
 class TestLinesOfSight:
-    def test_stand_as_triangulation_takes_them(self):
+    def test_come_in_the_order_that_triangulation_takes(self):
         a, b = looks_at("a", MAIN, BALL), looks_at("b", OPPOSITE, BALL)
         P_a, P_b, pixels_a, pixels_b = lines_of_sight([a, b], [b, a])
         assert np.array_equal(P_a, [MAIN.P, OPPOSITE.P])

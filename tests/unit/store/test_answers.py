@@ -31,7 +31,7 @@ class TestKeepAnswer:
         keep(store, "k", "ann", ANSWER)
         assert find(store, "k", "bob") is None
 
-    def test_an_old_one_is_none_and_gives_way(self, store: Store) -> None:
+    def test_an_expired_answer_is_not_found_and_its_key_is_free(self, store: Store) -> None:
         keep(store, "old", "ann", ANSWER)
         age(store)
         assert find(store, "old", "ann") is None

@@ -28,14 +28,14 @@ class TestExportedGroups:
             assert left_out_groups(session, 1) == left_out
             assert exported_groups(session, 1, everything=False) == ([] if left_out else [1])
 
-    def test_everything_is_everything(self, filled) -> None:
+    def test_an_export_of_everything_takes_every_group(self, filled) -> None:
         with filled.read() as session:
             assert exported_groups(session, 1, everything=True) == [1]
             assert exported_groups(session, 1, everything=False) == []
 
 
 class TestNewestWord:
-    def test_freezing_says_nothing(self, filled) -> None:
+    def test_freezing_does_not_count_as_a_change(self, filled) -> None:
         with filled.write() as session:
             assert newest_word(session, 1) is None
             append(session, [Entry("edit", "ann", "2026-01-02", {}, 1)])

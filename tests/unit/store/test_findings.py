@@ -16,7 +16,7 @@ class TestGroupFindings:
             add_group_findings(session, "upstream", [(1, "7.png", "b"), (1, None, "a")])
             assert group_findings(session, 1) == [("7.png", "b"), (None, "a")]
 
-    def test_new_ones_take_the_place_of_all(self, filled) -> None:
+    def test_new_findings_replace_all_of_the_group(self, filled) -> None:
         with filled.write() as session:
             add_group_findings(session, "upstream", [(1, "7.png", "b")])
             replace_group_findings(session, 1, "upstream", [("cam1", "c")])
@@ -36,7 +36,7 @@ class TestGroupsTold:
 
 
 class TestStationFinding:
-    def test_there_is_at_most_one(self, filled) -> None:
+    def test_a_station_has_at_most_one_finding(self, filled) -> None:
         with filled.write() as session:
             assert station_finding(session, 1) is None
             for sentence in ("first", "second"):

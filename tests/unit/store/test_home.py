@@ -31,7 +31,7 @@ class TestFileSystem:
         mounts.write_text(MOUNTS)
         assert file_system(Path(folder), mounts) == kind
 
-    def test_nobody_says_where_there_is_no_list(self, tmp_path: Path) -> None:
+    def test_without_a_list_of_mounts_the_file_system_is_unknown(self, tmp_path: Path) -> None:
         assert file_system(tmp_path, tmp_path / "nothing") == ""
 
 

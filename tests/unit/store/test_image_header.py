@@ -79,7 +79,7 @@ class TestReadHeader:
             png(0, 5),
         ],
     )
-    def test_what_is_no_image_is_refused_in_a_sentence(self, data: bytes) -> None:
+    def test_a_file_that_is_no_image_is_refused_in_a_sentence(self, data: bytes) -> None:
         with pytest.raises(ImageError):
             read_header(data)
 

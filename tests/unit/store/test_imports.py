@@ -17,7 +17,7 @@ VALUES = ("ann", "t", "rejected", "bad", None, "i", "p", False, None)
 
 
 class TestKnownGroups:
-    def test_all_or_those_of_some_keys(self, filled) -> None:
+    def test_gives_all_groups_or_those_of_some_keys(self, filled) -> None:
         expected = [KnownGroup(1, "m/7.png", "m", "source")]
         with filled.read() as session:
             assert known_groups(session, 1) == known_groups(session, 1, ["m/7.png"]) == expected
@@ -25,7 +25,7 @@ class TestKnownGroups:
 
 
 class TestNewestImports:
-    def test_of_each_group_the_last_one(self, filled) -> None:
+    def test_finds_the_last_import_of_each_group(self, filled) -> None:
         with filled.write() as session:
             for source in ("old", "new"):
                 append(session, [Entry("import", "ann", "t", {"source": source}, 1, 1)])
@@ -35,7 +35,7 @@ class TestNewestImports:
 
 
 class TestSharedStations:
-    def test_a_camera_of_one_view_is_none(self, filled, group) -> None:
+    def test_a_camera_of_one_view_is_no_shared_station(self, filled, group) -> None:
         with filled.read() as session:
             (found,) = shared_stations(session, 1)
             assert found.station == group.views[1].station

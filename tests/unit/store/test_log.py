@@ -33,7 +33,7 @@ class TestAppend:
         ]
         assert entries[0].body == FIRST.body
 
-    def test_a_number_that_is_none_is_refused(self, store) -> None:
+    def test_an_entry_with_nan_is_refused(self, store) -> None:
         with pytest.raises(ValueError, match="JSON"), store.write() as session:
             append(session, [replace(FIRST, body={"x": float("nan")})])
 

@@ -65,7 +65,9 @@ def nested(tmp_path: Path, archive: Path, compression: int) -> Path:
 
 class TestFrameOfAZipInsideAZip:
     @pytest.mark.parametrize("compression", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
-    def test_it_is_read_where_it_lies(self, tmp_path, archive, settings, compression) -> None:
+    def test_a_frame_is_read_inside_the_nested_zip(
+        self, tmp_path, archive, settings, compression
+    ) -> None:
         upload = nested(tmp_path, archive, compression)
         media = Media(str(upload), "league/Frames-v3.zip/v3_frames/7.png")
         assert read_frame(media, None, False, settings) == PNG
@@ -105,7 +107,7 @@ class TestFrameOfAZipInsideAZip:
             thread.join()
         assert got == [True] * 80
 
-    def test_a_damaged_one_is_named(self, tmp_path, archive) -> None:
+    def test_a_damaged_nested_zip_is_named(self, tmp_path, archive) -> None:
         archive.write_bytes(archive.read_bytes()[:-30])
         upload = nested(tmp_path, archive, zipfile.ZIP_STORED)
         with pytest.raises(ImageError, match=r"upload\.zip/league/Frames-v3\.zip"):
@@ -138,7 +140,7 @@ class TestReadFrame:
         file.write_bytes(cv2.imencode(".png", 255 - PICTURE)[1].tobytes())
         assert read_frame(Media(str(file)), 40, False, settings) != first
 
-    def test_is_never_enlarged(self, file, settings) -> None:
+    def test_a_frame_is_never_enlarged(self, file, settings) -> None:
         assert decoded(read_frame(Media(str(file)), 4000, False, settings)).shape == (90, 160, 3)
 
     def test_a_mirrored_camera_is_turned_right(self, file, settings) -> None:
@@ -174,14 +176,14 @@ class TestReadFrame:
 
     @pytest.mark.parametrize("width", [None, 40])
     @pytest.mark.parametrize("data", [b"", b"hello", b"<svg/>", PNG[:60], b"\xff\xd8\xff\xe0" * 9])
-    def test_what_is_no_image_is_said(self, tmp_path, settings, data, width) -> None:
+    def test_a_file_that_is_no_image_is_refused(self, tmp_path, settings, data, width) -> None:
         path = tmp_path / "x.png"
         path.write_bytes(data)
         with pytest.raises(ImageError, match=r"^frame x\.png is "):
             read_frame(Media(str(path)), width, False, settings)
 
     @pytest.mark.parametrize("width", [None, 40])
-    def test_what_is_no_image_is_named_by_member_and_archive(
+    def test_a_member_that_is_no_image_is_named_with_its_archive(
         self, tmp_path, settings, width
     ) -> None:
         path = tmp_path / "Frames-v3.zip"
@@ -197,14 +199,14 @@ class TestReadFrame:
             with pytest.raises(error, match=f"^frame {member} of Frames-v3.zip {what}"):
                 read_frame(Media(str(path), member), width, False, settings)
 
-    def test_what_is_too_many_bytes_is_not_read(self, file, archive, settings) -> None:
+    def test_a_file_beyond_the_limit_is_not_read(self, file, archive, settings) -> None:
         small = settings.model_copy(update={"max_file_bytes": 50})
         for media in (Media(str(file)), Media(str(archive), "v3_frames/7.png")):
             with pytest.raises(TooLargeError, match="larger than 50 bytes"):
                 read_frame(media, None, False, small)
 
     @pytest.mark.parametrize("width", [None, 40])
-    def test_what_is_gone_is_named_without_its_folder(
+    def test_a_missing_file_is_named_without_its_folder(
         self, tmp_path, archive, settings, width
     ) -> None:
         for media in (
@@ -248,13 +250,13 @@ class TestMediaFacts:
         }
         assert media_facts(Media(str(file))) == {"bytes": len(PNG)}
 
-    def test_what_is_gone_has_none(self, tmp_path, archive) -> None:
+    def test_a_missing_file_has_no_facts(self, tmp_path, archive) -> None:
         assert media_facts(Media(str(tmp_path / "gone.png"))) == {}
         assert media_facts(Media(str(archive), "gone.png")) == {}
 
 
 class TestArchives:
-    def test_few_stay_open_and_all_are_read(self, tmp_path) -> None:
+    def test_few_archives_stay_open_and_all_are_read(self, tmp_path) -> None:
         archives = Archives(most=2)
         paths = []
         for number in range(5):

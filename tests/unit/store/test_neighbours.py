@@ -30,7 +30,7 @@ class TestFiles:
             4: "000104.jpg",
         }
 
-    def test_numbers_may_gain_a_digit(self, tmp_path) -> None:
+    def test_frame_numbers_may_gain_a_digit(self, tmp_path) -> None:
         touch(tmp_path, "frame_99.png", "frame_100.png", "frame_101.png")
         found = neighbours(Media(str(tmp_path / "frame_100.png")), "100", static=True)
         assert sorted(found) == [-1, 1]

@@ -37,13 +37,15 @@ class TestOpen:
         store.close()
 
     @pytest.mark.parametrize("name", PRAGMAS)
-    def test_every_connection_keeps_the_promises(self, store: Store, name: str) -> None:
+    def test_every_connection_has_the_durability_settings(self, store: Store, name: str) -> None:
         with store.read() as one, store.read() as two, store.write() as three:
             for session in (one, two, three):
                 answer = session.execute(text(f"PRAGMA {name}")).scalar()
                 assert answer == PRAGMAS[name][1]
 
-    def test_a_weaker_promise_is_noticed(self, settings: Settings, monkeypatch) -> None:
+    def test_a_database_with_weaker_durability_is_refused(
+        self, settings: Settings, monkeypatch
+    ) -> None:
         # The planted fault: what is set is weaker than what must be answered.
         monkeypatch.setitem(PRAGMAS, "synchronous", ("NORMAL", 2))
         with pytest.raises(StorageError, match="synchronous"):
@@ -147,7 +149,7 @@ class TestWrite:
         other.execute("ROLLBACK")
         other.close()
 
-    def test_what_was_acknowledged_survives_a_killed_process(self, store, settings) -> None:
+    def test_an_acknowledged_write_survives_a_killed_process(self, store, settings) -> None:
         script = (
             "import os, sys; from pathlib import Path; from app.config import Settings;"
             "from app.store.session import Store; from sqlalchemy import text\n"

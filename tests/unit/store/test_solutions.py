@@ -101,7 +101,7 @@ class TestRoundTrip:
         with with_group.read() as session:
             assert read_solutions(session, [KEY]) == {1: solution}
 
-    def test_only_under_its_own_key(self, with_group, group, solution) -> None:
+    def test_a_solution_is_found_only_under_its_own_key(self, with_group, group, solution) -> None:
         with with_group.write() as session:
             insert_solutions(session, [(KEY, encode_solution(group, solution))])
         with with_group.read() as session:
@@ -145,7 +145,7 @@ class TestValueCodec:
         del value["fix"], value["confidence"]
         assert value_codec.from_json(Finding, value) == Finding("low_parallax", "3 degrees")
 
-    def test_what_has_no_codec_is_our_own_mistake(self) -> None:
+    def test_a_type_without_a_codec_is_a_programming_error(self) -> None:
         with pytest.raises(TypeError, match="no codec"):
             value_codec.to_json({"a": 1})
 

@@ -85,18 +85,18 @@ class TestSafeName:
             ("a" * 300 + ".zip", "a" * 116 + ".zip"),
         ],
     )
-    def test_is_as_near_as_can_be(self, sent: str, name: str) -> None:
+    def test_an_unsafe_name_becomes_the_nearest_safe_one(self, sent: str, name: str) -> None:
         assert safe_name(sent) == name
 
     @pytest.mark.parametrize("sent", ["", "..", "/", "...", "\x00"])
-    def test_something_must_be_left(self, sent: str) -> None:
+    def test_a_name_without_a_single_safe_letter_is_refused(self, sent: str) -> None:
         with pytest.raises(InputError):
             safe_name(sent)
 
 
 class TestUploadPath:
     @pytest.mark.parametrize("upload_id", ["", "..", "x" * 32, "a" * 32, "../" + "a" * 29])
-    def test_an_id_that_is_none_finds_nothing(self, settings: Settings, upload_id: str) -> None:
+    def test_an_impossible_id_finds_nothing(self, settings: Settings, upload_id: str) -> None:
         send(settings)
         with pytest.raises(NotFoundError):
             upload_path(settings, upload_id)
@@ -124,7 +124,7 @@ class TestExpireUploads:
         assert expire_uploads(settings) == 1
         assert list(settings.uploads.iterdir()) == []
 
-    def test_without_uploads_there_is_nothing_to_do(self, settings: Settings) -> None:
+    def test_without_uploads_nothing_expires(self, settings: Settings) -> None:
         assert expire_uploads(settings) == 0
         assert list_uploads(settings) == []
 

@@ -18,7 +18,7 @@ class TestDatasetViews:
             assert (stored.flipped, stored.media) == (view.station.flipped, view.media)
             assert tuple(stored.balls) == view.balls
 
-    def test_only_those_that_are_asked_for(self, filled) -> None:
+    def test_finds_only_the_views_that_are_asked_for(self, filled) -> None:
         with filled.read() as session:
             assert [view.id for view in dataset_views(session, 1, ids=[3, 9])] == [3]
             assert dataset_views(session, 1, [QueueModel.key == "m/8.png"]) == []
@@ -27,13 +27,13 @@ class TestDatasetViews:
 
 
 class TestGroupViews:
-    def test_they_come_in_their_order(self, filled) -> None:
+    def test_views_come_in_the_order_of_their_group(self, filled) -> None:
         with filled.read() as session:
             assert [view.key for view in group_views(session, 1)] == ["7.png", "cam1", "cam2"]
 
 
 class TestFindView:
-    def test_by_its_id(self, filled) -> None:
+    def test_finds_a_view_by_its_id(self, filled) -> None:
         with filled.read() as session:
             assert find_view(session, 2) == group_views(session, 1)[1]
             assert find_view(session, 9) is None

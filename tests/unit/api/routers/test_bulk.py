@@ -28,7 +28,7 @@ class TestPostVerdicts:
         assert (done.json()["batch"], done.json()["changed"], done.json()["refused"]) == (1, 3, [])
         assert statuses(api) == {"accepted"}
 
-    def test_what_fails_needs_a_note_and_is_counted(self, api) -> None:
+    def test_groups_that_fail_a_gate_need_a_note_and_are_counted(self, api) -> None:
         view = api.get("/api/v1/groups/1").json()
         etag = {"If-Match": view["etag"]}
         api.patch(
@@ -59,7 +59,9 @@ class TestPostVerdicts:
             ({"state": "deferred", "q": "id:" + "1," * 50_000}, 422, "/q"),
         ],
     )
-    def test_what_cannot_be_changes_nothing(self, api, body: Any, status: int, pointer) -> None:
+    def test_an_impossible_verdict_changes_nothing(
+        self, api, body: Any, status: int, pointer
+    ) -> None:
         answer = api.post(VERDICTS, json=body)
         assert (answer.status_code, answer.json()["pointer"]) == (status, pointer)
         assert statuses(api) == {"unreviewed"}
@@ -74,7 +76,7 @@ class TestPostVerdicts:
 
 
 class TestUndoBatch:
-    def test_takes_all_of_it_back_once(self, api) -> None:
+    def test_takes_the_whole_batch_back_and_only_once(self, api) -> None:
         batch = api.post(VERDICTS, json={"state": "deferred"}).json()["batch"]
         path = f"/api/v1/verdict-batches/{batch}/undo"
         answer = api.post(path)
@@ -88,5 +90,5 @@ class TestUndoBatch:
         assert (item["state"], item["changed"], item["done"]) == ("deferred", 3, True)
         assert item["undone_by"] == "local"
 
-    def test_what_is_no_batch_is_404(self, api) -> None:
+    def test_an_unknown_batch_is_404(self, api) -> None:
         assert api.post("/api/v1/verdict-batches/7/undo").status_code == 404

@@ -95,7 +95,7 @@ def exact(running) -> dict[str, Any]:
 
 
 class TestAddPredictions:
-    def test_reads_an_upload_and_tells_what_it_could_not_place(self, running) -> None:
+    def test_reads_an_upload_and_lists_frames_that_it_does_not_know(self, running) -> None:
         values = [*results(running), {**results(running)[0], "image_id": "99.png"}]
         answer = add(running, "yolo", values)
         body = answer.json()
@@ -129,7 +129,7 @@ class TestAddPredictions:
             ({"more": 1}, 422),
         ],
     )
-    def test_what_cannot_be_is_refused(self, running, change, status) -> None:
+    def test_an_impossible_upload_is_refused(self, running, change, status) -> None:
         body = {"name": "a", "upload": upload(running, "a.json", results(running)), **change}
         answer = running.post(f"{API}/datasets/broadcast/predictions", json=body)
         assert answer.status_code == status, answer.text
@@ -208,7 +208,7 @@ class TestAccept:
             ({"views": [9999]}, 404),
         ],
     )
-    def test_what_cannot_be_is_refused(self, running, exact, change, status) -> None:
+    def test_an_impossible_request_is_refused(self, running, exact, change, status) -> None:
         body = {"dataset": "broadcast", "predictions": exact["id"], **change}
         assert running.post(f"{API}/predictions/accept", json=body).status_code == status
 
@@ -300,6 +300,8 @@ class TestEvaluations:
             ({"predictions": 1, "boxes": "round"}, 422),
         ],
     )
-    def test_what_cannot_be_is_refused_at_once(self, running, exact, body, status) -> None:
+    def test_an_impossible_evaluation_is_refused_before_a_job_starts(
+        self, running, exact, body, status
+    ) -> None:
         answer = running.post(f"{API}/datasets/broadcast/evaluations", json=body)
         assert answer.status_code == status, answer.text

@@ -133,14 +133,16 @@ class TestListen:
             time.sleep(0.3)
         assert not look.called
 
-    def test_another_dataset_is_not_told_of(self, app, served) -> None:
+    def test_changes_of_another_dataset_are_not_told(self, app, served) -> None:
         store, (address, _) = app.state.services.store, served
         with opened(address, dataset="static") as stream:
             set_verdict(store, 1, "deferred", if_match=load(store, 1).etag, actor="bob")
             set_verdict(store, 4, "deferred", if_match=load(store, 4).etag, actor="bob")
             assert stream.next()[1]["group"] == 4
 
-    def test_who_comes_back_misses_nothing_and_hears_nothing_twice(self, app, served) -> None:
+    def test_a_listener_that_reconnects_misses_nothing_and_hears_nothing_twice(
+        self, app, served
+    ) -> None:
         store, (address, _) = app.state.services.store, served
         with opened(address) as stream:
             edit = IncludeView("7.png", False)
@@ -188,7 +190,7 @@ class TestListen:
             told = {stream.until(lambda name, _: name == "group")["group"] for _ in range(3)}
             assert told == {1, 2, 3}
 
-    def test_head_ends(self, served) -> None:
+    def test_head_is_answered_and_ends(self, served) -> None:
         answer = httpx.head(f"{served[0]}{EVENTS}", timeout=SECONDS)
         assert (answer.status_code, answer.content) == (200, b"")
 
@@ -230,7 +232,7 @@ class TestStop:
 
 
 class TestFeed:
-    def test_who_does_not_keep_up_is_let_go_and_comes_back(
+    def test_a_listener_that_is_too_slow_is_dropped_and_reconnects(
         self, app, served, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(module, "MAX_WAITING", 2)

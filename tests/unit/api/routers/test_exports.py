@@ -54,7 +54,7 @@ class TestMakeExport:
         assert (done["state"], done["done"], done["total"]) == ("done", 3, 3)
         assert done["result"]["content"] == document["content"]
 
-    def test_what_cannot_be_is_refused_at_once(self, app, api) -> None:
+    def test_an_impossible_export_is_refused_before_a_job_starts(self, app, api) -> None:
         nothing = api.post(API, json={**ORDER, "all": False})
         assert (nothing.status_code, "accepted" in nothing.json()["detail"]) == (400, True)
         assert api.post(API, json={**ORDER, "dataset": "x"}).status_code == 404
@@ -95,13 +95,15 @@ class TestListExports:
 
 
 class TestGetContent:
-    def test_does_not_wait_forever(self, api, busy, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_a_request_for_the_content_does_not_wait_forever(
+        self, api, busy, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         monkeypatch.setattr(module, "PATIENCE", 0.1)
         job = api.post(API, json=ORDER).json()
         answer = api.get(job["content"])
         assert (answer.status_code, "still being written" in answer.text) == (409, True)
 
-    def test_of_what_is_no_export_is_404(self, app, api, busy) -> None:
+    def test_the_content_of_an_unknown_export_is_404(self, app, api, busy) -> None:
         (other,) = app.state.services.jobs.find()
         for name in (other.id, 99, "x", "0" * 32, "1" * 30):
             assert api.get(f"{API}/{name}/content").status_code == 404
@@ -109,7 +111,9 @@ class TestGetContent:
 
 
 class TestCancel:
-    def test_leaves_no_file(self, app, api, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_a_cancelled_export_leaves_no_file(
+        self, app, api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         from app.review.exporting import export
 
         jobs: Jobs = app.state.services.jobs
@@ -132,7 +136,7 @@ class TestCancel:
 
 
 class TestDeleteExport:
-    def test_takes_the_file_away(self, app, api) -> None:
+    def test_deleting_an_export_deletes_its_file(self, app, api) -> None:
         job = api.post(API, json=ORDER).json()
         assert api.get(job["content"]).status_code == 200
         assert api.delete(f"{API}/{job['id']}").status_code == 204
@@ -141,7 +145,7 @@ class TestDeleteExport:
         assert api.delete(f"{API}/{job['id']}").status_code == 404
         assert list(app.state.services.exports.folder.iterdir()) == []
 
-    def test_of_one_that_is_being_written_is_409(self, api, busy) -> None:
+    def test_deleting_an_export_that_is_being_written_is_409(self, api, busy) -> None:
         job = api.post(API, json=ORDER).json()
         assert api.delete(f"{API}/{job['id']}").status_code == 409
 

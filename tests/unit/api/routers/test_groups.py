@@ -47,7 +47,7 @@ class TestGetGroup:
             box = said.balls[0].box
             assert view["balls"][0]["box"] == [box.x, box.y, box.width, box.height]
 
-    def test_who_has_it_is_told_so(self, api, document) -> None:
+    def test_a_caller_who_has_the_current_state_gets_304(self, api, document) -> None:
         path = f"{API}/groups/{document['id']}"
         assert api.get(path).headers["etag"] == document["etag"]
         again = api.get(path, headers={"If-None-Match": f'"other", {document["etag"]}'})

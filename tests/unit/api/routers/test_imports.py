@@ -118,7 +118,9 @@ class TestStartImport:
             ({"options": {"lines": {"folder": "nowhere"}}, "format": "issia"}, 404),
         ],
     )
-    def test_what_cannot_be_is_refused_at_once(self, app, api, tree, changes, status) -> None:
+    def test_an_impossible_import_is_refused_before_a_job_starts(
+        self, app, api, tree, changes, status
+    ) -> None:
         answer = api.post(API, json=body(**changes))
         assert answer.status_code == status, answer.text
         assert app.state.services.jobs.find(kinds=["import"]) == []
@@ -152,7 +154,7 @@ class TestListImportFolders:
         assert inside["format"] == "soccernet-v3"
 
     @pytest.mark.parametrize("path", ["data/..", "..", "data/%2e%2e", "/etc", "data\\.."])
-    def test_leads_nowhere_else(self, api, tree, path: str) -> None:
+    def test_a_path_outside_the_allowed_folders_is_refused(self, api, tree, path: str) -> None:
         answer = api.get(f"{API}/folders", params={"path": path})
         assert answer.status_code == 400
         assert "/tmp" not in answer.text
@@ -215,7 +217,7 @@ class TestOutcome:
         job = finished(app, api.post(API, json=body(format="coco", dry_run=True)))
         assert job.state == "failed"
 
-    def test_doing_it_again_is_no_failure(self, app, api, tree) -> None:
+    def test_importing_the_same_files_again_is_no_failure(self, app, api, tree) -> None:
         finished(app, api.post(API, json=body()))
         again = finished(app, api.post(API, json=body()))
         assert (again.state, again.result["unchanged"]) == ("done", 1)

@@ -17,7 +17,7 @@ def submit(app: Any, work: Any = lambda progress: 1, **options: Any) -> int:
 
 
 class TestGetJob:
-    def test_says_what_it_is_and_what_came_of_it(self, app, api) -> None:
+    def test_says_what_a_job_does_and_its_result(self, app, api) -> None:
         job = submit(app, lambda progress: {"n": 1}, dataset_id=1)
         app.state.services.jobs.wait(job, SECONDS)
         body = api.get(f"{API}/{job}").json()
@@ -59,7 +59,7 @@ class TestListJobs:
 
 
 class TestCancelJob:
-    def test_ends_it_and_once_it_is_over_it_is_409(self, app, api) -> None:
+    def test_cancelling_ends_a_running_job_and_a_finished_one_is_409(self, app, api) -> None:
         started = threading.Event()
 
         def endless(progress: JobProgress) -> None:
@@ -78,7 +78,7 @@ class TestCancelJob:
 
 
 class TestOverload:
-    def test_is_503_with_a_time_to_come_back(self, app, api) -> None:
+    def test_too_many_jobs_are_503_with_a_time_to_come_back(self, app, api) -> None:
         app.state.services.jobs._capacity = 0
         body = {"dataset": "broadcast", "format": "cameras", "all": True}
         answer = api.post("/api/v1/exports", json=body)

@@ -48,7 +48,7 @@ class TestReason:
         entries = api.get(f"{address}/history").text
         assert "a moment later" in entries
 
-    def test_none_is_given_when_nobody_says_why(self, api) -> None:
+    def test_leaving_a_view_out_needs_no_reason(self, api) -> None:
         after = leave(api, first_group(api), included=False).json()
         assert after["views"][1]["left_out"] is None
 
@@ -64,7 +64,7 @@ class TestReason:
         ],
         ids=str,
     )
-    def test_what_cannot_be_changes_nothing(self, api, body, status, pointer) -> None:
+    def test_an_impossible_reason_changes_nothing(self, api, body, status, pointer) -> None:
         before = first_group(api)
         answer = leave(api, before, **body)
         assert (answer.status_code, answer.json()["pointer"] or "") == (status, pointer)
@@ -150,5 +150,5 @@ class TestRedoBatch:
             "the verdicts of this batch were given again already",
         )
 
-    def test_what_is_no_batch_is_404(self, api) -> None:
+    def test_an_unknown_batch_is_404(self, api) -> None:
         assert api.post(f"{API}/verdict-batches/7/redo").status_code == 404

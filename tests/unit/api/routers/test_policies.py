@@ -98,7 +98,7 @@ class TestSetPolicy:
         gates = {gate["name"]: gate["active"] for gate in group["solution"]["gates"]}
         assert gates["parallax"] and gates["sigma"]
 
-    def test_needs_if_match_and_tells_who_was_slower(self, api) -> None:
+    def test_needs_if_match_and_refuses_a_change_of_an_older_policy(self, api) -> None:
         assert api.put(POLICY, json={"name": "strict"}).status_code == 428
         etag = api.get(POLICY).headers["etag"]
         put(api, {"name": "strict"}, etag)
@@ -121,7 +121,7 @@ class TestSetPolicy:
             ({}, None),
         ],
     )
-    def test_what_cannot_be_is_refused_with_its_place(self, api, body, pointer) -> None:
+    def test_an_impossible_policy_is_refused_with_its_place(self, api, body, pointer) -> None:
         answer = put(api, body)
         assert (answer.status_code, answer.json()["pointer"]) == (400, pointer)
         assert api.get(POLICY).json()["version"] == 1

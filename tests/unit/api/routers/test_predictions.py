@@ -79,7 +79,7 @@ class TestGroupPredictions:
         alone = api.get(f"{API}/views/{views[0]}/predictions").json()["items"]
         assert [item["id"] for item in alone] == [item["id"] for item in predicted[:2]]
 
-    def test_without_a_set_none_are_to_be_expected(self, api, emptied) -> None:
+    def test_a_dataset_without_prediction_sets_says_so(self, api, emptied) -> None:
         assert asked(api, emptied) == {"sets": 0, "items": [], "accepted": []}
 
     def test_an_accepted_ball_says_where_it_is_from(self, api, emptied, predicted) -> None:
@@ -88,7 +88,7 @@ class TestGroupPredictions:
         assert (ball["view"], ball["name"], ball["score"]) == (predicted[0]["view"], "yolo", 0.9)
         assert ball["by"] and ball["at"]
 
-    def test_no_group_no_answer(self, api) -> None:
+    def test_an_unknown_group_is_404(self, api) -> None:
         assert api.get(f"{API}/groups/999/predictions").status_code == 404
 
 
@@ -105,9 +105,7 @@ class TestAccept:
         )
         assert undone.json()["views"][0]["balls"] == []
 
-    def test_a_ball_that_is_there_is_replaced_only_when_that_is_said(
-        self, api, emptied, predicted
-    ) -> None:
+    def test_an_existing_ball_is_replaced_only_on_request(self, api, emptied, predicted) -> None:
         refused = accept(api, emptied, predicted[2])
         assert refused.status_code == 409
         assert "has a ball already" in refused.json()["detail"]
@@ -115,13 +113,15 @@ class TestAccept:
         answer = accept(api, emptied, predicted[2], replace=True)
         assert answer.json()["views"][1]["balls"][0]["predicted_by"] == "yolo"
 
-    def test_who_comes_late_is_shown_the_present_state(self, api, emptied, predicted) -> None:
+    def test_an_accept_on_an_older_state_gets_the_present_one(
+        self, api, emptied, predicted
+    ) -> None:
         after = accept(api, emptied, predicted[0]).json()
         late = accept(api, emptied, predicted[1])
         assert late.status_code == 412
         assert late.json()["current"]["etag"] == after["etag"]
 
     @pytest.mark.parametrize("change", [{"id": 999}, {"view": 999}])
-    def test_what_does_not_exist_is_not_accepted(self, api, emptied, predicted, change) -> None:
+    def test_an_unknown_view_or_prediction_is_404(self, api, emptied, predicted, change) -> None:
         answer = accept(api, emptied, {**predicted[0], **change})
         assert answer.status_code == 404, json.dumps(answer.json())

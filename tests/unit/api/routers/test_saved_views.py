@@ -29,7 +29,7 @@ class TestSavedViews:
         ("body", "status"),
         [({"name": "x", "q": "a:b"}, 400), ({"name": "", "q": ""}, 422), ({"q": ""}, 422)],
     )
-    def test_what_cannot_be_saved_is_refused(self, api, body, status: int) -> None:
+    def test_an_impossible_view_is_refused(self, api, body, status: int) -> None:
         assert api.post(f"{DATASET}/saved-views", json=body).status_code == status
 
 

@@ -31,7 +31,7 @@ class TestUploadFile:
         folder = app.state.services.settings.uploads
         assert (folder / body["id"] / "ISSIA-3D.csv").stat().st_size == 4_000_000
 
-    def test_again_it_is_the_same_one(self, api) -> None:
+    def test_the_same_file_again_is_the_same_upload(self, api) -> None:
         assert send(api).json() == send(api).json()
 
     def test_too_many_bytes_are_413_and_leave_nothing(self, app, api) -> None:

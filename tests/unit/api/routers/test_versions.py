@@ -50,7 +50,7 @@ class TestFreezeVersion:
         assert answer.json() == {"groups": 3, "left_out": {}, "unsolved": 0}
         assert services.jobs.find() == []
 
-    def test_what_can_be_refused_is_refused_at_once(self, api, version) -> None:
+    def test_an_impossible_freeze_is_refused_before_a_job_starts(self, api, version) -> None:
         address = f"{API}/datasets/broadcast/versions"
         nothing = api.post(address, json={"name": "v2"})
         assert (nothing.status_code, "unreviewed" in nothing.json()["detail"]) == (400, True)
@@ -116,7 +116,7 @@ class TestVersions:
         assert job["result"]["groups"] == job["done"] == 3
 
     @pytest.mark.parametrize("route", ["", "/manifest", "/changelog", "/diff?against=1"])
-    def test_there_is_no_such_version(self, api, route: str) -> None:
+    def test_an_unknown_version_is_404(self, api, route: str) -> None:
         assert api.get(f"{API}/versions/99{route}").status_code == 404
 
 
@@ -133,6 +133,6 @@ class TestExportOfAVersion:
             manifest = json.loads(archive.read("manifest.json"))
         assert (manifest["version"], manifest["date"]) == ("v1", version.created)
 
-    def test_of_another_dataset_there_is_no_such_version(self, api, version) -> None:
+    def test_a_version_of_another_dataset_is_404(self, api, version) -> None:
         body = {"dataset": "static", "format": "cameras", "version": version.id}
         assert api.post(f"{API}/exports", json=body).status_code == 404

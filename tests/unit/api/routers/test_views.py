@@ -105,7 +105,7 @@ class TestBall:
         ],
         ids=str,
     )
-    def test_what_places_no_ball_or_contradicts_itself_deletes_none(
+    def test_a_body_that_places_no_ball_or_contradicts_itself_deletes_no_ball(
         self, api, document, body
     ) -> None:
         assert patch(api, document, "/ball", body).status_code == 422
@@ -114,7 +114,7 @@ class TestBall:
         assert api.post(f"{group}/preview", json=what_if).status_code == 422
         assert api.get(group).json() == document
 
-    def test_the_body_null_means_that_there_is_none(self, api, document) -> None:
+    def test_the_body_null_deletes_the_ball(self, api, document) -> None:
         after = patch(api, document, "/ball", None).json()
         assert after["views"][0]["balls"] == []
         assert after["solution"]["ball"] is None
@@ -154,7 +154,7 @@ class TestView:
         "body",
         [{}, {"included": None}, {"included": 1}, {"included": True, "calibration": "given"}],
     )
-    def test_one_thing_at_a_time(self, api, document, body) -> None:
+    def test_a_body_that_changes_two_things_is_refused(self, api, document, body) -> None:
         assert patch(api, document, "", body).status_code == 422
 
 

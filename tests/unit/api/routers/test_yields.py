@@ -51,7 +51,7 @@ class TestTryPolicy:
             api.get("/api/v1/datasets/broadcast").json()["policy"]["min_parallax_degrees"] is None
         )
 
-    def test_null_switches_a_gate_off_and_is_nothing_elsewhere(self, api) -> None:
+    def test_null_switches_an_optional_gate_off_and_is_refused_elsewhere(self, api) -> None:
         policy = "/api/v1/datasets/broadcast/policy"
         headers = {"If-Match": api.get(policy).headers["etag"]}
         assert api.put(policy, json={"name": "strict"}, headers=headers).status_code == 202
@@ -60,7 +60,7 @@ class TestTryPolicy:
         assert "sigma" not in gates(answer) and "parallax" in gates(answer)
         assert answer.json()["policy"]["min_jac"] == 0.75
 
-    def test_what_needs_solving_is_named(self, api) -> None:
+    def test_thresholds_that_need_solving_are_named(self, api) -> None:
         answer = api.post(PATH, json={"calibration": {"check_labels": False}, "tau_percent": 2})
         assert answer.json()["needs_solving"] == ["calibration.check_labels"]
 
@@ -73,7 +73,7 @@ class TestTryPolicy:
             ({"calibration": {"x": 1}}, "/calibration/x"),
         ],
     )
-    def test_what_is_no_threshold_is_422(self, api, body: Any, pointer: str) -> None:
+    def test_an_unknown_threshold_is_422(self, api, body: Any, pointer: str) -> None:
         answer = api.post(PATH, json=body)
         assert (answer.status_code, answer.json()["pointer"]) == (422, pointer)
 

@@ -74,7 +74,7 @@ class TestCheckJson:
         assert "UTF-8" in refusal('{"a": "ä"}'.encode("latin-1"))
         refusal('{"a": 1}'.encode("utf-16"))
 
-    def test_half_of_a_surrogate_pair_is_refused(self) -> None:
+    def test_half_of_a_unicode_surrogate_pair_is_refused(self) -> None:
         check_json(rb'"\ud83d\ude00"')
         assert "Unicode" in refusal(rb'{"note": "\ud800"}')
 

@@ -55,7 +55,7 @@ class TestSameOrigin:
             "http://[::1",
         ],
     )
-    def test_everything_else_is_another_one(self, origin: str) -> None:
+    def test_another_host_port_or_scheme_is_another_origin(self, origin: str) -> None:
         assert not same_origin(origin, "127.0.0.1:8000", "http")
 
     def test_another_scheme_is_another_one_on_the_same_port_too(self) -> None:
@@ -103,7 +103,9 @@ class TestSameOriginMiddleware:
         assert answer.json()["type"] == "urn:touchline:problem:forbidden"
 
     @pytest.mark.parametrize("site", ["cross-site", "same-site"])
-    def test_what_the_browser_calls_foreign_may_not(self, guarded, site: str) -> None:
+    def test_a_request_that_the_browser_marks_as_cross_site_may_not_write(
+        self, guarded, site: str
+    ) -> None:
         assert guarded.post("/x", headers={"Sec-Fetch-Site": site}).status_code == 403
 
     def test_reading_needs_no_origin(self, guarded) -> None:

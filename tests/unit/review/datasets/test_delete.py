@@ -74,13 +74,13 @@ class TestReadContents:
         assert contents.counts["views"] == 7
         assert contents.counts["saved_views"] == 1
 
-    def test_a_dataset_that_is_not_there_is_said(self, store) -> None:
+    def test_an_unknown_dataset_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):
             read_contents(store, "demo")
 
 
 class TestDeleteDataset:
-    def test_all_of_it_goes_and_the_other_stays(self, two: Store) -> None:
+    def test_the_whole_dataset_goes_and_the_other_one_stays(self, two: Store) -> None:
         before = list_groups(two, 2, limit=500)
         contents = delete_dataset(two, "demo", confirm="demo", actor="eve")
         assert contents.counts["groups"] == 3
@@ -94,7 +94,7 @@ class TestDeleteDataset:
                     owners = set(session.scalars(select(table.c.dataset_id)))
                     assert owners <= {2}, table.name
 
-    def test_the_log_stays_whole_and_its_replay_is_what_is_left(self, two: Store) -> None:
+    def test_the_log_stays_whole_and_replays_to_what_is_left(self, two: Store) -> None:
         before = log_entries(two)
         delete_dataset(two, "demo", confirm="demo", actor="eve")
         assert log_entries(two) == [*before, ("dataset_deleted", 1)]
@@ -135,13 +135,15 @@ class TestDeleteDataset:
         assert solve_dataset(two, "third").solved == 1
 
     @pytest.mark.parametrize("confirm", ["", "Demo", "other", "1"])
-    def test_without_its_name_nothing_happens(self, two: Store, confirm: str) -> None:
+    def test_without_typing_its_name_nothing_is_deleted(self, two: Store, confirm: str) -> None:
         with pytest.raises(ConflictError, match='called "demo"'):
             delete_dataset(two, "demo", confirm=confirm, actor="eve")
         assert rows(two, "dataset") == 2
         assert rows(two, "solution") > 2
 
-    def test_killed_midway_what_was_said_is_all_there(self, two: Store, monkeypatch) -> None:
+    def test_a_deletion_that_is_killed_midway_loses_nothing_that_people_said(
+        self, two: Store, monkeypatch
+    ) -> None:
         def killed(_session, _identity):
             raise KeyboardInterrupt
 
@@ -156,7 +158,7 @@ class TestDeleteDataset:
         delete_dataset(two, "demo", confirm="demo", actor="eve")
         assert rows(two, "groups") == 2
 
-    def test_the_database_lets_no_verdict_go_but_so(self, two: Store) -> None:
+    def test_verdicts_can_be_deleted_only_with_their_dataset(self, two: Store) -> None:
         delete_dataset(two, "other", confirm="other", actor="eve")
         with pytest.raises(IntegrityError), two.write() as session:
             session.execute(text("DELETE FROM verdict"))

@@ -6,7 +6,7 @@ from app.review.datasets.fan_out import AHEAD, fan_out
 
 
 class TestFanOut:
-    def test_here_results_come_in_order(self) -> None:
+    def test_without_an_executor_results_come_in_order(self) -> None:
         assert list(fan_out(abs, [-3, -1, -2], None)) == [3, 1, 2]
 
     def test_an_executor_does_all_of_them(self) -> None:

@@ -92,7 +92,7 @@ class TestApply:
             (SetCalibrationSource("7.png", "guess"), InputError, "given"),
         ],
     )
-    def test_the_impossible_is_refused_in_one_sentence(
+    def test_an_impossible_edit_is_refused_in_one_sentence(
         self, edit, error, sentence, make_group
     ) -> None:
         with pytest.raises(error, match=sentence):

@@ -48,7 +48,7 @@ class TestReadEtags:
         assert all(state.solution.findings for state in states.values())
         assert etags_of(store, *ids) == {number: item.etag for number, item in states.items()}
 
-    def test_leaves_out_what_does_not_exist(self, store: Store, state: GroupState) -> None:
+    def test_leaves_out_groups_that_do_not_exist(self, store: Store, state: GroupState) -> None:
         assert list(etags_of(store, state.id, 99)) == [state.id]
 
 

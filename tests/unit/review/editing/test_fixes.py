@@ -53,7 +53,7 @@ class TestEditOfFix:
             Fix("look_ball", "a", to="b"),
         ],
     )
-    def test_what_is_not_there_cannot_be_mended(self, fix):
+    def test_a_marking_that_is_gone_cannot_be_mended(self, fix):
         assert edit_of_fix(GROUP, fix) is None
 
 
@@ -86,7 +86,7 @@ class TestOffers:
     def test_where_one_ball_is_left_there_is_none_to_pick(self):
         assert offers(GROUP, Fix("pick_ball", "a")) == ()
 
-    def test_nothing_is_offered_where_nothing_is_proposed(self):
+    def test_a_finding_without_a_fix_offers_no_edit(self):
         assert offers(GROUP, None) == offers(GROUP, Fix("swap_sides")) == ()
 
 

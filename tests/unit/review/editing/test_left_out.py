@@ -66,11 +66,11 @@ class TestIncludeView:
             ("other", "x" * 2001, "at most 2000"),
         ],
     )
-    def test_a_reason_is_one_that_there_is(self, make_group, reason, note, sentence) -> None:
+    def test_an_unknown_reason_is_refused(self, make_group, reason, note, sentence) -> None:
         with pytest.raises(InputError, match=sentence):
             IncludeView("7_1.png", False, reason, note).apply(make_group(7))
 
-    def test_only_a_view_that_is_left_out_has_one(self, make_group) -> None:
+    def test_only_a_view_that_is_left_out_has_a_reason(self, make_group) -> None:
         with pytest.raises(InputError, match="left out"):
             IncludeView("7_1.png", True, "duplicate_view").apply(make_group(7))
 
@@ -118,12 +118,12 @@ class TestUndo:
 
 
 class TestDigests:
-    def test_solving_reads_nothing_of_it(self, make_group) -> None:
+    def test_solving_does_not_read_the_reason(self, make_group) -> None:
         group = make_group(7)
         plain = IncludeView("7_1.png", False).apply(group)
         assert group_inputs_hash(LEAVE.apply(group)) == group_inputs_hash(plain)
 
-    def test_groups_without_one_are_what_they_always_were(self, make_group) -> None:
+    def test_groups_without_a_reason_are_frozen_without_that_field(self, make_group) -> None:
         group = IncludeView("7_1.png", False).apply(make_group(7))
         assert "left_out" not in "".join(freeze_said(group).texts.values())
         assert source_hash(group) != source_hash(LEAVE.apply(make_group(7)))
@@ -162,7 +162,7 @@ class TestFixed:
         self.judge(store, "accepted")
         assert self.fixed(store) == (True, True)
 
-    def test_after_undo_of_all_edits_it_is_not(self, store, state) -> None:
+    def test_after_undo_of_all_edits_a_group_is_not_fixed(self, store, state) -> None:
         left = change(store, LEAVE)
         self.judge(store, "accepted")
         undo(store, 1, if_match=load(store, 1).etag, actor="ann")
@@ -171,12 +171,12 @@ class TestFixed:
         assert self.fixed(store) == (True, True)
         assert left.group == load(store, 1).group
 
-    def test_a_rejected_group_is_not(self, store, state) -> None:
+    def test_a_rejected_group_is_not_fixed(self, store, state) -> None:
         change(store, LEAVE)
         self.judge(store, "rejected", reason="bad_calibration")
         assert self.fixed(store) == (False, False)
 
-    def test_a_failing_group_is_not_though_somebody_accepts_it(self, store, state) -> None:
+    def test_an_accepted_group_that_fails_is_not_fixed(self, store, state) -> None:
         change(store, LEAVE)
         change(store, IncludeView("7_2.png", False))
         self.judge(store, "accepted", note="needed")
@@ -184,7 +184,7 @@ class TestFixed:
         give_verdicts(store, 1, "", "accepted", note="all", actor="ben")
         assert self.fixed(store) == (False, False)
 
-    def test_one_that_an_edit_makes_fail_afterwards_is_not(self, store, state) -> None:
+    def test_a_group_that_an_edit_makes_fail_is_no_longer_fixed(self, store, state) -> None:
         change(store, LEAVE)
         self.judge(store, "accepted")
         change(store, SetBall("7.png", None))

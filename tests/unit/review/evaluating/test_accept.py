@@ -79,7 +79,9 @@ class TestPlanAccept:
         request = AcceptRequest(predictions.id, query="number:2", replace=True)
         assert [item.view for item in plan_accept(store, "demo", request).changes] == ["8.png"]
 
-    def test_what_does_not_exist_is_refused(self, store, cleared, predictions) -> None:
+    def test_an_unknown_set_view_or_prediction_is_refused(
+        self, store, cleared, predictions
+    ) -> None:
         with pytest.raises(NotFoundError):
             plan_accept(store, "demo", AcceptRequest(99))
         with pytest.raises(NotFoundError, match="no prediction for view"):
@@ -118,7 +120,7 @@ class TestAccept:
         assert (report.views, report.refused) == (0, {"the_same": 3})
         assert load(store, cleared.id) == before
 
-    def test_named_views_alone(self, store, cleared, predictions) -> None:
+    def test_changes_only_the_views_that_are_named(self, store, cleared, predictions) -> None:
         view = cleared.view_ids["7_1.png"]
         request = AcceptRequest(predictions.id, views=(view,), replace=True)
         assert accept(store, "demo", request, actor="bob").views == 1
@@ -200,7 +202,7 @@ class TestAcceptBox:
         after = accept_box(store, view, box, if_match=cleared.etag, actor="bob", replace=True)
         assert after.group.view("7_1.png").ball.box == Box(20, 300, 14, 14)
 
-    def test_of_a_state_that_is_gone_it_is_refused(self, store, cleared, predictions) -> None:
+    def test_an_accept_on_an_older_state_is_refused(self, store, cleared, predictions) -> None:
         view, box = cleared.view_ids["7.png"], self.box(store, cleared, 0.9)
         accept_box(store, view, box, if_match=cleared.etag, actor="bob")
         with pytest.raises(StaleRevisionError):
@@ -208,14 +210,14 @@ class TestAcceptBox:
                 store, view, self.box(store, cleared, 0.6), if_match=cleared.etag, actor="eve"
             )
 
-    def test_one_that_went_with_an_older_state_is_stale_first(
+    def test_an_older_state_is_reported_before_a_missing_prediction(
         self, store, cleared, predictions
     ) -> None:
         view = cleared.view_ids["7.png"]
         with pytest.raises(StaleRevisionError):
             accept_box(store, view, 9999, if_match='"older"', actor="eve")
 
-    def test_belongs_to_its_view(self, store, cleared, predictions) -> None:
+    def test_a_prediction_of_another_view_is_not_found(self, store, cleared, predictions) -> None:
         other, box = cleared.view_ids["7_1.png"], self.box(store, cleared, 0.9)
         for view, asked in ((other, box), (other, 9999)):
             with pytest.raises(NotFoundError, match="has no prediction"):

@@ -77,7 +77,7 @@ class TestRunEvaluation:
         assert cell(found, "localization", "oracle", "mae_m").value < 0.05
         assert (found.name, found.counts["balls"], found.counts["groups"]) == ("exact", 6, 3)
 
-    def test_pins_what_it_rests_on(self, store, states, exact) -> None:
+    def test_pins_the_state_policy_and_predictions_that_it_used(self, store, states, exact) -> None:
         request = EvaluationRequest(predictions=exact.id)
         first = run_evaluation(store, "demo", request, actor="ann")
         again = run_evaluation(store, "demo", request, actor="bob")
@@ -181,7 +181,7 @@ class TestRunEvaluation:
             ({"split": "valid"}, InputError),
         ],
     )
-    def test_what_cannot_be_is_refused(self, store, exact, change, error) -> None:
+    def test_an_impossible_request_is_refused(self, store, exact, change, error) -> None:
         values = {"predictions": exact.id, **change}
         with pytest.raises(error):
             run_evaluation(store, "demo", EvaluationRequest(**values), actor="ann")
@@ -230,7 +230,7 @@ class TestListFrames:
 
 
 class TestFigures:
-    def test_come_back_as_they_were(self, store, exact) -> None:
+    def test_tables_and_figures_come_back_as_they_were(self, store, exact) -> None:
         run = run_evaluation(store, "demo", EvaluationRequest(predictions=exact.id), actor="ann")
         figure = get_figure(store, run.id, "precision_recall")
         assert figure.panels[0].series[0].y[-1] == 1

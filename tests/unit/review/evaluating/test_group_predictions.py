@@ -58,13 +58,13 @@ class TestGroupPredictions:
         ]
         assert found.accepted == ()
 
-    def test_of_a_dataset_without_any_say_so(self, store, ids, add) -> None:
+    def test_says_how_many_prediction_sets_the_dataset_has(self, store, ids, add) -> None:
         assert group_predictions(store, ids[0]).sets == 0
         add("one", ("8.png", 5, 0.9))
         found = group_predictions(store, ids[0])
         assert (found.sets, found.boxes) == (1, ())
 
-    def test_of_no_group_there_are_none(self, store, ids) -> None:
+    def test_an_unknown_group_is_not_found(self, store, ids) -> None:
         with pytest.raises(NotFoundError):
             group_predictions(store, 999)
 
@@ -100,7 +100,7 @@ class TestAcceptedBall:
         submit(store, ids[0], moved, if_match=state.etag, actor="bob")
         assert group_predictions(store, ids[0]).accepted == ()
 
-    def test_one_that_was_brought_so_names_nobody(self, store, fill, make_group) -> None:
+    def test_an_imported_prediction_names_nobody(self, store, fill, make_group) -> None:
         group = make_group(7)
         ball = BallAnnotation(box=Box(10, 300, 14, 14), predicted_by="elsewhere")
         (group_id,) = fill(SetBall("7.png", ball).apply(group))

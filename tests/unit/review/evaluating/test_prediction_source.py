@@ -34,7 +34,7 @@ class TestGuessFormat:
     @pytest.mark.parametrize(
         ("name", "format_"), [("a.json", "coco"), ("a.csv", "csv"), ("labels/7.txt", "yolo")]
     )
-    def test_goes_by_the_ending(self, tmp_path, name, format_) -> None:
+    def test_the_ending_of_the_files_tells_the_format(self, tmp_path, name, format_) -> None:
         path = tmp_path / name
         path.parent.mkdir(exist_ok=True)
         path.write_text("x")

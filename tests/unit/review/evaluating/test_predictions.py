@@ -39,7 +39,9 @@ def results(path: Path, *frames: str) -> PredictionFiles:
 
 
 class TestAddPredictions:
-    def test_keeps_boxes_and_tells_what_it_could_not_place(self, store, state, tmp_path) -> None:
+    def test_keeps_boxes_and_lists_frames_that_it_does_not_know(
+        self, store, state, tmp_path
+    ) -> None:
         files = results(tmp_path / "yolo.json", "7.png", "7.png", "99.png")
         found = add_predictions(store, "demo", "yolo", files, actor="ann")
         assert (found.frames, found.boxes, found.unknown, found.cameras) == (1, 2, 1, 0)
@@ -102,7 +104,7 @@ class TestAddPredictions:
         with pytest.raises(InputError, match="cannot be the name"):
             add_predictions(store, "demo", name, results(tmp_path / "y.json", "7.png"), actor="a")
 
-    def test_the_digest_is_of_what_is_said(self, store, state, tmp_path) -> None:
+    def test_the_digest_is_of_the_boxes_and_not_of_the_file(self, store, state, tmp_path) -> None:
         one = add_predictions(store, "demo", "a", results(tmp_path / "a.json", "7.png"), actor="a")
         same = add_predictions(store, "demo", "b", results(tmp_path / "b.json", "7.png"), actor="b")
         other = add_predictions(

@@ -86,7 +86,7 @@ class TestExport:
         assert {row["main_action"] for row in table(report.out)} == {"7"}
         assert report.left_out == {"failing": 1}
 
-    def test_what_changed_after_its_verdict_is_left_out_and_counted(
+    def test_a_group_that_changed_after_its_verdict_is_left_out_and_counted(
         self, store, three, tmp_path
     ) -> None:
         judge(store, three[0], "accepted")

@@ -29,7 +29,7 @@ def keep(folder: ExportFolder, name: str) -> ExportEntry:
 
 
 class TestKeep:
-    def test_what_was_written_can_be_found_again(self, folder: ExportFolder) -> None:
+    def test_a_finished_export_is_found_again(self, folder: ExportFolder) -> None:
         entry = keep(folder, "12")
         assert folder.get("12") == folder.find("12") == entry
         assert (entry.counts, entry.left_out, entry.bytes) == ({"cameras": 2}, {"stale": 1}, 22)
@@ -44,7 +44,7 @@ class TestGet:
     @pytest.mark.parametrize(
         "name", ["", "x", "../../etc/passwd", "0" * 31, "0" * 32, "A" * 32, "0", "012", "1" * 20]
     )
-    def test_what_was_never_made_is_not_found(self, folder: ExportFolder, name: str) -> None:
+    def test_an_unknown_export_is_not_found(self, folder: ExportFolder, name: str) -> None:
         with pytest.raises(NotFoundError):
             folder.get(name)
 
@@ -74,7 +74,7 @@ class TestForget:
 
 
 class TestPrepare:
-    def test_clears_what_was_left_half_written(self, folder: ExportFolder) -> None:
+    def test_clears_half_written_files_of_a_killed_server(self, folder: ExportFolder) -> None:
         keep(folder, "12")
         (folder.folder / ".13.zip.abc.partial").mkdir()
         (folder.folder / ".13.zip.abc.partial" / "x.csv").write_text("x")

@@ -53,7 +53,7 @@ class TestVersionSource:
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
 
     @pytest.mark.parametrize("name", STATIC)
-    def test_formats_of_static_cameras_too(
+    def test_formats_of_static_cameras_are_the_same_bytes_too(
         self, store, fill, make_static, tmp_path, name: str
     ) -> None:
         fill(make_static(10), make_static(9))

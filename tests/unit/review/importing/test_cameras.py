@@ -19,14 +19,16 @@ def attach(store, cameras):
 
 class TestIngestCameras:
     @pytest.mark.parametrize("name", ["7_1", "{match}/7_1"])
-    def test_a_view_is_meant_by_its_stem(self, store, state, opposite, name) -> None:
+    def test_a_camera_is_matched_to_a_view_by_the_stem_of_its_name(
+        self, store, state, opposite, name
+    ) -> None:
         report = attach(store, {name.format(match=state.group.match): opposite})
         after = load(store, state.id)
         assert (report.changed, report.problems) == (1, [])
         assert after.group.view("7_1.png").station.given == opposite
         assert (after.revision, after.solution) == (2, None)
 
-    def test_again_it_changes_nothing(self, store, state, opposite) -> None:
+    def test_attaching_the_same_cameras_again_changes_nothing(self, store, state, opposite) -> None:
         attach(store, {"7": opposite})
         before = load(store, state.id)
         report = attach(store, {"7": opposite})
@@ -41,7 +43,7 @@ class TestIngestCameras:
         assert load(store, ids[1]).group.view("cam1").station.given == opposite
         assert stale_groups(store, "demo") == ids
 
-    def test_names_that_fit_nothing_or_too_much_are_reported(
+    def test_names_that_match_no_view_or_several_are_reported(
         self, store, fill, make_group, opposite
     ) -> None:
         other = replace(make_group(7), key="other/7.png", match="other")
@@ -67,7 +69,7 @@ class TestIngestCameras:
         assert after.group.view("7.png").station.given == opposite
         assert not after.stored.edited
 
-    def test_is_no_edit_of_a_person(self, store, state, opposite) -> None:
+    def test_attaching_cameras_is_no_edit_of_a_person(self, store, state, opposite) -> None:
         attach(store, {"7": opposite})
         assert not load(store, state.id).stored.edited
         now = load(store, state.id)

@@ -140,7 +140,7 @@ class TestRoundTrip:
         assert [entry["actor"] for entry in told[0]] == ["ann", "ann"]
 
     @pytest.mark.parametrize("back", [False, True])
-    def test_twice_changes_nothing_and_neither_does_the_way_back(
+    def test_carrying_again_or_back_changes_nothing(
         self, store, there, busy, bring, back: bool
     ) -> None:
         bring(store, there)
@@ -163,7 +163,7 @@ class TestRoundTrip:
         assert bring(store, there, dry_run=True).new == 4
         assert entries(there) == before
 
-    def test_a_version_is_not_carried(self, store, busy, tmp_path) -> None:
+    def test_a_frozen_version_is_not_carried(self, store, busy, tmp_path) -> None:
         with pytest.raises(InputError, match="carries the whole dataset"):
             export(store, "demo", "touchline", tmp_path / "x", version="v1")
 
@@ -179,7 +179,7 @@ def both(store, there, fill, make_group, make_static):
 
 
 class TestMerge:
-    def test_what_nobody_edited_here_follows(self, both, bring) -> None:
+    def test_what_nobody_edited_here_follows_the_other_installation(self, both, bring) -> None:
         here, there = both
         edit(there, 1, SetBall("7.png", BALL))
         assert bring(there, here).changed == 1
@@ -220,7 +220,7 @@ class TestMerge:
             edit(home, 1, SetBall("7.png", BALL))
         assert bring(there, here).findings == 0
 
-    def test_who_is_behind_follows_and_who_is_ahead_stays(self, both, bring) -> None:
+    def test_an_installation_that_is_behind_follows_and_one_ahead_stays(self, both, bring) -> None:
         here, there = both
         edit(here, 1, SetBall("7.png", BALL))
         bring(here, there)
@@ -285,7 +285,7 @@ class TestMerge:
         assert ball_of(here, 1, "7_1.png") == OTHER
         assert any("another state of the dataset" in item for item in findings(here, 1))
 
-    def test_the_policy_here_stays(self, both, bring) -> None:
+    def test_the_policy_of_the_existing_dataset_stays(self, both, bring) -> None:
         here, there = both
         change_policy(there, "demo", STRICT, if_match=None, actor="ann")
         assert any("another policy" in item for item in bring(there, here).problems)
@@ -302,7 +302,7 @@ def edit_station(store: Store, change) -> None:
 
 
 class TestVerdicts:
-    def test_of_both_are_kept_and_the_newest_counts(self, both, bring) -> None:
+    def test_verdicts_of_both_are_kept_and_the_newest_counts(self, both, bring) -> None:
         here, there = both
         judge(there, 1, "rejected", "bad_calibration", actor="ben")
         judge(here, 1, "accepted")
@@ -318,7 +318,7 @@ class TestVerdicts:
         assert load(here, 1).verdict.state == "deferred"
         assert_replays(here)
 
-    def test_on_another_state_is_stale(self, both, bring) -> None:
+    def test_a_verdict_on_another_state_is_stale(self, both, bring) -> None:
         here, there = both
         edit(here, 1, SetBall("7.png", BALL))
         judge(there, 1, "accepted")
@@ -376,7 +376,7 @@ class TestBrokenFiles:
         bring_file(there, tmp_path / "out")
         assert [view.media for view in load(there, 1).group.views] == [None, None]
 
-    def test_something_else_is_refused(self, there, tmp_path) -> None:
+    def test_a_file_that_is_no_export_is_refused(self, there, tmp_path) -> None:
         (tmp_path / "out").mkdir()
         (tmp_path / "out" / STATIONS).write_text("")
         report = bring_file(there, tmp_path / "out")

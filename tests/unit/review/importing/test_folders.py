@@ -59,12 +59,12 @@ class TestResolveFolder:
     @pytest.mark.parametrize(
         "path", ["data/../secret", "data/out", "../x", "data/%2e%2e/secret", "data\\..\\x", "/etc"]
     )
-    def test_nothing_leads_out(self, settings: Settings, path: str) -> None:
+    def test_no_path_leads_out_of_the_allowed_folders(self, settings: Settings, path: str) -> None:
         with pytest.raises(UnsafePathError):
             resolve_folder(settings, path)
 
     @pytest.mark.parametrize("path", ["data/none", "etc", "home"])
-    def test_what_is_not_there_is_not_found(self, settings: Settings, path: str) -> None:
+    def test_a_folder_that_is_not_there_is_not_found(self, settings: Settings, path: str) -> None:
         with pytest.raises(NotFoundError):
             resolve_folder(settings, path)
 

@@ -144,7 +144,7 @@ class TestIngest:
 
 
 class TestAChangedSource:
-    def test_what_nobody_edited_follows(self, store, fill, make_group) -> None:
+    def test_a_ball_that_nobody_edited_follows_its_source(self, store, fill, make_group) -> None:
         (group_id,) = fill(make_group())
         changed = with_ball(make_group(), "7.png", 300.0)
         report = again(store, changed)
@@ -154,7 +154,7 @@ class TestAChangedSource:
         assert state.revision == 2
         assert state.solution is None
 
-    def test_what_a_person_edited_stays_and_becomes_a_finding(
+    def test_a_ball_that_a_person_edited_stays_and_becomes_a_finding(
         self, store: Store, fill, state: GroupState, make_group
     ) -> None:
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
@@ -205,7 +205,9 @@ class TestAChangedSource:
         assert after.station.lines == lines
         assert after.balls == ()
 
-    def test_an_edit_that_was_undone_is_none(self, store, fill, state, make_group) -> None:
+    def test_an_edit_that_was_undone_counts_as_no_edit(
+        self, store, fill, state, make_group
+    ) -> None:
         edited = submit(store, state.id, SetBall("7.png", None), if_match=state.etag, actor="ann")
         undo(store, state.id, if_match=edited.etag, actor="ann")
         changed = with_ball(make_group(), "7.png", 300.0)

@@ -36,18 +36,18 @@ class TestNoteGone:
         assert GONE in told(store, three[1])
         assert GONE not in told(store, three[0])
 
-    def test_a_match_that_did_not_come_is_not_taken_for_gone(
+    def test_groups_of_a_match_that_was_not_imported_are_not_missing(
         self, store, three, make_group
     ) -> None:
         bring(store, [make_group(7)])
         assert GONE not in told(store, three[2])
 
-    def test_once_is_enough(self, store, three, make_group) -> None:
+    def test_a_second_import_does_not_repeat_the_finding(self, store, three, make_group) -> None:
         bring(store, [make_group(7)])
         assert bring(store, [make_group(7)]).findings == 0
         assert told(store, three[1]).count(GONE) == 1
 
-    def test_what_comes_back_is_not_gone_any_more(self, store, three, make_group) -> None:
+    def test_a_group_that_comes_back_loses_its_finding(self, store, three, make_group) -> None:
         bring(store, [make_group(7)])
         bring(store, [make_group(7), make_group(8)])
         assert GONE not in told(store, three[1])

@@ -45,7 +45,7 @@ class TestQueue:
         assert found(store, "pictures:all") == ids[:1]
         assert found(store, "-pictures:all") == ids[1:]
 
-    def test_any_other_word_is_refused(self, store: Store, ids: list[int]) -> None:
+    def test_an_unknown_value_of_pictures_is_refused(self, store: Store, ids: list[int]) -> None:
         with pytest.raises(InputError):
             found(store, "pictures:some")
 
@@ -80,7 +80,9 @@ class TestSetVerdict:
 
 
 class TestBulk:
-    def test_leaves_them_alone_and_says_how_many(self, store: Store, ids: list[int]) -> None:
+    def test_bulk_accept_leaves_groups_without_pictures_alone_and_counts_them(
+        self, store: Store, ids: list[int]
+    ) -> None:
         dataset = get_dataset(store, "demo").id
         plan = plan_verdicts(store, dataset, "", "accepted")
         assert (plan.would_change, plan.refused) == (2, (Refusal(NO_PICTURE, 1),))

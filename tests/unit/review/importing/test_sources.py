@@ -73,7 +73,9 @@ class TestThereAndBack:
 
     @pytest.mark.parametrize("out", ["out", "out.zip"])
     @pytest.mark.parametrize("form", ["coco", "parquet"])
-    def test_everything_that_was_said(self, store, broadcast, tmp_path, form, out) -> None:
+    def test_everything_that_people_said_comes_back(
+        self, store, broadcast, tmp_path, form, out
+    ) -> None:
         again = there_and_back(store, form, tmp_path / out)
         for key, group in groups_of(store, "demo").items():
             assert bare(again[key]) == bare(group)

@@ -44,7 +44,7 @@ class TestRequestEvaluation:
         assert job.result == {"evaluation": found.id, "name": "one", "counts": found.counts}
         assert (job.done, job.total) == (4, 4)
 
-    def test_what_cannot_be_is_refused_at_once(self, store, jobs, predictions) -> None:
+    def test_an_unknown_set_is_refused_before_a_job_starts(self, store, jobs, predictions) -> None:
         with pytest.raises(NotFoundError):
             request_evaluation(jobs, store, "demo", EvaluationRequest(predictions=99), actor="ann")
         assert jobs.find() == []

@@ -62,7 +62,9 @@ def submit(jobs: Jobs, work: Callable[[JobProgress], Json], **options: Any) -> J
 
 
 class TestSubmit:
-    def test_what_the_work_returns_is_the_result(self, jobs: Jobs, store: Store) -> None:
+    def test_the_job_keeps_what_its_work_returns_as_the_result(
+        self, jobs: Jobs, store: Store
+    ) -> None:
         found = ensure_dataset(store, "demo", "ann")
         job = submit(jobs, lambda progress: {"n": 3}, dataset_id=found, request={"a": 1})
         assert (job.state, job.dataset, job.request) == ("waiting", "demo", {"a": 1})
@@ -103,7 +105,7 @@ class TestSubmit:
         assert submit(jobs, lambda _: None, kind="solve", once=True).state == "waiting"
         first.finish.set()
 
-    def test_what_waits_already_is_not_queued_twice_but_what_runs_is(
+    def test_a_waiting_job_is_not_queued_twice_but_a_running_one_is(
         self, jobs: Jobs, store: Store
     ) -> None:
         one, other = ensure_dataset(store, "one", "ann"), ensure_dataset(store, "other", "ann")
@@ -170,9 +172,7 @@ class TestFailure:
             "pointer": "/all",
         }
 
-    def test_of_our_own_making_says_nothing_of_the_inside_and_the_next_job_runs(
-        self, jobs: Jobs
-    ) -> None:
+    def test_a_bug_in_a_job_shows_no_internals_and_the_next_job_runs(self, jobs: Jobs) -> None:
         def work(progress: JobProgress) -> Json:
             raise ZeroDivisionError("secret")
 
@@ -185,7 +185,7 @@ class TestFailure:
 
 
 class TestCancel:
-    def test_what_waits_never_runs(self, jobs: Jobs) -> None:
+    def test_a_cancelled_job_that_waits_never_runs(self, jobs: Jobs) -> None:
         gate, ran = Gate(), []
         submit(jobs, gate)
         assert gate.started.wait(SECONDS)
@@ -195,7 +195,7 @@ class TestCancel:
         assert jobs.wait(submit(jobs, lambda _: None).id, SECONDS).state == "done"
         assert ran == []
 
-    def test_what_runs_ends_at_its_next_step(self, jobs: Jobs) -> None:
+    def test_a_cancelled_job_that_runs_ends_at_its_next_step(self, jobs: Jobs) -> None:
         gate = Gate()
         job = submit(jobs, gate)
         assert gate.started.wait(SECONDS)
@@ -204,7 +204,7 @@ class TestCancel:
         assert (ended.state, ended.done, ended.problem) == ("cancelled", 1, None)
         assert jobs.cancel(job.id).state == "cancelled"
 
-    def test_what_is_over_cannot_be_cancelled(self, jobs: Jobs) -> None:
+    def test_a_finished_job_cannot_be_cancelled(self, jobs: Jobs) -> None:
         job = submit(jobs, lambda _: None)
         jobs.wait(job.id, SECONDS)
         with pytest.raises(ConflictError):
@@ -225,7 +225,9 @@ class TestCancel:
 
 
 class TestRestart:
-    def test_what_was_under_way_is_failed_with_a_sentence(self, store: Store) -> None:
+    def test_a_job_under_way_when_the_server_stopped_fails_with_a_sentence(
+        self, store: Store
+    ) -> None:
         first, gate = Jobs(store), Gate()
         running = submit(first, gate)
         assert gate.started.wait(SECONDS)
@@ -251,7 +253,9 @@ class TestRestart:
         assert (done.state, done.result, second.find()) == ("done", 6, [done])
         second.close()
 
-    def test_what_is_over_stays_as_it_was(self, jobs: Jobs, store: Store) -> None:
+    def test_finished_jobs_stay_as_they_were_after_a_restart(
+        self, jobs: Jobs, store: Store
+    ) -> None:
         done = jobs.wait(submit(jobs, lambda _: 1).id, SECONDS)
         second = Jobs(store)
         second.start()

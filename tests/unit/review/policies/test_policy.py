@@ -84,7 +84,7 @@ class TestChangePolicy:
         assert change_policy(store, "demo", STRICT, if_match=None, actor="ann") == first
         assert count(store, LogModel) == entries
 
-    def test_who_was_slower_is_told(self, store: Store) -> None:
+    def test_a_change_of_an_older_policy_is_refused(self, store: Store) -> None:
         ensure_dataset(store, "demo", "ann")
         etag = read_policy(store, "demo").etag
         first = change_policy(store, "demo", STRICT, if_match=etag, actor="ann")

@@ -39,7 +39,7 @@ class TestPolicyToYaml:
 
 
 class TestPolicyFromYaml:
-    def test_what_is_not_named_is_as_in_the_paper(self) -> None:
+    def test_thresholds_that_are_not_named_are_those_of_the_paper(self) -> None:
         policy = policy_from_yaml("name: tight\ntau_percent: 0.5\ncalibration:\n  check_labels: no")
         expected = dataclasses.replace(
             PAPER,
@@ -74,7 +74,7 @@ class TestPolicyFromYaml:
             ("name: paper\ntau_percent: 2", "/name", "other thresholds"),
         ],
     )
-    def test_what_is_unknown_or_impossible_is_refused_with_its_place(
+    def test_an_unknown_or_impossible_threshold_is_refused_with_its_place(
         self, text: str, pointer: str, words: str
     ) -> None:
         with pytest.raises(InputError, match=words) as caught:
@@ -99,7 +99,7 @@ class TestPolicyFromYaml:
             ("? [1, 2]\n: 3", "line 1"),
         ],
     )
-    def test_what_is_no_plain_yaml_is_refused(self, text: str, words: str) -> None:
+    def test_anything_but_plain_yaml_is_refused(self, text: str, words: str) -> None:
         with pytest.raises(InputError, match=words):
             policy_from_yaml(text)
 

@@ -218,7 +218,7 @@ class TestListGroups:
 
 class TestPositions:
     @pytest.mark.parametrize("query", [*SORTED, "sort:jac status:unreviewed", "jac>2"])
-    def test_every_position_has_what_stands_there_in_the_whole_list(
+    def test_a_page_from_a_position_is_that_part_of_the_whole_list(
         self, store, dataset, query
     ) -> None:
         whole = list_groups(store, dataset, query, 500)
@@ -262,7 +262,7 @@ class TestPositions:
 
 class TestNeighbours:
     @pytest.mark.parametrize("query", ["", "sort:jac", "sort:sigma-desc status:unreviewed"])
-    def test_agree_with_the_list(self, store, dataset, query: str) -> None:
+    def test_neighbours_are_those_of_the_list(self, store, dataset, query: str) -> None:
         ids = walk(store, dataset, query, 500)
         for place in (0, 3, len(ids) // 2, len(ids) - 1):
             found = neighbours(store, ids[place], query)

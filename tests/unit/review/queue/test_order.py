@@ -26,7 +26,7 @@ class TestDecode:
     @pytest.mark.parametrize(
         "key", [float("inf"), float("-inf"), float("nan"), 1e300, 2**64, None, [1], {"a": 1}]
     )
-    def test_no_key_is_beyond_what_a_row_can_have(self, order: Order, key: object) -> None:
+    def test_a_cursor_with_an_impossible_key_is_refused(self, order: Order, key: object) -> None:
         with pytest.raises(InputError, match="came from another query") as caught:
             order.decode(cursor("jac", 0, key, 3))
         assert caught.value.pointer == "/cursor"

@@ -16,7 +16,7 @@ def pointer(text: str) -> str | None:
 
 
 class TestParseQuery:
-    def test_nothing_asks_for_everything_by_number(self) -> None:
+    def test_an_empty_query_lists_every_group_by_number(self) -> None:
         query = parse_query("  ")
         assert (query.conditions, query.sort, query.descending) == ((), "number", False)
 
@@ -62,7 +62,9 @@ class TestParseQuery:
             ("x" * 1001, "/q"),
         ],
     )
-    def test_what_cannot_be_understood_is_pointed_at(self, text: str, where: str) -> None:
+    def test_a_query_that_cannot_be_understood_is_refused_with_its_place(
+        self, text: str, where: str
+    ) -> None:
         assert pointer(text) == where
 
     def test_unknown_fields_are_answered_with_the_known_ones(self) -> None:

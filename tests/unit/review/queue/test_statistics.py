@@ -68,7 +68,7 @@ class TestStatistics:
         assert [item.groups for item in found.matches] == [6, 6]
         assert sum(item.passing for item in found.splits) == 12
 
-    def test_is_of_what_matches(self, spread: Store) -> None:
+    def test_counts_only_groups_that_match(self, spread: Store) -> None:
         found = statistics(spread, 1, "split:train distance>=0")
         assert found.groups == list_groups(spread, 1, "split:train distance>=0").total
         assert [item.split for item in found.splits] == ["train"]

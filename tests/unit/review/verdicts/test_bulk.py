@@ -56,7 +56,7 @@ class TestPlanVerdicts:
         assert [group.id for group in plan.sample] == [ids[1], ids[3]]
         assert statuses(store) == ["accepted", *["unreviewed"] * 3]
 
-    def test_with_a_note_nothing_is_refused_but_what_nobody_knows(
+    def test_with_a_note_only_unsolved_groups_are_refused(
         self, store, ids, fill, make_group
     ) -> None:
         fill(make_group(11), solved=False)
@@ -68,7 +68,7 @@ class TestPlanVerdicts:
         ("query", "state", "reason"),
         [("colour:red", "accepted", None), ("", "rejected", None), ("", "maybe", None)],
     )
-    def test_what_cannot_be_is_refused(self, store, ids, query, state, reason) -> None:
+    def test_an_impossible_verdict_is_refused(self, store, ids, query, state, reason) -> None:
         with pytest.raises(InputError):
             plan_verdicts(store, 1, query, state, reason)
 
@@ -88,7 +88,7 @@ class TestGiveVerdicts:
         assert [kind for (kind,) in kinds] == ["verdict_batch", *["verdict"] * 3]
         assert verdict_of(store, ids[0]).actor == "ben"
 
-    def test_it_is_what_one_verdict_after_the_other_would_be(self, store, ids) -> None:
+    def test_gives_the_same_state_as_single_verdicts(self, store, ids) -> None:
         submit(
             store, ids[1], SetBall("8_1.png", None), if_match=load(store, ids[1]).etag, actor="ann"
         )
@@ -137,7 +137,7 @@ class TestGiveVerdicts:
         with pytest.raises(ConflictError):
             set_verdict(store, ids[0], "accepted", if_match=etag, actor="ann")
 
-    def test_again_there_is_nothing_to_do(self, store, ids) -> None:
+    def test_the_same_verdict_again_changes_nothing(self, store, ids) -> None:
         first = give_verdicts(store, 1, "", "deferred", actor="ben")
         again = give_verdicts(store, 1, "", "deferred", actor="ann")
         assert (first.changed, again.changed, again.batch) == (4, 0, None)
@@ -224,7 +224,7 @@ class TestUndoBatch:
         assert (undone.restored, undone.kept) == (3, 1)
         assert statuses(store)[2] == "rejected"
 
-    def test_once_is_enough(self, store, ids) -> None:
+    def test_a_batch_is_taken_back_only_once(self, store, ids) -> None:
         report = give_verdicts(store, 1, "", "deferred", actor="ben")
         undo_batch(store, report.batch, actor="ben")
         (batch,) = list_batches(store, 1)
@@ -232,7 +232,7 @@ class TestUndoBatch:
         with pytest.raises(ConflictError, match="ben has taken this batch back"):
             undo_batch(store, report.batch, actor="ann")
 
-    def test_what_is_no_batch_is_not_found(self, store) -> None:
+    def test_an_unknown_batch_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):
             undo_batch(store, 5, actor="ben")
 

@@ -55,7 +55,7 @@ class TestRedoBatch:
         with store.read() as session:
             assert replay(session) == read_ledger(session)
 
-    def test_what_two_people_had_said_before_is_under_it_again(self, store, ids) -> None:
+    def test_taking_a_redone_batch_back_restores_the_verdicts_before_it(self, store, ids) -> None:
         judge(store, ids[0], "accepted")
         batch = give_verdicts(store, 1, "", "deferred", actor="ben").batch
         undo_batch(store, batch, actor="eve")
@@ -91,7 +91,9 @@ class TestRedoBatch:
         assert (done.batch, done.changed, done.kept) == (None, 0, 4)
         assert len(list_batches(store, 1)) == 1
 
-    def test_only_what_was_taken_back_is_given_again_and_once(self, store, ids, undone) -> None:
+    def test_only_a_batch_that_was_taken_back_is_given_again_and_only_once(
+        self, store, ids, undone
+    ) -> None:
         done = redo_batch(store, undone, actor="ben")
         with pytest.raises(ConflictError, match="given again already"):
             redo_batch(store, undone, actor="ben")
@@ -100,7 +102,7 @@ class TestRedoBatch:
         with pytest.raises(NotFoundError):
             redo_batch(store, 99, actor="ben")
 
-    def test_one_that_an_older_version_took_back_says_what_to_do(self, store, undone) -> None:
+    def test_a_batch_that_an_older_version_took_back_says_what_to_do(self, store, undone) -> None:
         with store.write() as session:
             session.execute(text("UPDATE verdict_batch SET undo_spans = NULL"))
         with pytest.raises(ConflictError, match="older version") as refused:

@@ -35,7 +35,7 @@ class TestListReviewers:
         assert (ben.name, ben.rejected, ben.today) == ("ben", 1, 0)
         assert ben.last == "2020-02-02T10:00:00.000000+00:00"
 
-    def test_who_is_overruled_is_listed_still(self, store, ids) -> None:
+    def test_a_reviewer_whose_verdicts_were_all_replaced_is_still_listed(self, store, ids) -> None:
         judge(store, ids[0], "accepted", "ann")
         judge(store, ids[0], "deferred", "ben")
         assert [(item.name, item.accepted, item.deferred) for item in list_reviewers(store, 1)] == [

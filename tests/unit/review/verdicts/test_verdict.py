@@ -62,7 +62,7 @@ class TestSetVerdict:
             (("deferred", None, "x" * 2001), "/note"),
         ],
     )
-    def test_half_a_verdict_is_refused(self, store, state, arguments, pointer) -> None:
+    def test_an_incomplete_verdict_is_refused(self, store, state, arguments, pointer) -> None:
         with pytest.raises(InputError) as caught:
             judge(store, state, *arguments)
         assert caught.value.pointer == pointer
@@ -89,7 +89,7 @@ class TestSetVerdict:
         back = undo(store, state.id, if_match=edited.etag, actor="ben")
         assert not back.verdict.stale
 
-    def test_everyones_is_kept_and_the_newest_counts(self, store, state) -> None:
+    def test_every_persons_verdict_is_kept_and_the_newest_counts(self, store, state) -> None:
         first = judge(store, state, "accepted", actor="ann")
         second = judge(store, first, "deferred", actor="ben")
         third = judge(store, second, "rejected", "bad_calibration", actor="ann")
@@ -106,12 +106,12 @@ class TestSetVerdict:
         (row,) = list_groups(store, state.dataset_id, "status:unreviewed").items
         assert row.reviewer is None
 
-    def test_of_what_somebody_changed_is_refused(self, store, state) -> None:
+    def test_a_verdict_on_a_group_that_somebody_changed_is_refused(self, store, state) -> None:
         submit(store, state.id, SetBall("7.png", BALL), if_match=state.etag, actor="ben")
         with pytest.raises(StaleRevisionError):
             judge(store, state, "accepted", note="note")
 
-    def test_after_somebody_elses_verdict_is_refused(self, store, state) -> None:
+    def test_a_verdict_after_somebody_elses_is_refused(self, store, state) -> None:
         judge(store, state, "accepted")
         with pytest.raises(StaleRevisionError):
             judge(store, state, "deferred", actor="ben")

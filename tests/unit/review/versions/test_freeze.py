@@ -105,7 +105,7 @@ class TestFreeze:
         assert {key for key, row in rows.items() if row.member} == {"7.png", "9.png", "11.png"}
         assert rows["10.png"].why == "fails reprojection"
 
-    def test_what_changed_after_its_verdict_stays_out(self, store, judged) -> None:
+    def test_a_group_that_changed_after_its_verdict_stays_out(self, store, judged) -> None:
         etag = load(store, judged[0]).etag
         submit(store, judged[0], SetBall("7.png", BALL), if_match=etag, actor="ben")
         assert rows_of(store, frozen(store))[0].why == "changed after its verdict"
@@ -187,7 +187,7 @@ class TestFreeze:
         with pytest.raises(InputError, match="test camera"):
             frozen(store, split=Split("camera"))
 
-    def test_what_is_not_solved_is_not_guessed(self, store, judged) -> None:
+    def test_a_dataset_with_unsolved_groups_is_not_frozen(self, store, judged) -> None:
         with store.write() as session:
             session.execute(delete(SolutionModel))
         change_policy(store, "demo", STRICT, if_match=None, actor="ann")
@@ -236,7 +236,7 @@ class TestPlanFreeze:
         assert plan.left_out == {"rejected: bad_calibration": 1, "unreviewed": 2}
         assert list_versions(store, "demo") == []
 
-    def test_strictly_it_refuses_what_freezing_refuses(self, store, fill, make_group) -> None:
+    def test_a_strict_plan_refuses_what_freezing_refuses(self, store, fill, make_group) -> None:
         fill(make_group(7))
         with pytest.raises(InputError):
             plan_freeze(store, "demo", FreezeRequest("v1"), strict=True)

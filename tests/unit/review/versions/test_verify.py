@@ -109,6 +109,6 @@ class TestVerify:
         assert {item.place for item in report.differences} == {"missing"}
         assert report.equal == 0
 
-    def test_there_is_no_such_version(self, store) -> None:
+    def test_an_unknown_version_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):
             verify(store, 12)

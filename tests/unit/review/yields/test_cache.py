@@ -26,7 +26,7 @@ def same(one: YieldTable, other: YieldTable) -> bool:
 
 
 class TestKeptTable:
-    def test_is_the_table_that_was_kept(self, table, tmp_path) -> None:
+    def test_gives_back_the_table_that_was_kept(self, table, tmp_path) -> None:
         place = tmp_path / "cache" / "1.npz"
         keep_table(place, "calibration", table)
         assert same(kept_table(place, "calibration"), table)
@@ -34,7 +34,7 @@ class TestKeptTable:
         forget_table(place)
         assert kept_table(place, "calibration") is EMPTY
 
-    def test_another_calibration_has_no_use_for_it(self, table, tmp_path) -> None:
+    def test_a_table_of_another_calibration_is_not_used(self, table, tmp_path) -> None:
         place = tmp_path / "1.npz"
         keep_table(place, "one", table)
         assert kept_table(place, "another") is EMPTY
@@ -57,7 +57,7 @@ class TestKeptTable:
             ("view_included", np.zeros(7)),
         ],
     )
-    def test_rows_that_cannot_be_are_made_again(self, table, tmp_path, name, value) -> None:
+    def test_impossible_rows_are_made_again(self, table, tmp_path, name, value) -> None:
         place = tmp_path / "1.npz"
         facts = replace(table.facts, **{name: value})
         keep_table(place, "c", replace(table, facts=facts))

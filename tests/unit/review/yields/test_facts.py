@@ -37,7 +37,7 @@ def solved(request, store, fill, make_group, make_static) -> list[int]:
 
 
 class TestReadFacts:
-    def test_are_those_that_solving_judges(self, store, solved) -> None:
+    def test_read_facts_are_those_that_solving_judges(self, store, solved) -> None:
         states = [load(store, group) for group in solved]
         expected = join(
             [

@@ -107,7 +107,7 @@ def solved_again(group: Group, solution: Solution, policy: Policy) -> Solution:
 
 class TestJudgeTable:
     @pytest.mark.parametrize("seed", range(SEEDS))
-    def test_says_what_solve_says(self, filled, solutions, seed: int) -> None:
+    def test_judges_as_solve_does(self, filled, solutions, seed: int) -> None:
         policy = random_policy(seed)
         table = YieldStore(filled).snapshot(1).table
         judged = judge_table(table, policy)
@@ -236,7 +236,7 @@ class TestGetYield:
         assert leak.match == make_group(7).match
         assert leak.splits == (("test", 1), ("train", 2))
 
-    def test_what_needs_solving_is_said_and_left_as_it_is(self, filled) -> None:
+    def test_thresholds_that_need_solving_are_named_and_left_as_they_are(self, filled) -> None:
         yields = YieldStore(filled)
         values = {"calibration": {"check_labels": False}, "min_jac": 0.5, "ball_diameter_m": 0.3}
         found = get_yield(yields, 1, values)
