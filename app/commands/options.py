@@ -10,6 +10,8 @@ import typer
 from app.soccer.frames import ImageSize
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from app.config import Settings
 
 
@@ -56,6 +58,21 @@ Size = Annotated[
 Workers = Annotated[
     int | None, typer.Option("--workers", min=1, help="Processes; default: all cores.")
 ]
+
+
+def read_text(path: Path, most: int) -> str:
+    """The text of a file that an option names, cut off after one character too many.
+
+    Raises:
+        InputError: It cannot be read, or is not UTF-8.
+    """
+    from app.errors import InputError
+
+    try:
+        with path.open(encoding="utf-8") as file:
+            return file.read(most + 1)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read as text") from error
 
 
 def read_settings(**given: object) -> Settings:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Dataset, Json
+from app.commands.options import Dataset, Json, read_text
 from app.commands.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
@@ -81,11 +81,9 @@ def read_policy_option(text: str) -> Policy:
     if not path.is_file():
         names = ", ".join(POLICIES)
         raise typer.BadParameter(f'"{text}" is no policy ({names}) and no YAML file')
+    yaml = read_text(path, MAX_CHARACTERS)
     try:
-        with path.open(encoding="utf-8") as file:
-            return policy_from_yaml(file.read(MAX_CHARACTERS + 1))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read as text") from error
+        return policy_from_yaml(yaml)
     except InputError as error:
         raise InputError(f"{path}: {error.message}", hint=error.hint) from error
 

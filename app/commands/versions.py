@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.commands.opened import executor_of, opened_store
-from app.commands.options import Dataset, Json, Workers, parse_cameras, read_settings
+from app.commands.options import Dataset, Json, Workers, parse_cameras, read_settings, read_text
 from app.commands.terminal import complain, print_json, print_values, say, show_progress
 
 if TYPE_CHECKING:
@@ -68,13 +68,13 @@ def freeze(
 ) -> None:
     """Freeze a dataset as it is now into a version that never changes."""
     cameras = tuple(f"cam{number}" for number in sorted(parse_cameras(test_cameras)))
-    from app.review.versions.freeze import FreezeRequest, plan_freeze
+    from app.review.versions.freeze import MAX_LICENCE, FreezeRequest, plan_freeze
     from app.review.versions.freeze import freeze as run_freeze
     from app.review.versions.version import next_name
     from app.soccer.split import Split
 
     chosen = Split(split.value, seed, test_share, cameras)
-    text = licence if licence_file is None else licence_file.read_text(encoding="utf-8")
+    text = licence if licence_file is None else read_text(licence_file, MAX_LICENCE)
     with opened_store() as store, show_progress("Freezing") as progress:
         title = name or named or next_name(store, dataset)
         request = FreezeRequest(title, note, text, chosen, groups.value)

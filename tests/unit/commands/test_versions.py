@@ -64,6 +64,14 @@ class TestFreeze:
         assert (code, json.loads(out)["groups"]) == (0, 0)
         assert len(run("versions", "--dataset", "demo")[1].splitlines()) == 2
 
+    def test_a_licence_file_that_is_no_text_is_one_sentence(
+        self, run: Run, frozen: Path, tmp_path: Path
+    ) -> None:
+        picture = tmp_path / "licence.png"
+        picture.write_bytes(b"\x89PNG\xff")
+        code, out, err = run("freeze", "--dataset", "demo", "--licence-file", str(picture))
+        assert (code, out, err.strip()) == (1, "", f"{picture} cannot be read as text")
+
     def test_nothing_to_freeze_is_one_sentence(self, run: Run, frozen: Path) -> None:
         code, out, err = run("freeze", "--dataset", "demo")
         assert (code, out) == (1, "")

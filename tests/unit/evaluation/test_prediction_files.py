@@ -80,7 +80,7 @@ class TestCoco:
         ("more", "field", "words"),
         [
             ({"bbox": [1, 2, 3]}, "bbox", "has 3 numbers, not 4"),
-            ({"bbox": [1, 2, 0, 4]}, "bbox", "wider"),
+            ({"bbox": [1, 2, 0, 4]}, "bbox", "above zero"),
             ({"bbox": [5000, 2, 3, 4]}, "bbox", "outside the image of 1280 x 720"),
             ({"bbox": [1, 2, True, 4]}, "bbox", "truth value"),
             ({"bbox": [1, 2, 3e9, 4]}, "bbox", "wider or higher than the image of 1280 x 720"),
@@ -159,7 +159,7 @@ class TestYolo:
             ("0 640 360 12 14 0.5", "in pixels"),
             ("0 0.5 0.5 x 0.1", "'x'"),
             ("0.5 0.5 0.5 0.1 0.1", "whole number"),
-            ("0 0.5 0.5 0 0.1", "wider"),
+            ("0 0.5 0.5 0 0.1", "above zero"),
             ("0 0.5 0.5 1.5 0.1", "wider or higher than the image"),
             ("0 0.5 0.5 0.1 0.1 2", "is 2, which"),
         ],
