@@ -86,8 +86,10 @@ def read_predictions(
         InputError: The format is none, or the file as a whole is not what it should be.
     """
     if format not in FORMATS:
-        raise InputError(f'"{format}" is no format of predictions; {", ".join(FORMATS)} are',
-                         pointer="/format")  # fmt: skip
+        raise InputError(
+            f'"{format}" is not a format of predictions; formats are {", ".join(FORMATS)}',
+            pointer="/format",
+        )
     run = PredictionRun(names, category, size)
     tree = open_tree(path, run.found.report, limits)
     if tree is None:

@@ -43,7 +43,9 @@ def left_out(reason: str | None, note: str | None) -> LeftOut | None:
         return None
     if reason not in REASONS:
         known = ", ".join(REASONS)
-        said = "a note needs a reason beside it" if reason is None else f'"{reason}" is no reason'
+        said = (
+            "a note needs a reason beside it" if reason is None else f'"{reason}" is not a reason'
+        )
         raise InputError(f"{said}; reasons are {known}", pointer="/reason")
     if reason == "other" and note is None:
         raise InputError('the reason "other" needs a note', pointer="/note")

@@ -38,7 +38,8 @@ class Split:
         """Raise InputError where it says something impossible."""
         if self.kind not in KINDS:
             raise InputError(
-                f'"{self.kind}" is no kind of split; {", ".join(KINDS)} are', pointer="/split/kind"
+                f'"{self.kind}" is not a kind of split; kinds are {", ".join(KINDS)}',
+                pointer="/split/kind",
             )
         if not 0 < self.test_share < 1:
             raise InputError("test_share lies between 0 and 1", pointer="/split/test_share")

@@ -23,7 +23,7 @@ PLAIN_WORDS = """
     application archive archives arrays arrival ask axis bar bars batches best binned bodies
     body boxes bulk button buttons cache calibrate canvas caption card cards cell changes chart
     chip choice chooser class cli client clock codec codecs colours comparison completion config
-    confirm contact cross csv curve damped delete deps details detect diagram dialog diff doctor
+    confirm contact cross csv cursor curve damped delete deps details detect diagram dialog diff doctor
     document documents drags drawing editor empty encode engine environment estimator etags
     evaluate event events exact export exports facets facts failures fan faults fields figure
     figures files finite fixes fixture folder folders form format formats frozen gestures

@@ -71,7 +71,7 @@ class _Options:
         ):
             if value not in choices:
                 raise InputError(
-                    f'"{value}" is not possible for {name}; {", ".join(choices)} are',
+                    f'"{value}" is not possible for {name}; choose one of {", ".join(choices)}',
                     pointer=f"/{name}",
                 )
         if self.images == "link" and out.suffix.lower() == ".zip":

@@ -78,7 +78,8 @@ def check_verdict(state: str, reason: str | None, note: str | None) -> Verdict:
     """
     note = (note or "").strip() or None
     if state not in STATES:
-        raise InputError(f'"{state}" is no verdict; {", ".join(STATES)} are', pointer="/state")
+        known = ", ".join(STATES)
+        raise InputError(f'"{state}" is not a verdict; verdicts are {known}', pointer="/state")
     if note is not None and len(note) > MAX_NOTE:
         raise InputError(f"a note has at most {MAX_NOTE} characters", pointer="/note")
     if state != "rejected" and reason is not None:

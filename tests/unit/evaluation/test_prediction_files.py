@@ -123,7 +123,7 @@ class TestCoco:
     def test_a_missing_file_and_an_unknown_format_are_refused(self, tmp_path, names) -> None:
         with pytest.raises(InputError, match="does not exist"):
             read_predictions(tmp_path / "none.json", "coco", names)
-        with pytest.raises(InputError, match='"xml" is no format'):
+        with pytest.raises(InputError, match='"xml" is not a format'):
             read_predictions(tmp_path / "none.json", "xml", names)
 
     def test_a_size_of_the_callers_scales_pixels(self, tmp_path, names) -> None:

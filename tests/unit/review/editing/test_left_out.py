@@ -60,7 +60,7 @@ class TestIncludeView:
     @pytest.mark.parametrize(
         ("reason", "note", "sentence"),
         [
-            ("bored", None, '"bored" is no reason'),
+            ("bored", None, '"bored" is not a reason'),
             ("other", " ", "needs a note"),
             (None, "a note", "needs a reason"),
             ("other", "x" * 2001, "at most 2000"),
