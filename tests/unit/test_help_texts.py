@@ -44,7 +44,7 @@ PLAIN_WORDS = """
     v3d viewport viewports virtual walk warm what when words workspace write writer zip
 """
 PLAIN = frozenset(PLAIN_WORDS.split())
-"""Words of file names that are plain English, or that every programmer knows; any other has to stand
+"""Words of file names that are plain English, or that every programmer knows; any other has to be
 in the glossary."""
 
 
