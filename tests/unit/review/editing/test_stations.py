@@ -97,10 +97,10 @@ class TestSubmitStation:
     def test_hundreds_of_groups_are_brought_in_step_at_once(self, store, fill, make_static) -> None:
         ids = fill(*(make_static(frame) for frame in range(300)), solved=False)[:1]
         station = load_station(store, load(store, ids[0]).station_ids["cam1"])
-        start = time.perf_counter()
+        start = time.process_time()
         after = change(store, station)
         assert len(after.groups) == 300
-        assert time.perf_counter() - start < 5.0
+        assert time.process_time() - start < 5.0
 
 
 class TestUndoStation:
