@@ -1,8 +1,13 @@
 # The two commands of the README are `run` and `test`; every target sets up what it needs.
 
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3; do command -v $$p >/dev/null 2>&1 && $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+# A half of the tests that fails must fail although its output goes through a pipe.
+SHELL := bash
+.SHELLFLAGS := -o pipefail -c
 BIN := .venv/bin
 export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
+# Compiled modules are kept: without them every process of a test compiles all anew.
+unexport PYTHONDONTWRITEBYTECODE
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
 .PHONY: setup run test test-python test-browser check bench mutate torture paper chromium clean
@@ -26,16 +31,19 @@ static/node_modules/.ready: static/package-lock.json .venv/ready
 run: setup
 	@$(BIN)/touchline serve --sample
 
-# Two halves side by side: one browser and one Python process leave two cores no rest.
+# Two halves side by side, each in as many processes as there are cores: a browser's test waits
+# much of its time. Every line says which half speaks.
+PYTEST = $(BIN)/python -m pytest --numprocesses=auto --maxprocesses=8 --dist=loadfile
+
 test: setup chromium
 	@$(MAKE) --no-print-directory -j2 test-python test-browser
+	@echo "Every test has passed."
 
 test-python:
-	$(BIN)/python -m pytest --ignore=tests/e2e
+	@$(PYTEST) --ignore=tests/e2e 2>&1 | sed -u 's/^/python  | /'
 
 test-browser:
-	$(BIN)/npm --prefix static test
-	$(BIN)/python -m pytest tests/e2e
+	@{ $(BIN)/npm --prefix static test && $(PYTEST) tests/e2e; } 2>&1 | sed -u 's/^/browser | /'
 
 check: setup
 	$(BIN)/ruff format --check .

@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from shutil import copytree
 
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
-from tests.e2e.film import write_film
+from tests.e2e.homes import build_film, build_sample, build_season, copy_home, once_for_all
 from tests.e2e.install_chromium import ADVICE, find_chromium
 from tests.e2e.screen import Screen, passing
-from tests.e2e.season import fill_season
-from tests.e2e.service import ROOT, run_touchline, serving
+from tests.e2e.service import ROOT, serving
 from tests.e2e.windows import TIMEOUT_MS, Windows
 
-GROUPS = 14
 CONTEXTS = 4
 """3D contexts that the browser keeps at a time."""
 SOFTWARE_GRAPHICS = [
@@ -36,35 +33,26 @@ def _chromium() -> str:
 
 
 @pytest.fixture(scope="session")
-def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A home with the solved sample dataset, to be copied; nobody serves or changes it."""
+def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the solved sample dataset, ``home``, and the files it came from, ``tree``."""
     if not (ROOT / "static" / "node_modules" / "preact").is_dir():
         pytest.fail(
             "The browser's libraries are not installed: run 'npm ci' in static/ (make setup).",
             pytrace=False,
         )
-    folder = tmp_path_factory.mktemp("pristine")
-    home, tree = folder / "home", folder / "tree"
-    run_touchline(
-        home,
-        "migrate",
-        f"sample --groups {GROUPS} {tree}",
-        f"import soccernet-v3 {tree} --dataset sample",
-        "solve --dataset sample --workers 1",
-    )
-    return home
+    return once_for_all(tmp_path_factory, "sample", build_sample)
 
 
 @pytest.fixture(scope="session")
-def labels_file(pristine: Path) -> Path:
+def labels_file(sample: Path) -> Path:
     """The labels of the sample's first match, in SoccerNet-v3 layout."""
-    return sorted((pristine.parent / "tree").rglob("Labels-v3.json"))[0]
+    return sorted((sample / "tree").rglob("Labels-v3.json"))[0]
 
 
 @pytest.fixture(scope="session")
-def home(pristine: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def home(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A home with the solved sample dataset."""
-    return Path(copytree(pristine, tmp_path_factory.mktemp("shared") / "home"))
+    return copy_home(sample, tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
@@ -77,24 +65,16 @@ def server(home: Path) -> Iterator[str]:
 @pytest.fixture(scope="session")
 def film(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Address of a server over a home of its own: a short film by six static cameras."""
-    home = tmp_path_factory.mktemp("film-home")
-    folder = write_film(tmp_path_factory.mktemp("film"))
-    run_touchline(
-        home,
-        "migrate",
-        f"import issia {folder} --dataset film",
-        "solve --dataset film --workers 1",
-    )
-    with serving(home) as address:
+    built = once_for_all(tmp_path_factory, "film", build_film)
+    with serving(copy_home(built, tmp_path_factory)) as address:
         yield address
 
 
 @pytest.fixture(scope="session")
 def season(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Address of a server over a home of its own: two thousand groups."""
-    home = tmp_path_factory.mktemp("season-home")
-    fill_season(home)
-    with serving(home) as address:
+    built = once_for_all(tmp_path_factory, "season", build_season)
+    with serving(copy_home(built, tmp_path_factory)) as address:
         yield address
 
 

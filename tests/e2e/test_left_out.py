@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from shutil import copytree
 
 import cv2
 import numpy as np
@@ -13,6 +12,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
 from tests.e2e.film import write_film
+from tests.e2e.homes import copy_home
 from tests.e2e.screen import Screen, withdraw_verdict
 from tests.e2e.service import run_touchline, serving
 
@@ -21,9 +21,9 @@ FRAME = 110
 
 
 @pytest.fixture(scope="module")
-def server(pristine: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def server(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A server of its own: the sample, and a film whose first camera has frames on disk."""
-    home = Path(copytree(pristine, tmp_path_factory.mktemp("left-out") / "home"))
+    home = copy_home(sample, tmp_path_factory)
     film = write_film(tmp_path_factory.mktemp("left-out-film"))
     frames = film / "cam1"
     frames.mkdir()
