@@ -22,7 +22,7 @@ from app.solving.jaccard import project_markings
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
 from tests.bench.table import print_table
-from tests.rotation import rotation_looking
+from tests.cameras import looking
 
 SIZE = ImageSize(960, 540)
 PAIRS = 1_000_000
@@ -115,9 +115,7 @@ def _often(work: Callable[[], object], times: int = TIMES) -> None:
 
 
 def _camera(*position: float) -> Camera:
-    place: FloatArray = np.array(position)
-    rotation = rotation_looking(place, np.array([25.0, 0.0, 0.0]))
-    return Camera(rotation, place, (2000.0, 2000.0), (479.5, 269.5))
+    return looking(position, (25.0, 0.0, 0.0), 2000.0, size=SIZE)
 
 
 def _best(work: Callable[[], object]) -> float:

@@ -10,8 +10,8 @@ import numpy as np
 from app.datasets.camera_json import camera_to_json
 from app.geometry.camera import Camera
 from app.soccer.pitch import MARKINGS, Pitch
+from tests.cameras import FULL_HD, looking
 
-SIZE = (1920, 1080)
 FRAMES = range(100, 140)
 SEEN_BY_TWO = range(130, 133)
 """Frames that two cameras see alone, which then disagree."""
@@ -31,16 +31,7 @@ FOCAL = 1500.0
 
 def camera(stand: int) -> Camera:
     """The camera of a stand, without roll and lens."""
-    position, target = (np.array(place) for place in STANDS[stand])
-    forward = (target - position) / np.linalg.norm(target - position)
-    right = np.cross([0.0, 0.0, 1.0], forward)
-    right /= np.linalg.norm(right)
-    return Camera(
-        rotation=np.array([right, np.cross(forward, right), forward]),
-        position=position,
-        focal_length=(FOCAL, FOCAL),
-        principal_point=((SIZE[0] - 1) / 2, (SIZE[1] - 1) / 2),
-    )
+    return looking(*STANDS[stand], FOCAL, size=FULL_HD)
 
 
 def ball(frame: int) -> tuple[float, float, float]:
@@ -91,7 +82,7 @@ def _lines(stand: int) -> dict[str, list[dict[str, float]]]:
         inside = [
             {"x": round(float(x), 2), "y": round(float(y), 2)}
             for x, y in pixels
-            if 3 <= x < SIZE[0] - 3 and 3 <= y < SIZE[1] - 3
+            if 3 <= x < FULL_HD.width - 3 and 3 <= y < FULL_HD.height - 3
         ]
         if len(inside) > 1:
             lines[marking] = inside[:: max(len(inside) // 6, 1)]

@@ -24,10 +24,11 @@ from app.geometry.camera import Camera
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
-from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import MARKINGS, Pitch
 from app.store.session import Store
+from tests.cameras import SIZE, looking
 
 with warnings.catch_warnings():
     # It would rather use another HTTP client than the one that is installed.
@@ -90,17 +91,6 @@ CAMERAS = {
 }
 """Position, a point looked at, focal length in pixels."""
 BALL = (21.0, -4.0, -1.5)
-SIZE = ImageSize(1280, 720)
-
-
-def look_at(position: tuple[float, ...], target: tuple[float, ...], focal: float) -> Camera:
-    """A camera without roll."""
-    forward = np.subtract(target, position)
-    forward = forward / np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, -1.0])
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(forward, right), forward])
-    return Camera(rotation, np.array(position), (focal, focal), (639.5, 359.5))
 
 
 def lines_of(camera: Camera) -> Lines:
@@ -117,7 +107,7 @@ def lines_of(camera: Camera) -> Lines:
 
 def view_of(key: str, media: Media | None = None) -> View:
     """A view with its lines and a ball box that fits."""
-    camera = look_at(*CAMERAS[key])
+    camera = looking(*CAMERAS[key])
     x, y = camera.project(np.array([BALL]))[0]
     depth = camera.pitch_to_camera(np.array([BALL]))[0, 2]
     diameter = 0.226 * CAMERAS[key][2] / depth

@@ -8,18 +8,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import settings
 
 from app.datasets.export_record import ExportRecord
 from app.datasets.report import Report
 from app.geometry.camera import Camera
-from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.solution import Ball3D, BallFit, Calibration, Pair, Solution, ViewSolution
+from tests.cameras import EVERY_COEFFICIENT
 
 # The same examples every time, and no clock: other work on the machine is not our failure.
 settings.register_profile("datasets", deadline=None, derandomize=True)
@@ -36,13 +35,7 @@ def report() -> Report:
 
 @pytest.fixture
 def camera() -> Camera:
-    return Camera(
-        rotation=rotation_from_pan_tilt_roll(*np.radians([12.3, 78.9, -0.4])),
-        position=np.array([1.25, 61.5, -18.75]),
-        focal_length=(2100.5, 2099.25),
-        principal_point=(639.5, 359.5),
-        distortion=np.array([0.1, -0.02, 1e-3, 2e-3, 0.3, 0.4, 0.5, 0.6, 1e-4, 2e-4, 3e-4, 4e-4]),
-    )
+    return EVERY_COEFFICIENT
 
 
 @pytest.fixture

@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from app.evaluation.frame import Detection, Frame, Judged
 from app.geometry.camera import Camera
-from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.geometry.sphere import optimal_diameter
-from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.frames import Box, ImagePoint
+from tests.cameras import SIZE, looking
 
-SIZE = ImageSize(1280, 720)
 DIAMETER = 0.226
 MakeFrame = Callable[..., Frame]
 
 
 def camera_at(distance: float, distortion: float = 0.0) -> Camera:
     """A camera on the near side that looks at the centre mark from that far, horizontally."""
-    coefficients = np.zeros(12)
-    coefficients[0] = distortion
-    return Camera(
-        rotation=rotation_from_pan_tilt_roll(*np.radians([0.0, 90.0, 0.0])),
-        position=np.array([0.0, distance, -0.113]),
-        focal_length=(2000.0, 2000.0),
-        principal_point=(639.5, 359.5),
-        distortion=coefficients,
-    )
+    camera = looking((0.0, distance, -0.113), (0.0, 0.0, -0.113), 2000.0)
+    return replace(camera, distortion=np.array([distortion, *np.zeros(11)]))
 
 
 @pytest.fixture

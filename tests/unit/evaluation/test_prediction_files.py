@@ -11,7 +11,8 @@ from app.errors import DatasetFormatError, InputError
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.evaluation.prediction_files import read_predicted_cameras, read_predictions
 from app.soccer.frames import Box, ImageSize
-from tests.unit.evaluation.conftest import SIZE, camera_at
+from tests.cameras import SIZE
+from tests.unit.evaluation.conftest import camera_at
 
 MATCH = "league/2030-2031/2030-08-17 - 18-00 Alder 3 - 1 Birch"
 

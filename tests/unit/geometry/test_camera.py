@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -5,18 +7,14 @@ import pytest
 from app.errors import DegenerateGeometryError, ShapeError
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
-from tests.rotation import rotation_looking
+from app.soccer.frames import ImageSize
+from tests.cameras import looking
+
+SMALL = ImageSize(960, 540)
 
 
 def main_camera(**changes) -> Camera:
-    position = np.array([2.0, 62.0, -14.0])
-    values = {
-        "rotation": rotation_looking(position, np.array([10.0, 0.0, 0.0])),
-        "position": position,
-        "focal_length": (2000.0, 2000.0),
-        "principal_point": (479.5, 269.5),
-    }
-    return Camera(**{**values, **changes})
+    return replace(looking((2.0, 62.0, -14.0), (10.0, 0.0, 0.0), 2000.0, size=SMALL), **changes)
 
 
 class TestConventions:

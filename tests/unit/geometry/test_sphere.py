@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app.errors import DegenerateGeometryError
 from app.geometry.camera import Camera
 from app.geometry.sphere import optimal_diameter, position_from_diameter, tight_box
-from tests.rotation import rotation_looking
+from tests.cameras import looking
 
 BALL = 0.226
 PLACE = np.array([5.0, 55.0, -12.0])
@@ -12,13 +14,8 @@ POINT = np.array([12.0, 4.0, -1.3])
 
 
 def camera(**changes) -> Camera:
-    values = {
-        "rotation": rotation_looking(PLACE, np.array([10.0, 0.0, 0.0])),
-        "position": PLACE,
-        "focal_length": (3000.0, 2900.0),
-        "principal_point": (639.5, 359.5),
-    }
-    return Camera(**{**values, **changes})
+    level = looking(PLACE, (10.0, 0.0, 0.0), 3000.0)
+    return replace(level, **{"focal_length": (3000.0, 2900.0), **changes})
 
 
 CAMERAS = {

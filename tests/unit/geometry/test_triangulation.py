@@ -13,17 +13,12 @@ from app.geometry.triangulation import (
     point_covariance,
     triangulate_pairs,
 )
-from tests.rotation import rotation_looking
+from tests.cameras import FULL_HD, looking
 
-
-def camera_at(*position: float) -> Camera:
-    place = np.array(position)
-    return Camera(
-        rotation_looking(place, np.array([20.0, 0.0, 0.0])), place, (2500.0, 2500.0), (960.0, 540.0)
-    )
-
-
-MAIN, REPLAY = camera_at(0.0, 60.0, -15.0), camera_at(75.0, -10.0, -8.0)
+MAIN, REPLAY = (
+    looking(place, (20.0, 0.0, 0.0), 2500.0, size=FULL_HD)
+    for place in ((0.0, 60.0, -15.0), (75.0, -10.0, -8.0))
+)
 PLACES = MAIN.position[None], REPLAY.position[None]
 
 

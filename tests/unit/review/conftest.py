@@ -24,36 +24,21 @@ from app.review.editing.submit import load
 from app.review.importing.ingest import ingest
 from app.review.queue.listing import list_groups
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
-from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import MARKINGS, Pitch
 from app.store.models import DatasetModel
 from app.store.session import Store
+from tests.cameras import SIZE, looking
 
-SIZE = ImageSize(1280, 720)
 MATCH = "north_league/2030-2031/2030-08-17 - 18-00 Alder Town 3 - 1 Birch Rovers"
 
 MakeGroup = Callable[..., Group]
 
 
-def aimed(position: tuple[float, float, float], target: tuple[float, float, float]) -> Camera:
-    """A camera at a place, looking at another, without roll."""
-    forward = np.subtract(target, position)
-    forward = forward / np.linalg.norm(forward)
-    right = np.cross([0.0, 0.0, 1.0], forward)
-    right /= np.linalg.norm(right)
-    rotation = np.array([right, np.cross(forward, right), forward])
-    return Camera(
-        rotation=rotation,
-        position=np.array(position),
-        focal_length=(1500.0, 1500.0),
-        principal_point=(639.5, 359.5),
-    )
-
-
-MAIN = aimed((2.0, 62.0, -18.0), (5.0, 0.0, 0.0))
-BEHIND = aimed((75.0, 10.0, -12.0), (5.0, 0.0, 0.0))
-OPPOSITE = aimed((-10.0, -60.0, -15.0), (5.0, 0.0, 0.0))
+MAIN = looking((2.0, 62.0, -18.0), (5.0, 0.0, 0.0), 1500.0)
+BEHIND = looking((75.0, 10.0, -12.0), (5.0, 0.0, 0.0), 1500.0)
+OPPOSITE = looking((-10.0, -60.0, -15.0), (5.0, 0.0, 0.0), 1500.0)
 
 
 def seen(camera: Camera, point: tuple[float, float, float]) -> ImagePoint:

@@ -8,10 +8,10 @@ from hypothesis import HealthCheck, settings
 from app.geometry.camera import Camera
 from app.geometry.polyline import clip_polyline
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
-from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
-from tests.rotation import rotation_looking
+from tests.cameras import SIZE, looking
 
 # ``make mutate`` runs a test several times in one process, each time from a new instance.
 settings.register_profile(
@@ -22,24 +22,15 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.differing_executors],
 )
 
-SIZE = ImageSize(1280, 720)
-CENTER = ((SIZE.width - 1) / 2, (SIZE.height - 1) / 2)
 PITCH = Pitch()
 BALL_M = 0.226
+BEND = 0.02
+"""Of the lenses: what zoom lenses of broadcast cameras have."""
 
 
-def looking(position, target, focal: float, kappa: float = 0.02) -> Camera:
-    """A level camera; kappa is the displacement at half the diagonal as a share of it."""
-    place = np.array(position, dtype=float)
-    k1 = kappa * (focal / (SIZE.diagonal / 2)) ** 2
-    distortion = np.array([k1, k1 * k1 / 2, *np.zeros(10)])
-    rotation = rotation_looking(place, np.array(target, dtype=float))
-    return Camera(rotation, place, (focal, focal), CENTER, distortion=distortion)
-
-
-MAIN = looking((3.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2200.0)
-BEHIND_GOAL = looking((78.0, -6.0, -9.0), (38.0, 2.0, 0.0), 1500.0)
-OPPOSITE = looking((20.0, -66.0, -14.0), (38.0, 2.0, 0.0), 2400.0)
+MAIN = looking((3.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2200.0, bend=BEND)
+BEHIND_GOAL = looking((78.0, -6.0, -9.0), (38.0, 2.0, 0.0), 1500.0, bend=BEND)
+OPPOSITE = looking((20.0, -66.0, -14.0), (38.0, 2.0, 0.0), 2400.0, bend=BEND)
 
 
 def click(camera: Camera, noise_px: float = 0.0, seed: int = 0, pitch: Pitch = PITCH) -> Lines:

@@ -8,13 +8,11 @@ import numpy as np
 
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation
-from app.soccer.frames import Box, ImageSize
+from app.soccer.frames import Box
 from app.soccer.group import Station, View
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Calibration, MarkingFit
-from tests.rotation import rotation_looking
-
-SIZE = ImageSize(1920, 1080)
+from tests.cameras import FULL_HD, looking
 
 
 def random_views(seed: int) -> tuple[tuple[View, ...], list[Calibration]]:
@@ -29,7 +27,7 @@ def random_views(seed: int) -> tuple[tuple[View, ...], list[Calibration]]:
         x, y = camera.project(ball[None])[0] + rng.normal(0, rng.choice([0.5, 10.0, 40.0]), 2)
         seen = BallAnnotation(box=Box(float(x) - 6, float(y) - 6, 12, 14))
         balls = ((seen,), (replace(seen, inferred=True),), ())[rng.choice(3, p=[0.8, 0.1, 0.1])]
-        station = Station(f"v{place}", SIZE, given=camera)
+        station = Station(f"v{place}", FULL_HD, given=camera)
         views.append(View(f"v{place}", station, balls, included=bool(rng.random() > 0.1)))
         calibrations.append(_random_calibration(rng, camera))
     return tuple(views), calibrations
@@ -54,9 +52,7 @@ def _random_camera(rng: np.random.Generator, ball: np.ndarray) -> Camera:
     angle, far = rng.uniform(0, 2 * np.pi), rng.uniform(60, 110)
     place = np.array([far * np.cos(angle), far * np.sin(angle), -rng.uniform(5, 30)])
     focal = rng.uniform(1500, 4000)
-    return Camera(
-        rotation_looking(place, ball + rng.normal(0, 3, 3)), place, (focal, focal), (959.5, 539.5)
-    )
+    return looking(place, ball + rng.normal(0, 3, 3), focal, size=FULL_HD)
 
 
 def _random_calibration(rng: np.random.Generator, camera: Camera) -> Calibration:

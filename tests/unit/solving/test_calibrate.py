@@ -8,7 +8,8 @@ from app.soccer.group import Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate, calibrate_station, calibration_key
-from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH, SIZE, click, looking
+from tests.cameras import SIZE, looking
+from tests.unit.solving.conftest import BEHIND_GOAL, BEND, MAIN, OPPOSITE, PITCH, click
 
 POLICY = CalibrationPolicy()
 VIEWS = {"main": MAIN, "behind goal": BEHIND_GOAL, "opposite": OPPOSITE}
@@ -48,7 +49,7 @@ class TestCalibrate:
         assert found.jac[0] > 0.9
 
     def test_the_circle_alone_is_not_enough_and_that_is_said(self):
-        lines = click(looking((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), 2200.0))
+        lines = click(looking((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), 2200.0, bend=BEND))
         few = {name: lines[name] for name in ("Circle central",)}
         found = calibrate(make_lines(few), PITCH, SIZE, POLICY)
         assert found.camera is None
@@ -57,7 +58,7 @@ class TestCalibrate:
     def test_parallel_lines_leave_the_camera_open_and_that_is_said(self):
         # Four lines along y, each clicked in its middle: nothing says how far away y is.
         names = ("Big rect. right main", "Small rect. right main", "Side line right", "Middle line")
-        wide = looking((3.0, 62.0, -16.0), (30.0, 0.0, 0.0), 700.0)
+        wide = looking((3.0, 62.0, -16.0), (30.0, 0.0, 0.0), 700.0, bend=BEND)
         middle = {name: wide.project(PITCH.sample(name, 0.5, 0.5)[12:24:4]) for name in names}
         found = calibrate(make_lines(middle), PITCH, SIZE, POLICY)
         assert "position" in found.unobservable

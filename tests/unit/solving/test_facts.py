@@ -14,7 +14,8 @@ from app.soccer.frames import ImagePoint
 from app.soccer.solution import Calibration, MarkingFit
 from app.solving.facts import COLUMNS, NOTHING, STEP_PX, Facts, group_facts, join
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
-from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, SIZE, given_view
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 from tests.unit.solving.random_groups import random_views
 
 BALL = (38.0, 2.0, -1.4)

@@ -12,7 +12,8 @@ from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, BallFit, Calibration, Finding, Fix, Pair, ViewSolution
 from app.solving.findings import _BY_WEIGHT, _sides_swapped, find
 from app.solving.sides import Swap
-from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, SIZE, given_view, group
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
 
 BALL = (38.0, 2.0, -1.4)
 CAMERAS = {"a": MAIN, "b": BEHIND_GOAL, "c": OPPOSITE}

@@ -18,7 +18,8 @@ from app.solving.jaccard import (
     outcomes,
     project_markings,
 )
-from tests.unit.solving.conftest import MAIN, PITCH, SIZE, click
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import MAIN, PITCH, click
 
 GAMMA = 0.005 * SIZE.diagonal
 

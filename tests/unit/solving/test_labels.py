@@ -13,7 +13,8 @@ from app.soccer.policy import CalibrationPolicy
 from app.solving.labels import GAMMA_SHARE, MISFIT, _by_suspicion, _half, _minority, find_suspects
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
-from tests.unit.solving.conftest import MAIN, PITCH, SIZE, click
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import MAIN, PITCH, click
 
 PROBLEM = ResectionProblem.of(SIZE, CalibrationPolicy())
 GAMMA = GAMMA_SHARE * SIZE.diagonal

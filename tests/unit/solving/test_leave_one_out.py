@@ -1,7 +1,8 @@
 from app.soccer.annotation import make_lines
 from app.soccer.policy import CalibrationPolicy
 from app.solving.leave_one_out import leave_one_out
-from tests.unit.solving.conftest import MAIN, PITCH, SIZE, click
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import MAIN, PITCH, click
 
 
 class TestLeaveOneOut:

@@ -4,14 +4,20 @@ from app.errors import DegenerateGeometryError
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.pitch_size import estimate_pitch
-from tests.unit.solving.conftest import SIZE, click, looking
+from tests.cameras import SIZE, looking
+from tests.unit.solving.conftest import BEND, click
 
 POLICY = CalibrationPolicy()
 
 
 def frames(pitch, count=10, noise_px=0.8):
     cameras = [
-        looking((4.0 * (index % 3 - 1), 62.0, -16.0), (-36.0 + 8.0 * index, -4.0, 0.0), 1300.0)
+        looking(
+            (4.0 * (index % 3 - 1), 62.0, -16.0),
+            (-36.0 + 8.0 * index, -4.0, 0.0),
+            1300.0,
+            bend=BEND,
+        )
         for index in range(count)
     ]
     return [click(camera, noise_px, seed, pitch) for seed, camera in enumerate(cameras)]

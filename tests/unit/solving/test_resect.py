@@ -6,7 +6,8 @@ from app.soccer.annotation import make_lines
 from app.soccer.policy import CalibrationPolicy
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
-from tests.unit.solving.conftest import BEHIND_GOAL, OPPOSITE, PITCH, SIZE, click, looking
+from tests.cameras import SIZE, looking
+from tests.unit.solving.conftest import BEHIND_GOAL, BEND, OPPOSITE, PITCH, click
 
 PROBLEM = ResectionProblem.of(SIZE, CalibrationPolicy())
 FEW = ("Side line top", "Big rect. right top", "Big rect. right main", "Circle right")
@@ -24,7 +25,7 @@ class TestRefineMain:
         assert PROBLEM.refine_main(fit, observations) is fit
 
     def test_a_camera_that_its_lines_determine_hardly_moves_even_in_an_unusual_stadium(self):
-        unusual = looking((9.0, 95.0, -27.0), (34.0, -4.0, 0.0), 3200.0)
+        unusual = looking((9.0, 95.0, -27.0), (34.0, -4.0, 0.0), 3200.0, bend=BEND)
         observations = observe(click(unusual, 0.5, seed=2), PITCH, SIZE)
         fit = PROBLEM.resect(observations)
         refined = PROBLEM.refine_main(fit, observations)
@@ -33,7 +34,7 @@ class TestRefineMain:
         assert moved @ np.linalg.solve(spread, moved) < 1.0
 
     def test_where_few_lines_leave_a_direction_open_the_camera_comes_nearer_to_the_truth(self):
-        usual = looking((0.5, 70.0, -14.0), (34.0, -4.0, 0.0), 2400.0)
+        usual = looking((0.5, 70.0, -14.0), (34.0, -4.0, 0.0), 2400.0, bend=BEND)
         before, after = [], []
         for seed in range(20):
             clicks = click(usual, 1.5, seed)

@@ -1,7 +1,8 @@
 import pytest
 
 from app.solving.score import FrameScore, score, score_frame
-from tests.unit.solving.conftest import MAIN, PITCH, SIZE, click
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import MAIN, PITCH, click
 
 
 class TestScore:

@@ -13,7 +13,8 @@ from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
 from app.solving.sides import Swap, find_swaps, turned_camera
 from app.solving.triangulate import Sight
-from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH, SIZE
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH
 
 BALL = (38.0, 2.0, -1.4)
 

@@ -10,15 +10,15 @@ from app.soccer.policy import PAPER, STRICT
 from app.soccer.solution import Calibration, MarkingFit, Suspect
 from app.solving.calibration_findings import calibration_findings
 from app.solving.solve import solve, view_letter
+from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import (
     BALL_M,
     BEHIND_GOAL,
+    BEND,
     MAIN,
     OPPOSITE,
-    SIZE,
     given_view,
     group,
-    looking,
     view,
 )
 
@@ -141,7 +141,7 @@ class TestGates:
         assert self.first(clean.views[0], blind) == ("ball", "7_1.png")
 
     def test_two_views_from_one_place_have_no_baseline(self):
-        beside = looking((3.3, 62.1, -16.0), (34.0, -4.0, 0.0), 2300.0)
+        beside = looking((3.3, 62.1, -16.0), (34.0, -4.0, 0.0), 2300.0, bend=BEND)
         views = given_view("a", MAIN, BALL), given_view("b", beside, BALL)
         assert self.first(*views) == ("baseline", None)
 
@@ -170,7 +170,7 @@ class TestGates:
         assert self.first(a, shifted(b, 0.0, 40.0)) == ("reprojection", None)
 
     def test_parallax_is_a_gate_of_the_strict_policy_alone(self):
-        near = looking((7.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2300.0)
+        near = looking((7.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2300.0, bend=BEND)
         views = given_view("a", MAIN, BALL), given_view("b", near, BALL)
         assert self.first(*views) is None
         assert self.first(*views, policy=STRICT) == ("parallax", None)
@@ -211,7 +211,7 @@ class TestFindings:
         assert "several_balls" in self.kinds(twice, *clean.views[1:])
 
     def test_a_low_parallax_is_said(self):
-        near = looking((7.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2300.0)
+        near = looking((7.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2300.0, bend=BEND)
         assert "low_parallax" in self.kinds(
             given_view("a", MAIN, BALL), given_view("b", near, BALL)
         )
@@ -225,8 +225,8 @@ class TestFindings:
         ],
     )
     def test_an_implausible_ball_is_said_with_its_number(self, place, words):
-        wide = looking((3.0, 80.0, -20.0), (38.0, 0.0, -10.0), 700.0, kappa=0.0)
-        side = looking((90.0, 20.0, -20.0), (38.0, 0.0, -10.0), 500.0, kappa=0.0)
+        wide = looking((3.0, 80.0, -20.0), (38.0, 0.0, -10.0), 700.0)
+        side = looking((90.0, 20.0, -20.0), (38.0, 0.0, -10.0), 500.0)
         found = solve(group(given_view("a", wide, place), given_view("b", side, place)), PAPER)
         (finding,) = [item for item in found.findings if item.kind == "implausible_ball"]
         assert words in finding.sentence

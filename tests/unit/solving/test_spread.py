@@ -24,8 +24,8 @@ from app.solving.spread import (
 )
 from app.solving.triangulate import Sight
 from app.solving.verdict import judge
-from tests.rotation import rotation_looking
-from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, SIZE, given_view
+from tests.cameras import SIZE, looking
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 from tests.unit.solving.random_groups import random_policy, random_views
 
 BALL = (38.0, 2.0, -1.4)
@@ -48,8 +48,7 @@ class TestClickVariance:
 
 class TestCalibrationSpread:
     def test_a_camera_that_may_stand_aside_moves_the_pixel_by_as_much(self):
-        place = np.array([0.0, 20.0, 0.0])
-        camera = Camera(rotation_looking(place, np.zeros(3)), place, (1000.0,) * 2, (639.5, 359.5))
+        camera = looking((0.0, 20.0, 0.0), (0.0, 0.0, 0.0), 1000.0)
         covariance = np.zeros((8, 8))
         covariance[3, 3] = 0.04
         calibration = Calibration("lines", camera, covariance=tuple(covariance.ravel()))

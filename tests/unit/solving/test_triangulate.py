@@ -17,7 +17,8 @@ from app.soccer.group import Station, View
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
 from app.solving.triangulate import Sight, lines_of_sight, meet, sights_of
-from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, SIZE, given_view
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 
 BALL = (38.0, 2.0, -1.4)
 # 1000 px a radian, looking along +y from 20 m before and along -x from 10 m beside the origin.

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from sqlalchemy import insert
 
 from app.config import Settings
 from app.geometry.camera import Camera
-from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -23,6 +22,7 @@ from app.store.group_rows import NewRows
 from app.store.models import DatasetModel
 from app.store.queue import refresh_queue
 from app.store.session import Store
+from tests.cameras import EVERY_COEFFICIENT
 
 
 @pytest.fixture(scope="session")
@@ -49,14 +49,7 @@ def store(settings: Settings, migrated: Path) -> Iterator[Store]:
 
 @pytest.fixture
 def camera() -> Camera:
-    return Camera(
-        rotation=rotation_from_pan_tilt_roll(*np.radians([12.3, 78.9, -0.4])),
-        position=np.array([1.25, 61.5, -18.75]),
-        focal_length=(2100.5, 2099.25),
-        principal_point=(639.5, 359.5),
-        skew=0.125,
-        distortion=np.array([0.1, -0.02, 1e-3, 2e-3, 0.3, 0.4, 0.5, 0.6, 1e-4, 2e-4, 3e-4, 4e-4]),
-    )
+    return replace(EVERY_COEFFICIENT, skew=0.125)
 
 
 @pytest.fixture

@@ -9,7 +9,8 @@ from app.errors import InputError
 from app.review.datasets.batch import calibrate_files, estimate_pitch_of_files, score_files
 from app.soccer.annotation import make_lines
 from app.soccer.pitch import Pitch
-from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, SIZE, click, looking
+from tests.cameras import SIZE, looking
+from tests.unit.solving.conftest import BEHIND_GOAL, BEND, MAIN, OPPOSITE, click
 
 
 def write(folder, **frames):
@@ -153,7 +154,7 @@ class TestEstimatePitchOfFiles:
         true = Pitch(102.0, 66.0)
         frames = {
             f"{index}": click(
-                looking((0.0, 62.0, -16.0), (-36.0 + 12.0 * index, -4.0, 0.0), 1300.0),
+                looking((0.0, 62.0, -16.0), (-36.0 + 12.0 * index, -4.0, 0.0), 1300.0, bend=BEND),
                 0.6,
                 index,
                 true,

@@ -28,7 +28,8 @@ from app.soccer.group import Group, Station, View
 from app.soccer.reasons import LeftOut
 from app.store.digest import group_inputs_hash, source_hash
 from app.store.frozen import freeze_said
-from tests.unit.review.conftest import OPPOSITE, SIZE, drawn, seen
+from tests.cameras import SIZE
+from tests.unit.review.conftest import OPPOSITE, drawn, seen
 
 WHY = LeftOut("not_same_instant", "the foot is off the ball")
 LEAVE = IncludeView("7_1.png", False, WHY.reason, WHY.note)

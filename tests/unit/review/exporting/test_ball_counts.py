@@ -23,7 +23,8 @@ from app.soccer.ball_boxes import ball_boxes, ball_fit, has_ball_3d
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View
 from app.store.session import Store
-from tests.unit.review.conftest import MATCH, OPPOSITE, SIZE, drawn, seen
+from tests.cameras import SIZE
+from tests.unit.review.conftest import MATCH, OPPOSITE, drawn, seen
 
 
 def with_a_view_apart(group: Group, number: int) -> Group:

@@ -1,0 +1,53 @@
+"""Cameras for tests: level ones that look at a place, and a lens with every coefficient."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.geometry.camera import Camera
+from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.soccer.frames import ImageSize
+from tests.rotation import rotation_looking
+
+SIZE = ImageSize(1280, 720)
+CENTER = ((SIZE.width - 1) / 2, (SIZE.height - 1) / 2)
+FULL_HD = ImageSize(1920, 1080)
+
+EVERY_COEFFICIENT = Camera(
+    rotation=rotation_from_pan_tilt_roll(*np.radians([12.3, 78.9, -0.4])),
+    position=np.array([1.25, 61.5, -18.75]),
+    focal_length=(2100.5, 2099.25),
+    principal_point=CENTER,
+    distortion=np.array([0.1, -0.02, 1e-3, 2e-3, 0.3, 0.4, 0.5, 0.6, 1e-4, 2e-4, 3e-4, 4e-4]),
+)
+"""A main camera of which no number is another's, as files must bring it back."""
+
+
+def looking(
+    position: Sequence[float],
+    target: Sequence[float],
+    focal: float,
+    *,
+    bend: float = 0.0,
+    size: ImageSize = SIZE,
+) -> Camera:
+    """A level camera that looks at a point, its principal point in the middle of the image.
+
+    Args:
+        position: Of the camera in the pitch frame, metres.
+        target: In the pitch frame, metres.
+        focal: Focal length, pixels.
+        bend: Displacement by the lens at half the diagonal, as a share of it.
+        size: Of the image.
+    """
+    place = np.array(position, dtype=float)
+    k1 = bend * (focal / (size.diagonal / 2)) ** 2
+    return Camera(
+        rotation=rotation_looking(place, np.array(target, dtype=float)),
+        position=place,
+        focal_length=(focal, focal),
+        principal_point=((size.width - 1) / 2, (size.height - 1) / 2),
+        distortion=np.array([k1, k1 * k1 / 2, *np.zeros(10)]),
+    )
