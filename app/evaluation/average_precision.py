@@ -117,9 +117,18 @@ def area(found: Curve) -> float:
 
 
 def mean_interpolated(hits: Hits, weights: FloatArray | None = None) -> float:
-    """COCO's AP averaged over ``IOUS``."""
-    every = [interpolated(curve(hits, index, weights)) for index in range(len(IOUS))]
-    return float(np.mean(every))
+    """COCO's AP averaged over ``IOUS``: the same as `interpolated` of each, in one go."""
+    weights = np.ones(len(hits.balls)) if weights is None else weights
+    each, balls = weights[hits.frames], float(weights @ hits.balls)
+    if not len(each) or not balls:
+        return np.nan if len(each) else 0.0
+    right = np.cumsum(each * hits.found.T, axis=1)
+    precision = right / np.maximum(np.cumsum(each), np.finfo(float).eps)
+    envelope = np.zeros((len(IOUS), len(each) + 1))
+    envelope[:, :-1] = _envelope(precision)
+    places = np.stack([np.searchsorted(recall, RECALLS, side="left") for recall in right / balls])
+    at = np.take_along_axis(envelope, places, axis=1)
+    return float(np.mean(at.mean(axis=1)))
 
 
 def _at_recalls(found: Curve) -> FloatArray:
@@ -132,8 +141,8 @@ def _at_recalls(found: Curve) -> FloatArray:
 
 
 def _envelope(precision: FloatArray) -> FloatArray:
-    """The best precision at this recall or any higher one."""
-    best: FloatArray = np.maximum.accumulate(precision[::-1])[::-1]
+    """The best precision at this recall or any higher one, along the last axis."""
+    best: FloatArray = np.maximum.accumulate(precision[..., ::-1], axis=-1)[..., ::-1]
     return best
 
 

@@ -138,3 +138,18 @@ class TestCurve:
         ap_50, ap = coco_average_precision(random_judged)
         assert interpolated(curve(hits)) == pytest.approx(ap_50, abs=1e-12)
         assert mean_interpolated(hits) == pytest.approx(ap, abs=1e-12)
+
+
+class TestMeanInterpolated:
+    @pytest.mark.parametrize("seed", range(5))
+    def test_is_that_of_each_threshold_to_the_last_bit(self, random_judged, seed: int) -> None:
+        hits = find_hits(random_judged)
+        weights = np.random.default_rng(seed).integers(0, 3, len(hits.balls)).astype(float)
+        each = [interpolated(curve(hits, index, weights)) for index in range(len(IOUS))]
+        assert mean_interpolated(hits, weights) == np.mean(each)
+
+    def test_without_a_ball_there_is_none_and_without_a_detection_it_is_nought(
+        self, make_judged
+    ) -> None:
+        assert np.isnan(mean_interpolated(find_hits([make_judged(None, (BALL, 0.9))])))
+        assert mean_interpolated(find_hits([make_judged(BALL)])) == 0.0
