@@ -22,6 +22,7 @@ import pytest
 
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.sample.scene import Scene
+from tests.e2e.service import run_touchline
 from tests.scenes import make_scenes
 
 COMMAND = "from app.cli import main; main()"
@@ -111,13 +112,12 @@ def environment(home: Path) -> dict[str, str]:
 @pytest.fixture(scope="session")
 def address(touchline, tree: Path, spoiled_tree: Path) -> Iterator[str]:
     """Address of a server over a home with the datasets ``small`` (solved) and ``spoiled``."""
-    for arguments in (
-        ("import", "soccernet-v3", tree, "--dataset", "small"),
-        ("import", "soccernet-v3", spoiled_tree, "--dataset", "spoiled"),
-        ("solve", "--dataset", "small", "--workers", "1"),
-    ):
-        done = touchline(*arguments)
-        assert done.returncode == 0, done.stderr
+    run_touchline(
+        touchline.home,
+        f"import soccernet-v3 {tree} --dataset small",
+        f"import soccernet-v3 {spoiled_tree} --dataset spoiled",
+        "solve --dataset small --workers 1",
+    )
     server = subprocess.Popen(
         [sys.executable, "-c", COMMAND, "serve", "--port", "0"],
         stdout=subprocess.PIPE,
