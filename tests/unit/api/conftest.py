@@ -23,11 +23,11 @@ from app.config import Settings
 from app.geometry.camera import Camera
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
-from app.soccer.annotation import BallAnnotation, Lines, make_lines
-from app.soccer.frames import Box, ImagePoint
+from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import MARKINGS, Pitch
 from app.store.session import Store
+from tests.balls import box_around
 from tests.cameras import SIZE, looking
 
 with warnings.catch_warnings():
@@ -108,11 +108,8 @@ def lines_of(camera: Camera) -> Lines:
 def view_of(key: str, media: Media | None = None) -> View:
     """A view with its lines and a ball box that fits."""
     camera = looking(*CAMERAS[key])
-    x, y = camera.project(np.array([BALL]))[0]
-    depth = camera.pitch_to_camera(np.array([BALL]))[0, 2]
-    diameter = 0.226 * CAMERAS[key][2] / depth
-    ball = BallAnnotation(box=Box.square(ImagePoint(float(x), float(y)), float(diameter)))
-    return View(key, Station(key, SIZE, lines=lines_of(camera)), (ball,), media)
+    station = Station(key, SIZE, lines=lines_of(camera))
+    return View(key, station, (box_around(camera, BALL),), media)
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pysqlite3.dbapi2 as sqlite
 import pytest
 from sqlalchemy import select
@@ -29,6 +28,7 @@ from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import MARKINGS, Pitch
 from app.store.models import DatasetModel
 from app.store.session import Store
+from tests.balls import seen
 from tests.cameras import SIZE, looking
 
 MATCH = "north_league/2030-2031/2030-08-17 - 18-00 Alder Town 3 - 1 Birch Rovers"
@@ -39,12 +39,6 @@ MakeGroup = Callable[..., Group]
 MAIN = looking((2.0, 62.0, -18.0), (5.0, 0.0, 0.0), 1500.0)
 BEHIND = looking((75.0, 10.0, -12.0), (5.0, 0.0, 0.0), 1500.0)
 OPPOSITE = looking((-10.0, -60.0, -15.0), (5.0, 0.0, 0.0), 1500.0)
-
-
-def seen(camera: Camera, point: tuple[float, float, float]) -> ImagePoint:
-    """Where a camera sees a point."""
-    x, y = camera.project(np.array([point]))[0]
-    return ImagePoint(float(x), float(y))
 
 
 @cache

@@ -7,10 +7,10 @@ from hypothesis import HealthCheck, settings
 
 from app.geometry.camera import Camera
 from app.geometry.polyline import clip_polyline
-from app.soccer.annotation import BallAnnotation, Lines, make_lines
-from app.soccer.frames import Box, ImagePoint
+from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
+from tests.balls import box_around
 from tests.cameras import SIZE, looking
 
 # ``make mutate`` runs a test several times in one process, each time from a new instance.
@@ -23,7 +23,6 @@ settings.register_profile(
 )
 
 PITCH = Pitch()
-BALL_M = 0.226
 BEND = 0.02
 """Of the lenses: what zoom lenses of broadcast cameras have."""
 
@@ -46,15 +45,6 @@ def click(camera: Camera, noise_px: float = 0.0, seed: int = 0, pitch: Pitch = P
         chosen = visible[np.linspace(0, len(visible) - 1, count).astype(int)]
         lines[marking] = chosen + generator.normal(0, noise_px, chosen.shape)
     return make_lines(lines)
-
-
-def box_around(camera: Camera, point, scale: float = 1.0) -> BallAnnotation:
-    """A square box around the image of a ball, ``scale`` times as large as the ball."""
-    point = np.array(point, dtype=float)
-    x, y = camera.project(point[None])[0]
-    depth = camera.pitch_to_camera(point[None])[0, 2]
-    diameter = scale * BALL_M * camera.focal_length[1] / depth
-    return BallAnnotation(box=Box.square(ImagePoint(float(x), float(y)), float(diameter)))
 
 
 def view(key: str, camera: Camera, point, *, noise_px: float = 0.0, seed: int = 0) -> View:

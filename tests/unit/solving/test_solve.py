@@ -10,17 +10,9 @@ from app.soccer.policy import PAPER, STRICT
 from app.soccer.solution import Calibration, MarkingFit, Suspect
 from app.solving.calibration_findings import calibration_findings
 from app.solving.solve import solve, view_letter
+from tests.balls import BALL_M
 from tests.cameras import SIZE, looking
-from tests.unit.solving.conftest import (
-    BALL_M,
-    BEHIND_GOAL,
-    BEND,
-    MAIN,
-    OPPOSITE,
-    given_view,
-    group,
-    view,
-)
+from tests.unit.solving.conftest import BEHIND_GOAL, BEND, MAIN, OPPOSITE, given_view, group, view
 
 BALL = (38.0, 2.0, -1.4)
 TAU = 0.01 * SIZE.diagonal

@@ -28,8 +28,9 @@ from app.soccer.group import Group, Station, View
 from app.soccer.reasons import LeftOut
 from app.store.digest import group_inputs_hash, source_hash
 from app.store.frozen import freeze_said
+from tests.balls import seen
 from tests.cameras import SIZE
-from tests.unit.review.conftest import OPPOSITE, drawn, seen
+from tests.unit.review.conftest import OPPOSITE, drawn
 
 WHY = LeftOut("not_same_instant", "the foot is off the ball")
 LEAVE = IncludeView("7_1.png", False, WHY.reason, WHY.note)

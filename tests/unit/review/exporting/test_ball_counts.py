@@ -23,8 +23,9 @@ from app.soccer.ball_boxes import ball_boxes, ball_fit, has_ball_3d
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View
 from app.store.session import Store
+from tests.balls import seen
 from tests.cameras import SIZE
-from tests.unit.review.conftest import MATCH, OPPOSITE, drawn, seen
+from tests.unit.review.conftest import MATCH, OPPOSITE, drawn
 
 
 def with_a_view_apart(group: Group, number: int) -> Group:
