@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.frames import ImageSize
-from tests.rotation import rotation_looking
 
 SIZE = ImageSize(1280, 720)
 CENTER = ((SIZE.width - 1) / 2, (SIZE.height - 1) / 2)
@@ -45,9 +45,19 @@ def looking(
     place = np.array(position, dtype=float)
     k1 = bend * (focal / (size.diagonal / 2)) ** 2
     return Camera(
-        rotation=rotation_looking(place, np.array(target, dtype=float)),
+        rotation=_level(place, np.array(target, dtype=float)),
         position=place,
         focal_length=(focal, focal),
         principal_point=((size.width - 1) / 2, (size.height - 1) / 2),
         distortion=np.array([k1, k1 * k1 / 2, *np.zeros(10)]),
     )
+
+
+def _level(place: FloatArray, target: FloatArray) -> FloatArray:
+    """World-to-camera rotation of a camera without roll, shape (3, 3)."""
+    forward = target - place
+    forward = forward / np.linalg.norm(forward)
+    # z points down, so "right" of a level camera is down x forward.
+    right = np.cross(np.array([0.0, 0.0, 1.0]), forward)
+    right = right / np.linalg.norm(right)
+    return np.vstack([right, np.cross(forward, right), forward])
