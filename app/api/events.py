@@ -21,13 +21,7 @@ from app.api.schemas.event import DatasetEvent, GroupEvent
 from app.api.schemas.job import JobDocument
 from app.errors import OverloadedError, StorageError
 from app.review.jobs.jobs import Jobs
-from app.review.queue.changes import (
-    Change,
-    newest_entry,
-    newest_solution,
-    read_changes,
-    read_solved,
-)
+from app.review.queue.changes import Change, read_news, read_position
 from app.store.jobs import OPEN, Job
 from app.store.session import Store
 
@@ -127,8 +121,7 @@ class Events:
 
     def position(self) -> int:
         """Id of the newest entry of the log."""
-        with self._store.read() as session:
-            return newest_entry(session)
+        return read_position(self._store)
 
     @property
     def counts(self) -> Counts:
@@ -199,18 +192,12 @@ class Events:
 
     def _look(self, feeds: list[Feed], *, first: bool) -> None:
         """Tell each listener what has happened since it was told last."""
-        with self._store.read() as session:
-            newest, solution = newest_entry(session), newest_solution(session)
-            places = {feed.position for feed in feeds if feed.position < newest}
-            changes = {place: read_changes(session, place) for place in places}
-            solved: list[Change] = []
-            if not first and solution > self._solutions:
-                told = {item.group_id for items in changes.values() for item in items}
-                solved = read_solved(session, self._solutions, told)
-        self._solutions = solution
+        places = {feed.position for feed in feeds}
+        news = read_news(self._store, places, None if first else self._solutions)
+        self._solutions = news.solution
         for feed in feeds:
-            wanted = [*changes.get(feed.position, []), *solved]
-            feed.position = max(feed.position, newest)
+            wanted = [*news.changes.get(feed.position, []), *news.solved]
+            feed.position = max(feed.position, news.entry)
             feed.offer([_change_event(item) for item in wanted if feed.wants(item.dataset_id)])
 
     def _tell_job(self, job: Job) -> None:

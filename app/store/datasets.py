@@ -21,3 +21,9 @@ def policy_of(text: str) -> Policy:
 def dataset_name(session: Session, dataset_id: int) -> str:
     """The name of a dataset that is there."""
     return session.scalars(select(DatasetModel.name).where(DatasetModel.id == dataset_id)).one()
+
+
+def dataset_names(session: Session) -> dict[int, str]:
+    """The name of every dataset, by id."""
+    statement = select(DatasetModel.id, DatasetModel.name)
+    return {row.id: row.name for row in session.execute(statement)}

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, bindparam, insert, select
+from sqlalchemy import ColumnElement, bindparam, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.errors import StorageError
@@ -93,6 +93,11 @@ def station_steps(session: Session, station_id: int, kinds: Iterable[str]) -> Se
         .order_by(LogModel.id)
     )
     return session.execute(statement).all()
+
+
+def newest_entry(session: Session) -> int:
+    """Id of the last entry; 0 for an empty log."""
+    return session.scalar(select(func.max(LogModel.id))) or 0
 
 
 def group_entries(session: Session, group_id: int) -> list[LogEntry]:

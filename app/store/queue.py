@@ -9,7 +9,6 @@ from typing import Any, cast
 
 from sqlalchemy import (
     BindParameter,
-    ColumnElement,
     Table,
     and_,
     bindparam,
@@ -257,30 +256,3 @@ def _computed(summary: Summary | None, noticed: Sequence[str]) -> dict[str, Any]
 
 def _list(items: Sequence[str]) -> str:
     return f",{','.join(dict.fromkeys(items))}," if items else ""
-
-
-def count_with_findings(session: Session, dataset_id: int, kind: str | None) -> int:
-    """How many groups of a dataset have findings (of a kind)."""
-    statement = select(func.count()).select_from(QueueModel)
-    return session.scalar(statement.where(*_with_findings(dataset_id, kind))) or 0
-
-
-def groups_with_findings(
-    session: Session, dataset_id: int, kind: str | None, *, after: int, limit: int
-) -> list[int]:
-    """Ids of groups with findings (of a kind), by number, from the one after ``after``."""
-    statement = (
-        select(QueueModel.group_id)
-        .where(*_with_findings(dataset_id, kind), QueueModel.number > after)
-        .order_by(QueueModel.number)
-        .limit(limit)
-    )
-    return list(session.scalars(statement))
-
-
-def _with_findings(dataset_id: int, kind: str | None) -> list[ColumnElement[bool]]:
-    pattern = "," if kind is None else f",{kind},"
-    return [
-        QueueModel.dataset_id == dataset_id,
-        QueueModel.findings.contains(pattern, autoescape=True),
-    ]

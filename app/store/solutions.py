@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, bindparam, select
+from sqlalchemy import ColumnElement, and_, bindparam, func, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
@@ -221,6 +221,11 @@ def present_bodies(session: Session, ids: Sequence[int], policy_hash: str) -> di
         )
     )
     return {row.group_id: row.body for row in session.execute(statement)}
+
+
+def newest_solution(session: Session) -> int:
+    """Id of the last solution; 0 where there is none."""
+    return session.scalar(select(func.max(SolutionModel.id))) or 0
 
 
 def unsolved_groups(session: Session, dataset_id: int) -> list[int]:

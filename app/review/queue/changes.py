@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from sqlalchemy import func, select
-from sqlalchemy.orm import Session
-
 from app.review.editing.etags import read_etags
-from app.store.models import DatasetModel, GroupModel, LogModel, SolutionModel, ViewModel
+from app.store.changes import StoredChange, logged_changes, solved_groups
+from app.store.datasets import dataset_names
+from app.store.log import newest_entry
+from app.store.session import Session, Store
+from app.store.solutions import newest_solution
 
 MANY = 200
 """So many groups of one dataset at once are told as one change of the dataset."""
@@ -43,76 +44,69 @@ class Change:
     etag: str | None = None
 
 
-def newest_entry(session: Session) -> int:
+@dataclass(frozen=True)
+class News:
+    """What there is to tell at one moment.
+
+    Attributes:
+        entry: Id of the log's last entry; 0 for an empty log.
+        solution: Id of the last solution; 0 where there is none.
+        changes: By the entry after which they came.
+        solved: Groups that got a solution and are in none of the changes.
+    """
+
+    entry: int
+    solution: int
+    changes: Mapping[int, list[Change]]
+    solved: list[Change]
+
+
+def read_position(store: Store) -> int:
     """Id of the log's last entry; 0 for an empty log."""
-    return session.scalar(select(func.max(LogModel.id))) or 0
+    with store.read() as session:
+        return newest_entry(session)
 
 
-def newest_solution(session: Session) -> int:
-    """Id of the last solution; 0 where there is none."""
-    return session.scalar(select(func.max(SolutionModel.id))) or 0
+def read_news(store: Store, places: Collection[int], solution: int | None) -> News:
+    """What has changed since some entries of the log, and since a solution (None: none is told)."""
+    with store.read() as session:
+        entry, newest = newest_entry(session), newest_solution(session)
+        changes = {place: read_changes(session, place) for place in places if place < entry}
+        solved: list[Change] = []
+        if solution is not None and newest > solution:
+            told = {item.group_id for items in changes.values() for item in items}
+            solved = read_solved(session, solution, told)
+    return News(entry, newest, changes, solved)
 
 
 def read_changes(session: Session, after: int) -> list[Change]:
     """What has changed since an entry of the log, each group once, in the order of the log."""
     newest = newest_entry(session)
     if newest - after > FAR:
-        rows = session.execute(select(DatasetModel.id, DatasetModel.name))
-        return [Change(newest, row.id, row.name, EVERYTHING, None) for row in rows]
-    return _told(session, list(_entries(session, after)))
+        names = dataset_names(session)
+        return [Change(newest, key, name, EVERYTHING, None) for key, name in names.items()]
+    return _told(session, logged_changes(session, after))
 
 
 def read_solved(session: Session, after: int, known: Iterable[int | None] = ()) -> list[Change]:
     """Groups that got a solution after another one; ``known`` are told of already."""
-    statement = (
-        select(GroupModel.dataset_id, GroupModel.id)
-        .join(SolutionModel, SolutionModel.group_id == GroupModel.id)
-        .where(SolutionModel.id > after)
-        .distinct()
-    )
     told = set(known)
     found = [
-        _Found(None, row.dataset_id, row.id, SOLVED, None)
-        for row in session.execute(statement)
-        if row.id not in told
+        StoredChange(None, dataset_id, SOLVED, None, group_id)
+        for dataset_id, group_id in solved_groups(session, after)
+        if group_id not in told
     ]
     return _told(session, found)
 
 
-@dataclass(frozen=True)
-class _Found:
-    id: int | None
-    dataset_id: int
-    group_id: int | None
-    kind: str
-    actor: str | None
-
-
-def _entries(session: Session, after: int) -> Iterator[_Found]:
-    """Log entries, in order; a static camera's stand once for each of its groups."""
-    columns = (LogModel.id, LogModel.dataset_id, LogModel.kind, LogModel.actor)
-    plain = select(*columns, LogModel.group_id).where(
-        LogModel.id > after, LogModel.dataset_id.is_not(None)
-    )
-    of_station = (
-        select(*columns, ViewModel.group_id)
-        .join(ViewModel, ViewModel.station_id == LogModel.station_id)
-        .where(LogModel.id > after, LogModel.group_id.is_(None), LogModel.dataset_id.is_not(None))
-        .distinct()
-    )
-    rows = [*session.execute(plain), *session.execute(of_station)]
-    for row in sorted(rows, key=lambda row: int(row.id)):
-        yield _Found(row.id, row.dataset_id, row.group_id, row.kind, row.actor)
-
-
-def _told(session: Session, found: Iterable[_Found]) -> list[Change]:
+def _told(session: Session, found: Iterable[StoredChange]) -> list[Change]:
     """Changes with names and ETags; a dataset with too many of them is told as a whole."""
     items = _merged(found)
     sizes = Counter(item.dataset_id for item in items if item.group_id is not None)
     items = _merged(
         replace(item, group_id=None) if sizes[item.dataset_id] > MANY else item for item in items
     )
-    names = _names(session, {item.dataset_id for item in items})
+    names = dataset_names(session)
     etags = read_etags(session, [item.group_id for item in items if item.group_id is not None])
     return [
         Change(
@@ -130,16 +124,9 @@ def _told(session: Session, found: Iterable[_Found]) -> list[Change]:
     ]
 
 
-def _merged(found: Iterable[_Found]) -> list[_Found]:
+def _merged(found: Iterable[StoredChange]) -> list[StoredChange]:
     """The last change of each group, and the last one of each kind of each dataset, in order."""
     last = {
         (item.dataset_id, item.group_id, "" if item.group_id else item.kind): item for item in found
     }
     return sorted(last.values(), key=lambda item: item.id or 0)
-
-
-def _names(session: Session, ids: set[int]) -> dict[int, str]:
-    rows = session.execute(
-        select(DatasetModel.id, DatasetModel.name).where(DatasetModel.id.in_(ids))
-    )
-    return {row.id: row.name for row in rows}

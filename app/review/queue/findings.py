@@ -10,7 +10,9 @@ from app.review.datasets.dataset import dataset_id
 from app.review.editing.state import GroupState, read_states
 from app.soccer.group import Group
 from app.soccer.solution import Finding
-from app.store.queue import count_with_findings, groups_with_findings
+from app.store import listing
+from app.store.conditions import Condition, compares, contains, lists
+from app.store.order import Order
 from app.store.session import Store
 
 BATCH = 100
@@ -37,7 +39,7 @@ class GroupFindings:
 def count_groups(store: Store, dataset_id: int, kind: str | None) -> int:
     """How many groups of a dataset have findings (of a kind)."""
     with store.read() as session:
-        return count_with_findings(session, dataset_id, kind)
+        return listing.count_groups(session, dataset_id, [_has(kind)])
 
 
 def read_findings(
@@ -45,7 +47,8 @@ def read_findings(
 ) -> list[GroupFindings]:
     """Findings of up to ``limit`` groups, by number of the group, from the one after ``after``."""
     with store.read() as session:
-        ids = groups_with_findings(session, dataset_id, kind, after=after, limit=limit)
+        where = [_has(kind), compares("number", ">", after)]
+        ids = listing.ids_in_order(session, dataset_id, where, Order("number"), limit)
         states = read_states(session, ids)
     return [_group_findings(state, kind) for state in states]
 
@@ -57,6 +60,10 @@ def finding_values(store: Store, dataset: str) -> Iterator[dict[str, Any]]:
         after = groups[-1].number
         for group in groups:
             yield from group.values
+
+
+def _has(kind: str | None) -> Condition:
+    return contains("findings", ",") if kind is None else lists("findings", kind)
 
 
 def _group_findings(state: GroupState, kind: str | None) -> GroupFindings:

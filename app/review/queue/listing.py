@@ -10,13 +10,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from sqlalchemy import ColumnElement, Select, func, select
-from sqlalchemy.orm import Session
-
 from app.errors import InputError, NotFoundError
-from app.review.queue.order import Order
-from app.review.queue.query import Query, parse_query
-from app.store.models import QueueModel
+from app.review.queue import cursor as cursors
+from app.review.queue.query import parse_query
+from app.store.listing import (
+    count_groups,
+    find_place,
+    ids_around,
+    ids_from,
+    ids_in_order,
+    read_rows_after,
+    read_rows_of,
+)
 from app.store.session import Store
 
 MAX_PAGE = 500
@@ -130,21 +135,20 @@ def list_groups(
         raise InputError(f"a page has 1 to {MAX_PAGE} groups", pointer="/limit")
     if cursor is not None and start is not None:
         raise InputError("a page begins at a cursor or at a position, not both", pointer="/from")
-    where = _where(dataset_id, parsed)
-    order = Order(parsed)
-    columns = select(*_COLUMNS, *order.keys).order_by(*order.ascending)
+    where, order = parsed.conditions, parsed.order
+    keys = None if cursor is None else cursors.decode(parsed, cursor)
     with store.read() as session:
-        total = _count(session, where)
+        total = count_groups(session, dataset_id, where)
         if start is not None:
-            ids = _ids_from(session, where, order, start, limit, total)
-            rows = session.execute(columns.where(QueueModel.group_id.in_(ids))).all()
+            ids = ids_from(session, dataset_id, where, order, start, limit, total)
+            rows = read_rows_of(session, ids, order)
             more = start + limit < total
         else:
-            after = [] if cursor is None else [order.after(order.decode(cursor))]
-            rows = session.execute(columns.where(*where, *after).limit(limit + 1)).all()
+            rows = read_rows_after(session, dataset_id, where, order, keys, limit + 1)
             more = len(rows) > limit
     rows = rows[:limit]
-    return Page([_row(row) for row in rows], order.encode(rows[-1]) if more else None, total)
+    following = cursors.encode(parsed, order.keys_of(rows[-1])) if more else None
+    return Page([_row(row) for row in rows], following, total)
 
 
 def list_ids(
@@ -156,12 +160,11 @@ def list_ids(
         InputError: The query cannot be understood.
     """
     parsed = parse_query(query)
-    where = _where(dataset_id, parsed)
+    where = parsed.conditions
     with store.read() as session:
-        total = _count(session, where)
-        return Ids(
-            tuple(_ids_from(session, where, Order(parsed), start, limit, total)), total=total
-        )
+        total = count_groups(session, dataset_id, where)
+        ids = ids_from(session, dataset_id, where, parsed.order, start, limit, total)
+    return Ids(tuple(ids), total)
 
 
 def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
@@ -173,53 +176,18 @@ def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
         NotFoundError: There is no such group.
     """
     parsed = parse_query(query)
-    order = Order(parsed)
+    where, order = parsed.conditions, parsed.order
     with store.read() as session:
-        here = session.execute(
-            select(QueueModel.dataset_id, *order.keys).where(QueueModel.group_id == group_id)
-        ).one_or_none()
-        if here is None:
+        place = find_place(session, group_id, order)
+        if place is None:
             raise NotFoundError(f"there is no group {group_id}")
-        where = _where(here.dataset_id, parsed)
+        dataset_id, keys = place
         # One pass over all that match is faster than counting what comes before each time.
-        ids = list(session.scalars(_ordered(where, order)))
+        ids = ids_in_order(session, dataset_id, where, order)
         if group_id in ids:
             return _around(ids, ids.index(group_id))
-        values = [here[index + 1] for index in range(len(order.keys))]
-        before, after = order.before(values), order.after(values)
-        return Neighbours(
-            index=None,
-            total=len(ids),
-            previous=_ids(session, [*where, before], order.backwards),
-            next=_ids(session, [*where, after], order.ascending),
-        )
-
-
-def _ids_from(
-    session: Session,
-    where: Sequence[ColumnElement[bool]],
-    order: Order,
-    start: int,
-    limit: int,
-    total: int,
-) -> list[int]:
-    """Ids from a position on, in order.
-
-    SQLite sorts as many rows as it skips and reads, and wide rows cost it several times as much:
-    hence ids alone, and behind the middle from the end.
-    """
-    count = min(limit, total - start)
-    if count <= 0:
-        return []
-    behind = total - start - count
-    if start <= behind:
-        return list(session.scalars(_ordered(where, order).offset(start).limit(count)))
-    backwards = select(QueueModel.group_id).where(*where).order_by(*order.backwards)
-    return list(session.scalars(backwards.offset(behind).limit(count)))[::-1]
-
-
-def _ordered(where: Sequence[ColumnElement[bool]], order: Order) -> Select[int]:
-    return select(QueueModel.group_id).where(*where).order_by(*order.ascending)
+        before, after = ids_around(session, dataset_id, where, order, keys, _NEIGHBOURS)
+    return Neighbours(None, len(ids), tuple(before), tuple(after))
 
 
 def _around(ids: Sequence[int], index: int) -> Neighbours:
@@ -228,28 +196,7 @@ def _around(ids: Sequence[int], index: int) -> Neighbours:
     return Neighbours(index, len(ids), tuple(reversed(before)), tuple(after))
 
 
-def _where(dataset_id: int, query: Query) -> list[ColumnElement[bool]]:
-    return [QueueModel.dataset_id == dataset_id, *query.conditions]
-
-
-def _count(session: Session, where: Sequence[ColumnElement[bool]]) -> int:
-    statement = select(func.count()).select_from(QueueModel).where(*where)
-    return int(session.execute(statement).scalar_one())
-
-
-def _ids(
-    session: Session, where: Sequence[ColumnElement[bool]], order: Sequence[ColumnElement[Any]]
-) -> tuple[int, ...]:
-    statement = select(QueueModel.group_id).where(*where).order_by(*order).limit(_NEIGHBOURS)
-    return tuple(session.scalars(statement))
-
-
 _STORED = [item.name for item in fields(GroupRow) if item.name not in ("id", "findings")]
-_COLUMNS = [
-    QueueModel.group_id,
-    QueueModel.findings,
-    *(getattr(QueueModel, name) for name in _STORED),
-]
 
 
 def _row(row: Any) -> GroupRow:

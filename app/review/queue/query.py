@@ -17,15 +17,24 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
-
-from sqlalchemy import ColumnElement, and_, case, func, not_, or_, select
-from sqlalchemy.orm import InstrumentedAttribute
 
 from app.errors import InputError
-from app.finite import json_text
 from app.soccer.solution import FINDING_KINDS, GATES
-from app.store.models import QueueModel
+from app.store.conditions import (
+    Condition,
+    compares,
+    contains,
+    either,
+    has_all_pictures,
+    is_absent,
+    is_empty,
+    is_flag,
+    is_one_of,
+    is_text,
+    lists,
+    opposite,
+)
+from app.store.order import Order
 
 MAX_LENGTH = 1000
 MAX_LISTED_LENGTH = 100_000
@@ -33,77 +42,60 @@ MAX_LISTED_LENGTH = 100_000
 MAX_TERMS = 30
 MAX_ID = 2**63 - 1
 
-NUMBERS: dict[str, InstrumentedAttribute[Any]] = {
-    "jac": QueueModel.min_jac,
-    "jac05": QueueModel.min_jac,
-    "error": QueueModel.error_px,
-    "error_percent": QueueModel.error_percent,
-    "sigma": QueueModel.sigma_m,
-    "parallax": QueueModel.parallax_degrees,
-    "ratio": QueueModel.size_ratio,
-    "size_ratio": QueueModel.size_ratio,
-    "height": QueueModel.height_m,
-    "distance": QueueModel.distance_m,
-    "box": QueueModel.box_px,
-    "x": QueueModel.x_m,
-    "y": QueueModel.y_m,
-    "margin": QueueModel.margin,
-    "value": QueueModel.value,
-    "views": QueueModel.views,
-    "number": QueueModel.number,
+NUMBERS = {
+    "jac": "min_jac",
+    "jac05": "min_jac",
+    "error": "error_px",
+    "error_percent": "error_percent",
+    "sigma": "sigma_m",
+    "parallax": "parallax_degrees",
+    "ratio": "size_ratio",
+    "size_ratio": "size_ratio",
+    "height": "height_m",
+    "distance": "distance_m",
+    "box": "box_px",
+    "x": "x_m",
+    "y": "y_m",
+    "margin": "margin",
+    "value": "value",
+    "views": "views",
+    "number": "number",
 }
-"""Fields that compare with < <= > >= = and with :, which is =; ``none`` is where there is no
-number."""
+"""Fields that compare with < <= > >= = and with :, which is =, by the column that they mean;
+``none`` is where there is no number."""
 
 STATUSES = ("unreviewed", "accepted", "rejected", "deferred")
-FLAGS: dict[str, InstrumentedAttribute[Any]] = {
-    "stale": QueueModel.stale,
-    "solved": QueueModel.solved,
-    "passes": QueueModel.passes,
-    "fixed": QueueModel.fixed,
-}
+FLAGS = ("stale", "solved", "passes", "fixed")
 """Fields that are ``yes`` or ``no``."""
-EXACT: dict[str, InstrumentedAttribute[Any]] = {
-    "split": QueueModel.split,
-    "key": QueueModel.key,
-    "reviewer": QueueModel.reviewer,
-    "reason": QueueModel.reason,
-    "override": QueueModel.override,
-}
+EXACT = ("split", "key", "reviewer", "reason", "override")
 """Fields whose whole text must be the same; ``none`` is where there is none, ``any`` where there
 is one."""
 
-SORTS: dict[str, ColumnElement[Any]] = {
-    "number": QueueModel.number.expression,
-    "value": QueueModel.value.expression,
-    "sigma": QueueModel.sigma_m.expression,
-    "jac": QueueModel.min_jac.expression,
-    "error": QueueModel.error_px.expression,
-    "error_percent": QueueModel.error_percent.expression,
-    "parallax": QueueModel.parallax_degrees.expression,
-    "margin": QueueModel.margin.expression,
-    "ratio": QueueModel.size_ratio.expression,
-    "height": QueueModel.height_m.expression,
-    "distance": QueueModel.distance_m.expression,
-    "box": QueueModel.box_px.expression,
-    "x": QueueModel.x_m.expression,
-    "y": QueueModel.y_m.expression,
-    "views": QueueModel.views.expression,
-    "findings": func.length(QueueModel.findings)
-    - func.length(func.replace(QueueModel.findings, ",", "")),
-    "gate": case(
-        {name: place for place, name in enumerate(GATES)}, value=QueueModel.gate, else_=None
-    ),
-    "status": QueueModel.status.expression,
-    "split": QueueModel.split.expression,
-    "reviewer": QueueModel.reviewer.expression,
-    "label": QueueModel.label.expression,
-    "newest": QueueModel.changed.expression,
+SORTS = {
+    "number": "number",
+    "value": "value",
+    "sigma": "sigma_m",
+    "jac": "min_jac",
+    "error": "error_px",
+    "error_percent": "error_percent",
+    "parallax": "parallax_degrees",
+    "margin": "margin",
+    "ratio": "size_ratio",
+    "height": "height_m",
+    "distance": "distance_m",
+    "box": "box_px",
+    "x": "x_m",
+    "y": "y_m",
+    "views": "views",
+    "findings": "findings",
+    "gate": "gate",
+    "status": "status",
+    "split": "split",
+    "reviewer": "reviewer",
+    "label": "label",
+    "newest": "changed",
 }
-"""What the queue can be sorted by; ``findings`` by how many kinds there are, ``gate`` by the
-order in which gates are judged."""
-TEXT_SORTS = frozenset({"status", "split", "reviewer", "label", "newest"})
-"""Sorts whose keys are texts."""
+"""What the queue can be sorted by, and the column of it."""
 
 _TERM = re.compile(
     r"""\s*(?P<minus>-)?
@@ -115,11 +107,17 @@ _TERM = re.compile(
 
 @dataclass(frozen=True)
 class Query:
-    """A parsed query: conditions on ``QueueModel``, and a sort."""
+    """A parsed query: conditions that must all hold, and a sort."""
 
-    conditions: tuple[ColumnElement[bool], ...] = field(default=())
+    conditions: tuple[Condition, ...] = field(default=())
     sort: str = "number"
     descending: bool = False
+
+    @property
+    def order(self) -> Order:
+        """The order in which it lists groups."""
+        # "newest" says the direction itself.
+        return Order(SORTS[self.sort], self.descending != (self.sort == "newest"))
 
 
 @dataclass(frozen=True)
@@ -140,14 +138,14 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
     Raises:
         InputError: With a pointer ``/q/<position>`` to the term that cannot be understood.
     """
-    conditions: list[ColumnElement[bool]] = []
+    conditions: list[Condition] = []
     sort, descending = "number", False
     for negative, term in _terms(text, longest):
         if term.field == "sort":
             sort, descending = _sort(term)
         else:
             condition = _condition(term)
-            conditions.append(not_(condition) if negative else condition)
+            conditions.append(opposite(condition) if negative else condition)
     return Query(tuple(conditions), sort, descending)
 
 
@@ -181,7 +179,7 @@ def _sort(term: _Term) -> tuple[str, bool]:
     return name, term.value.endswith("-desc")
 
 
-def _condition(term: _Term) -> ColumnElement[bool]:
+def _condition(term: _Term) -> Condition:
     if term.field in NUMBERS:
         return _number(term)
     if term.op not in (":", "="):
@@ -191,7 +189,7 @@ def _condition(term: _Term) -> ColumnElement[bool]:
     if term.field == "id":
         return _listed_groups(term)
     if term.field in FLAGS:
-        return FLAGS[term.field].is_(_choice(term, term.value, ("yes", "no")) == "yes")
+        return is_flag(term.field, _choice(term, term.value, ("yes", "no")) == "yes")
     test = _TESTS.get(term.field)
     if test is None:
         fields = sorted({*NUMBERS, *FLAGS, *_TESTS, "id", "sort"} - {""})
@@ -202,14 +200,11 @@ def _condition(term: _Term) -> ColumnElement[bool]:
         )
     # A bare word may hold commas; a field's value is a list of choices.
     values = [term.value] if term.field == "" else term.value.split(",")
-    return or_(*(test(term, value) for value in values))
+    return either(test(term, value) for value in values)
 
 
-def _listed_groups(term: _Term) -> ColumnElement[bool]:
-    ids = [_id(term, text) for text in term.value.split(",")]
-    # One parameter, however many there are: a statement takes a limited number of them.
-    listed = func.json_each(json_text(ids)).table_valued("value")
-    return QueueModel.group_id.in_(select(listed.c.value))
+def _listed_groups(term: _Term) -> Condition:
+    return is_one_of(_id(term, text) for text in term.value.split(","))
 
 
 def _id(term: _Term, text: str) -> int:
@@ -223,10 +218,10 @@ def _id(term: _Term, text: str) -> int:
     return int(text)
 
 
-def _number(term: _Term) -> ColumnElement[bool]:
+def _number(term: _Term) -> Condition:
     column = NUMBERS[term.field]
     if term.value == "none":
-        return column.is_(None)
+        return is_absent(column)
     try:
         value = float(term.value)
     except ValueError:
@@ -237,15 +232,7 @@ def _number(term: _Term) -> ColumnElement[bool]:
             hint=f"For example {term.field}<1.5, or {term.field}:none.",
             pointer=term.pointer,
         )
-    compared: dict[str, ColumnElement[bool]] = {
-        "<": column < value,
-        "<=": column <= value,
-        ">": column > value,
-        ">=": column >= value,
-        "=": column == value,
-        ":": column == value,
-    }
-    return compared[term.op]
+    return compares(column, "=" if term.op == ":" else term.op, value)
 
 
 def _choice(term: _Term, value: str, choices: tuple[str, ...]) -> str:
@@ -258,64 +245,56 @@ def _choice(term: _Term, value: str, choices: tuple[str, ...]) -> str:
     return value
 
 
-def _listed(column: InstrumentedAttribute[str], value: str) -> ColumnElement[bool]:
-    return column.contains(f",{value},", autoescape=True)
+def _status(term: _Term, value: str) -> Condition:
+    return compares("status", "=", _choice(term, value, STATUSES))
 
 
-def _status(term: _Term, value: str) -> ColumnElement[bool]:
-    return QueueModel.status == _choice(term, value, STATUSES)
-
-
-def _finding(term: _Term, value: str) -> ColumnElement[bool]:
+def _finding(term: _Term, value: str) -> Condition:
     if value in ("any", "none"):
-        return QueueModel.findings != "" if value == "any" else QueueModel.findings == ""
-    return _listed(QueueModel.findings, _choice(term, value, FINDING_KINDS))
+        return compares("findings", "=" if value == "none" else ">", "")
+    return lists("findings", _choice(term, value, FINDING_KINDS))
 
 
-def _gate(term: _Term, value: str) -> ColumnElement[bool]:
+def _gate(term: _Term, value: str) -> Condition:
     """The first failing gate; ``none`` for groups that pass, ``unsolved`` for neither."""
     if value == "unsolved":
-        return QueueModel.solved.is_(False)
+        return is_flag("solved", False)
     if value == "none":
-        return QueueModel.passes.is_(True)
-    return QueueModel.gate == _choice(term, value, GATES)
+        return is_flag("passes", True)
+    return compares("gate", "=", _choice(term, value, GATES))
 
 
-def _pictures(term: _Term, value: str) -> ColumnElement[bool]:
+def _pictures(term: _Term, value: str) -> Condition:
     """Whether views have a picture: ``none`` of them, ``any``, or ``all``."""
     choice = _choice(term, value, ("none", "any", "all"))
     if choice == "all":
-        return QueueModel.pictures >= QueueModel.views
-    return QueueModel.pictures == 0 if choice == "none" else QueueModel.pictures > 0
+        return has_all_pictures()
+    return compares("pictures", "=" if choice == "none" else ">", 0)
 
 
-def _view(_term: _Term, value: str) -> ColumnElement[bool]:
+def _view(_term: _Term, value: str) -> Condition:
     """A view's key (``cam3``, ``7_1.png``), or how many views there are."""
     if value.isascii() and value.isdigit():
-        return QueueModel.views == int(value[:9])
-    return _listed(QueueModel.view_keys, value)
+        return compares("views", "=", int(value[:9]))
+    return lists("view_keys", value)
 
 
-def _match(_term: _Term, value: str) -> ColumnElement[bool]:
-    return QueueModel.match.contains(value, autoescape=True)
+def _match(_term: _Term, value: str) -> Condition:
+    return contains("match", value)
 
 
-def _text(_term: _Term, value: str) -> ColumnElement[bool]:
-    return or_(
-        QueueModel.label.contains(value, autoescape=True),
-        QueueModel.key.contains(value, autoescape=True),
-    )
+def _text(_term: _Term, value: str) -> Condition:
+    return either((contains("label", value), contains("key", value)))
 
 
-def _exact(term: _Term, value: str) -> ColumnElement[bool]:
-    column = EXACT[term.field]
+def _exact(term: _Term, value: str) -> Condition:
     if value in ("any", "none"):
-        missing = or_(column.is_(None), column == "")
-        return missing if value == "none" else not_(missing)
-    return and_(column.is_not(None), column == value)
+        missing = is_empty(term.field)
+        return missing if value == "none" else opposite(missing)
+    return is_text(term.field, value)
 
 
-_TESTS: dict[str, Callable[[_Term, str], ColumnElement[bool]]] = {
+_TESTS: dict[str, Callable[[_Term, str], Condition]] = {
     "status": _status,
     "finding": _finding,
     "gate": _gate,

@@ -5,17 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import delete, func, insert, select
-from sqlalchemy.orm import Session
-
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.queue.query import parse_query
 from app.store.answers import Keep, keep_nothing
-from app.store.clock import now
-from app.store.group_rows import next_id
-from app.store.models import QueueModel
-from app.store.session import Store
-from app.store.view_models import SavedViewModel
+from app.store.listing import count_groups
+from app.store.saved_views import (
+    dataset_saved_views,
+    delete_saved_view,
+    find_saved_view,
+    insert_saved_view,
+    saved_view_names,
+)
+from app.store.session import Session, Store
 
 MAX_NAME = 80
 MAX_VIEWS = 200
@@ -36,10 +37,8 @@ class SavedView:
 
 def list_saved_views(store: Store, dataset_id: int) -> list[SavedView]:
     """The saved views of a dataset, by name, each with the number of groups that match."""
-    model = SavedViewModel
-    statement = select(*model.__table__.columns).where(model.dataset_id == dataset_id)
     with store.read() as session:
-        rows = session.execute(statement.order_by(model.name)).all()
+        rows = dataset_saved_views(session, dataset_id)
         return [_saved_view(row, _matching(session, row)) for row in rows]
 
 
@@ -60,18 +59,15 @@ def save_view(
     """
     name = _checked(name)
     parse_query(query)
-    values = {"dataset_id": dataset_id, "name": name, "query": query.strip(), "actor": actor}
     with store.write() as session:
-        mine = SavedViewModel.dataset_id == dataset_id
-        if session.scalar(select(SavedViewModel.id).where(mine, SavedViewModel.name == name)):
+        names = saved_view_names(session, dataset_id)
+        if name in names:
             raise ConflictError(
                 f'there is a view "{name}" already', hint="Delete it, or choose another name."
             )
-        count = session.scalar(select(func.count()).select_from(SavedViewModel).where(mine))
-        if (count or 0) >= MAX_VIEWS:
+        if len(names) >= MAX_VIEWS:
             raise ConflictError(f"a dataset has at most {MAX_VIEWS} saved views")
-        identity = next_id(session, SavedViewModel)
-        session.execute(insert(SavedViewModel), [{**values, "id": identity, "created": now()}])
+        identity = insert_saved_view(session, dataset_id, name, query.strip(), actor=actor)
         saved = _read(session, identity)
         keep(saved)(session)
     return saved
@@ -91,14 +87,13 @@ def delete_view(store: Store, view_id: int, *, keep: Keep[SavedView] = keep_noth
     """
     with store.write() as session:
         view = _read(session, view_id)
-        session.execute(delete(SavedViewModel).where(SavedViewModel.id == view_id))
+        delete_saved_view(session, view_id)
         keep(view)(session)
     return view
 
 
 def _read(session: Session, view_id: int) -> SavedView:
-    statement = select(*SavedViewModel.__table__.columns).where(SavedViewModel.id == view_id)
-    row = session.execute(statement).one_or_none()
+    row = find_saved_view(session, view_id)
     if row is None:
         raise NotFoundError(f"there is no saved view {view_id}")
     return _saved_view(row, _matching(session, row))
@@ -117,8 +112,7 @@ def _matching(session: Session, row: Any) -> int:
         conditions = parse_query(row.query).conditions
     except InputError:
         return 0
-    where = [QueueModel.dataset_id == row.dataset_id, *conditions]
-    return session.scalar(select(func.count()).select_from(QueueModel).where(*where)) or 0
+    return count_groups(session, row.dataset_id, conditions)
 
 
 def _saved_view(row: Any, groups: int) -> SavedView:

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from sqlalchemy import select
-from sqlalchemy.orm import InstrumentedAttribute
 
 from app.geometry.arrays import FloatArray, IntArray
 from app.review.queue.bins import ERROR_PERCENT, SIGMA_M, even, places
-from app.review.queue.query import parse_query
-from app.store.models import QueueModel
+from app.review.queue.query import NUMBERS, parse_query
+from app.store.listing import read_columns
 from app.store.session import Store
 
 
@@ -30,7 +28,6 @@ class Measure:
     label: str
     unit: str
     field: str
-    column: InstrumentedAttribute[Any]
     edges: tuple[float, ...]
     open_low: bool = False
     open_high: bool = True
@@ -88,37 +85,17 @@ class Statistics:
 
 
 MEASURES = (
+    Measure("distance", "Camera to ball", "m", "distance", even(0, 120, 24)),
+    Measure("parallax", "Parallax", "°", "parallax", even(0, 180, 36), open_high=False),
+    Measure("sigma", "Uncertainty", "m", "sigma", SIGMA_M, log=True),
+    Measure("box", "Ball diameter in the image", "px", "box", even(0, 40, 20)),
+    Measure("size_ratio", "Annotated over expected size", "", "ratio", even(0, 3, 30)),
+    Measure("height", "Height above the grass", "m", "height", even(-1, 11, 24), open_low=True),
     Measure(
-        "distance", "Camera to ball", "m", "distance", QueueModel.distance_m, even(0, 120, 24)
+        "error", "Reprojection error", "% of the diagonal", "error_percent", ERROR_PERCENT, log=True
     ),
-    Measure(
-        "parallax",
-        "Parallax",
-        "°",
-        "parallax",
-        QueueModel.parallax_degrees,
-        even(0, 180, 36),
-        open_high=False,
-    ),
-    Measure("sigma", "Uncertainty", "m", "sigma", QueueModel.sigma_m, SIGMA_M, log=True),
-    Measure("box", "Ball diameter in the image", "px", "box", QueueModel.box_px, even(0, 40, 20)),
-    Measure(
-        "size_ratio", "Annotated over expected size", "", "ratio", QueueModel.size_ratio,
-        even(0, 3, 30),
-    ),
-    Measure(
-        "height", "Height above the grass", "m", "height", QueueModel.height_m, even(-1, 11, 24),
-        open_low=True,
-    ),
-    Measure(
-        "error", "Reprojection error", "% of the diagonal", "error_percent",
-        QueueModel.error_percent, ERROR_PERCENT, log=True,
-    ),
-    Measure(
-        "jac", "Lowest JaC of the views", "", "jac", QueueModel.min_jac, even(0, 1, 20),
-        open_high=False,
-    ),
-)  # fmt: skip
+    Measure("jac", "Lowest JaC of the views", "", "jac", even(0, 1, 20), open_high=False),
+)
 
 X_EDGES = even(-60, 60, 24)
 Y_EDGES = even(-40, 40, 16)
@@ -131,20 +108,13 @@ def statistics(store: Store, dataset_id: int, query: str = "") -> Statistics:
     Raises:
         InputError: The query cannot be understood.
     """
-    columns = [measure.column for measure in MEASURES]
-    statement = select(
-        QueueModel.split,
-        QueueModel.match,
-        QueueModel.passes,
-        QueueModel.status,
-        QueueModel.x_m,
-        QueueModel.y_m,
-        *columns,
-    ).where(QueueModel.dataset_id == dataset_id, *parse_query(query).conditions)
+    columns = ("split", "match", "passes", "status", "x_m", "y_m")
+    measured = (NUMBERS[measure.field] for measure in MEASURES)
+    conditions = parse_query(query).conditions
     with store.read() as session:
-        rows = session.execute(statement).all()
-    found: list[tuple[Any, ...]] = list(zip(*rows, strict=True)) or [()] * (6 + len(MEASURES))
-    split, match, passes, status, *numbers = found
+        rows = read_columns(session, dataset_id, conditions, (*columns, *measured))
+    nothing: list[tuple[Any, ...]] = [()] * (len(columns) + len(MEASURES))
+    split, match, passes, status, *numbers = list(zip(*rows, strict=True)) or nothing
     x, y, *values = (np.array(column, float) for column in numbers)
     splits = sorted(set(split))
     of_split = np.array([splits.index(name) for name in split], np.int64)

@@ -6,10 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import select
-
 from app.review.queue.query import parse_query
-from app.store.models import QueueModel
+from app.store.conditions import compares
+from app.store.listing import read_columns
 from app.store.session import Store
 
 _FRAME_DIGITS = 12
@@ -56,12 +55,11 @@ def read_timeline(
     Raises:
         InputError: The query cannot be understood.
     """
-    where = [QueueModel.dataset_id == dataset_id, *parse_query(query).conditions]
+    conditions = list(parse_query(query).conditions)
     if match is not None:
-        where.append(QueueModel.match == match)
-    statement = select(*_SOURCES).where(*where).order_by(QueueModel.number)
+        conditions.append(compares("match", "=", match))
     with store.read() as session:
-        rows = session.execute(statement).all()
+        rows = read_columns(session, dataset_id, conditions, _SOURCES, by_number=True)
     timeline = Timeline()
     for name, value in _COLUMNS.items():
         getattr(timeline, name).extend(map(value, rows))
@@ -79,18 +77,18 @@ def _point(row: Any) -> tuple[float, float, float] | None:
 
 
 _SOURCES = (
-    QueueModel.group_id,
-    QueueModel.number,
-    QueueModel.key,
-    QueueModel.error_px,
-    QueueModel.passes,
-    QueueModel.gate,
-    QueueModel.status,
-    QueueModel.stale,
-    QueueModel.sigma_m,
-    QueueModel.x_m,
-    QueueModel.y_m,
-    QueueModel.height_m,
+    "group_id",
+    "number",
+    "key",
+    "error_px",
+    "passes",
+    "gate",
+    "status",
+    "stale",
+    "sigma_m",
+    "x_m",
+    "y_m",
+    "height_m",
 )
 _COLUMNS: dict[str, Callable[[Any], Any]] = {
     "id": lambda row: row.group_id,

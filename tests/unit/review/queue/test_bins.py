@@ -9,6 +9,7 @@ from sqlalchemy import update
 from app.review.queue.bins import ERROR_PERCENT, SIGMA_M, decades, places
 from app.review.queue.listing import list_groups
 from app.review.queue.progress import COLUMNS, summary
+from app.review.queue.query import NUMBERS
 from app.review.queue.statistics import MEASURES
 from app.store.models import QueueModel
 
@@ -72,7 +73,7 @@ def test_the_range_of_each_bar_of_the_queue_finds_exactly_its_groups(
     with store.write() as session:
         for group, value in zip(ids, values, strict=True):
             statement = update(QueueModel).where(QueueModel.group_id == group)
-            session.execute(statement.values({COLUMNS[name].column.key: value}))
+            session.execute(statement.values({NUMBERS[name]: value}))
     found = summary(store, 1).histograms[name]
     edges = found.column.edges
     assert sum(found.counts) == len(values) - 1

@@ -14,14 +14,14 @@ from app.review.policies.policy import change_policy
 from app.review.queue import changes as module
 from app.review.queue.changes import (
     Change,
-    newest_entry,
-    newest_solution,
     read_changes,
     read_solved,
 )
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.policy import STRICT
+from app.store.log import newest_entry
 from app.store.session import Store
+from app.store.solutions import newest_solution
 
 
 def since(store: Store, after: int) -> list[Change]:

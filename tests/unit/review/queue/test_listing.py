@@ -119,7 +119,7 @@ def sorted_by(row: GroupRow, name: str) -> Any:
         return len(row.findings) + bool(row.findings)
     if name == "gate":
         return None if row.gate is None else GATES.index(row.gate)
-    return getattr(row, SORTS[name].key)
+    return getattr(row, SORTS[name])
 
 
 SORTED = [f"sort:{name}{end}" for name in SORTS for end in ("", "-desc")]

@@ -6,6 +6,7 @@ from sqlalchemy import update
 from app.errors import InputError
 from app.review.importing.ingest import ensure_dataset
 from app.review.queue.listing import list_groups
+from app.review.queue.query import NUMBERS
 from app.review.queue.statistics import MEASURES, X_EDGES, Y_EDGES, statistics
 from app.store.models import QueueModel
 from app.store.session import Store
@@ -16,7 +17,7 @@ def spread(store: Store, fill, make_group) -> Store:
     """Twelve groups with numbers on every kind of edge, in two splits; one has none."""
     ids = fill(*(make_group(n, split="train" if n % 2 else "test") for n in range(1, 13)))
     values = [None, -5.0, 0.0, 0.05, 0.1, 0.75, 1.0, 2.0, 40.0, 120.0, 180.0, 1e9]
-    names = [measure.column.key for measure in MEASURES]
+    names = [NUMBERS[measure.field] for measure in MEASURES]
     with store.write() as session:
         for group, value in zip(ids, values, strict=True):
             numbers = dict.fromkeys(names, value)

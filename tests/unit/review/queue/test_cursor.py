@@ -6,8 +6,8 @@ import json
 import pytest
 
 from app.errors import InputError
-from app.review.queue.order import Order
-from app.review.queue.query import parse_query
+from app.review.queue.cursor import decode
+from app.review.queue.query import Query, parse_query
 
 
 def cursor(*values: object) -> str:
@@ -15,18 +15,18 @@ def cursor(*values: object) -> str:
 
 
 @pytest.fixture
-def order() -> Order:
-    return Order(parse_query("sort:jac"))
+def query() -> Query:
+    return parse_query("sort:jac")
 
 
 class TestDecode:
-    def test_takes_the_keys_of_its_own_cursors(self, order: Order) -> None:
-        assert order.decode(cursor("jac", 0, 0.75, 3)) == [0, 0.75, 3]
+    def test_takes_the_keys_of_its_own_cursors(self, query: Query) -> None:
+        assert decode(query, cursor("jac", 0, 0.75, 3)) == [0, 0.75, 3]
 
     @pytest.mark.parametrize(
         "key", [float("inf"), float("-inf"), float("nan"), 1e300, 2**64, None, [1], {"a": 1}]
     )
-    def test_a_cursor_with_an_impossible_key_is_refused(self, order: Order, key: object) -> None:
+    def test_a_cursor_with_an_impossible_key_is_refused(self, query: Query, key: object) -> None:
         with pytest.raises(InputError, match="came from another query") as caught:
-            order.decode(cursor("jac", 0, key, 3))
+            decode(query, cursor("jac", 0, key, 3))
         assert caught.value.pointer == "/cursor"

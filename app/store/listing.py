@@ -1,0 +1,149 @@
+"""Listing: the groups of a dataset that fulfil conditions, counted, read and put in order.
+
+Every question takes the dataset's id and conditions that all must hold (``store.conditions``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from sqlalchemy import ColumnElement, Integer, Select, cast, func, select
+from sqlalchemy.orm import Session
+
+from app.store.conditions import Condition
+from app.store.models import QueueModel
+from app.store.order import Key, Order
+
+
+def count_groups(session: Session, dataset_id: int, conditions: Iterable[Condition] = ()) -> int:
+    """How many groups there are."""
+    statement = select(func.count()).select_from(QueueModel).where(*_where(dataset_id, conditions))
+    return session.scalar(statement) or 0
+
+
+def read_columns(
+    session: Session,
+    dataset_id: int,
+    conditions: Iterable[Condition],
+    names: Iterable[str],
+    *,
+    by_number: bool = False,
+) -> Sequence[Any]:
+    """Some columns of each group."""
+    statement = _columns(names).where(*_where(dataset_id, conditions))
+    return session.execute(statement.order_by(QueueModel.number) if by_number else statement).all()
+
+
+def read_columns_of(
+    session: Session, ids: Sequence[int], conditions: Iterable[Condition], names: Iterable[str]
+) -> Sequence[Any]:
+    """Some columns of those among some groups of one dataset that fulfil conditions, by number."""
+    # The dataset is not asked for: SQLite would look through all of it.
+    statement = _columns(names).where(QueueModel.group_id.in_(ids), *conditions)
+    return session.execute(statement.order_by(QueueModel.number)).all()
+
+
+def read_rows_after(
+    session: Session,
+    dataset_id: int,
+    conditions: Iterable[Condition],
+    order: Order,
+    keys: Sequence[Key] | None,
+    limit: int,
+) -> Sequence[Any]:
+    """Rows in order with their keys, from the one after these keys on, or from the first."""
+    where = _where(dataset_id, conditions)
+    if keys is not None:
+        where.append(order.after(keys))
+    return session.execute(_rows(order).where(*where).limit(limit)).all()
+
+
+def read_rows_of(session: Session, ids: Sequence[int], order: Order) -> Sequence[Any]:
+    """The rows of groups in order, with their keys."""
+    return session.execute(_rows(order).where(QueueModel.group_id.in_(ids))).all()
+
+
+def ids_in_order(
+    session: Session,
+    dataset_id: int,
+    conditions: Iterable[Condition],
+    order: Order,
+    limit: int | None = None,
+) -> list[int]:
+    """Ids of the groups in order, of all or of the first."""
+    statement = select(QueueModel.group_id).where(*_where(dataset_id, conditions))
+    return list(session.scalars(statement.order_by(*order.ascending).limit(limit)))
+
+
+def ids_from(
+    session: Session,
+    dataset_id: int,
+    conditions: Iterable[Condition],
+    order: Order,
+    start: int,
+    limit: int,
+    total: int,
+) -> list[int]:
+    """Ids from a position on, in order, out of ``total``.
+
+    SQLite sorts as many rows as it skips and reads, and wide rows cost it several times as much:
+    hence ids alone, and behind the middle from the end.
+    """
+    count = min(limit, total - start)
+    if count <= 0:
+        return []
+    behind = total - start - count
+    ids = select(QueueModel.group_id).where(*_where(dataset_id, conditions)).limit(count)
+    if start <= behind:
+        return list(session.scalars(ids.order_by(*order.ascending).offset(start)))
+    return list(session.scalars(ids.order_by(*order.backwards).offset(behind)))[::-1]
+
+
+def ids_around(
+    session: Session,
+    dataset_id: int,
+    conditions: Iterable[Condition],
+    order: Order,
+    keys: Sequence[Key],
+    limit: int,
+) -> tuple[list[int], list[int]]:
+    """Ids of the groups just before some keys and just after, the nearest first."""
+    ids = select(QueueModel.group_id).where(*_where(dataset_id, conditions)).limit(limit)
+    before = ids.where(order.before(keys)).order_by(*order.backwards)
+    after = ids.where(order.after(keys)).order_by(*order.ascending)
+    return list(session.scalars(before)), list(session.scalars(after))
+
+
+def find_place(session: Session, group_id: int, order: Order) -> tuple[int, list[Key]] | None:
+    """The dataset of a group and its keys in an order; None where there is no such group."""
+    statement = select(QueueModel.dataset_id, *order.keys).where(QueueModel.group_id == group_id)
+    row = session.execute(statement).one_or_none()
+    return None if row is None else (row.dataset_id, order.keys_of(row))
+
+
+def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[Any]:
+    """Rows (dataset_id, status, groups, solved): how many groups there are, and have a solution."""
+    statement = (
+        select(
+            QueueModel.dataset_id,
+            QueueModel.status,
+            func.count().label("groups"),
+            func.sum(cast(QueueModel.solved, Integer)).label("solved"),
+        )
+        .where(QueueModel.dataset_id.in_(dataset_ids))
+        .group_by(QueueModel.dataset_id, QueueModel.status)
+    )
+    return session.execute(statement).all()
+
+
+def _columns(names: Iterable[str]) -> Select[Any]:
+    return select(*(getattr(QueueModel, name) for name in names))
+
+
+def _rows(order: Order) -> Select[Any]:
+    return select(*QueueModel.__table__.columns, *order.keys).order_by(*order.ascending)
+
+
+def _where(dataset_id: int, conditions: Iterable[Condition]) -> list[ColumnElement[bool]]:
+    return [QueueModel.dataset_id == dataset_id, *conditions]
