@@ -8,11 +8,11 @@ from typing import Annotated, Generic, TypeVar
 
 from fastapi import Depends, Request
 from pydantic import BaseModel
-from sqlalchemy.orm import Session
 from starlette.responses import Response
 
 from app.errors import ConflictError
 from app.store.answers import Answer, Kept, keep_answer
+from app.store.session import Session
 
 T = TypeVar("T")
 

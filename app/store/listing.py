@@ -137,6 +137,16 @@ def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[Any]:
     return session.execute(statement).all()
 
 
+def count_reviewed(session: Session, dataset_id: int) -> dict[tuple[str | None, str], int]:
+    """How many groups have a verdict that counts, by who gave it and their status."""
+    statement = (
+        select(QueueModel.reviewer, QueueModel.status, func.count())
+        .where(QueueModel.dataset_id == dataset_id, QueueModel.reviewer.is_not(None))
+        .group_by(QueueModel.reviewer, QueueModel.status)
+    )
+    return {(name, status): count for name, status, count in session.execute(statement)}
+
+
 def _columns(names: Iterable[str]) -> Select[Any]:
     return select(*(getattr(QueueModel, name) for name in names))
 

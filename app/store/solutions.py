@@ -208,6 +208,16 @@ def known_calibrations(session: Session, keys: Iterable[str]) -> set[str]:
     return set(session.scalars(statement))
 
 
+def present_keys(session: Session, group_ids: Sequence[int]) -> dict[int, SolutionKey]:
+    """Key of the solution that fits each group as it is, whether there is one or not."""
+    statement = (
+        select(GroupModel.id, GroupModel.inputs_hash, DatasetModel.policy_hash)
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .where(GroupModel.id.in_(group_ids))
+    )
+    return {row.id: SolutionKey(*row) for row in session.execute(statement)}
+
+
 def present_bodies(session: Session, ids: Sequence[int], policy_hash: str) -> dict[int, bytes]:
     """Encoded solutions that fit the groups as they are, by the group's id."""
     statement = (

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from sqlalchemy import bindparam, insert, select
+from sqlalchemy import bindparam, case, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.store.group_rows import next_id
 from app.store.log import Entry, append
-from app.store.models import VerdictModel
+from app.store.models import GroupModel, VerdictModel
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,46 @@ def judged_between(session: Session, first: int, last: int) -> list[int]:
     """Ids of the groups that the verdicts of a range of ids judge."""
     statement = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
     return list(session.scalars(statement.order_by(VerdictModel.id)))
+
+
+def newest_between(session: Session, first: int, last: int) -> list[int]:
+    """Ids of the groups whose newest verdict is one of a range of ids."""
+    judged = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
+    newest = func.max(VerdictModel.id)
+    statement = (
+        select(VerdictModel.group_id)
+        .where(VerdictModel.group_id.in_(judged))
+        .group_by(VerdictModel.group_id)
+        .having(newest.between(first, last))
+    )
+    return list(session.scalars(statement))
+
+
+def inputs_judged(
+    session: Session, first: int, last: int, group_ids: Sequence[int]
+) -> dict[int, str]:
+    """Inputs hash that the verdicts of a range of ids judged, by the group's id."""
+    statement = select(VerdictModel.group_id, VerdictModel.inputs_hash).where(
+        VerdictModel.id.between(first, last), VerdictModel.group_id.in_(group_ids)
+    )
+    return {row.group_id: row.inputs_hash for row in session.execute(statement)}
+
+
+def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[Any]:
+    """Rows (actor, last, groups): everybody who judged a group of a dataset, when for the last
+    time, and how many groups since some time."""
+    recent = case((VerdictModel.at >= since, VerdictModel.group_id))
+    statement = (
+        select(
+            VerdictModel.actor,
+            func.max(VerdictModel.at).label("last"),
+            func.count(recent.distinct()).label("groups"),
+        )
+        .join(GroupModel, GroupModel.id == VerdictModel.group_id)
+        .where(GroupModel.dataset_id == dataset_id)
+        .group_by(VerdictModel.actor)
+    )
+    return session.execute(statement).all()
 
 
 def next_verdict_id(session: Session) -> int:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import ColumnElement, Integer, cast, func, insert, select, update
-from sqlalchemy.orm import Session
 
 from app.errors import InputError, NotFoundError
 from app.soccer.policy import Policy
@@ -19,7 +18,7 @@ from app.store.group_rows import next_id
 from app.store.log import Entry, append
 from app.store.models import DatasetModel, GroupModel, QueueModel
 from app.store.queue import refresh_queue
-from app.store.session import Store
+from app.store.session import Session, Store
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
 

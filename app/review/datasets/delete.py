@@ -22,7 +22,6 @@ from sqlalchemy import (
     text,
     true,
 )
-from sqlalchemy.orm import Session
 
 from app.errors import ConflictError
 from app.review.datasets.dataset import dataset_id, read_dataset
@@ -36,7 +35,7 @@ from app.store.models import (
     StationModel,
     VerdictModel,
 )
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.tables import Base
 from app.store.view_models import UsedIdModel
 

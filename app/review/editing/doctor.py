@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import func, select, text
-from sqlalchemy.orm import Session
 
 from app.errors import StorageError
 from app.review.datasets.dataset import list_datasets
@@ -15,7 +14,7 @@ from app.review.editing.ledger import Ledger, read_ledger
 from app.review.editing.recompute import stale_groups
 from app.review.editing.replay import replay
 from app.store.models import LogModel
-from app.store.session import Store
+from app.store.session import Session, Store
 
 REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
 RESTORE = "Restore the database from a backup."

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from sqlalchemy import bindparam, func, select
-from sqlalchemy.orm import Session
 
 from app.errors import NotFoundError, StaleRevisionError
 from app.soccer.solution import SOLVER_VERSION
@@ -15,6 +14,7 @@ from app.store.codecs import parse
 from app.store.digest import digest
 from app.store.models import DatasetModel, GroupModel, SolutionModel, VerdictModel
 from app.store.queue import import_findings
+from app.store.session import Session
 from app.store.solutions import is_current
 
 _NEWEST = (

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from sqlalchemy.orm import Session
-
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibration_key
+from app.store.session import Session
 from app.store.solutions import read_calibrations
 
 

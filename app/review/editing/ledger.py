@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session
 
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
@@ -26,6 +25,7 @@ from app.store.models import (
     StationModel,
     VerdictModel,
 )
+from app.store.session import Session
 
 _BATCH = 500
 _ELSEWHERE = Station("", ImageSize(0, 0))

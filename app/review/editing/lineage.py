@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
 
 from app.review.editing.ledger import Ledger, StationRecord
 from app.review.editing.replay import apply_entry
@@ -28,6 +27,7 @@ from app.store.digest import digest, station_digest, view_digest
 from app.store.groups import StoredGroup, StoredStation, stored_station
 from app.store.log import LogEntry, read_log
 from app.store.models import LogModel, StationModel
+from app.store.session import Session
 
 
 @dataclass(frozen=True)

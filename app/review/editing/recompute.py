@@ -10,7 +10,6 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session
 
 from app.progress import Progress
 from app.review.datasets.dataset import Dataset, get_dataset, need_dataset, read_dataset
@@ -27,7 +26,7 @@ from app.store.codecs import group_from_json, group_to_json, pack, unpack
 from app.store.groups import read_groups, read_stations
 from app.store.models import GroupModel, StationModel, ViewModel
 from app.store.queue import refresh_queue
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.solutions import (
     EncodedSolution,
     SolutionKey,

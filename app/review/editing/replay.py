@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 from sqlalchemy import delete, insert, text
-from sqlalchemy.orm import Session
 
 from app.review.editing.codec import edit_from_json, station_edit_from_json
 from app.review.editing.ledger import (
@@ -42,7 +41,7 @@ from app.store.models import (
     ViewModel,
 )
 from app.store.queue import refresh_queue
-from app.store.session import Store
+from app.store.session import Session, Store
 
 
 def replay(session: Session) -> Ledger:

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from sqlalchemy import delete, insert, select
-from sqlalchemy.orm import Session
 
 from app.review.editing.upstream import KIND, FollowedStation, follow_station
 from app.soccer.group import Station
@@ -24,6 +23,7 @@ from app.store.groups import (
 from app.store.log import Entry, append, read_log
 from app.store.models import ImportFindingModel, LogModel, StationModel
 from app.store.queue import refresh_queue
+from app.store.session import Session
 
 
 class SharedStations:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from sqlalchemy.orm import Session
-
 from app.errors import NotFoundError, StaleRevisionError
 from app.review.editing.etags import group_etag, said_of, said_part
 from app.review.editing.undo import Stacks, read_stacks
@@ -16,6 +14,7 @@ from app.soccer.solution import Finding, Solution
 from app.store.digest import digest
 from app.store.groups import StoredGroup, StoredStation, read_groups
 from app.store.queue import import_findings, is_fixed
+from app.store.session import Session
 from app.store.solutions import SolutionKey, read_solutions
 from app.store.verdicts import StoredVerdict, read_verdicts
 

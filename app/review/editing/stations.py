@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from sqlalchemy.orm import Session
-
 from app.errors import ConflictError, NotFoundError
 from app.review.editing.codec import edit_to_json, station_edit_from_json
 from app.review.editing.edit import StationEdit, with_station
@@ -38,7 +36,7 @@ from app.store.groups import (
 )
 from app.store.log import Entry, append, read_entry
 from app.store.queue import refresh_queue
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.solutions import (
     EncodedSolution,
     SolutionKey,

@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
-from sqlalchemy.orm import Session
-
 from app.errors import ConflictError, NotFoundError, SharedStationError
 from app.review.editing.codec import edit_from_json, edit_to_json
 from app.review.editing.edit import STATION_EDITS, Edit, need_view
@@ -34,7 +32,7 @@ from app.store.groups import (
 )
 from app.store.log import Entry, LogEntry, append, group_entries, read_entry
 from app.store.queue import refresh_queue, update_row
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.solutions import EncodedSolution, insert_solutions, read_solutions
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy.orm import Session
-
 from app.store.log import group_steps, station_steps
+from app.store.session import Session
 
 GROUP_KINDS = {"edit": "edit", "undo": "undo", "redo": "redo"}
 STATION_KINDS = {"station_edit": "edit", "station_undo": "undo", "station_redo": "redo"}

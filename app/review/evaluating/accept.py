@@ -10,8 +10,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy.orm import Session
-
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import box_problem
 from app.progress import Progress
@@ -27,7 +25,7 @@ from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
 from app.store.answers import Keep, keep_nothing
 from app.store.predictions import PredictedBox, PredictionSet, read_box, read_boxes
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.views import StoredView, dataset_views, find_view
 
 SHOWN = 20

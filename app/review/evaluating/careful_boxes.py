@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy.orm import Session
-
 from app.errors import InputError
 from app.soccer.frames import Box
 from app.store.predictions import PredictionSet, read_boxes, read_view_rows
+from app.store.session import Session
 
 LISTED = 5
 """Frames that a refusal names; all are counted."""

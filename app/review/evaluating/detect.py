@@ -7,7 +7,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from sqlalchemy.orm import Session
 
 from app.config import Settings
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
@@ -26,7 +25,7 @@ from app.review.queue.query import parse_query
 from app.soccer.frames import Box
 from app.store.media import read_frame
 from app.store.predictions import PredictionSet
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.views import StoredView, dataset_views
 
 MIN_SCORE = 0.05

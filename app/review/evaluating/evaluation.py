@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import ColumnElement, and_
-from sqlalchemy.orm import Session
 
 from app.errors import InputError, NotFoundError
 from app.evaluation.comparison import (
@@ -48,7 +47,7 @@ from app.store.predictions import (
     read_boxes,
     read_predicted_cameras,
 )
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.value_codec import from_json, to_json
 
 MAX_PAGE = 500

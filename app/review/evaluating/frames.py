@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from sqlalchemy.orm import Session
-
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
 from app.evaluation.frame import Frame
@@ -20,6 +18,7 @@ from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Solution
 from app.store.codecs import Json, policy_to_json
 from app.store.digest import digest
+from app.store.session import Session
 from app.store.versions import BATCH, read_rows
 from app.store.views import present_ids
 

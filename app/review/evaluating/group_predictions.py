@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy.orm import Session
-
 from app.errors import NotFoundError
 from app.soccer.annotation import BallAnnotation
 from app.store.codecs import ball_from_json
@@ -20,7 +18,7 @@ from app.store.predictions import (
     read_group_boxes,
     read_prediction_sets,
 )
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.views import StoredView, group_dataset, group_views
 
 

@@ -13,8 +13,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy.orm import Session
-
 from app.datasets.archive import Limits
 from app.datasets.report import Report
 from app.errors import ConflictError, InputError, NotFoundError
@@ -42,7 +40,7 @@ from app.store.predictions import (
     read_view_boxes,
     read_view_rows,
 )
-from app.store.session import Store
+from app.store.session import Session, Store
 
 LISTED = 100
 """Unknown frames and problems that a report names; all are counted."""

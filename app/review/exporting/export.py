@@ -7,8 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from sqlalchemy.orm import Session
-
 from app.datasets.export_record import ExportRecord
 from app.datasets.issia import FramePersons
 from app.datasets.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
@@ -33,7 +31,7 @@ from app.review.importing.carry import carry_out
 from app.review.importing.spare import spare_persons
 from app.review.versions.version import find_version
 from app.soccer.ball_boxes import BOX_KINDS
-from app.store.session import Store
+from app.store.session import Session, Store
 
 IMAGES = ("none", "copy", "link")
 

@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Protocol
 
-from sqlalchemy.orm import Session
-
 from app.datasets.export_record import ExportRecord
 from app.errors import InputError
 from app.review.datasets.dataset import Dataset
@@ -17,6 +15,7 @@ from app.review.versions.version import FrozenGroup, Version, thaw
 from app.soccer.solution import SOLVER_VERSION
 from app.store.codecs import Json
 from app.store.exports import exported_groups, left_out_groups, newest_word
+from app.store.session import Session
 from app.store.versions import BATCH, VersionGroup, read_rows
 
 Facts = Mapping[str, Mapping[str, int]]

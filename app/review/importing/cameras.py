@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 
-from sqlalchemy.orm import Session
-
 from app.geometry.camera import Camera
 from app.review.datasets.dataset import get_dataset
 from app.review.importing.ingest import IngestReport, attempt
@@ -23,7 +21,7 @@ from app.store.groups import (
 from app.store.imports import camera_places
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
-from app.store.session import Store
+from app.store.session import Session, Store
 
 BATCH = 500
 """Cameras a transaction."""

@@ -12,8 +12,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy.orm import Session
-
 from app.datasets.manifest import Manifest, write_manifest
 from app.datasets.output import output_tree
 from app.finite import json_text
@@ -37,7 +35,7 @@ from app.store.groups import StoredGroup, read_groups
 from app.store.imports import group_verdicts, known_groups, shared_stations
 from app.store.log import read_log
 from app.store.models import LogModel
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.spare import sorted_spare_rows
 
 FORMAT = "touchline"

@@ -13,8 +13,6 @@ from itertools import islice
 from pathlib import Path
 from typing import TypeVar
 
-from sqlalchemy.orm import Session
-
 from app.datasets.archive import FileTree, Limits, open_tree
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, InputError
@@ -42,7 +40,7 @@ from app.store.codecs import Json
 from app.store.groups import read_groups
 from app.store.imports import known_groups, shared_stations
 from app.store.queue import refresh_queue
-from app.store.session import Store
+from app.store.session import Session, Store
 
 BATCH = 200
 T = TypeVar("T")

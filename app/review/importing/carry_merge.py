@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from sqlalchemy.orm import Session
-
 from app.review.editing.lineage import Lineage
 from app.review.editing.upstream import Kept
 from app.review.importing.body import import_body, places_of
@@ -18,6 +16,7 @@ from app.store.digest import station_digest, view_digest
 from app.store.findings import group_findings
 from app.store.groups import StoredGroup, read_groups, save_group
 from app.store.log import Entry, append
+from app.store.session import Session
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from sqlalchemy.orm import Session
-
 from app.review.editing.lineage import StationLineage, station_lineage
 from app.review.editing.shared_stations import SharedStations
 from app.review.editing.upstream import KIND
@@ -26,6 +24,7 @@ from app.store.groups import (
 from app.store.imports import shared_stations
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
+from app.store.session import Session
 
 
 def merge_stations(

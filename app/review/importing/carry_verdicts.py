@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy.orm import Session
-
 from app.review.importing.ingest import Origin
 from app.store.clock import now
 from app.store.imports import VERDICT, add_verdicts, group_verdicts
 from app.store.log import Entry, append
+from app.store.session import Session
 
 
 def merge_verdicts(

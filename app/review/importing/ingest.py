@@ -8,8 +8,6 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
-from sqlalchemy.orm import Session
-
 from app.progress import Progress
 from app.review.datasets.dataset import find_dataset, insert_dataset
 from app.review.editing.shared_stations import SharedStations
@@ -26,7 +24,7 @@ from app.store.groups import StoredGroup, read_groups, save_group
 from app.store.imports import known_groups, newest_imports
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
-from app.store.session import Store
+from app.store.session import Session, Store
 
 BATCH = 200
 """Groups a transaction: one import holds the writers up for a fraction of a second at a time."""

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 
-from sqlalchemy.orm import Session
-
 from app.review.editing.lineage import Lineages
 from app.review.editing.upstream import KIND
 from app.review.importing.body import import_body, places_of
@@ -21,6 +19,7 @@ from app.store.groups import StoredGroup, read_groups, save_group
 from app.store.imports import known_groups
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
+from app.store.session import Session
 
 GONE = "this group is gone from the dataset; it stays until a person rejects it"
 

@@ -7,8 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
-from sqlalchemy.orm import Session
-
 from app.datasets.issia import FramePersons
 from app.review.datasets.dataset import read_dataset
 from app.review.importing.ingest import IngestReport, ensure_dataset
@@ -16,7 +14,7 @@ from app.soccer.annotation import Extras
 from app.store.clock import now
 from app.store.codecs import extras_from_json, extras_to_json, pack, unpack
 from app.store.log import Entry, append
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.spare import known_spare, put_spare, spare_rows
 
 BATCH = 1000

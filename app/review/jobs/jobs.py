@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import structlog
-from sqlalchemy.orm import Session
 
 from app.errors import (
     ConflictError,
@@ -44,7 +43,7 @@ from app.store.jobs import (
     trim_jobs,
     update_job,
 )
-from app.store.session import Store
+from app.store.session import Session, Store
 
 log = structlog.get_logger("touchline.jobs")
 

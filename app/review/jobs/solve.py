@@ -5,8 +5,6 @@ from __future__ import annotations
 from contextlib import nullcontext
 from dataclasses import dataclass
 
-from sqlalchemy.orm import Session
-
 from app.review.datasets.dataset import get_dataset, list_datasets
 from app.review.editing.recompute import SolveReport, solve_dataset, stale_groups
 from app.review.jobs.jobs import JobProgress, Jobs, Pool, Work, counting
@@ -16,7 +14,7 @@ from app.store.answers import Keep, Kept, keep_nothing
 from app.store.codecs import Json
 from app.store.datasets import dataset_name
 from app.store.jobs import Job
-from app.store.session import Store
+from app.store.session import Session, Store
 
 KIND = "solve"
 WORTH_A_POOL = 400

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sqlalchemy.orm import Session
-
 from app.review.datasets.dataset import read_dataset, save_policy
 from app.review.editing.state import require_etag
 from app.soccer.policy import Policy
 from app.store.digest import digest
 from app.store.policies import PolicyVersion, policy_history
-from app.store.session import Store
+from app.store.session import Session, Store
 
 
 @dataclass(frozen=True)

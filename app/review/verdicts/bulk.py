@@ -11,22 +11,18 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, insert, select, update
-from sqlalchemy.orm import Session
-
 from app.errors import ConflictError
-from app.finite import json_text
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdicts.verdict import Verdict, check_verdict
 from app.store.answers import Keep, keep_nothing
+from app.store.batches import Batch, insert_batch, read_batches, update_batch
 from app.store.clock import now
-from app.store.group_rows import next_id
+from app.store.listing import read_columns, read_columns_of
 from app.store.log import Entry, append
-from app.store.models import DatasetModel, GroupModel, QueueModel
 from app.store.queue import edited_groups, refresh_verdicts
-from app.store.session import Store
+from app.store.session import Session, Store
+from app.store.solutions import present_keys
 from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id
-from app.store.view_models import VerdictBatchModel
 
 CHUNK = 500
 """Groups a transaction: a few hundredths of a second."""
@@ -79,27 +75,20 @@ class BatchReport:
     refused: tuple[Refusal, ...]
 
 
-@dataclass(frozen=True)
-class Batch:
-    """A bulk verdict as it is remembered.
-
-    Attributes:
-        done: False while it runs, or when it was killed.
-        undone: When it was taken back; ``redone`` is the batch that gave it again after that.
-    """
-
-    id: int
-    at: str
-    actor: str
-    query: str
-    state: str
-    reason: str | None
-    note: str | None
-    changed: int
-    done: bool
-    undone: str | None
-    undone_by: str | None
-    redone: int | None
+ASKED = (
+    "group_id",
+    "key",
+    "number",
+    "label",
+    "status",
+    "stale",
+    "reason",
+    "solved",
+    "passes",
+    "gate",
+    "pictures",
+)
+"""What a bulk verdict asks of a group's row in the queue."""
 
 
 def plan_verdicts(
@@ -116,8 +105,9 @@ def plan_verdicts(
         InputError: The query or the verdict cannot be.
     """
     verdict = check_verdict(state, reason, note)
+    conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
     with store.read() as session:
-        rows = queue_rows(session, _where(dataset_id, query))
+        rows = read_columns(session, dataset_id, conditions, ASKED, by_number=True)
     sorted_out = sort_out(rows, verdict)
     sample = [
         SampleGroup(row.group_id, row.key, row.number, row.label)
@@ -158,9 +148,10 @@ def give_verdicts(
         ConflictError: Another number of groups would change than the caller expects.
     """
     verdict = check_verdict(state, reason, note)
-    where = _where(dataset_id, query)
+    conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
     with store.read() as session:
-        found = sort_out(queue_rows(session, where), verdict)
+        rows = read_columns(session, dataset_id, conditions, ASKED, by_number=True)
+    found = sort_out(rows, verdict)
     if expected is not None and expected != len(found.change):
         raise ConflictError(
             f"{len(found.change)} groups would change, not {expected}",
@@ -172,8 +163,8 @@ def give_verdicts(
     ids = [row.group_id for row in found.change]
     for start in range(0, len(ids), CHUNK):
         with store.write() as session:
-            chosen = [*where, QueueModel.group_id.in_(ids[start : start + CHUNK])]
-            run.save(session, sort_out(queue_rows(session, chosen), verdict).change)
+            rows = read_columns_of(session, ids[start : start + CHUNK], conditions, ASKED)
+            run.save(session, sort_out(rows, verdict).change)
             if start + CHUNK >= len(ids):
                 run.close(session)
                 report = BatchReport(run.batch, run.changed, found.refused)
@@ -183,11 +174,8 @@ def give_verdicts(
 
 def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[Batch]:
     """The newest bulk verdicts of a dataset, the newest first."""
-    model = VerdictBatchModel
-    statement = select(*model.__table__.columns).where(model.dataset_id == dataset_id)
     with store.read() as session:
-        rows = session.execute(statement.order_by(model.id.desc()).limit(limit)).all()
-    return [_batch(row) for row in rows]
+        return read_batches(session, dataset_id, limit)
 
 
 @dataclass(frozen=True)
@@ -196,31 +184,6 @@ class SortedOut:
 
     change: list[Any]
     refused: tuple[Refusal, ...]
-
-
-def _where(dataset_id: int, query: str) -> list[ColumnElement[bool]]:
-    conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
-    return [QueueModel.dataset_id == dataset_id, *conditions]
-
-
-def queue_rows(session: Session, where: Sequence[ColumnElement[bool]]) -> list[Any]:
-    """Rows of the queue with what a bulk verdict asks of them, in their order."""
-    names = (
-        "group_id",
-        "key",
-        "number",
-        "label",
-        "status",
-        "stale",
-        "reason",
-        "solved",
-        "passes",
-        "gate",
-        "pictures",
-    )
-    columns = [getattr(QueueModel, name) for name in names]
-    statement = select(*columns).where(*where).order_by(QueueModel.number)
-    return list(session.execute(statement).all())
 
 
 def sort_out(rows: Sequence[Any], verdict: Verdict) -> SortedOut:
@@ -287,26 +250,22 @@ class BatchRun:
         body |= asdict(self._verdict) | self._again
         entry = Entry("verdict_batch", self._actor, at, body, self._dataset_id)
         (log_id,) = append(session, [entry])
-        mine = VerdictBatchModel.id == self.batch
-        session.execute(update(VerdictBatchModel).where(mine).values(log_id=log_id))
+        update_batch(session, self.batch, log_id=log_id)
 
     def _save_batch(self, session: Session, at: str) -> None:
-        values: dict[str, Any] = {"changed": self.changed, "spans": json_text(self._spans)}
+        values: dict[str, Any] = {"changed": self.changed, "spans": self._spans}
         if self.batch is not None:
-            mine = VerdictBatchModel.id == self.batch
-            session.execute(update(VerdictBatchModel).where(mine).values(values))
+            update_batch(session, self.batch, **values)
             return
-        self.batch = next_id(session, VerdictBatchModel)
-        values |= {"id": self.batch, "dataset_id": self._dataset_id, "at": at}
-        values |= {"actor": self._actor, "query": self._query, **asdict(self._verdict)}
-        session.execute(insert(VerdictBatchModel), [values])
+        values |= {"dataset_id": self._dataset_id, "at": at, "actor": self._actor}
+        self.batch = insert_batch(session, query=self._query, **asdict(self._verdict), **values)
 
 
 def _verdicts(
     session: Session, rows: Sequence[Any], verdict: Verdict, actor: str, at: str
 ) -> list[StoredVerdict]:
     ids = [row.group_id for row in rows]
-    heads, edited = _heads(session, ids), edited_groups(session, ids)
+    keys, edited = present_keys(session, ids), edited_groups(session, ids)
     number = next_verdict_id(session)
     accepts = verdict.state == "accepted"
     return [
@@ -316,23 +275,13 @@ def _verdicts(
             actor=actor,
             at=at,
             **vars(verdict),
-            inputs_hash=heads[row.group_id].inputs_hash,
-            policy_hash=heads[row.group_id].policy_hash,
+            inputs_hash=keys[row.group_id].inputs_hash,
+            policy_hash=keys[row.group_id].policy_hash,
             fixed=bool(accepts and row.passes and row.group_id in edited),
             override=(row.gate or "unknown") if accepts and not row.passes else None,
         )
         for place, row in enumerate(rows)
     ]
-
-
-def _heads(session: Session, ids: Sequence[int]) -> dict[int, Any]:
-    """What a verdict keeps of its group: what it was given for, and under which policy."""
-    statement = (
-        select(GroupModel.id, GroupModel.inputs_hash, DatasetModel.policy_hash)
-        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .where(GroupModel.id.in_(ids))
-    )
-    return {row.id: row for row in session.execute(statement)}
 
 
 def save_verdicts(
@@ -341,10 +290,3 @@ def save_verdicts(
     """Insert verdicts, log them under who gives them, and show them in the queue."""
     insert_verdicts(session, dataset_id, given, actor=actor, at=at)
     refresh_verdicts(session, list({verdict.group_id: None for verdict in given}))
-
-
-def _batch(row: Any) -> Batch:
-    same = ("id", "at", "actor", "query", "state", "reason", "note", "changed")
-    values = {name: getattr(row, name) for name in same}
-    taken_back = {"undone": row.undone, "undone_by": row.undone_by, "redone": row.redone}
-    return Batch(**values, done=row.log_id is not None, **taken_back)

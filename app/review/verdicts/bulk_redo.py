@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from dataclasses import dataclass
-from typing import Any
-
-from sqlalchemy import func, select, update
-from sqlalchemy.orm import Session
 
 from app.errors import ConflictError
-from app.review.verdicts.bulk import BatchRun, Refusal, queue_rows, sort_out
+from app.review.verdicts.bulk import ASKED, BatchRun, Refusal, sort_out
 from app.review.verdicts.bulk_undo import read_batch
 from app.review.verdicts.verdict import check_verdict
 from app.store.answers import Keep, keep_nothing
-from app.store.models import GroupModel, QueueModel, VerdictModel
-from app.store.session import Store
-from app.store.view_models import VerdictBatchModel
+from app.store.batches import Batch, Spans, update_batch
+from app.store.listing import read_columns_of
+from app.store.session import Session, Store
+from app.store.solutions import present_keys
+from app.store.verdicts import inputs_judged, newest_between
 
 
 @dataclass(frozen=True)
@@ -59,14 +56,12 @@ def redo_batch(
         return _report(batch, run, refused)
     for number, (first, last) in enumerate(spans, 1):
         with store.write() as session:
-            ids = _unchanged(session, json.loads(batch.spans), first, last)
-            rows = queue_rows(session, [QueueModel.group_id.in_(ids)])
-            found = sort_out(rows, verdict)
+            ids = _unchanged(session, batch.spans, first, last)
+            found = sort_out(read_columns_of(session, ids, (), ASKED), verdict)
             run.save(session, found.change)
             refused.update({item.reason: item.groups for item in found.refused})
             if run.batch is not None:
-                mine = VerdictBatchModel.id == batch_id
-                session.execute(update(VerdictBatchModel).where(mine).values(redone=run.batch))
+                update_batch(session, batch_id, redone=run.batch)
             if number == len(spans):
                 run.close(session)
                 report = _report(batch, run, refused)
@@ -74,13 +69,13 @@ def redo_batch(
     return report
 
 
-def _report(batch: Any, run: BatchRun, refused: Counter[str]) -> RedoReport:
+def _report(batch: Batch, run: BatchRun, refused: Counter[str]) -> RedoReport:
     kept = batch.changed - run.changed - refused.total()
     reasons = tuple(Refusal(reason, groups) for reason, groups in refused.items())
     return RedoReport(run.batch, run.changed, kept, reasons)
 
 
-def _spans(batch: Any) -> list[tuple[int, int]]:
+def _spans(batch: Batch) -> Spans:
     """First and last id of the verdicts that took a batch back, chunk by chunk."""
     if batch.undone is None:
         raise ConflictError("this batch was not taken back, so there is nothing to give again")
@@ -92,24 +87,14 @@ def _spans(batch: Any) -> list[tuple[int, int]]:
             "of the groups",
             hint="Give the verdict once more in the queue.",
         )
-    return [(first, last) for first, last in json.loads(batch.undo_spans)]
+    return batch.undo_spans
 
 
-def _unchanged(session: Session, given: list[tuple[int, int]], first: int, last: int) -> list[int]:
+def _unchanged(session: Session, given: Spans, first: int, last: int) -> list[int]:
     """Groups of one chunk that nobody has judged since it was taken back, or edited."""
-    chunk = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
-    newest = (
-        select(VerdictModel.group_id, func.max(VerdictModel.id).label("newest"))
-        .where(VerdictModel.group_id.in_(chunk))
-        .group_by(VerdictModel.group_id)
-    )
-    ids = [row.group_id for row in session.execute(newest) if first <= row.newest <= last]
-    heads = select(GroupModel.id, GroupModel.inputs_hash).where(GroupModel.id.in_(ids))
-    hashes = {row.id: row.inputs_hash for row in session.execute(heads)}
+    ids = newest_between(session, first, last)
     judged: dict[int, str] = {}
     for start, end in given:
-        statement = select(VerdictModel.group_id, VerdictModel.inputs_hash).where(
-            VerdictModel.id.between(start, end), VerdictModel.group_id.in_(ids)
-        )
-        judged |= {row.group_id: row.inputs_hash for row in session.execute(statement)}
-    return [group for group in ids if judged.get(group) == hashes[group]]
+        judged |= inputs_judged(session, start, end, ids)
+    keys = present_keys(session, ids)
+    return [group for group in ids if judged.get(group) == keys[group].inputs_hash]

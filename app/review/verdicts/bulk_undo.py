@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
-
-from sqlalchemy import select, update
-from sqlalchemy.orm import Session
 
 from app.errors import ConflictError, NotFoundError
-from app.finite import json_text
 from app.review.verdicts.bulk import save_verdicts
 from app.store.answers import Keep, keep_nothing
+from app.store.batches import Batch, find_batch, update_batch
 from app.store.clock import now
 from app.store.log import Entry, append
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.verdicts import StoredVerdict, judged_between, next_verdict_id, read_verdicts
-from app.store.view_models import VerdictBatchModel
 
 
 @dataclass(frozen=True)
@@ -46,13 +40,12 @@ def undo_batch(
     if batch.undone is not None:
         raise ConflictError(f"{batch.undone_by} has taken this batch back already")
     restored, spans = 0, list[tuple[int, int]]()
-    given: list[tuple[int, int]] = json.loads(batch.spans)
-    for number, (first, last) in enumerate(given, 1):
+    for number, (first, last) in enumerate(batch.spans, 1):
         with store.write() as session:
             verdicts = _restore(session, batch, first, last, actor)
             restored += len({verdict.group_id for verdict in verdicts})
             spans += [(verdicts[0].id, verdicts[-1].id)] if verdicts else []
-            if number == len(given):
+            if number == len(batch.spans):
                 report = UndoReport(batch_id, restored, batch.changed - restored)
                 _close(session, batch, report, spans, actor)
                 keep(report)(session)
@@ -60,34 +53,29 @@ def undo_batch(
 
 
 def _close(
-    session: Session, batch: Any, report: UndoReport, spans: list[tuple[int, int]], actor: str
+    session: Session, batch: Batch, report: UndoReport, spans: list[tuple[int, int]], actor: str
 ) -> None:
     """Say of a batch, and in the log, that it was taken back."""
     at = now()
-    values = {"undone": at, "undone_by": actor, "undo_spans": json_text(spans)}
-    session.execute(
-        update(VerdictBatchModel).where(VerdictBatchModel.id == batch.id).values(values)
-    )
+    update_batch(session, batch.id, undone=at, undone_by=actor, undo_spans=spans)
     entry = Entry("verdict_batch_undo", actor, at, dict(vars(report)), batch.dataset_id)
     append(session, [entry])
 
 
-def read_batch(session: Session, batch_id: int) -> Any:
-    """The row of a batch.
+def read_batch(session: Session, batch_id: int) -> Batch:
+    """A batch by its id.
 
     Raises:
         NotFoundError: There is no such batch.
     """
-    model = VerdictBatchModel
-    statement = select(*model.__table__.columns).where(model.id == batch_id)
-    row = session.execute(statement).one_or_none()
-    if row is None:
+    batch = find_batch(session, batch_id)
+    if batch is None:
         raise NotFoundError(f"there is no batch of verdicts {batch_id}")
-    return row
+    return batch
 
 
 def _restore(
-    session: Session, batch: Any, first: int, last: int, actor: str
+    session: Session, batch: Batch, first: int, last: int, actor: str
 ) -> list[StoredVerdict]:
     """Take one chunk back; returns the verdicts that do it, of groups not judged since."""
     at, number = now(), next_verdict_id(session)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sqlalchemy import case, func, select
-
 from app.store.clock import now
-from app.store.models import GroupModel, QueueModel, VerdictModel
+from app.store.listing import count_reviewed
 from app.store.session import Store
+from app.store.verdicts import count_by_judge
 
 
 @dataclass(frozen=True)
@@ -32,36 +31,20 @@ class Reviewer:
 
 def list_reviewers(store: Store, dataset_id: int) -> list[Reviewer]:
     """Everybody who has judged a group of a dataset, the most active first."""
-    today = now()[:10]
-    given = (
-        select(
-            VerdictModel.actor,
-            func.max(VerdictModel.at),
-            func.count(case((VerdictModel.at >= today, VerdictModel.group_id)).distinct()),
-        )
-        .join(GroupModel, GroupModel.id == VerdictModel.group_id)
-        .where(GroupModel.dataset_id == dataset_id)
-        .group_by(VerdictModel.actor)
-    )
-    counting = (
-        select(QueueModel.reviewer, QueueModel.status, func.count())
-        .where(QueueModel.dataset_id == dataset_id, QueueModel.reviewer.is_not(None))
-        .group_by(QueueModel.reviewer, QueueModel.status)
-    )
     with store.read() as session:
-        people = session.execute(given).all()
-        counts = {(name, status): count for name, status, count in session.execute(counting)}
+        people = count_by_judge(session, dataset_id, since=now()[:10])
+        counts = count_reviewed(session, dataset_id)
     reviewers = [
         Reviewer(
-            name=name,
-            today=judged,
-            last=last,
+            name=row.actor,
+            today=row.groups,
+            last=row.last,
             **{
-                status: counts.get((name, status), 0)
+                status: counts.get((row.actor, status), 0)
                 for status in ("accepted", "rejected", "deferred")
             },
         )
-        for name, last, judged in people
+        for row in people
     ]
     return sorted(
         reviewers, key=lambda item: (-item.accepted - item.rejected - item.deferred, item.name)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from sqlalchemy.orm import Session
-
 from app.errors import InputError
 from app.review.editing.etags import require_said, require_unchanged
 from app.review.editing.state import GroupState
@@ -14,7 +12,7 @@ from app.soccer.reasons import MAX_NOTE, REASONS
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.queue import update_verdict
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id
 
 STATES = ("unreviewed", "accepted", "rejected", "deferred")

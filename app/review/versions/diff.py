@@ -9,12 +9,10 @@ from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any
 
-from sqlalchemy.orm import Session
-
 from app.errors import InputError
 from app.review.versions.version import Version, read_version
 from app.store.codecs import Json, parse, policy_to_json
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.versions import said_rows
 
 NEW, GONE = "not in the dataset before", "no longer in the dataset"

@@ -11,8 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy.orm import Session
-
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
 from app.progress import Progress
@@ -40,7 +38,7 @@ from app.store.frozen import (
 from app.store.groups import read_groups
 from app.store.log import Entry, append
 from app.store.media import media_facts
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.solutions import known_calibrations, present_bodies, read_calibration_bodies
 from app.store.versions import BATCH, has_version, insert_version
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from sqlalchemy.orm import Session
-
 from app.review.versions.diff import read_changelog
 from app.review.versions.version import Version, read_version
 from app.soccer.policy import Policy
 from app.store.codecs import Json, policy_to_json
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.versions import version_verdicts
 
 

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy.orm import Session
-
 from app.errors import ConflictError
 from app.store.codecs import Json
+from app.store.session import Session
 from app.store.versions import candidate_rows
 
 RULES = ("accepted", "passing")

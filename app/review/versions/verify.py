@@ -10,8 +10,6 @@ from dataclasses import asdict, dataclass, field
 from itertools import islice
 from typing import Any
 
-from sqlalchemy.orm import Session
-
 from app.errors import JobCancelled, ReviewError, StorageError
 from app.progress import Progress
 from app.review.datasets.fan_out import fan_out
@@ -40,7 +38,7 @@ from app.store.frozen import (
     text_of,
     thaw_group,
 )
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.solutions import decode_calibration, encode_calibration, encode_solution
 from app.store.verifications import keep_verification
 from app.store.versions import VersionGroup, read_page, said_rows, version_matches

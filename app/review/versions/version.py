@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
 
-from sqlalchemy.orm import Session
-
 from app.errors import InputError, NotFoundError, StorageError
 from app.review.datasets.dataset import read_dataset
 from app.soccer.group import Group
@@ -17,7 +15,7 @@ from app.soccer.solution import Solution
 from app.soccer.split import Split
 from app.store.codecs import Json, parse, policy_from_json
 from app.store.frozen import CALIBRATION, json_of, read_frozen, station_keys, thaw_group
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.solutions import decode_calibration, decode_solution
 from app.store.verifications import Verification, read_verifications
 from app.store.versions import VersionGroup, dataset_versions, version_row

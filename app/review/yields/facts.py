@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from sqlalchemy import select
-from sqlalchemy.orm import Session
 
 from app.review.yields.table import EMPTY, YieldTable, join
 from app.solving.facts import Facts, group_facts
@@ -17,7 +16,7 @@ from app.solving.facts import join as join_facts
 from app.solving.facts_codec import facts_from_bytes
 from app.store.groups import read_groups
 from app.store.models import SolutionModel
-from app.store.session import Store
+from app.store.session import Session, Store
 from app.store.solutions import read_calibrations
 
 CHUNK = 400

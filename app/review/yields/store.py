@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from sqlalchemy import and_, func, select
-from sqlalchemy.orm import Session
 
 from app.errors import NotFoundError
 from app.geometry.arrays import FloatArray, IntArray
@@ -23,7 +22,7 @@ from app.solving.spread import MeanSpread
 from app.solving.verdict import Verdict, judge
 from app.store.codecs import parse, policy_from_json
 from app.store.models import DatasetModel, GroupModel, LogModel, SolutionModel
-from app.store.session import Store
+from app.store.session import Session, Store
 
 MAX_BYTES = 512 * 1024 * 1024
 """What all tables together may hold; beyond it the one that was asked for longest ago goes."""
