@@ -1,21 +1,63 @@
-"""Datasets in the database: their names and policies."""
+"""Datasets in the database: their names, policies and groups."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import insert, select, update
 from sqlalchemy.orm import Session
 
 from app.soccer.policy import Policy
-from app.store.codecs import parse, policy_from_json
-from app.store.models import DatasetModel
+from app.store.codecs import canonical, parse, policy_from_json, policy_to_json
+from app.store.group_rows import next_id
+from app.store.models import DatasetModel, GroupModel
+
+MAX_ID = 2**63 - 1
+_ROWS = select(*DatasetModel.__table__.columns)
 
 
 @lru_cache(maxsize=64)
 def policy_of(text: str) -> Policy:
     """The policy of a dataset's row; one value a text, however often it is asked for."""
     return policy_from_json(parse(text))
+
+
+def dataset_rows(session: Session) -> Sequence[Any]:
+    """The rows of all datasets, by name."""
+    return session.execute(_ROWS.order_by(DatasetModel.name)).all()
+
+
+def find_dataset(session: Session, dataset: str | int) -> Any | None:
+    """The row of a dataset by name or id, or None."""
+    if isinstance(dataset, int) or (dataset.isascii() and dataset.isdigit()):
+        if int(dataset) > MAX_ID:
+            return None
+        statement = _ROWS.where(DatasetModel.id == int(dataset))
+    else:
+        statement = _ROWS.where(DatasetModel.name == dataset)
+    return session.execute(statement).one_or_none()
+
+
+def insert_dataset_row(session: Session, name: str, policy: Policy, at: str) -> int:
+    """Insert a dataset; returns its id."""
+    identity = next_id(session, DatasetModel)
+    values = {"id": identity, "name": name, "created": at, **_policy_values(policy)}
+    session.execute(insert(DatasetModel), [values])
+    return identity
+
+
+def update_policy(session: Session, dataset_id: int, policy: Policy) -> None:
+    """Judge a dataset by another policy; the queue is the caller's to refresh."""
+    mine = DatasetModel.id == dataset_id
+    session.execute(update(DatasetModel).where(mine).values(_policy_values(policy)))
+
+
+def group_ids(session: Session, dataset_id: int) -> list[int]:
+    """Ids of the groups of a dataset."""
+    statement = select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
+    return list(session.scalars(statement))
 
 
 def dataset_name(session: Session, dataset_id: int) -> str:
@@ -27,3 +69,7 @@ def dataset_names(session: Session) -> dict[int, str]:
     """The name of every dataset, by id."""
     statement = select(DatasetModel.id, DatasetModel.name)
     return {row.id: row.name for row in session.execute(statement)}
+
+
+def _policy_values(policy: Policy) -> dict[str, str]:
+    return {"policy": canonical(policy_to_json(policy)), "policy_hash": policy.hash}

@@ -8,15 +8,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Integer, cast, func, insert, select, update
-
 from app.errors import InputError, NotFoundError
 from app.soccer.policy import Policy
 from app.store.clock import now
-from app.store.codecs import canonical, parse, policy_from_json, policy_to_json
-from app.store.group_rows import next_id
+from app.store.codecs import policy_to_json
+from app.store.datasets import (
+    dataset_rows,
+    find_dataset,
+    group_ids,
+    insert_dataset_row,
+    policy_of,
+    update_policy,
+)
+from app.store.listing import count_states
 from app.store.log import Entry, append
-from app.store.models import DatasetModel, GroupModel, QueueModel
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
 
@@ -42,10 +47,9 @@ class Dataset:
 def insert_dataset(session: Session, name: str, policy: Policy, actor: str) -> int:
     """Insert a dataset and its log entry; returns its id."""
     require_name(name)
-    identity, at = next_id(session, DatasetModel), now()
+    at = now()
+    identity = insert_dataset_row(session, name, policy, at)
     body = {"name": name, "policy": policy_to_json(policy)}
-    values = {"id": identity, "name": name, "created": at, **_policy_values(policy)}
-    session.execute(insert(DatasetModel), [values])
     append(session, [Entry("dataset", actor, at, body, dataset_id=identity)])
     return identity
 
@@ -63,8 +67,7 @@ def require_name(name: str, pointer: str = "/name") -> None:
 def list_datasets(store: Store) -> list[Dataset]:
     """All datasets, by name."""
     with store.read() as session:
-        rows = session.execute(select(*_COLUMNS).order_by(DatasetModel.name)).all()
-        return _datasets(session, rows)
+        return _datasets(session, dataset_rows(session))
 
 
 def get_dataset(store: Store, dataset: str | int) -> Dataset:
@@ -101,44 +104,17 @@ def read_dataset(session: Session, dataset: str | int) -> Dataset:
 
 def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -> None:
     """Judge a dataset by another policy; what that leaves without a solution is stale."""
-    values = _policy_values(policy)
-    session.execute(update(DatasetModel).where(DatasetModel.id == dataset_id).values(values))
+    update_policy(session, dataset_id, policy)
     body = {"policy": policy_to_json(policy)}
     append(session, [Entry("policy", actor, now(), body, dataset_id=dataset_id)])
-    groups = select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
-    refresh_queue(session, list(session.scalars(groups)))
-
-
-def find_dataset(session: Session, dataset: str | int) -> Any:
-    """The row of a dataset by name or id, or None."""
-    by_id = isinstance(dataset, int) or (dataset.isascii() and dataset.isdigit())
-    where: ColumnElement[bool] = (
-        DatasetModel.id == int(dataset) if by_id else DatasetModel.name == dataset
-    )
-    if by_id and int(dataset) > 2**63 - 1:
-        return None
-    return session.execute(select(*_COLUMNS).where(where)).one_or_none()
-
-
-def _policy_values(policy: Policy) -> dict[str, str]:
-    return {"policy": canonical(policy_to_json(policy)), "policy_hash": policy.hash}
+    refresh_queue(session, group_ids(session, dataset_id))
 
 
 def _datasets(session: Session, rows: Sequence[Any]) -> list[Dataset]:
-    statement = (
-        select(
-            QueueModel.dataset_id,
-            QueueModel.status,
-            func.count(),
-            func.sum(cast(QueueModel.solved, Integer)),
-        )
-        .where(QueueModel.dataset_id.in_([row.id for row in rows]))
-        .group_by(QueueModel.dataset_id, QueueModel.status)
-    )
     states: dict[int, Counter[str]] = {}
-    for dataset_id, status, groups, solved in session.execute(statement):
-        counts = states.setdefault(dataset_id, Counter())
-        counts.update({status: groups, "groups": groups, "solved": int(solved)})
+    for row in count_states(session, [row.id for row in rows]):
+        counts = states.setdefault(row.dataset_id, Counter())
+        counts.update({row.status: row.groups, "groups": row.groups, "solved": int(row.solved)})
     return [_dataset(row, states.get(row.id, Counter())) for row in rows]
 
 
@@ -147,7 +123,7 @@ def _dataset(row: Any, counts: Counter[str]) -> Dataset:
         id=row.id,
         name=row.name,
         created=row.created,
-        policy=policy_from_json(parse(row.policy)),
+        policy=policy_of(row.policy),
         groups=counts["groups"],
         solved=counts["solved"],
         accepted=counts["accepted"],
@@ -155,6 +131,3 @@ def _dataset(row: Any, counts: Counter[str]) -> Dataset:
         deferred=counts["deferred"],
         unreviewed=counts["unreviewed"],
     )
-
-
-_COLUMNS = tuple(DatasetModel.__table__.columns)

@@ -17,7 +17,7 @@ from app.datasets.archive import FileTree, Limits, open_tree
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, InputError
 from app.progress import Progress
-from app.review.datasets.dataset import find_dataset, insert_dataset
+from app.review.datasets.dataset import insert_dataset
 from app.review.editing.lineage import Lineages, base_digest, station_lineage
 from app.review.importing.carry import GROUPS, SPARE, STATIONS
 from app.review.importing.carry_merge import merge_group
@@ -37,6 +37,7 @@ from app.review.importing.ingest import IngestReport, Origin, attempt, ingest_ba
 from app.review.importing.spare import SpareFrame, ingest_spare
 from app.soccer.group import Group, Station
 from app.store.codecs import Json
+from app.store.datasets import find_dataset
 from app.store.groups import read_groups
 from app.store.imports import known_groups, shared_stations
 from app.store.queue import refresh_queue

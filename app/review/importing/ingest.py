@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 
 from app.progress import Progress
-from app.review.datasets.dataset import find_dataset, insert_dataset
+from app.review.datasets.dataset import insert_dataset
 from app.review.editing.shared_stations import SharedStations
 from app.review.editing.upstream import KIND, Kept, follow_group
 from app.review.importing.body import import_body, places_of
@@ -17,6 +17,7 @@ from app.review.importing.missing import GONE, note_gone, of_read_matches
 from app.soccer.group import Group, View
 from app.soccer.policy import PAPER
 from app.store.clock import now
+from app.store.datasets import find_dataset
 from app.store.digest import source_hash
 from app.store.findings import group_findings, groups_told, replace_group_findings
 from app.store.group_rows import NewRows

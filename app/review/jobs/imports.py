@@ -10,13 +10,14 @@ from typing import Any
 from app.config import Settings
 from app.errors import InputError
 from app.progress import Progress
-from app.review.datasets.dataset import dataset_id, find_dataset, require_name
+from app.review.datasets.dataset import dataset_id, require_name
 from app.review.importing.folders import resolve_folder
 from app.review.importing.sources import FORMATS, Imported, Source, import_source
 from app.review.jobs.jobs import FailedWithReportError, JobProgress, Jobs, Work
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
 from app.store.codecs import Json
+from app.store.datasets import find_dataset
 from app.store.jobs import Job
 from app.store.session import Store
 from app.store.uploads import get_upload, keep_upload, upload_path

@@ -1,0 +1,138 @@
+"""Removal: everything of a dataset is found and deleted, and its ids are remembered as used."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+from sqlalchemy import (
+    ColumnElement,
+    Select,
+    Table,
+    delete,
+    func,
+    insert,
+    or_,
+    select,
+    text,
+    true,
+)
+from sqlalchemy.orm import Session
+
+from app.store.models import (
+    DatasetModel,
+    GroupModel,
+    QueueModel,
+    SolutionModel,
+    StationModel,
+    VerdictModel,
+)
+from app.store.tables import Base
+from app.store.view_models import UsedIdModel
+
+_TABLES = Base.metadata.tables
+_COUNTED = {
+    "groups": "groups",
+    "views": "view",
+    "verdicts": "verdict",
+    "saved_views": "saved_view",
+    "versions": "version",
+    "predictions": "prediction_set",
+    "evaluations": "evaluation",
+}
+"""What a person is told of, by the name of its table."""
+_DELETE_CALIBRATION = text("DELETE FROM calibration WHERE key = :unused")
+
+
+def count_contents(session: Session, dataset_id: int) -> dict[str, int]:
+    """How many groups, views, verdicts, versions and so on a dataset has."""
+    counts = {}
+    for word, name in _COUNTED.items():
+        table = _TABLES[name]
+        statement = select(func.count()).select_from(table).where(_belongs(table, dataset_id))
+        counts[word] = session.scalar(statement) or 0
+    return counts
+
+
+def solutions_of(session: Session, dataset_id: int) -> list[int]:
+    """Ids of the solutions of a dataset's groups."""
+    mine = SolutionModel.group_id.in_(_groups(dataset_id))
+    return list(session.scalars(select(SolutionModel.id).where(mine)))
+
+
+def delete_solutions(session: Session, ids: Sequence[int]) -> set[str]:
+    """Delete solutions; returns the keys of the calibrations that they rested on."""
+    chosen = SolutionModel.id.in_(ids)
+    keys = set(_calibration_keys(session, select(SolutionModel.id).where(chosen)))
+    session.execute(delete(SolutionModel).where(chosen))
+    return keys
+
+
+def has_unsolved(session: Session) -> bool:
+    """Whether a group of any dataset waits to be solved."""
+    statement = select(QueueModel.group_id).where(QueueModel.solved.is_(False)).limit(1)
+    return session.scalar(statement) is not None
+
+
+def delete_unused_calibrations(session: Session, keys: Collection[str]) -> None:
+    """Delete those of some calibrations that no solution names any more."""
+    used = set(_calibration_keys(session, select(SolutionModel.id)))
+    rows = [{"unused": key} for key in keys if key not in used]
+    if rows:
+        session.execute(_DELETE_CALIBRATION, rows)
+
+
+def keep_used_ids(session: Session) -> None:
+    """No id is ever given again: the log speaks of what had it."""
+    used = dict(session.execute(select(UsedIdModel.table, UsedIdModel.id)).all())
+    for table in Base.metadata.sorted_tables:
+        if list(table.primary_key.columns.keys()) == ["id"]:
+            newest = session.scalar(select(func.max(table.c.id)))
+            if newest is not None and newest >= used.get(table.name, 0):
+                statement = insert(UsedIdModel).prefix_with("OR REPLACE")
+                session.execute(statement, [{"table": table.name, "id": newest}])
+
+
+def delete_rows(session: Session, dataset_id: int) -> None:
+    """Delete everything that was said, from the leaves to the dataset itself.
+
+    Tables that cascade (versions, predictions, evaluations) follow the rows that they hang on.
+    """
+    session.execute(text("PRAGMA defer_foreign_keys = ON"))
+    dataset, groups = _TABLES[DatasetModel.__tablename__], _TABLES[GroupModel.__tablename__]
+    verdicts = _TABLES[VerdictModel.__tablename__]
+    # The database lets verdicts go while their group still tells whose they are.
+    session.execute(delete(verdicts).where(_belongs(verdicts, dataset_id)))
+    for table in filter(_hangs_on, reversed(Base.metadata.sorted_tables)):
+        if table not in (dataset, groups, verdicts):
+            session.execute(delete(table).where(_belongs(table, dataset_id)))
+    session.execute(delete(groups).where(_belongs(groups, dataset_id)))
+    session.execute(delete(dataset).where(dataset.c.id == dataset_id))
+
+
+def _belongs(table: Table, dataset_id: int) -> ColumnElement[bool]:
+    """Whether a row belongs to the dataset: by its own column, its group's or its station's."""
+    if "dataset_id" in table.c:
+        return table.c.dataset_id == dataset_id
+    stations = select(StationModel.id).where(StationModel.dataset_id == dataset_id)
+    owners = {"group_id": _groups(dataset_id), "station_id": stations}
+    return or_(*(table.c[name].in_(ids) for name, ids in owners.items() if name in table.c))
+
+
+def _groups(dataset_id: int) -> Select[int]:
+    return select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
+
+
+def _hangs_on(table: Table) -> bool:
+    """Whether rows refer to a dataset or a group and do not go with it by themselves."""
+    return any(
+        key.column.table.name in (DatasetModel.__tablename__, GroupModel.__tablename__)
+        and key.ondelete is None
+        for key in table.foreign_keys
+    )
+
+
+def _calibration_keys(session: Session, solutions: Select[int]) -> Iterator[str]:
+    """Keys of the calibrations that solutions rest on, each once."""
+    names = func.json_each(SolutionModel.calibrations).table_valued("value")
+    statement = select(names.c.value).distinct().select_from(SolutionModel).join(names, true())
+    return iter(session.scalars(statement.where(SolutionModel.id.in_(solutions))))
