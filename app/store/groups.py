@@ -413,6 +413,18 @@ def groups_of_station(session: Session, station_id: int) -> list[int]:
     return list(session.scalars(statement.order_by(ViewModel.group_id)))
 
 
+def station_pitches(session: Session, dataset_id: int) -> list[tuple[int, Pitch]]:
+    """Ids of a dataset's static cameras with each size of pitch that their groups have."""
+    statement = (
+        select(StationModel.id, GroupModel.pitch_length, GroupModel.pitch_width)
+        .join(ViewModel, ViewModel.station_id == StationModel.id)
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
+        .where(StationModel.dataset_id == dataset_id, StationModel.shared)
+        .distinct()
+    )
+    return [(station, Pitch(*size)) for station, *size in session.execute(statement)]
+
+
 def bump_groups(session: Session, group_ids: Sequence[int], at: str) -> None:
     """Count a revision of groups that a change of something of theirs made."""
     session.execute(

@@ -100,9 +100,27 @@ def newest_entry(session: Session) -> int:
     return session.scalar(select(func.max(LogModel.id))) or 0
 
 
-def group_entries(session: Session, group_id: int) -> list[LogEntry]:
-    """Everything that was said about a group, oldest first."""
-    return list(read_log(session, LogModel.group_id == group_id))
+def group_entries(session: Session, group_id: int, *, verdicts: bool = True) -> list[LogEntry]:
+    """Everything that was said about a group, oldest first; without its verdicts, if need be."""
+    where = [] if verdicts else [LogModel.kind != "verdict"]
+    return list(read_log(session, LogModel.group_id == group_id, *where))
+
+
+def station_entries(session: Session, station_id: int) -> list[LogEntry]:
+    """Everything that was said about a static camera, oldest first."""
+    where = (LogModel.station_id == station_id, LogModel.group_id.is_(None))
+    return list(read_log(session, *where))
+
+
+def groups_with_past(session: Session, group_ids: Sequence[int]) -> set[int]:
+    """Those of the groups of which more was said than their first import, but for verdicts."""
+    statement = (
+        select(LogModel.group_id)
+        .where(LogModel.group_id.in_(group_ids), LogModel.kind != "verdict")
+        .group_by(LogModel.group_id)
+        .having(func.count() > 1)
+    )
+    return {number for number in session.scalars(statement) if number is not None}
 
 
 def read_entry(session: Session, log_id: int) -> LogEntry:

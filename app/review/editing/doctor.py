@@ -6,15 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import func, select, text
-
 from app.errors import StorageError
 from app.review.datasets.dataset import list_datasets
 from app.review.editing.ledger import Ledger, read_ledger
 from app.review.editing.recompute import stale_groups
 from app.review.editing.replay import replay
-from app.store.models import LogModel
+from app.store.log import newest_entry
 from app.store.session import Session, Store
+from app.store.soundness import count_lost_references, file_faults
 
 REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
 RESTORE = "Restore the database from a backup."
@@ -56,7 +55,7 @@ def examine(store: Store) -> list[Check]:
     """
     with store.read() as session:
         checks = [_file(session)]
-        entries = session.scalar(select(func.count()).select_from(LogModel))
+        entries = newest_entry(session)
         try:
             said = replay(session)
         except StorageError as error:
@@ -69,9 +68,8 @@ def examine(store: Store) -> list[Check]:
 
 def _file(session: Session) -> Check:
     """SQLite's own look at its pages and indexes, and at references to rows that are gone."""
-    faults = [str(row[0]) for row in session.execute(text("PRAGMA quick_check(5)"))]
-    lost = len(session.execute(text("PRAGMA foreign_key_check")).all())
-    if faults != ["ok"]:
+    faults, lost = file_faults(session), count_lost_references(session)
+    if faults:
         return Check("file", False, f"SQLite finds it damaged: {'; '.join(faults)}", RESTORE)
     if lost:
         return Check("file", False, f"{lost} rows refer to rows that are gone", RESTORE)

@@ -6,29 +6,13 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import bindparam, func, select
-
 from app.errors import NotFoundError, StaleRevisionError
 from app.soccer.solution import SOLVER_VERSION
 from app.store.codecs import parse
 from app.store.digest import digest
-from app.store.models import DatasetModel, GroupModel, SolutionModel, VerdictModel
+from app.store.heads import find_head, read_heads
 from app.store.queue import import_findings
 from app.store.session import Session
-from app.store.solutions import is_current
-
-_NEWEST = (
-    select(func.max(VerdictModel.id))
-    .where(VerdictModel.group_id == GroupModel.id)
-    .correlate(GroupModel)
-    .scalar_subquery()
-    .label("last")
-)
-_HEAD = (
-    select(GroupModel.inputs_hash, GroupModel.revision, DatasetModel.policy_hash, _NEWEST)
-    .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-    .where(GroupModel.id == bindparam("group"))
-)
 
 
 def said_part(inputs_hash: str, revision: int, verdict_id: int) -> str:
@@ -71,10 +55,10 @@ class Head:
 
 def read_head(session: Session, group_id: int) -> Head | None:
     """What a change of a group would rest on now; None where there is no such group."""
-    row = session.execute(_HEAD, {"group": group_id}).one_or_none()
+    row = find_head(session, group_id)
     if row is None:
         return None
-    return Head(said_part(row.inputs_hash, row.revision, row.last or 0), row.policy_hash)
+    return Head(said_part(row.inputs_hash, row.revision, row.last), row.policy_hash)
 
 
 def said_of(etag: str) -> str:
@@ -114,24 +98,10 @@ def require_said(session: Session, group_id: int, said: str, if_match: str, what
 
 def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
     """ETags by group id; at most a few hundred groups, those that do not exist are left out."""
-    statement = (
-        select(
-            GroupModel.id,
-            GroupModel.inputs_hash,
-            GroupModel.revision,
-            DatasetModel.policy,
-            DatasetModel.policy_hash,
-            SolutionModel.summary,
-            _NEWEST,
-        )
-        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(SolutionModel, is_current())
-        .where(GroupModel.id.in_(group_ids))
-    )
     noticed = import_findings(session, group_ids)
     etags = {}
-    for row in session.execute(statement):
-        said = said_part(row.inputs_hash, row.revision, row.last or 0)
+    for row in read_heads(session, group_ids):
+        said = said_part(row.inputs_hash, row.revision, row.last)
         findings = None
         if row.summary is not None:
             kinds = [item.kind for item in noticed[row.id]]

@@ -8,26 +8,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from sqlalchemy import select
-
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import Policy
-from app.store.codecs import extras_from_json, parse, policy_from_json, unpack
+from app.store.codecs import extras_from_json, unpack
+from app.store.datasets import dataset_rows, policy_of
 from app.store.digest import group_inputs_hash
-from app.store.groups import StoredGroup, read_groups, read_stations
-from app.store.models import (
-    DatasetModel,
-    GroupModel,
-    ImportFindingModel,
-    SpareFrameModel,
-    StationModel,
-    VerdictModel,
-)
+from app.store.groups import StoredGroup
+from app.store.projection import all_groups, all_noticed, all_spare, all_stations, all_verdicts
 from app.store.session import Session
 
-_BATCH = 500
 _ELSEWHERE = Station("", ImageSize(0, 0))
 """Stands in a view for the station that is kept under its id."""
 
@@ -104,18 +95,21 @@ def without_station(view: View) -> View:
 def read_ledger(session: Session) -> Ledger:
     """The ledger as the tables have it."""
     ledger = Ledger()
-    for row in session.execute(select(DatasetModel.id, DatasetModel.name, DatasetModel.policy)):
-        ledger.datasets[row.id] = (row.name, policy_from_json(parse(row.policy)))
-    for stored in read_stations(session, session.scalars(select(StationModel.id)).all()).values():
-        ledger.stations[stored.id] = StationRecord(
-            stored.dataset_id, stored.station, stored.revision, stored.source_digest
+    for row in dataset_rows(session):
+        ledger.datasets[row.id] = (row.name, policy_of(row.policy))
+    for station in all_stations(session):
+        ledger.stations[station.id] = StationRecord(
+            station.dataset_id, station.station, station.revision, station.source_digest
         )
-    ids = session.scalars(select(GroupModel.id).order_by(GroupModel.id)).all()
-    for start in range(0, len(ids), _BATCH):
-        for item in read_groups(session, ids[start : start + _BATCH]).values():
-            ledger.groups[item.id] = _group_record(item)
-    _read_verdicts(session, ledger)
-    _read_rest(session, ledger)
+    for group in all_groups(session):
+        ledger.groups[group.id] = _group_record(group)
+    for values in all_verdicts(session):
+        ledger.verdicts.setdefault(values.pop("group_id"), []).append(values)
+    for spare in all_spare(session):
+        place = (spare.dataset_id, spare.camera, spare.frame)
+        ledger.spare[place] = extras_from_json(unpack(spare.extras))
+    for row in all_noticed(session):
+        ledger.noticed.add((row.group_id, row.station_id, row.view, row.sentence))
     return ledger
 
 
@@ -138,18 +132,3 @@ def _group_record(stored: StoredGroup) -> GroupRecord:
         head=replace(stored.group, views=()),
         views=views,
     )
-
-
-def _read_verdicts(session: Session, ledger: Ledger) -> None:
-    columns = [item for item in VerdictModel.__table__.columns if item.name != "id"]
-    for row in session.execute(select(*columns).order_by(VerdictModel.id)):
-        values = dict(row._mapping)
-        ledger.verdicts.setdefault(values.pop("group_id"), []).append(values)
-
-
-def _read_rest(session: Session, ledger: Ledger) -> None:
-    for spare in session.execute(select(*SpareFrameModel.__table__.columns)):
-        place = (spare.dataset_id, spare.camera, spare.frame)
-        ledger.spare[place] = extras_from_json(unpack(spare.extras))
-    for row in session.execute(select(*ImportFindingModel.__table__.columns)):
-        ledger.noticed.add((row.group_id, row.station_id, row.view, row.sentence))

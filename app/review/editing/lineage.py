@@ -6,11 +6,9 @@ behind and can follow; two that are in nobody's past are in conflict.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
-
-from sqlalchemy import func, select
 
 from app.review.editing.ledger import Ledger, StationRecord
 from app.review.editing.replay import apply_entry
@@ -24,9 +22,9 @@ from app.store.codecs import (
     view_from_json,
 )
 from app.store.digest import digest, station_digest, view_digest
-from app.store.groups import StoredGroup, StoredStation, stored_station
-from app.store.log import LogEntry, read_log
-from app.store.models import LogModel, StationModel
+from app.store.groups import StoredGroup, StoredStation
+from app.store.imports import shared_stations
+from app.store.log import LogEntry, group_entries, groups_with_past, station_entries
 from app.store.session import Session
 
 
@@ -121,29 +119,16 @@ class Lineages:
 
     def __init__(self, session: Session, dataset_id: int):
         self._session, self._dataset_id = session, dataset_id
-        columns = StationModel.__table__.columns
-        rows = session.execute(
-            select(*columns).where(StationModel.dataset_id == dataset_id, StationModel.shared)
-        )
-        self._shared = {row.id: stored_station(row) for row in rows}
+        self._shared = {item.id: item for item in shared_stations(session, dataset_id)}
 
     def of(self, groups: Iterable[StoredGroup]) -> dict[int, Lineage]:
         """Lineages by group id; what nobody touched since its import costs no look at it."""
         found = list(groups)
-        touched = self._touched([item.id for item in found])
+        touched = groups_with_past(self._session, [item.id for item in found])
         return {
             item.id: self._walked(item) if item.id in touched else _untouched(item)
             for item in found
         }
-
-    def _touched(self, ids: Sequence[int]) -> set[int]:
-        statement = (
-            select(LogModel.group_id)
-            .where(LogModel.group_id.in_(ids), LogModel.kind != "verdict")
-            .group_by(LogModel.group_id)
-            .having(func.count() > 1)
-        )
-        return {int(number) for number in self._session.scalars(statement) if number is not None}
 
     def _walked(self, stored: StoredGroup) -> Lineage:
         ledger = Ledger()
@@ -153,8 +138,7 @@ class Lineages:
             )
         by_key = {item.station.key: item.station for item in self._shared.values()}
         walk = _Walk(ledger)
-        where = (LogModel.group_id == stored.id, LogModel.kind != "verdict")
-        for entry in read_log(self._session, *where):
+        for entry in group_entries(self._session, stored.id, verdicts=False):
             walk.take(entry, by_key)
         assert walk.base is not None
         return Lineage(
@@ -182,8 +166,7 @@ def _untouched(stored: StoredGroup) -> Lineage:
 def station_lineage(session: Session, stored: StoredStation) -> StationLineage:
     """The lineage of a static camera."""
     ledger, base, states = Ledger(), stored.station, list[str]()
-    where = (LogModel.station_id == stored.id, LogModel.group_id.is_(None))
-    for entry in read_log(session, *where):
+    for entry in station_entries(session, stored.id):
         known = ledger.stations.get(stored.id)
         unedited = known is None or station_digest(known.station) == known.source_digest
         apply_entry(ledger, entry)

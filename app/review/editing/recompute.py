@@ -9,8 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
-from sqlalchemy import select
-
 from app.progress import Progress
 from app.review.datasets.dataset import Dataset, get_dataset, need_dataset, read_dataset
 from app.review.datasets.fan_out import fan_out
@@ -23,8 +21,7 @@ from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.solve import solve
 from app.store.codecs import group_from_json, group_to_json, pack, unpack
-from app.store.groups import read_groups, read_stations
-from app.store.models import GroupModel, StationModel, ViewModel
+from app.store.groups import read_groups, read_stations, station_pitches
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
 from app.store.solutions import (
@@ -169,13 +166,6 @@ def _calibrate_shared(store: Store, dataset: Dataset) -> None:
 
 def _shared(session: Session, dataset_id: int) -> Iterable[tuple[Station, Pitch]]:
     """Static cameras with each size of pitch that their groups have."""
-    statement = (
-        select(StationModel.id, GroupModel.pitch_length, GroupModel.pitch_width)
-        .join(ViewModel, ViewModel.station_id == StationModel.id)
-        .join(GroupModel, GroupModel.id == ViewModel.group_id)
-        .where(StationModel.dataset_id == dataset_id, StationModel.shared)
-        .distinct()
-    )
-    places = session.execute(statement).all()
-    stations = read_stations(session, {row.id for row in places})
-    return [(stations[row.id].station, Pitch(row.pitch_length, row.pitch_width)) for row in places]
+    places = station_pitches(session, dataset_id)
+    stations = read_stations(session, {station for station, _ in places})
+    return [(stations[station].station, pitch) for station, pitch in places]

@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from sqlalchemy import delete, insert, text
-
 from app.review.editing.codec import edit_from_json, station_edit_from_json
 from app.review.editing.ledger import (
     GroupRecord,
@@ -32,14 +30,7 @@ from app.store.codecs import (
 from app.store.digest import station_digest, view_digest
 from app.store.group_rows import head_values, station_values, view_values
 from app.store.log import LogEntry, read_log, verify_chain
-from app.store.models import (
-    GroupModel,
-    ImportFindingModel,
-    QueueModel,
-    SpareFrameModel,
-    StationModel,
-    ViewModel,
-)
+from app.store.projection import rewrite
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
 
@@ -75,15 +66,7 @@ def rebuild(store: Store) -> int:
     """
     with store.write() as session:
         ledger = replay(session)
-        # Solutions and verdicts refer to groups, which are gone for a moment.
-        session.execute(text("PRAGMA defer_foreign_keys = ON"))
-        for model in (QueueModel, ImportFindingModel, SpareFrameModel, ViewModel):
-            session.execute(delete(model))
-        session.execute(delete(GroupModel))
-        session.execute(delete(StationModel))
-        for model, rows in _rows(ledger):
-            if rows:
-                session.execute(insert(model), rows)
+        rewrite(session, **_rows(ledger))
         refresh_queue(session, list(ledger.groups))
     return len(ledger.groups)
 
@@ -248,8 +231,8 @@ def _notice(
             ledger.noticed.add((*place, view, sentence))
 
 
-def _rows(ledger: Ledger) -> list[tuple[Any, list[dict[str, Any]]]]:
-    """Rows of the tables in an order that their references allow."""
+def _rows(ledger: Ledger) -> dict[str, list[dict[str, Any]]]:
+    """Rows of the tables, as ``rewrite`` takes them."""
     stations = [
         {
             **station_values(item.station),
@@ -279,13 +262,14 @@ def _rows(ledger: Ledger) -> list[tuple[Any, list[dict[str, Any]]]]:
         {"dataset_id": key[0], "camera": key[1], "frame": key[2], "extras": _packed(extras)}
         for key, extras in ledger.spare.items()
     ]
-    return [
-        (StationModel, stations),
-        (GroupModel, [_group_row(ledger, key) for key in ledger.groups]),
-        (ViewModel, views),
-        (ImportFindingModel, noticed),
-        (SpareFrameModel, spare),
-    ]
+    groups = [_group_row(ledger, key) for key in ledger.groups]
+    return {
+        "stations": stations,
+        "groups": groups,
+        "views": views,
+        "noticed": noticed,
+        "spare": spare,
+    }
 
 
 def _group_row(ledger: Ledger, group_id: int) -> dict[str, Any]:

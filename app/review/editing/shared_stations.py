@@ -5,23 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from sqlalchemy import delete, insert, select
-
 from app.review.editing.upstream import KIND, FollowedStation, follow_station
 from app.soccer.group import Station
 from app.store.clock import now
 from app.store.codecs import camera_from_json, station_from_json, station_to_json
 from app.store.digest import station_digest
+from app.store.findings import replace_station_finding, station_finding
 from app.store.group_rows import NewRows
-from app.store.groups import (
-    StoredStation,
-    groups_of_station,
-    refresh_inputs_hashes,
-    save_station,
-    stored_station,
-)
-from app.store.log import Entry, append, read_log
-from app.store.models import ImportFindingModel, LogModel, StationModel
+from app.store.groups import StoredStation, groups_of_station, refresh_inputs_hashes, save_station
+from app.store.imports import shared_stations
+from app.store.log import Entry, append, station_entries
 from app.store.queue import refresh_queue
 from app.store.session import Session
 
@@ -41,12 +34,9 @@ class SharedStations:
         self._source, self._actor = source, actor
         self._stored: dict[str, StoredStation] = {}
         self._seen: dict[str, Station] = {}
-        statement = select(*StationModel.__table__.columns).where(
-            StationModel.dataset_id == dataset_id, StationModel.shared
-        )
-        for row in session.execute(statement):
-            self._stored[row.key] = stored_station(row)
-            self.ids[row.key] = row.id
+        for stored in shared_stations(session, dataset_id):
+            self._stored[stored.station.key] = stored
+            self.ids[stored.station.key] = stored.id
 
     def follow(self, stations: Iterable[Station]) -> None:
         """Insert the shared ones among stations, or bring them up to what they are now."""
@@ -74,7 +64,7 @@ class SharedStations:
         if not stored.edited:
             return stored.station
         found = said = None
-        for entry in read_log(self._session, LogModel.station_id == stored.id):
+        for entry in station_entries(self._session, stored.id):
             if entry.kind == "station":
                 said = station_from_json(entry.body["base"] or entry.body["station"])
             elif entry.kind == "camera" and said is not None:
@@ -98,19 +88,14 @@ class SharedStations:
 
     def _note(self, station_id: int, followed: FollowedStation) -> str | None:
         """Save what imports noticed about the station: this one, or earlier ones while it holds."""
-        model = ImportFindingModel
-        where = model.station_id == station_id
         if followed.kept is not None:
             sentence: str | None = followed.kept.sentence
             self.kept.append(followed.station.key)
         elif station_digest(followed.station) != station_digest(followed.base):
-            sentence = self._session.scalar(select(model.sentence).where(where))
+            sentence = station_finding(self._session, station_id)
         else:
             sentence = None
-        self._session.execute(delete(model).where(where))
-        if sentence is not None:
-            values = {"station_id": station_id, "kind": KIND, "sentence": sentence}
-            self._session.execute(insert(model), [values])
+        replace_station_finding(self._session, station_id, KIND, sentence)
         return sentence
 
     def _log(self, station_id: int, followed: FollowedStation, kept: str | None) -> None:

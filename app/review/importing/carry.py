@@ -8,9 +8,8 @@ are not carried: they lie elsewhere on each machine.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from app.datasets.manifest import Manifest, write_manifest
 from app.datasets.output import output_tree
@@ -33,8 +32,7 @@ from app.store.codecs import (
 from app.store.exports import newest_word
 from app.store.groups import StoredGroup, read_groups
 from app.store.imports import group_verdicts, known_groups, shared_stations
-from app.store.log import read_log
-from app.store.models import LogModel
+from app.store.log import LogEntry, group_entries, station_entries
 from app.store.session import Session, Store
 from app.store.spare import sorted_spare_rows
 
@@ -102,7 +100,7 @@ def _stations(session: Session, dataset_id: int) -> Iterator[Json]:
             "station": station,
             "base": None if base == station else base,
             "states": list(lineage.states),
-            "log": _log(session, LogModel.station_id == stored.id, LogModel.group_id.is_(None)),
+            "log": _log(station_entries(session, stored.id)),
         }
 
 
@@ -127,7 +125,7 @@ def _group(session: Session, stored: StoredGroup, lineage: Lineage, verdicts: Js
         "bases": list(lineage.bases),
         "views": {key: list(states) for key, states in lineage.views.items()},
         "stations": {key: list(states) for key, states in lineage.stations.items()},
-        "log": _log(session, LogModel.group_id == stored.id) if walked else [],
+        "log": _log(group_entries(session, stored.id)) if walked else [],
         "verdicts": verdicts,
     }
 
@@ -137,10 +135,10 @@ def _has_past(lineage: Lineage) -> bool:
     return any(len(item) > 1 for item in states)
 
 
-def _log(session: Session, *where: Any) -> list[Json]:
+def _log(said: Iterable[LogEntry]) -> list[Json]:
     """Who edited what and when; carried edits of a third installation too."""
     entries: list[Json] = []
-    for entry in read_log(session, *where):
+    for entry in said:
         if entry.kind in EDIT_KINDS:
             body = {"kind": entry.kind, "actor": entry.actor, "at": entry.at}
             entries.append({**body, "edit": entry.body["edit"]})

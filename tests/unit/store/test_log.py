@@ -6,7 +6,16 @@ import pytest
 from sqlalchemy import text
 
 from app.errors import StorageError
-from app.store.log import Entry, append, read_log, verify_chain
+from app.store.log import (
+    Entry,
+    append,
+    group_entries,
+    groups_with_past,
+    newest_entry,
+    read_log,
+    station_entries,
+    verify_chain,
+)
 from app.store.models import LogModel
 
 FIRST = Entry("import", "ann", "2030-01-01T00:00:00+00:00", {"x": 0.1 + 0.2}, 1, 7)
@@ -48,6 +57,25 @@ class TestReadLog:
                 9,
                 10,
             ]
+
+
+class TestEntriesOfOne:
+    def test_a_group_a_static_camera_and_neither(self, store) -> None:
+        with store.write() as session:
+            said = [
+                FIRST,
+                replace(FIRST, kind="verdict"),
+                replace(FIRST, kind="station", group_id=None, station_id=3),
+                replace(FIRST, kind="camera", station_id=3),
+                replace(FIRST, group_id=8),
+                replace(FIRST, group_id=8, kind="verdict"),
+            ]
+            append(session, said)
+            assert [item.id for item in group_entries(session, 7)] == [1, 2, 4]
+            assert [item.id for item in group_entries(session, 7, verdicts=False)] == [1, 4]
+            assert [item.id for item in station_entries(session, 3)] == [3]
+            assert groups_with_past(session, [7, 8, 9]) == {7}
+            assert newest_entry(session) == 6
 
 
 class TestVerifyChain:

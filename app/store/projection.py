@@ -1,0 +1,77 @@
+"""The projection: every row that the log can make anew, read whole and written whole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from sqlalchemy import delete, insert, select, text
+from sqlalchemy.orm import Session
+
+from app.store.groups import StoredGroup, StoredStation, read_groups, stored_station
+from app.store.models import (
+    GroupModel,
+    ImportFindingModel,
+    QueueModel,
+    SpareFrameModel,
+    StationModel,
+    VerdictModel,
+    ViewModel,
+)
+
+_BATCH = 500
+Rows = Sequence[Mapping[str, Any]]
+
+
+def all_stations(session: Session) -> Iterator[StoredStation]:
+    """Every station."""
+    rows = session.execute(select(*StationModel.__table__.columns))
+    return map(stored_station, rows)
+
+
+def all_groups(session: Session) -> Iterator[StoredGroup]:
+    """Every group by id, in batches."""
+    ids = session.scalars(select(GroupModel.id).order_by(GroupModel.id)).all()
+    for start in range(0, len(ids), _BATCH):
+        yield from read_groups(session, ids[start : start + _BATCH]).values()
+
+
+def all_verdicts(session: Session) -> Iterator[dict[str, Any]]:
+    """Every verdict as values by column but its id, oldest first."""
+    columns = [item for item in VerdictModel.__table__.columns if item.name != "id"]
+    for row in session.execute(select(*columns).order_by(VerdictModel.id)):
+        yield dict(row._mapping)
+
+
+def all_spare(session: Session) -> Iterator[Any]:
+    """The row of every spare frame."""
+    return iter(session.execute(select(*SpareFrameModel.__table__.columns)))
+
+
+def all_noticed(session: Session) -> Iterator[Any]:
+    """The row of everything that imports noticed."""
+    return iter(session.execute(select(*ImportFindingModel.__table__.columns)))
+
+
+def rewrite(
+    session: Session, *, stations: Rows, groups: Rows, views: Rows, noticed: Rows, spare: Rows
+) -> None:
+    """Put rows in the place of all stations, groups, views and what hangs on them.
+
+    Datasets, verdicts and solutions stay; the queue is the caller's to refresh.
+    """
+    # Solutions and verdicts refer to groups, which are gone for a moment.
+    session.execute(text("PRAGMA defer_foreign_keys = ON"))
+    for model in (QueueModel, ImportFindingModel, SpareFrameModel, ViewModel):
+        session.execute(delete(model))
+    session.execute(delete(GroupModel))
+    session.execute(delete(StationModel))
+    for table, rows in (
+        (StationModel, stations),
+        (GroupModel, groups),
+        (ViewModel, views),
+        (ImportFindingModel, noticed),
+        (SpareFrameModel, spare),
+    ):
+        if rows:
+            session.execute(insert(table), rows)

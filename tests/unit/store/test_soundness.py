@@ -1,0 +1,18 @@
+from __future__ import annotations
+
+from sqlalchemy import text
+
+from app.store.session import Store
+from app.store.soundness import count_lost_references, file_faults
+
+
+class TestSoundness:
+    def test_a_sound_file_has_no_fault(self, filled: Store) -> None:
+        with filled.read() as session:
+            assert (file_faults(session), count_lost_references(session)) == ([], 0)
+
+    def test_rows_that_refer_to_nothing_are_counted(self, filled: Store) -> None:
+        with filled.read() as session:
+            session.execute(text("PRAGMA defer_foreign_keys = ON"))
+            session.execute(text("UPDATE view SET station_id = 99"))
+            assert count_lost_references(session) == 3
