@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from sqlalchemy import ColumnElement, delete, func, insert, select
+from sqlalchemy import delete, insert, select
 from sqlalchemy.orm import Session
 
 from app.store.codecs import Json, canonical, pack, parse, unpack
@@ -15,6 +15,11 @@ from app.store.models import DatasetModel
 from app.store.prediction_models import EvaluationFrameModel, EvaluationModel
 
 _BATCH = 2000
+_MOST = 500
+"""Runs of a dataset that are listed."""
+_EVALUATIONS = select(*EvaluationModel.__table__.columns, DatasetModel.name.label("dataset")).join(
+    DatasetModel, DatasetModel.id == EvaluationModel.dataset_id
+)
 
 
 @dataclass(frozen=True)
@@ -68,18 +73,18 @@ def delete_evaluation(session: Session, evaluation_id: int) -> None:
     session.execute(delete(EvaluationModel).where(EvaluationModel.id == evaluation_id))
 
 
-def read_evaluations(
-    session: Session, *where: ColumnElement[bool], limit: int = 500
-) -> list[StoredEvaluation]:
-    """Runs, the newest first."""
-    statement = (
-        select(*EvaluationModel.__table__.columns, DatasetModel.name.label("dataset"))
-        .join(DatasetModel, DatasetModel.id == EvaluationModel.dataset_id)
-        .where(*where)
-        .order_by(EvaluationModel.id.desc())
-        .limit(limit)
-    )
-    return [_stored(row) for row in session.execute(statement)]
+def dataset_evaluations(session: Session, dataset_id: int) -> list[StoredEvaluation]:
+    """The runs of a dataset, the newest first."""
+    statement = _EVALUATIONS.where(EvaluationModel.dataset_id == dataset_id)
+    rows = session.execute(statement.order_by(EvaluationModel.id.desc()).limit(_MOST))
+    return [_stored(row) for row in rows]
+
+
+def find_evaluation(session: Session, evaluation_id: int) -> StoredEvaluation | None:
+    """A run by its id."""
+    statement = _EVALUATIONS.where(EvaluationModel.id == evaluation_id)
+    row = session.execute(statement).one_or_none()
+    return None if row is None else _stored(row)
 
 
 def read_figure(session: Session, evaluation_id: int, name: str) -> Json | None:
@@ -89,42 +94,8 @@ def read_figure(session: Session, evaluation_id: int, name: str) -> Json | None:
     return None if packed is None else unpack(packed).get(name)
 
 
-def read_frame_rows(
-    session: Session,
-    evaluation_id: int,
-    *where: ColumnElement[bool],
-    order: Sequence[ColumnElement[Any]] = (),
-    limit: int | None = None,
-    offset: int = 0,
-) -> Iterator[dict[str, Any]]:
-    """Frames of a run as values by column; a run never changes, so places are stable."""
-    model = EvaluationFrameModel
-    names = [column for column in model.__table__.columns if column.name not in _KEEPING]
-    statement = (
-        select(*names)
-        .where(model.evaluation_id == evaluation_id, *where)
-        .order_by(*order, model.position)
-        .limit(limit)
-        .offset(offset)
-    )
-    for row in session.execute(statement):
-        yield dict(row._mapping)
-
-
-def count_frame_rows(session: Session, evaluation_id: int, *where: ColumnElement[bool]) -> int:
-    """How many frames of a run fulfil the conditions."""
-    model = EvaluationFrameModel
-    statement = (
-        select(func.count()).select_from(model).where(model.evaluation_id == evaluation_id, *where)
-    )
-    return int(session.execute(statement).scalar_one())
-
-
 def _stored(row: Any) -> StoredEvaluation:
     values = {item.name: getattr(row, item.name) for item in fields(StoredEvaluation)}
     for name in ("pins", "counts", "tables"):
         values[name] = parse(values[name])
     return StoredEvaluation(**{**values, "figures": tuple(unpack(row.figures))})
-
-
-_KEEPING = ("evaluation_id", "position")

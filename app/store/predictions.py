@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import delete, func, insert, select
+from sqlalchemy import ColumnElement, delete, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.geometry.camera import Camera
@@ -117,17 +117,22 @@ def delete_prediction_set(session: Session, set_id: int) -> None:
     session.execute(delete(PredictionSetModel).where(PredictionSetModel.id == set_id))
 
 
-def read_prediction_sets(session: Session, *where: Any) -> list[PredictionSet]:
-    """Sets, the newest first."""
-    statement = (
-        select(*PredictionSetModel.__table__.columns)
-        .where(*where)
-        .order_by(PredictionSetModel.id.desc())
+def dataset_prediction_sets(session: Session, dataset_id: int) -> list[PredictionSet]:
+    """The sets of a dataset, the newest first."""
+    return _sets(session, PredictionSetModel.dataset_id == dataset_id)
+
+
+def read_prediction_sets(session: Session, ids: Collection[int]) -> list[PredictionSet]:
+    """Sets by their ids, the newest first; those that are not there are left out."""
+    return _sets(session, PredictionSetModel.id.in_(ids)) if ids else []
+
+
+def has_prediction_set(session: Session, dataset_id: int, name: str) -> bool:
+    """Whether a dataset has a set of that name."""
+    statement = select(PredictionSetModel.id).where(
+        PredictionSetModel.dataset_id == dataset_id, PredictionSetModel.name == name
     )
-    return [
-        PredictionSet(**{**row._mapping, "report": parse(row.report)})
-        for row in session.execute(statement)
-    ]
+    return session.scalar(statement) is not None
 
 
 def read_boxes(session: Session, set_id: int) -> dict[int, list[PredictedBox]]:
@@ -195,6 +200,15 @@ def read_view_rows(session: Session, dataset_id: int) -> list[Any]:
         .order_by(GroupModel.number, ViewModel.position)
     )
     return list(session.execute(statement))
+
+
+def _sets(session: Session, where: ColumnElement[bool]) -> list[PredictionSet]:
+    columns = PredictionSetModel.__table__.columns
+    statement = select(*columns).where(where).order_by(PredictionSetModel.id.desc())
+    return [
+        PredictionSet(**{**row._mapping, "report": parse(row.report)})
+        for row in session.execute(statement)
+    ]
 
 
 def _boxes(session: Session, *where: Any) -> Iterable[PredictedBox]:

@@ -238,6 +238,33 @@ def newest_solution(session: Session) -> int:
     return session.scalar(select(func.max(SolutionModel.id))) or 0
 
 
+def solution_facts(session: Session, ids: Sequence[int]) -> Sequence[Any]:
+    """Rows (group_id, inputs_hash, calibrations, facts) of solutions, as they are stored."""
+    model = SolutionModel
+    statement = select(model.group_id, model.inputs_hash, model.calibrations, model.facts)
+    return session.execute(statement.where(model.id.in_(ids))).all()
+
+
+def present_solutions(session: Session, dataset_id: int) -> Sequence[Any]:
+    """Each group of a dataset with the solution that fits it as it is, in the dataset's order.
+
+    Returns:
+        Rows (group_id, inputs_hash, solution_id or None, split, match, pitch_length, pitch_width).
+    """
+    group = GroupModel
+    statement = (
+        select(
+            group.id, group.inputs_hash, SolutionModel.id, group.split, group.match,
+            group.pitch_length, group.pitch_width,
+        )
+        .join(DatasetModel, DatasetModel.id == group.dataset_id)
+        .outerjoin(SolutionModel, is_current())
+        .where(group.dataset_id == dataset_id)
+        .order_by(group.number)
+    )  # fmt: skip
+    return session.execute(statement).all()
+
+
 def unsolved_groups(session: Session, dataset_id: int) -> list[int]:
     """Ids of a dataset's groups without a solution for their present state, in order."""
     statement = (

@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 from app.soccer.annotation import BallAnnotation
 from app.soccer.group import Media
 from app.store.codecs import ball_from_json, parse
+from app.store.conditions import Condition
 from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
 
 
@@ -46,7 +47,7 @@ class StoredView:
 def dataset_views(
     session: Session,
     dataset_id: int,
-    conditions: Iterable[ColumnElement[bool]] = (),
+    conditions: Iterable[Condition] = (),
     *,
     ids: Collection[int] | None = None,
     without_ball: bool = False,

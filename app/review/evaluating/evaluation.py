@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_
-
 from app.errors import InputError, NotFoundError
 from app.evaluation.comparison import (
     FIELDS,
@@ -32,16 +30,22 @@ from app.review.versions.version import Version, read_version
 from app.soccer.frames import Box
 from app.store.clock import now
 from app.store.codecs import Json
-from app.store.evaluations import (
-    StoredEvaluation,
+from app.store.evaluation_frames import (
+    FrameCondition,
     count_frame_rows,
-    delete_evaluation,
-    insert_evaluation,
-    read_evaluations,
-    read_figure,
+    is_of_match,
+    lacks,
+    lies_in,
     read_frame_rows,
 )
-from app.store.prediction_models import EvaluationFrameModel, EvaluationModel
+from app.store.evaluations import (
+    StoredEvaluation,
+    dataset_evaluations,
+    delete_evaluation,
+    find_evaluation,
+    insert_evaluation,
+    read_figure,
+)
 from app.store.predictions import (
     PredictionSet,
     read_boxes,
@@ -214,7 +218,7 @@ def list_evaluations(store: Store, dataset: str | int) -> list[StoredEvaluation]
     """The runs of a dataset, the newest first."""
     with store.read() as session:
         found = read_dataset(session, dataset)
-        return read_evaluations(session, EvaluationModel.dataset_id == found.id)
+        return dataset_evaluations(session, found.id)
 
 
 def get_evaluation(store: Store, evaluation_id: int) -> StoredEvaluation:
@@ -271,12 +275,20 @@ def list_frames(
     """
     if not 1 <= limit <= MAX_PAGE:
         raise InputError(f"a page has 1 to {MAX_PAGE} frames", pointer="/limit")
-    where, order = _conditions(query), _order(query.sort)
+    where = _conditions(query)
+    sort = _known(query.sort.removesuffix("-desc"), "/sort") if query.sort else None
+    descending = query.sort.endswith("-desc")
     with store.read() as session:
         _read(session, evaluation_id)
-        total = count_frame_rows(session, evaluation_id, *where)
+        total = count_frame_rows(session, evaluation_id, where)
         rows = read_frame_rows(
-            session, evaluation_id, *where, order=order, limit=limit, offset=offset
+            session,
+            evaluation_id,
+            where,
+            sort=sort,
+            descending=descending,
+            limit=limit,
+            offset=offset,
         )
         items = [FrameResult(**row) for row in rows]
     more = offset + len(items) < total
@@ -384,40 +396,25 @@ def _save(store: Store, values: Mapping[str, Any], result: Evaluation) -> Stored
 
 
 def _read(session: Session, evaluation_id: int) -> StoredEvaluation:
-    found = read_evaluations(session, EvaluationModel.id == evaluation_id)
-    if not found:
+    found = find_evaluation(session, evaluation_id)
+    if found is None:
         raise NotFoundError(f"there is no evaluation {evaluation_id}")
-    return found[0]
+    return found
 
 
-def _conditions(query: FrameQuery) -> list[ColumnElement[bool]]:
-    model = EvaluationFrameModel
-    where: list[ColumnElement[bool]] = []
-    if query.match is not None:
-        where.append(model.match == query.match)
-    if query.field is None:
-        return where
-    column = _column(query.field, "/field")
-    if query.missing:
-        return [*where, column.is_(None), model.ball.is_(True)]
-    where.append(column.is_not(None))
-    if query.low is not None:
-        where.append(column >= query.low)
-    if query.high is not None:
-        where.append(column < query.high)
-    return [and_(*where)]
+def _conditions(query: FrameQuery) -> list[FrameCondition]:
+    where = [] if query.match is None else [is_of_match(query.match)]
+    if query.field is not None:
+        field = _known(query.field, "/field")
+        where.append(lacks(field) if query.missing else lies_in(field, query.low, query.high))
+    return where
 
 
-def _order(sort: str) -> list[ColumnElement[Any]]:
-    if not sort:
-        return []
-    column = _column(sort.removesuffix("-desc"), "/sort")
-    return [column.is_(None), column.desc() if sort.endswith("-desc") else column.asc()]
-
-
-def _column(name: str, pointer: str) -> Any:
-    if name not in NUMBERS:
+def _known(field: str, pointer: str) -> str:
+    """A field of frames; raises InputError where they have none of that name."""
+    if field not in NUMBERS:
+        known = ", ".join(NUMBERS)
         raise InputError(
-            f'frames have no field "{name}"', hint=f"Fields: {', '.join(NUMBERS)}.", pointer=pointer
+            f'frames have no field "{field}"', hint=f"Fields: {known}.", pointer=pointer
         )
-    return getattr(EvaluationFrameModel, name)
+    return field

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from app.errors import NotFoundError
 from app.soccer.annotation import BallAnnotation
 from app.store.codecs import ball_from_json
-from app.store.log import LogEntry, read_log
-from app.store.models import LogModel
-from app.store.prediction_models import PredictionSetModel
+from app.store.log import LogEntry, group_entries
 from app.store.predictions import (
     PredictedBox,
     PredictionSet,
@@ -67,7 +65,7 @@ def group_predictions(store: Store, group_id: int) -> GroupPredictions:
             raise NotFoundError(f"there is no group {group_id}")
         boxes = _with_sets(session, read_group_boxes(session, group_id))
         taken = list(_taken(session, group_id))
-        said = list(read_log(session, LogModel.group_id == group_id)) if taken else []
+        said = group_entries(session, group_id) if taken else []
         count = count_prediction_sets(session, dataset)
     return GroupPredictions(
         count, boxes, tuple(_accepted(row, ball, boxes, said) for row, ball in taken)
@@ -77,8 +75,7 @@ def group_predictions(store: Store, group_id: int) -> GroupPredictions:
 def _with_sets(
     session: Session, boxes: Sequence[PredictedBox]
 ) -> tuple[tuple[PredictionSet, PredictedBox], ...]:
-    ids = {box.set_id for box in boxes}
-    found = read_prediction_sets(session, PredictionSetModel.id.in_(ids)) if ids else []
+    found = read_prediction_sets(session, {box.set_id for box in boxes})
     sets = {item.id: item for item in found}
     return tuple((sets[box.set_id], box) for box in boxes)
 

@@ -29,11 +29,12 @@ from app.review.datasets.dataset import read_dataset
 from app.soccer.frames import ImageSize
 from app.store.clock import now
 from app.store.codecs import Json, canonical
-from app.store.prediction_models import PredictionSetModel
 from app.store.predictions import (
     PredictedBox,
     PredictionSet,
+    dataset_prediction_sets,
     delete_prediction_set,
+    has_prediction_set,
     insert_prediction_set,
     predictions_digest,
     read_prediction_sets,
@@ -164,7 +165,7 @@ def save_predictions(
     with store.write() as session:
         found = read_dataset(session, dataset)
         if reuse:
-            own = read_prediction_sets(session, PredictionSetModel.dataset_id == found.id)
+            own = dataset_prediction_sets(session, found.id)
             known = next((item for item in own if _same_reading(item, values)), None)
             if known is not None:
                 return known
@@ -202,7 +203,7 @@ def list_predictions(store: Store, dataset: str | int) -> list[PredictionSet]:
     """The sets of a dataset, the newest first."""
     with store.read() as session:
         found = read_dataset(session, dataset)
-        return read_prediction_sets(session, PredictionSetModel.dataset_id == found.id)
+        return dataset_prediction_sets(session, found.id)
 
 
 def get_predictions(store: Store, set_id: int) -> PredictionSet:
@@ -247,14 +248,13 @@ def view_predictions(store: Store, view_id: int) -> list[tuple[PredictionSet, li
     """What was predicted for a view, by set, the newest set first."""
     with store.read() as session:
         boxes = read_view_boxes(session, view_id)
-        ids = {box.set_id for box in boxes}
-        sets = read_prediction_sets(session, PredictionSetModel.id.in_(ids)) if ids else []
+        sets = read_prediction_sets(session, {box.set_id for box in boxes})
     return [(item, [box for box in boxes if box.set_id == item.id]) for item in sets]
 
 
 def read_set(session: Session, set_id: int) -> PredictionSet:
     """``get_predictions`` within a session."""
-    found = read_prediction_sets(session, PredictionSetModel.id == set_id)
+    found = read_prediction_sets(session, [set_id])
     if not found:
         raise NotFoundError(f"there is no set of predictions {set_id}")
     return found[0]
@@ -272,8 +272,7 @@ def check_name(name: str) -> None:
 
 def require_free(session: Session, dataset_id: int, name: str) -> None:
     """Raise ConflictError where a dataset has a set of that name."""
-    model = PredictionSetModel
-    if read_prediction_sets(session, model.dataset_id == dataset_id, model.name == name):
+    if has_prediction_set(session, dataset_id, name):
         raise ConflictError(
             f'there is a set of predictions "{name}" already',
             hint="Choose another name, or delete that one first.",

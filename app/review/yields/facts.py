@@ -8,16 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from sqlalchemy import select
 
 from app.review.yields.table import EMPTY, YieldTable, join
 from app.solving.facts import Facts, group_facts
 from app.solving.facts import join as join_facts
 from app.solving.facts_codec import facts_from_bytes
 from app.store.groups import read_groups
-from app.store.models import SolutionModel
 from app.store.session import Session, Store
-from app.store.solutions import read_calibrations
+from app.store.solutions import read_calibrations, solution_facts
 
 CHUNK = 400
 """Groups that are read at once, each chunk from a snapshot of its own."""
@@ -53,12 +51,7 @@ def read_facts(store: Store, wanted: Sequence[Wanted]) -> YieldTable:
 
 def _facts(session: Session, wanted: Sequence[Wanted]) -> Iterator[tuple[int, Facts]]:
     """Groups with their facts."""
-    columns = (SolutionModel.group_id, SolutionModel.inputs_hash, SolutionModel.calibrations)
-    rows = session.execute(
-        select(*columns, SolutionModel.facts).where(
-            SolutionModel.id.in_([item.solution_id for item in wanted])
-        )
-    ).all()
+    rows = solution_facts(session, [item.solution_id for item in wanted])
     yield from _gathered(session, [row for row in rows if row.facts is None])
     for row in rows:
         if row.facts is not None:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from sqlalchemy import and_, func, select
 
 from app.errors import NotFoundError
 from app.geometry.arrays import FloatArray, IntArray
@@ -20,9 +19,10 @@ from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT, SOLVER_VERSION
 from app.solving.spread import MeanSpread
 from app.solving.verdict import Verdict, judge
-from app.store.codecs import parse, policy_from_json
-from app.store.models import DatasetModel, GroupModel, LogModel, SolutionModel
+from app.store.datasets import find_dataset, policy_of
+from app.store.log import newest_entry
 from app.store.session import Session, Store
+from app.store.solutions import newest_solution, present_solutions
 
 MAX_BYTES = 512 * 1024 * 1024
 """What all tables together may hold; beyond it the one that was asked for longest ago goes."""
@@ -118,7 +118,7 @@ class YieldStore:
             mark = _mark(session, policy)
             if kept.snapshot is not None and kept.mark == mark:
                 return kept.snapshot
-            rows = _rows(session, dataset_id)
+            rows: Rows = {group: rest for group, *rest in present_solutions(session, dataset_id)}
         calibration = f"{policy.calibration_hash} {SOLVER_VERSION}"
         place = self._store.settings.cache / "yields" / f"{dataset_id}.npz"
         if kept.snapshot is None:
@@ -190,47 +190,15 @@ Rows = dict[int, list[Any]]
 
 def read_policy(session: Session, dataset_id: int) -> Policy:
     """The present policy of a dataset; raises NotFoundError when there is none."""
-    statement = select(DatasetModel.policy).where(DatasetModel.id == dataset_id)
-    text = session.scalar(statement)
-    if text is None:
+    row = find_dataset(session, dataset_id)
+    if row is None:
         raise NotFoundError(f'there is no dataset "{dataset_id}"')
-    return policy_from_json(parse(text))
+    return policy_of(row.policy)
 
 
 def _mark(session: Session, policy: Policy) -> tuple[int, int, str]:
     """Differs whenever the log, the solutions or the policy do."""
-    newest = [
-        session.scalar(select(func.coalesce(func.max(model.id), 0)))
-        for model in (LogModel, SolutionModel)
-    ]
-    return int(newest[0] or 0), int(newest[1] or 0), policy.hash
-
-
-def _rows(session: Session, dataset_id: int) -> Rows:
-    statement = (
-        select(
-            GroupModel.id,
-            GroupModel.inputs_hash,
-            SolutionModel.id,
-            GroupModel.split,
-            GroupModel.match,
-            GroupModel.pitch_length,
-            GroupModel.pitch_width,
-        )
-        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(
-            SolutionModel,
-            and_(
-                SolutionModel.group_id == GroupModel.id,
-                SolutionModel.inputs_hash == GroupModel.inputs_hash,
-                SolutionModel.policy_hash == DatasetModel.policy_hash,
-                SolutionModel.solver_version == SOLVER_VERSION,
-            ),
-        )
-        .where(GroupModel.dataset_id == dataset_id)
-        .order_by(GroupModel.number)
-    )
-    return {group: rest for group, *rest in session.execute(statement).all()}
+    return newest_entry(session), newest_solution(session), policy.hash
 
 
 def _heads(rows: Rows, table: YieldTable) -> Heads:
