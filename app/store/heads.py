@@ -11,17 +11,32 @@ from sqlalchemy.orm import Session
 from app.store.models import DatasetModel, GroupModel, SolutionModel, VerdictModel
 from app.store.solutions import is_current
 
+_GROUP, _DATASET, _VERDICT = GroupModel.__table__, DatasetModel.__table__, VerdictModel.__table__
 _LAST = (
-    select(func.coalesce(func.max(VerdictModel.id), 0))
-    .where(VerdictModel.group_id == GroupModel.id)
-    .correlate(GroupModel)
+    select(func.coalesce(func.max(_VERDICT.c.id), 0))
+    .where(_VERDICT.c.group_id == _GROUP.c.id)
+    .correlate(_GROUP)
     .scalar_subquery()
     .label("last")
 )
 _HEAD = (
-    select(GroupModel.inputs_hash, GroupModel.revision, DatasetModel.policy_hash, _LAST)
-    .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-    .where(GroupModel.id == bindparam("group"))
+    select(_GROUP.c.inputs_hash, _GROUP.c.revision, _DATASET.c.policy_hash, _LAST)
+    .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
+    .where(_GROUP.c.id == bindparam("group"))
+)
+_HEADS = (
+    select(
+        _GROUP.c.id,
+        _GROUP.c.inputs_hash,
+        _GROUP.c.revision,
+        _DATASET.c.policy,
+        _DATASET.c.policy_hash,
+        SolutionModel.__table__.c.summary,
+        _LAST,
+    )
+    .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
+    .outerjoin(SolutionModel.__table__, is_current())
+    .where(_GROUP.c.id.in_(bindparam("ids", expanding=True)))
 )
 
 
@@ -32,18 +47,4 @@ def find_head(session: Session, group_id: int) -> Any | None:
 
 def read_heads(session: Session, group_ids: Sequence[int]) -> Sequence[Any]:
     """Rows as of ``find_head`` with ``id``, the ``policy`` and the ``summary`` of the solution."""
-    statement = (
-        select(
-            GroupModel.id,
-            GroupModel.inputs_hash,
-            GroupModel.revision,
-            DatasetModel.policy,
-            DatasetModel.policy_hash,
-            SolutionModel.summary,
-            _LAST,
-        )
-        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(SolutionModel, is_current())
-        .where(GroupModel.id.in_(group_ids))
-    )
-    return session.execute(statement).all()
+    return session.execute(_HEADS, {"ids": list(group_ids)}).all()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from app.errors import NotFoundError, StaleRevisionError
 from app.soccer.solution import SOLVER_VERSION
-from app.store.codecs import parse
+from app.store.datasets import policy_of
 from app.store.digest import digest
 from app.store.heads import find_head, read_heads
 from app.store.queue import import_findings
@@ -106,6 +106,6 @@ def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
         if row.summary is not None:
             kinds = [item.kind for item in noticed[row.id]]
             findings = [*json.loads(row.summary)["findings"], *kinds]
-        name = parse(row.policy)["name"]
+        name = policy_of(row.policy).name
         etags[row.id] = group_etag(said, row.policy_hash, name, findings)
     return etags
