@@ -9,7 +9,6 @@ from typing import Any
 import structlog
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
-from sqlalchemy.exc import DBAPIError
 from starlette.exceptions import HTTPException
 
 from app.api.problem import TITLES, make_problem, problem_response
@@ -84,7 +83,6 @@ def install_handlers(app: FastAPI) -> None:
     app.add_exception_handler(ReviewError, _review_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(HTTPException, _http_exception)
-    app.add_exception_handler(DBAPIError, _database_error)
 
 
 async def _review_error(request: Request, error: Exception) -> Response:
@@ -104,7 +102,8 @@ async def _review_error(request: Request, error: Exception) -> Response:
     if isinstance(error, StorageError):
         headers["Retry-After"] = RETRY_SECONDS
     if status >= 500:
-        log.error("request refused", instance=problem.instance, error=str(error))
+        cause = error.__cause__
+        log.error("request refused", instance=problem.instance, error=str(error), exc_info=cause)
     return problem_response(problem, headers)
 
 
@@ -145,12 +144,3 @@ async def _http_exception(request: Request, error: Exception) -> Response:
     }.get(error.status_code, TITLES.get(error.status_code, ("", "the request failed"))[1])
     problem = make_problem(error.status_code, detail)
     return problem_response(problem, error.headers)
-
-
-async def _database_error(request: Request, error: Exception) -> Response:
-    """The database was busy or failed; the transaction is rolled back and nothing is saved."""
-    problem = make_problem(
-        503, "the database could not carry out the request", hint="Nothing was saved. Try again."
-    )
-    log.error("database error", instance=problem.instance, exc_info=error)
-    return problem_response(problem, {"Retry-After": RETRY_SECONDS})

@@ -24,7 +24,8 @@ from app.api.reply import ASKED, KEPT_HEADERS, Asked
 from app.api.security.bodies import BYTES
 from app.api.security.origin import SAFE_METHODS
 from app.errors import OverloadedError, ReviewError, StorageError
-from app.store.answers import Answer, find_answer, forget_answers, keep_answer
+from app.review.answers.answers import find_first, forget_old, keep_first
+from app.store.answers import Answer
 from app.store.codecs import canonical, parse
 from app.store.session import Store
 
@@ -86,7 +87,7 @@ class Idempotency:
 
     async def _answer(self, key: str, request: _Request, send: Send) -> None:
         try:
-            known = await run_sync(self._find, request.store, key)
+            known = await run_sync(find_first, request.store, key, self._actor)
         except StorageError as error:
             await _refuse(error, request.scope, request.receive, send)
             return
@@ -109,7 +110,7 @@ class Idempotency:
         if recorded.is_kept and not (asked and asked.kept):
             try:
                 answer = recorded.answer(request.digest())
-                await run_sync(self._keep, request.store, key, answer)
+                await run_sync(keep_first, request.store, key, self._actor, answer)
             except StorageError as error:
                 # It is sent already; a repetition is answered with the state as it is then.
                 log.warning("an answer could not be kept", error=str(error))
@@ -120,19 +121,7 @@ class Idempotency:
             return
         self._tidied = time.monotonic()
         with suppress(StorageError):
-            await run_sync(self._forget, store)
-
-    def _forget(self, store: Store) -> None:
-        with store.write() as session:
-            forget_answers(session)
-
-    def _find(self, store: Store, key: str) -> Answer | None:
-        with store.read() as session:
-            return find_answer(session, key, self._actor)
-
-    def _keep(self, store: Store, key: str, answer: Answer) -> None:
-        with store.write() as session:
-            keep_answer(session, key, self._actor, answer)
+            await run_sync(forget_old, store)
 
 
 async def _refuse(error: ReviewError, scope: Scope, receive: Receive, send: Send) -> None:

@@ -10,9 +10,8 @@ from fastapi import Depends, Request
 from pydantic import BaseModel
 from starlette.responses import Response
 
-from app.errors import ConflictError
-from app.store.answers import Answer, Kept, keep_answer
-from app.store.session import Session
+from app.review.answers.answers import keep_with_work
+from app.store.answers import Answer, Kept, keep_nothing
 
 T = TypeVar("T")
 
@@ -29,6 +28,10 @@ class Asked:
     actor: str
     digest: str
     kept: bool = False
+
+    def note_kept(self) -> None:
+        """Its answer is in the database."""
+        self.kept = True
 
 
 class Reply(Generic[T]):
@@ -54,21 +57,15 @@ class Reply(Generic[T]):
         """Make the answer; what is returned writes it into a transaction."""
         response = self._make(outcome)
         self.made, self._of = response, outcome
-        return lambda session: self._save(session, response)
+        asked = self._asked
+        if asked is None:
+            return keep_nothing(outcome)
+        answer = answer_of(asked.digest, response)
+        return keep_with_work(asked.key, asked.actor, answer, asked.note_kept)
 
     def of(self, outcome: T) -> Response:
         """The answer to send: the one that was kept, or a new one where nothing was saved."""
         return self.made if self.made and self._of is outcome else self._make(outcome)
-
-    def _save(self, session: Session, response: Response) -> None:
-        asked = self._asked
-        if asked is None:
-            return
-        if not keep_answer(session, asked.key, asked.actor, answer_of(asked.digest, response)):
-            raise ConflictError(
-                "the same request was answered in the meantime", hint="Send it again."
-            )
-        asked.kept = True
 
 
 def answer_of(digest: str, response: Response) -> Answer:

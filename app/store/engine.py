@@ -83,7 +83,9 @@ def reported(settings: Settings) -> Iterator[None]:
     except DBAPIError as error:
         if getattr(error.orig, "sqlite_errorname", "") in ("SQLITE_NOTADB", "SQLITE_CORRUPT"):
             raise _storage_error(error, settings) from error
-        raise
+        raise StorageError(
+            "the database could not carry out the request", hint="Nothing was saved. Try again."
+        ) from error
 
 
 def _storage_error(error: DBAPIError, settings: Settings) -> StorageError:

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from sqlalchemy import Engine, text
+from sqlalchemy import Engine
 from sqlalchemy.orm import Session as Session
 
 from app.config import Settings
@@ -108,9 +108,3 @@ def _require_schema(engine: Engine) -> None:
         f"the database was made by a newer version of Touchline (schema {revision})",
         hint="Update Touchline; an older version would damage the data.",
     )
-
-
-def ping(store: Store) -> None:
-    """Ask the database one question; raises ``StorageError`` when it does not answer."""
-    with store.read() as session:
-        session.execute(text("SELECT 1"))

@@ -8,7 +8,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_l
 from app.api.deps import AppStore
 from app.api.problem import responses
 from app.api.schemas.health import Health, Readiness
-from app.store.session import ping
+from app.review.queue.changes import read_position
 
 router = APIRouter(tags=["health"])
 
@@ -22,7 +22,7 @@ async def get_health(request: Request) -> Health:
 @router.get("/readyz", operation_id="getReadiness", responses=responses())
 def get_readiness(store: AppStore) -> Readiness:
     """Whether the database answers; 503 while it does not."""
-    ping(store)
+    read_position(store)
     return Readiness(status="ready")
 
 

@@ -8,12 +8,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from app.api.schemas.document import Document
-from app.evaluation.table import Cell, Table
+from app.evaluation.table import Cell
 from app.review.evaluating.evaluation import (
     Comparison,
     EvaluationRequest,
+    read_tables,
 )
-from app.store.value_codec import from_json
 
 SetId = Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
 
@@ -113,7 +113,7 @@ _HEADLINE = (
 
 
 def _headline(tables: list[Any]) -> dict[str, Cell | None]:
-    found = {table.name: table for table in (from_json(Table, value) for value in tables)}
+    found = {table.name: table for table in read_tables(tables)}
     return {
         column: found[name].cell(row, column) for name, row, column in _HEADLINE if name in found
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -244,7 +244,12 @@ def remove_evaluation(store: Store, evaluation_id: int) -> None:
 
 def tables_of(evaluation: StoredEvaluation) -> list[Table]:
     """The tables of a run as values."""
-    return [from_json(Table, value) for value in evaluation.tables]
+    return read_tables(evaluation.tables)
+
+
+def read_tables(values: Iterable[Json]) -> list[Table]:
+    """Tables from JSON."""
+    return [from_json(Table, value) for value in values]
 
 
 def get_figure(store: Store, evaluation_id: int, name: str) -> Figure:

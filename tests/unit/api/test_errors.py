@@ -7,6 +7,7 @@ from typing import Annotated
 import pytest
 from fastapi import FastAPI, Path, Query
 from sqlalchemy.exc import OperationalError
+from structlog.testing import capture_logs
 
 from app.api.errors import (
     PreconditionRequiredError,
@@ -78,10 +79,6 @@ def client(plain_app: FastAPI, client_of):
     def fail(index: int) -> None:
         raise CASES[index][0]
 
-    @plain_app.get("/database")
-    def database() -> None:
-        raise OperationalError("SELECT secret", {}, Exception("locked"))
-
     @plain_app.patch("/lines/{view}")
     def lines(
         view: Annotated[int, Path(ge=1)], edit: LinesEdit, limit: Annotated[int, Query(le=5)] = 1
@@ -116,10 +113,14 @@ class TestReviewErrors:
             sent = "retry-after" in client.get(f"/raise/{index}").headers
             assert sent == (status in (429, 503, 507))
 
-    def test_a_busy_database_shows_no_sql(self, client) -> None:
-        answer = client.get("/database")
-        assert answer.status_code == 503
-        assert "SELECT" not in answer.text
+    def test_what_the_database_refused_shows_no_sql_and_is_logged_with_its_cause(
+        self, client
+    ) -> None:
+        index = next(i for i, (_, status) in enumerate(CASES) if status == 507)
+        with capture_logs() as logs:
+            answer = client.get(f"/raise/{index}")
+        assert "INSERT" not in answer.text
+        assert isinstance(logs[0]["exc_info"], OperationalError)
 
 
 class TestValidationErrors:

@@ -14,11 +14,10 @@ import uvicorn
 from sqlalchemy import update
 from structlog.testing import capture_logs
 
-from app.api import idempotency as module
-from app.api import reply
 from app.api.idempotency import Idempotency
 from app.api.server import Server, listen
 from app.errors import StorageError
+from app.review.answers import answers
 from app.store.job_models import AnswerModel
 
 API = "/api/v1"
@@ -131,7 +130,7 @@ class TestFailure:
         def full(*_: object) -> None:
             raise StorageError("the disk is full")
 
-        monkeypatch.setattr(module, "keep_answer", full)
+        monkeypatch.setattr(answers, "keep_answer", full)
         with capture_logs() as logs:
             assert api.post(f"{API}/practice", json={}, headers=KEY).status_code == 202
         assert [entry["event"] for entry in logs] == ["an answer could not be kept"]
@@ -143,7 +142,7 @@ class TestFailure:
             raise StorageError("the disk is full")
 
         with monkeypatch.context() as patch:
-            patch.setattr(reply, "keep_answer", full)
+            patch.setattr(answers, "keep_answer", full)
             assert accept(api).status_code == 503
         assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"
         assert accept(api).json()["verdict"]["state"] == "deferred"
@@ -151,7 +150,7 @@ class TestFailure:
     def test_of_two_servers_that_answer_the_same_request_one_does_it(
         self, api, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(reply, "keep_answer", lambda *_: False)
+        monkeypatch.setattr(answers, "keep_answer", lambda *_: False)
         assert accept(api).status_code == 409
         assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"
 
@@ -162,7 +161,7 @@ class TestFailure:
             raise StorageError("the database is busy")
 
         with monkeypatch.context() as patch:
-            patch.setattr(module, "find_answer", busy)
+            patch.setattr(answers, "find_answer", busy)
             answer = accept(api)
         assert (answer.status_code, answer.headers["retry-after"]) == (503, "5")
         assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"

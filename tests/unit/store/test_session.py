@@ -14,7 +14,7 @@ from app.config import Settings
 from app.errors import InputError, StorageError
 from app.store.engine import PRAGMAS
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
-from app.store.session import Store, ping
+from app.store.session import Store
 
 INSERT = "INSERT INTO dataset (name, created, policy, policy_hash) VALUES ('{}', '', '', '')"
 
@@ -194,7 +194,7 @@ class TestAppendOnly:
         with store.write() as session:
             for row in ROWS:
                 session.execute(text(row))
-        with pytest.raises(Exception, match="never changed"), store.write() as session:
+        with store.write() as session, pytest.raises(Exception, match="never changed"):
             session.execute(text(statement))
         with store.read() as session:
             assert session.execute(text("SELECT actor FROM log")).scalar() == ""
@@ -217,13 +217,22 @@ class TestAppendOnly:
         }
 
 
-class TestPing:
-    def test_answers_while_the_database_does(self, store: Store, settings: Settings) -> None:
-        ping(store)
+class TestErrors:
+    def test_a_file_that_is_no_database_is_a_storage_error(
+        self, store: Store, settings: Settings
+    ) -> None:
+        assert names(store) == []
         store.close()
         (settings.home / "touchline.db").write_bytes(b"x" * 4096)
-        with pytest.raises(StorageError):
-            ping(store)
+        with pytest.raises(StorageError, match="not a database"):
+            names(store)
+
+    def test_a_refused_statement_is_a_storage_error_that_shows_no_sql(self, store: Store) -> None:
+        add(store, "demo")
+        with pytest.raises(StorageError, match="could not carry out") as caught:
+            add(store, "demo")
+        assert "INSERT" not in f"{caught.value} {caught.value.hint}"
+        assert names(store) == ["demo"]
 
 
 def test_every_migration_is_known() -> None:

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import pytest
 from sqlalchemy import func, select, text
-from sqlalchemy.exc import IntegrityError
 
-from app.errors import ConflictError, NotFoundError
+from app.errors import ConflictError, NotFoundError, StorageError
 from app.review.datasets import delete as module
 from app.review.datasets.dataset import get_dataset, list_datasets
 from app.review.datasets.delete import delete_dataset, read_contents
@@ -160,7 +159,7 @@ class TestDeleteDataset:
 
     def test_verdicts_can_be_deleted_only_with_their_dataset(self, two: Store) -> None:
         delete_dataset(two, "other", confirm="other", actor="eve")
-        with pytest.raises(IntegrityError), two.write() as session:
+        with pytest.raises(StorageError), two.write() as session:
             session.execute(text("DELETE FROM verdict"))
         assert rows(two, "verdict") == 3
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 from sqlalchemy import text
-from sqlalchemy.exc import IntegrityError
 
 from app.config import Settings
 from app.errors import (
@@ -16,6 +15,7 @@ from app.errors import (
     NotFoundError,
     SharedStationError,
     StaleRevisionError,
+    StorageError,
 )
 from app.review.editing import state as state_module
 from app.review.editing import submit as submit_module
@@ -83,7 +83,7 @@ class TestSubmit:
             session.execute(
                 text(f"CREATE TRIGGER full BEFORE {step} BEGIN SELECT RAISE(ABORT, 'full'); END")
             )
-        with pytest.raises(IntegrityError, match="full"):
+        with pytest.raises(StorageError, match="could not carry out"):
             change(store, state, SetBall("7.png", BALL))
         assert load(store, state.id) == state
         assert {name: count(store, name) for name in before} == before

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 from sqlalchemy import text
-from sqlalchemy.exc import IntegrityError
 
+from app.errors import StorageError
 from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict
 from app.store.engine import make_engine
@@ -103,5 +103,5 @@ class TestUpgrade:
         as_before(filled)
         migrate(filled.settings)
         for statement in ("UPDATE solution SET summary = '{}'", "DELETE FROM verdict"):
-            with pytest.raises(IntegrityError), filled.write() as session:
+            with pytest.raises(StorageError), filled.write() as session:
                 session.execute(text(statement))

@@ -261,7 +261,7 @@ class TestTriggers:
     )
     def test_the_database_refuses_to_change_a_version(self, store, judged, statement) -> None:
         frozen(store)
-        with pytest.raises(Exception, match="never changed"), store.write() as session:
+        with store.write() as session, pytest.raises(Exception, match="never changed"):
             session.execute(text(statement))
 
     def test_frozen_content_is_not_replaced(self, store, judged) -> None:

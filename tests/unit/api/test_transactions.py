@@ -1,0 +1,38 @@
+"""Routes pass the database on; whoever asks it stands on the floor below."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import app.api
+
+SOURCES = sorted(Path(app.api.__path__[0]).rglob("*.py"))
+
+
+def transactions(source: str) -> list[int]:
+    """Lines that open one."""
+    opened = [
+        item.context_expr
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, (ast.With, ast.AsyncWith))
+        for item in node.items
+    ]
+    return [
+        call.lineno
+        for call in opened
+        if isinstance(call, ast.Call)
+        and isinstance(call.func, ast.Attribute)
+        and call.func.attr in ("read", "write")
+    ]
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
+def test_no_route_opens_a_transaction(path: Path) -> None:
+    assert transactions(path.read_text()) == []
+
+
+def test_one_that_did_would_be_found() -> None:
+    assert transactions("with store.read() as session:\n    ...") == [1]
