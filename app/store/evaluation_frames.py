@@ -58,14 +58,7 @@ def read_frame_rows(
 ) -> Iterator[dict[str, Any]]:
     """Frames of a run as values by column; a run never changes, so places are stable.
 
-    Args:
-        session: Any session.
-        evaluation_id: The run.
-        conditions: All must hold.
-        sort: Column; frames without such a number come last. None: as they stand in the dataset.
-        descending: The largest first.
-        limit: Most frames; None: all.
-        offset: Frames that are left out before.
+    ``sort`` is a column, whose missing numbers come last; None: as they stand in the dataset.
     """
     model = EvaluationFrameModel
     order: list[ColumnElement[Any]] = []

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import func, insert, select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app.store.group_rows import next_id
 from app.store.groups import StoredStation, stored_station
 from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, LogModel, StationModel, VerdictModel, ViewModel
@@ -110,12 +109,3 @@ def group_verdicts(session: Session, ids: Iterable[int]) -> dict[int, list[dict[
     for group_id, *values in session.execute(statement):
         verdicts.setdefault(group_id, []).append(dict(zip(VERDICT, values, strict=True)))
     return verdicts
-
-
-def add_verdicts(session: Session, group_id: int, verdicts: Sequence[Mapping[str, Any]]) -> None:
-    """Insert verdicts of a group; the last one counts."""
-    first = next_id(session, VerdictModel)
-    rows = [
-        {**item, "id": first + place, "group_id": group_id} for place, item in enumerate(verdicts)
-    ]
-    session.execute(insert(VerdictModel), rows, execution_options={"render_nulls": True})

@@ -1,11 +1,9 @@
-"""Listing: the groups of a dataset that fulfil conditions, counted, read and put in order.
-
-Every question takes the dataset's id and conditions that all must hold (``store.conditions``).
-"""
+"""Listing: the groups of a dataset that fulfil conditions, counted, read and put in order."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import ColumnElement, Integer, Select, cast, func, select
@@ -16,103 +14,83 @@ from app.store.models import QueueModel
 from app.store.order import Key, Order
 
 
-def count_groups(session: Session, dataset_id: int, conditions: Iterable[Condition] = ()) -> int:
-    """How many groups there are."""
-    statement = select(func.count()).select_from(QueueModel).where(*_where(dataset_id, conditions))
-    return session.scalar(statement) or 0
+@dataclass(frozen=True)
+class Listing:
+    """The groups of a dataset that fulfil all conditions, as a session sees them."""
+
+    session: Session
+    dataset_id: int
+    conditions: Iterable[Condition] = ()
+
+    def count(self) -> int:
+        """How many groups there are."""
+        statement = select(func.count()).select_from(QueueModel).where(*self._where)
+        return self.session.scalar(statement) or 0
+
+    def columns(self, names: Iterable[str], *, by_number: bool = False) -> Sequence[Any]:
+        """Some columns of each group."""
+        statement = _columns(names).where(*self._where)
+        if by_number:
+            statement = statement.order_by(QueueModel.number)
+        return self.session.execute(statement).all()
+
+    def rows_after(self, order: Order, keys: Sequence[Key] | None, limit: int) -> Sequence[Any]:
+        """Rows in order with their keys, from the one after these keys on, or from the first."""
+        after = [] if keys is None else [order.after(keys)]
+        statement = _rows(order).where(*self._where, *after).limit(limit)
+        return self.session.execute(statement).all()
+
+    def ids(self, order: Order, limit: int | None = None) -> list[int]:
+        """Ids in order, of all or of the first."""
+        return self._scalars(self._ids.order_by(*order.ascending).limit(limit))
+
+    def ids_from(self, order: Order, start: int, limit: int, total: int) -> list[int]:
+        """Ids from a position on, in order, out of ``total``.
+
+        SQLite sorts as many rows as it skips and reads, and wide rows cost it several times as
+        much: hence ids alone, and behind the middle from the end.
+        """
+        count = min(limit, total - start)
+        if count <= 0:
+            return []
+        behind = total - start - count
+        if start <= behind:
+            return self._scalars(self._ids.order_by(*order.ascending).offset(start).limit(count))
+        backwards = self._ids.order_by(*order.backwards).offset(behind).limit(count)
+        return self._scalars(backwards)[::-1]
+
+    def ids_around(
+        self, order: Order, keys: Sequence[Key], limit: int
+    ) -> tuple[list[int], list[int]]:
+        """Ids just before some keys and just after, the nearest first."""
+        before = self._ids.where(order.before(keys)).order_by(*order.backwards).limit(limit)
+        after = self._ids.where(order.after(keys)).order_by(*order.ascending).limit(limit)
+        return self._scalars(before), self._scalars(after)
+
+    @property
+    def _where(self) -> list[ColumnElement[bool]]:
+        return [QueueModel.dataset_id == self.dataset_id, *self.conditions]
+
+    @property
+    def _ids(self) -> Select[int]:
+        return select(QueueModel.group_id).where(*self._where)
+
+    def _scalars(self, statement: Select[int]) -> list[int]:
+        return list(self.session.scalars(statement))
+
+
+def read_rows(session: Session, ids: Sequence[int], order: Order) -> Sequence[Any]:
+    """The rows of groups in order, with their keys."""
+    return session.execute(_rows(order).where(QueueModel.group_id.in_(ids))).all()
 
 
 def read_columns(
-    session: Session,
-    dataset_id: int,
-    conditions: Iterable[Condition],
-    names: Iterable[str],
-    *,
-    by_number: bool = False,
-) -> Sequence[Any]:
-    """Some columns of each group."""
-    statement = _columns(names).where(*_where(dataset_id, conditions))
-    return session.execute(statement.order_by(QueueModel.number) if by_number else statement).all()
-
-
-def read_columns_of(
     session: Session, ids: Sequence[int], conditions: Iterable[Condition], names: Iterable[str]
 ) -> Sequence[Any]:
     """Some columns of those among some groups of one dataset that fulfil conditions, by number."""
     # The dataset is not asked for: SQLite would look through all of it.
     statement = _columns(names).where(QueueModel.group_id.in_(ids), *conditions)
     return session.execute(statement.order_by(QueueModel.number)).all()
-
-
-def read_rows_after(
-    session: Session,
-    dataset_id: int,
-    conditions: Iterable[Condition],
-    order: Order,
-    keys: Sequence[Key] | None,
-    limit: int,
-) -> Sequence[Any]:
-    """Rows in order with their keys, from the one after these keys on, or from the first."""
-    where = _where(dataset_id, conditions)
-    if keys is not None:
-        where.append(order.after(keys))
-    return session.execute(_rows(order).where(*where).limit(limit)).all()
-
-
-def read_rows_of(session: Session, ids: Sequence[int], order: Order) -> Sequence[Any]:
-    """The rows of groups in order, with their keys."""
-    return session.execute(_rows(order).where(QueueModel.group_id.in_(ids))).all()
-
-
-def ids_in_order(
-    session: Session,
-    dataset_id: int,
-    conditions: Iterable[Condition],
-    order: Order,
-    limit: int | None = None,
-) -> list[int]:
-    """Ids of the groups in order, of all or of the first."""
-    statement = select(QueueModel.group_id).where(*_where(dataset_id, conditions))
-    return list(session.scalars(statement.order_by(*order.ascending).limit(limit)))
-
-
-def ids_from(
-    session: Session,
-    dataset_id: int,
-    conditions: Iterable[Condition],
-    order: Order,
-    start: int,
-    limit: int,
-    total: int,
-) -> list[int]:
-    """Ids from a position on, in order, out of ``total``.
-
-    SQLite sorts as many rows as it skips and reads, and wide rows cost it several times as much:
-    hence ids alone, and behind the middle from the end.
-    """
-    count = min(limit, total - start)
-    if count <= 0:
-        return []
-    behind = total - start - count
-    ids = select(QueueModel.group_id).where(*_where(dataset_id, conditions)).limit(count)
-    if start <= behind:
-        return list(session.scalars(ids.order_by(*order.ascending).offset(start)))
-    return list(session.scalars(ids.order_by(*order.backwards).offset(behind)))[::-1]
-
-
-def ids_around(
-    session: Session,
-    dataset_id: int,
-    conditions: Iterable[Condition],
-    order: Order,
-    keys: Sequence[Key],
-    limit: int,
-) -> tuple[list[int], list[int]]:
-    """Ids of the groups just before some keys and just after, the nearest first."""
-    ids = select(QueueModel.group_id).where(*_where(dataset_id, conditions)).limit(limit)
-    before = ids.where(order.before(keys)).order_by(*order.backwards)
-    after = ids.where(order.after(keys)).order_by(*order.ascending)
-    return list(session.scalars(before)), list(session.scalars(after))
 
 
 def find_place(session: Session, group_id: int, order: Order) -> tuple[int, list[Key]] | None:
@@ -153,7 +131,3 @@ def _columns(names: Iterable[str]) -> Select[Any]:
 
 def _rows(order: Order) -> Select[Any]:
     return select(*QueueModel.__table__.columns, *order.keys).order_by(*order.ascending)
-
-
-def _where(dataset_id: int, conditions: Iterable[Condition]) -> list[ColumnElement[bool]]:
-    return [QueueModel.dataset_id == dataset_id, *conditions]

@@ -26,12 +26,6 @@ def find_saved_view(session: Session, view_id: int) -> Any | None:
     return session.execute(_SAVED.where(SavedViewModel.id == view_id)).one_or_none()
 
 
-def saved_view_names(session: Session, dataset_id: int) -> list[str]:
-    """The names that the saved views of a dataset have."""
-    statement = select(SavedViewModel.name).where(SavedViewModel.dataset_id == dataset_id)
-    return list(session.scalars(statement))
-
-
 def insert_saved_view(
     session: Session, dataset_id: int, name: str, query: str, *, actor: str
 ) -> int:

@@ -9,17 +9,9 @@ from dataclasses import dataclass
 
 from app.errors import ConflictError
 from app.review.datasets.dataset import dataset_id, read_dataset
+from app.store import removal
 from app.store.clock import now
 from app.store.log import Entry, append
-from app.store.removal import (
-    count_contents,
-    delete_rows,
-    delete_solutions,
-    delete_unused_calibrations,
-    has_unsolved,
-    keep_used_ids,
-    solutions_of,
-)
 from app.store.session import Session, Store
 
 KIND = "dataset_deleted"
@@ -77,27 +69,27 @@ def delete_dataset(
     calibrations = _delete_solutions(store, identity)
     with store.write() as session:
         contents = _contents(session, identity)
-        keep_used_ids(session)
+        removal.keep_used_ids(session)
         body = {"name": contents.name, "counts": contents.counts}
         append(session, [Entry(KIND, actor, now(), body, identity)])
-        delete_rows(session, identity)
+        removal.delete_rows(session, identity)
     _delete_calibrations(store, calibrations)
     return contents
 
 
 def _contents(session: Session, identity: int) -> DatasetContents:
     name = read_dataset(session, identity).name
-    return DatasetContents(identity, name, count_contents(session, identity))
+    return DatasetContents(identity, name, removal.count_contents(session, identity))
 
 
 def _delete_solutions(store: Store, identity: int) -> set[str]:
     """Delete what was computed; returns the keys of the calibrations that it rested on."""
     keys: set[str] = set()
     with store.read() as session:
-        solutions = solutions_of(session, identity)
+        solutions = removal.solutions_of(session, identity)
     for start in range(0, len(solutions), CHUNK):
         with store.write() as session:
-            keys |= delete_solutions(session, solutions[start : start + CHUNK])
+            keys |= removal.delete_solutions(session, solutions[start : start + CHUNK])
     return keys
 
 
@@ -109,6 +101,6 @@ def _delete_calibrations(store: Store, keys: set[str]) -> None:
     names = sorted(keys)
     for start in range(0, len(names), CALIBRATIONS):
         with store.write() as session:
-            if has_unsolved(session):
+            if removal.has_unsolved(session):
                 return
-            delete_unused_calibrations(session, names[start : start + CALIBRATIONS])
+            removal.delete_unused_calibrations(session, names[start : start + CALIBRATIONS])

@@ -28,16 +28,10 @@ from app.review.evaluating.predictions import read_set
 from app.review.evaluating.truth import AcceptedTruth
 from app.review.versions.version import Version, read_version
 from app.soccer.frames import Box
+from app.store import evaluation_frames as frame_rows
 from app.store.clock import now
 from app.store.codecs import Json
-from app.store.evaluation_frames import (
-    FrameCondition,
-    count_frame_rows,
-    is_of_match,
-    lacks,
-    lies_in,
-    read_frame_rows,
-)
+from app.store.evaluation_frames import FrameCondition
 from app.store.evaluations import (
     StoredEvaluation,
     dataset_evaluations,
@@ -285,8 +279,8 @@ def list_frames(
     descending = query.sort.endswith("-desc")
     with store.read() as session:
         _read(session, evaluation_id)
-        total = count_frame_rows(session, evaluation_id, where)
-        rows = read_frame_rows(
+        total = frame_rows.count_frame_rows(session, evaluation_id, where)
+        rows = frame_rows.read_frame_rows(
             session,
             evaluation_id,
             where,
@@ -314,7 +308,7 @@ def compare(store: Store, first_id: int, second_id: int, field: str = "error_m")
         if first.dataset_id != second.dataset_id:
             raise InputError("the two runs belong to different datasets", pointer="/with")
         frames = [
-            [FrameResult(**row) for row in read_frame_rows(session, item.id)]
+            [FrameResult(**row) for row in frame_rows.read_frame_rows(session, item.id)]
             for item in (first, second)
         ]
     differs = differing_pins(first.pins, second.pins)
@@ -408,10 +402,14 @@ def _read(session: Session, evaluation_id: int) -> StoredEvaluation:
 
 
 def _conditions(query: FrameQuery) -> list[FrameCondition]:
-    where = [] if query.match is None else [is_of_match(query.match)]
+    where = [] if query.match is None else [frame_rows.is_of_match(query.match)]
     if query.field is not None:
         field = _known(query.field, "/field")
-        where.append(lacks(field) if query.missing else lies_in(field, query.low, query.high))
+        where.append(
+            frame_rows.lacks(field)
+            if query.missing
+            else frame_rows.lies_in(field, query.low, query.high)
+        )
     return where
 
 

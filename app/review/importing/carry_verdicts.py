@@ -7,9 +7,9 @@ from typing import Any
 
 from app.review.importing.ingest import Origin
 from app.store.clock import now
-from app.store.imports import VERDICT, add_verdicts, group_verdicts
-from app.store.log import Entry, append
+from app.store.imports import VERDICT, group_verdicts
 from app.store.session import Session
+from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id
 
 
 def merge_verdicts(
@@ -30,13 +30,9 @@ def merge_verdicts(
     fresh = sorted(fresh, key=lambda item: str(item["at"]))
     if known and str(known[-1]["at"]) > str(fresh[-1]["at"]):
         fresh.append(known[-1])
-    at = now()
-    add_verdicts(session, group_id, fresh)
-    entries = [
-        Entry("verdict", origin.actor, at, dict(item), origin.dataset_id, group_id)
-        for item in fresh
-    ]
-    append(session, entries)
+    first = next_verdict_id(session)
+    given = [StoredVerdict(first + place, group_id, **item) for place, item in enumerate(fresh)]
+    insert_verdicts(session, origin.dataset_id, given, actor=origin.actor, at=now())
     return True
 
 

@@ -10,8 +10,8 @@ from app.review.datasets.dataset import dataset_id
 from app.review.editing.state import GroupState, read_states
 from app.soccer.group import Group
 from app.soccer.solution import Finding
-from app.store import listing
 from app.store.conditions import Condition, compares, contains, lists
+from app.store.listing import Listing
 from app.store.order import Order
 from app.store.session import Store
 
@@ -39,7 +39,7 @@ class GroupFindings:
 def count_groups(store: Store, dataset_id: int, kind: str | None) -> int:
     """How many groups of a dataset have findings (of a kind)."""
     with store.read() as session:
-        return listing.count_groups(session, dataset_id, [_has(kind)])
+        return Listing(session, dataset_id, [_has(kind)]).count()
 
 
 def read_findings(
@@ -48,7 +48,7 @@ def read_findings(
     """Findings of up to ``limit`` groups, by number of the group, from the one after ``after``."""
     with store.read() as session:
         where = [_has(kind), compares("number", ">", after)]
-        ids = listing.ids_in_order(session, dataset_id, where, Order("number"), limit)
+        ids = Listing(session, dataset_id, where).ids(Order("number"), limit)
         states = read_states(session, ids)
     return [_group_findings(state, kind) for state in states]
 

@@ -13,15 +13,7 @@ from typing import Any
 from app.errors import InputError, NotFoundError
 from app.review.queue import cursor as cursors
 from app.review.queue.query import parse_query
-from app.store.listing import (
-    count_groups,
-    find_place,
-    ids_around,
-    ids_from,
-    ids_in_order,
-    read_rows_after,
-    read_rows_of,
-)
+from app.store.listing import Listing, find_place, read_rows
 from app.store.session import Store
 
 MAX_PAGE = 500
@@ -135,16 +127,16 @@ def list_groups(
         raise InputError(f"a page has 1 to {MAX_PAGE} groups", pointer="/limit")
     if cursor is not None and start is not None:
         raise InputError("a page begins at a cursor or at a position, not both", pointer="/from")
-    where, order = parsed.conditions, parsed.order
+    order = parsed.order
     keys = None if cursor is None else cursors.decode(parsed, cursor)
     with store.read() as session:
-        total = count_groups(session, dataset_id, where)
+        listing = Listing(session, dataset_id, parsed.conditions)
+        total = listing.count()
         if start is not None:
-            ids = ids_from(session, dataset_id, where, order, start, limit, total)
-            rows = read_rows_of(session, ids, order)
+            rows = read_rows(session, listing.ids_from(order, start, limit, total), order)
             more = start + limit < total
         else:
-            rows = read_rows_after(session, dataset_id, where, order, keys, limit + 1)
+            rows = listing.rows_after(order, keys, limit + 1)
             more = len(rows) > limit
     rows = rows[:limit]
     following = cursors.encode(parsed, order.keys_of(rows[-1])) if more else None
@@ -160,10 +152,10 @@ def list_ids(
         InputError: The query cannot be understood.
     """
     parsed = parse_query(query)
-    where = parsed.conditions
     with store.read() as session:
-        total = count_groups(session, dataset_id, where)
-        ids = ids_from(session, dataset_id, where, parsed.order, start, limit, total)
+        listing = Listing(session, dataset_id, parsed.conditions)
+        total = listing.count()
+        ids = listing.ids_from(parsed.order, start, limit, total)
     return Ids(tuple(ids), total)
 
 
@@ -176,17 +168,18 @@ def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
         NotFoundError: There is no such group.
     """
     parsed = parse_query(query)
-    where, order = parsed.conditions, parsed.order
+    order = parsed.order
     with store.read() as session:
         place = find_place(session, group_id, order)
         if place is None:
             raise NotFoundError(f"there is no group {group_id}")
         dataset_id, keys = place
+        listing = Listing(session, dataset_id, parsed.conditions)
         # One pass over all that match is faster than counting what comes before each time.
-        ids = ids_in_order(session, dataset_id, where, order)
+        ids = listing.ids(order)
         if group_id in ids:
             return _around(ids, ids.index(group_id))
-        before, after = ids_around(session, dataset_id, where, order, keys, _NEIGHBOURS)
+        before, after = listing.ids_around(order, keys, _NEIGHBOURS)
     return Neighbours(None, len(ids), tuple(before), tuple(after))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from app.review.queue.bins import ERROR_PERCENT, SIGMA_M, even, places
 from app.review.queue.query import NUMBERS, STATUSES, parse_query
-from app.store.listing import read_columns
+from app.store.listing import Listing
 from app.store.session import Store
 
 
@@ -71,7 +71,7 @@ def summary(store: Store, dataset_id: int, query: str = "") -> Summary:
     conditions = parse_query(query).conditions
     # One pass for all of it: seven statements over ten thousand groups take seven times as long.
     with store.read() as session:
-        rows = read_columns(session, dataset_id, conditions, columns)
+        rows = Listing(session, dataset_id, conditions).columns(columns)
     status, solved, stale, *numbers = (
         zip(*rows, strict=True) if rows else ((),) * (3 + len(COLUMNS))
     )

@@ -20,20 +20,8 @@ from dataclasses import dataclass, field
 
 from app.errors import InputError
 from app.soccer.solution import FINDING_KINDS, GATES
-from app.store.conditions import (
-    Condition,
-    compares,
-    contains,
-    either,
-    has_all_pictures,
-    is_absent,
-    is_empty,
-    is_flag,
-    is_one_of,
-    is_text,
-    lists,
-    opposite,
-)
+from app.store import conditions
+from app.store.conditions import Condition
 from app.store.order import Order
 
 MAX_LENGTH = 1000
@@ -71,30 +59,12 @@ EXACT = ("split", "key", "reviewer", "reason", "override")
 """Fields whose whole text must be the same; ``none`` is where there is none, ``any`` where there
 is one."""
 
-SORTS = {
-    "number": "number",
-    "value": "value",
-    "sigma": "sigma_m",
-    "jac": "min_jac",
-    "error": "error_px",
-    "error_percent": "error_percent",
-    "parallax": "parallax_degrees",
-    "margin": "margin",
-    "ratio": "size_ratio",
-    "height": "height_m",
-    "distance": "distance_m",
-    "box": "box_px",
-    "x": "x_m",
-    "y": "y_m",
-    "views": "views",
-    "findings": "findings",
-    "gate": "gate",
-    "status": "status",
-    "split": "split",
-    "reviewer": "reviewer",
-    "label": "label",
-    "newest": "changed",
-}
+_SORTED = (
+    "number", "value", "sigma", "jac", "error", "error_percent", "parallax", "margin", "ratio",
+    "height", "distance", "box", "x", "y", "views", "findings", "gate", "status", "split",
+    "reviewer", "label",
+)  # fmt: skip
+SORTS = {**{name: NUMBERS.get(name, name) for name in _SORTED}, "newest": "changed"}
 """What the queue can be sorted by, and the column of it."""
 
 _TERM = re.compile(
@@ -138,15 +108,15 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
     Raises:
         InputError: With a pointer ``/q/<position>`` to the term that cannot be understood.
     """
-    conditions: list[Condition] = []
+    found: list[Condition] = []
     sort, descending = "number", False
     for negative, term in _terms(text, longest):
         if term.field == "sort":
             sort, descending = _sort(term)
         else:
             condition = _condition(term)
-            conditions.append(opposite(condition) if negative else condition)
-    return Query(tuple(conditions), sort, descending)
+            found.append(conditions.opposite(condition) if negative else condition)
+    return Query(tuple(found), sort, descending)
 
 
 def _terms(text: str, longest: int) -> Iterator[tuple[bool, _Term]]:
@@ -189,7 +159,7 @@ def _condition(term: _Term) -> Condition:
     if term.field == "id":
         return _listed_groups(term)
     if term.field in FLAGS:
-        return is_flag(term.field, _choice(term, term.value, ("yes", "no")) == "yes")
+        return conditions.is_flag(term.field, _choice(term, term.value, ("yes", "no")) == "yes")
     test = _TESTS.get(term.field)
     if test is None:
         fields = sorted({*NUMBERS, *FLAGS, *_TESTS, "id", "sort"} - {""})
@@ -200,11 +170,11 @@ def _condition(term: _Term) -> Condition:
         )
     # A bare word may hold commas; a field's value is a list of choices.
     values = [term.value] if term.field == "" else term.value.split(",")
-    return either(test(term, value) for value in values)
+    return conditions.either(test(term, value) for value in values)
 
 
 def _listed_groups(term: _Term) -> Condition:
-    return is_one_of(_id(term, text) for text in term.value.split(","))
+    return conditions.is_one_of(_id(term, text) for text in term.value.split(","))
 
 
 def _id(term: _Term, text: str) -> int:
@@ -221,7 +191,7 @@ def _id(term: _Term, text: str) -> int:
 def _number(term: _Term) -> Condition:
     column = NUMBERS[term.field]
     if term.value == "none":
-        return is_absent(column)
+        return conditions.is_absent(column)
     try:
         value = float(term.value)
     except ValueError:
@@ -232,7 +202,7 @@ def _number(term: _Term) -> Condition:
             hint=f"For example {term.field}<1.5, or {term.field}:none.",
             pointer=term.pointer,
         )
-    return compares(column, "=" if term.op == ":" else term.op, value)
+    return conditions.compares(column, "=" if term.op == ":" else term.op, value)
 
 
 def _choice(term: _Term, value: str, choices: tuple[str, ...]) -> str:
@@ -246,52 +216,54 @@ def _choice(term: _Term, value: str, choices: tuple[str, ...]) -> str:
 
 
 def _status(term: _Term, value: str) -> Condition:
-    return compares("status", "=", _choice(term, value, STATUSES))
+    return conditions.compares("status", "=", _choice(term, value, STATUSES))
 
 
 def _finding(term: _Term, value: str) -> Condition:
     if value in ("any", "none"):
-        return compares("findings", "=" if value == "none" else ">", "")
-    return lists("findings", _choice(term, value, FINDING_KINDS))
+        return conditions.compares("findings", "=" if value == "none" else ">", "")
+    return conditions.lists("findings", _choice(term, value, FINDING_KINDS))
 
 
 def _gate(term: _Term, value: str) -> Condition:
     """The first failing gate; ``none`` for groups that pass, ``unsolved`` for neither."""
     if value == "unsolved":
-        return is_flag("solved", False)
+        return conditions.is_flag("solved", False)
     if value == "none":
-        return is_flag("passes", True)
-    return compares("gate", "=", _choice(term, value, GATES))
+        return conditions.is_flag("passes", True)
+    return conditions.compares("gate", "=", _choice(term, value, GATES))
 
 
 def _pictures(term: _Term, value: str) -> Condition:
     """Whether views have a picture: ``none`` of them, ``any``, or ``all``."""
     choice = _choice(term, value, ("none", "any", "all"))
     if choice == "all":
-        return has_all_pictures()
-    return compares("pictures", "=" if choice == "none" else ">", 0)
+        return conditions.has_all_pictures()
+    return conditions.compares("pictures", "=" if choice == "none" else ">", 0)
 
 
 def _view(_term: _Term, value: str) -> Condition:
     """A view's key (``cam3``, ``7_1.png``), or how many views there are."""
     if value.isascii() and value.isdigit():
-        return compares("views", "=", int(value[:9]))
-    return lists("view_keys", value)
+        return conditions.compares("views", "=", int(value[:9]))
+    return conditions.lists("view_keys", value)
 
 
 def _match(_term: _Term, value: str) -> Condition:
-    return contains("match", value)
+    return conditions.contains("match", value)
 
 
 def _text(_term: _Term, value: str) -> Condition:
-    return either((contains("label", value), contains("key", value)))
+    return conditions.either(
+        (conditions.contains("label", value), conditions.contains("key", value))
+    )
 
 
 def _exact(term: _Term, value: str) -> Condition:
     if value in ("any", "none"):
-        missing = is_empty(term.field)
-        return missing if value == "none" else opposite(missing)
-    return is_text(term.field, value)
+        missing = conditions.is_empty(term.field)
+        return missing if value == "none" else conditions.opposite(missing)
+    return conditions.is_text(term.field, value)
 
 
 _TESTS: dict[str, Callable[[_Term, str], Condition]] = {

@@ -8,13 +8,12 @@ from typing import Any
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.queue.query import parse_query
 from app.store.answers import Keep, keep_nothing
-from app.store.listing import count_groups
+from app.store.listing import Listing
 from app.store.saved_views import (
     dataset_saved_views,
     delete_saved_view,
     find_saved_view,
     insert_saved_view,
-    saved_view_names,
 )
 from app.store.session import Session, Store
 
@@ -60,7 +59,7 @@ def save_view(
     name = _checked(name)
     parse_query(query)
     with store.write() as session:
-        names = saved_view_names(session, dataset_id)
+        names = [row.name for row in dataset_saved_views(session, dataset_id)]
         if name in names:
             raise ConflictError(
                 f'there is a view "{name}" already', hint="Delete it, or choose another name."
@@ -112,7 +111,7 @@ def _matching(session: Session, row: Any) -> int:
         conditions = parse_query(row.query).conditions
     except InputError:
         return 0
-    return count_groups(session, row.dataset_id, conditions)
+    return Listing(session, row.dataset_id, conditions).count()
 
 
 def _saved_view(row: Any, groups: int) -> SavedView:

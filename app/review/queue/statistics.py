@@ -11,7 +11,7 @@ import numpy as np
 from app.geometry.arrays import FloatArray, IntArray
 from app.review.queue.bins import ERROR_PERCENT, SIGMA_M, even, places
 from app.review.queue.query import NUMBERS, parse_query
-from app.store.listing import read_columns
+from app.store.listing import Listing
 from app.store.session import Store
 
 
@@ -112,7 +112,7 @@ def statistics(store: Store, dataset_id: int, query: str = "") -> Statistics:
     measured = (NUMBERS[measure.field] for measure in MEASURES)
     conditions = parse_query(query).conditions
     with store.read() as session:
-        rows = read_columns(session, dataset_id, conditions, (*columns, *measured))
+        rows = Listing(session, dataset_id, conditions).columns((*columns, *measured))
     nothing: list[tuple[Any, ...]] = [()] * (len(columns) + len(MEASURES))
     split, match, passes, status, *numbers = list(zip(*rows, strict=True)) or nothing
     x, y, *values = (np.array(column, float) for column in numbers)

@@ -8,7 +8,7 @@ from typing import Any
 
 from app.review.queue.query import parse_query
 from app.store.conditions import compares
-from app.store.listing import read_columns
+from app.store.listing import Listing
 from app.store.session import Store
 
 _FRAME_DIGITS = 12
@@ -59,7 +59,7 @@ def read_timeline(
     if match is not None:
         conditions.append(compares("match", "=", match))
     with store.read() as session:
-        rows = read_columns(session, dataset_id, conditions, _SOURCES, by_number=True)
+        rows = Listing(session, dataset_id, conditions).columns(_SOURCES, by_number=True)
     timeline = Timeline()
     for name, value in _COLUMNS.items():
         getattr(timeline, name).extend(map(value, rows))
@@ -77,19 +77,9 @@ def _point(row: Any) -> tuple[float, float, float] | None:
 
 
 _SOURCES = (
-    "group_id",
-    "number",
-    "key",
-    "error_px",
-    "passes",
-    "gate",
-    "status",
-    "stale",
-    "sigma_m",
-    "x_m",
-    "y_m",
-    "height_m",
-)
+    "group_id", "number", "key", "error_px", "passes", "gate", "status", "stale", "sigma_m",
+    "x_m", "y_m", "height_m",
+)  # fmt: skip
 _COLUMNS: dict[str, Callable[[Any], Any]] = {
     "id": lambda row: row.group_id,
     "number": lambda row: row.number,

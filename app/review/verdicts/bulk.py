@@ -17,7 +17,7 @@ from app.review.verdicts.verdict import Verdict, check_verdict
 from app.store.answers import Keep, keep_nothing
 from app.store.batches import Batch, insert_batch, read_batches, update_batch
 from app.store.clock import now
-from app.store.listing import read_columns, read_columns_of
+from app.store.listing import Listing, read_columns
 from app.store.log import Entry, append
 from app.store.queue import edited_groups, refresh_verdicts
 from app.store.session import Session, Store
@@ -76,18 +76,9 @@ class BatchReport:
 
 
 ASKED = (
-    "group_id",
-    "key",
-    "number",
-    "label",
-    "status",
-    "stale",
-    "reason",
-    "solved",
-    "passes",
-    "gate",
+    "group_id", "key", "number", "label", "status", "stale", "reason", "solved", "passes", "gate",
     "pictures",
-)
+)  # fmt: skip
 """What a bulk verdict asks of a group's row in the queue."""
 
 
@@ -107,7 +98,7 @@ def plan_verdicts(
     verdict = check_verdict(state, reason, note)
     conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
     with store.read() as session:
-        rows = read_columns(session, dataset_id, conditions, ASKED, by_number=True)
+        rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
     sorted_out = sort_out(rows, verdict)
     sample = [
         SampleGroup(row.group_id, row.key, row.number, row.label)
@@ -150,7 +141,7 @@ def give_verdicts(
     verdict = check_verdict(state, reason, note)
     conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
     with store.read() as session:
-        rows = read_columns(session, dataset_id, conditions, ASKED, by_number=True)
+        rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
     found = sort_out(rows, verdict)
     if expected is not None and expected != len(found.change):
         raise ConflictError(
@@ -163,7 +154,7 @@ def give_verdicts(
     ids = [row.group_id for row in found.change]
     for start in range(0, len(ids), CHUNK):
         with store.write() as session:
-            rows = read_columns_of(session, ids[start : start + CHUNK], conditions, ASKED)
+            rows = read_columns(session, ids[start : start + CHUNK], conditions, ASKED)
             run.save(session, sort_out(rows, verdict).change)
             if start + CHUNK >= len(ids):
                 run.close(session)

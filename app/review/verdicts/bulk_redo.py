@@ -11,7 +11,7 @@ from app.review.verdicts.bulk_undo import read_batch
 from app.review.verdicts.verdict import check_verdict
 from app.store.answers import Keep, keep_nothing
 from app.store.batches import Batch, Spans, update_batch
-from app.store.listing import read_columns_of
+from app.store.listing import read_columns
 from app.store.session import Session, Store
 from app.store.solutions import present_keys
 from app.store.verdicts import inputs_judged, newest_between
@@ -57,7 +57,7 @@ def redo_batch(
     for number, (first, last) in enumerate(spans, 1):
         with store.write() as session:
             ids = _unchanged(session, batch.spans, first, last)
-            found = sort_out(read_columns_of(session, ids, (), ASKED), verdict)
+            found = sort_out(read_columns(session, ids, (), ASKED), verdict)
             run.save(session, found.change)
             refused.update({item.reason: item.groups for item in found.refused})
             if run.batch is not None:

@@ -17,7 +17,7 @@ from app.store.conditions import (
     lists,
     opposite,
 )
-from app.store.listing import count_groups
+from app.store.listing import Listing
 from app.store.models import QueueModel
 
 ROW = {
@@ -74,4 +74,4 @@ class TestConditions:
     def test_a_group_is_meant_or_not(self, filled, condition: Condition, holds: bool) -> None:
         with filled.write() as session:
             session.execute(update(QueueModel).values(ROW))
-            assert count_groups(session, 1, [condition]) == holds
+            assert Listing(session, 1, [condition]).count() == holds

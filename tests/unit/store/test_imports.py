@@ -4,7 +4,6 @@ from app.store.imports import (
     VERDICT,
     CameraPlace,
     KnownGroup,
-    add_verdicts,
     camera_places,
     group_verdicts,
     known_groups,
@@ -12,6 +11,7 @@ from app.store.imports import (
     shared_stations,
 )
 from app.store.log import Entry, append
+from app.store.verdicts import StoredVerdict, insert_verdicts
 
 VALUES = ("ann", "t", "rejected", "bad", None, "i", "p", False, None)
 
@@ -57,6 +57,6 @@ class TestGroupVerdicts:
         first = dict(zip(VERDICT, VALUES, strict=True))
         second = first | {"state": "accepted", "reason": None, "fixed": True}
         with filled.write() as session:
-            add_verdicts(session, 1, [first])
-            add_verdicts(session, 1, [second])
+            given = [StoredVerdict(1, 1, **first), StoredVerdict(2, 1, **second)]
+            insert_verdicts(session, 1, given, actor="ann", at="t")
             assert group_verdicts(session, [1, 2]) == {1: [first, second]}

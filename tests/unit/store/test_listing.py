@@ -7,18 +7,7 @@ from sqlalchemy import insert, select
 from sqlalchemy.orm import Session
 
 from app.store.conditions import compares
-from app.store.listing import (
-    count_groups,
-    count_states,
-    find_place,
-    ids_around,
-    ids_from,
-    ids_in_order,
-    read_columns,
-    read_columns_of,
-    read_rows_after,
-    read_rows_of,
-)
+from app.store.listing import Listing, count_states, find_place, read_columns, read_rows
 from app.store.models import GroupModel, QueueModel
 from app.store.order import Order
 from app.store.session import Store
@@ -54,8 +43,8 @@ BY_SIGMA = Order("sigma_m", descending=True)
 
 class TestCounts:
     def test_groups_of_the_dataset_that_fulfil_all_conditions(self, session: Session) -> None:
-        assert [count_groups(session, 1), count_groups(session, 2)] == [4, 0]
-        assert count_groups(session, 1, [*OPEN, compares("sigma_m", ">", 0.2)]) == 1
+        assert [Listing(session, 1).count(), Listing(session, 2).count()] == [4, 0]
+        assert Listing(session, 1, [*OPEN, compares("sigma_m", ">", 0.2)]).count() == 1
 
     def test_states_with_the_groups_that_are_solved(self, session: Session) -> None:
         rows = {row.status: (row.groups, row.solved) for row in count_states(session, [1, 2])}
@@ -64,31 +53,31 @@ class TestCounts:
 
 class TestReadColumns:
     def test_some_columns_by_number(self, session: Session) -> None:
-        rows = read_columns(session, 1, OPEN, ("number", "sigma_m"), by_number=True)
+        rows = Listing(session, 1, OPEN).columns(("number", "sigma_m"), by_number=True)
         assert [tuple(row) for row in rows] == [(1, None), (2, 0.5), (3, 0.1)]
 
     def test_of_some_groups_alone(self, session: Session) -> None:
-        rows = read_columns_of(session, [4, 3, 9, 1], OPEN, ("group_id",))
+        rows = read_columns(session, [4, 3, 9, 1], OPEN, ("group_id",))
         assert [row.group_id for row in rows] == [1, 3]
 
 
 class TestOrder:
     def test_ids_all_or_the_first(self, session: Session) -> None:
-        assert ids_in_order(session, 1, [], BY_SIGMA) == [2, 4, 3, 1]
-        assert ids_in_order(session, 1, OPEN, BY_SIGMA, 2) == [2, 3]
+        assert Listing(session, 1).ids(BY_SIGMA) == [2, 4, 3, 1]
+        assert Listing(session, 1, OPEN).ids(BY_SIGMA, 2) == [2, 3]
 
     def test_ids_from_a_position_on_either_side_of_the_middle(self, session: Session) -> None:
         whole = [2, 4, 3, 1]
         for start in range(6):
-            assert ids_from(session, 1, [], BY_SIGMA, start, 2, 4) == whole[start : start + 2]
+            assert Listing(session, 1).ids_from(BY_SIGMA, start, 2, 4) == whole[start : start + 2]
 
     def test_a_page_goes_on_after_the_keys_of_a_row(self, session: Session) -> None:
-        first = read_rows_after(session, 1, [], BY_SIGMA, None, 2)
+        first = Listing(session, 1).rows_after(BY_SIGMA, None, 2)
         assert [row.group_id for row in first] == [2, 4]
         keys = BY_SIGMA.keys_of(first[-1])
-        rest = read_rows_after(session, 1, [], BY_SIGMA, keys, 9)
+        rest = Listing(session, 1).rows_after(BY_SIGMA, keys, 9)
         assert [row.group_id for row in rest] == [3, 1]
-        assert [row.group_id for row in read_rows_of(session, [1, 4], BY_SIGMA)] == [4, 1]
+        assert [row.group_id for row in read_rows(session, [1, 4], BY_SIGMA)] == [4, 1]
 
     def test_a_group_has_a_place_also_where_it_is_not_among_those_that_are_meant(
         self, session: Session
@@ -97,13 +86,13 @@ class TestOrder:
         assert place is not None
         dataset, keys = place
         assert (dataset, find_place(session, 9, BY_SIGMA)) == (1, None)
-        assert ids_around(session, 1, OPEN, BY_SIGMA, keys, 5) == ([2], [3, 1])
-        assert ids_around(session, 1, OPEN, BY_SIGMA, keys, 1) == ([2], [3])
+        assert Listing(session, 1, OPEN).ids_around(BY_SIGMA, keys, 5) == ([2], [3, 1])
+        assert Listing(session, 1, OPEN).ids_around(BY_SIGMA, keys, 1) == ([2], [3])
 
     @pytest.mark.parametrize("column", ["number", "changed", "gate", "findings", "label"])
     def test_no_two_groups_have_the_same_keys(self, session: Session, column: str) -> None:
         order = Order(column)
-        rows = read_rows_of(session, [1, 2, 3, 4], order)
+        rows = read_rows(session, [1, 2, 3, 4], order)
         keys = [tuple(order.keys_of(row)) for row in rows]
         assert len(set(keys)) == 4
         assert keys == sorted(keys)

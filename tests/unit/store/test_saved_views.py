@@ -5,7 +5,6 @@ from app.store.saved_views import (
     delete_saved_view,
     find_saved_view,
     insert_saved_view,
-    saved_view_names,
 )
 
 
@@ -16,9 +15,8 @@ class TestSavedViews:
             early = insert_saved_view(session, 1, "early", "views:2", actor="bob")
             assert [row.id for row in dataset_saved_views(session, 1)] == [early, late]
             assert dataset_saved_views(session, 2) == []
-            assert sorted(saved_view_names(session, 1)) == ["early", "late"]
             found = find_saved_view(session, late)
             assert (found.dataset_id, found.name, found.query) == (1, "late", "sort:newest")
             delete_saved_view(session, late)
             assert find_saved_view(session, late) is None
-            assert saved_view_names(session, 1) == ["early"]
+            assert [row.name for row in dataset_saved_views(session, 1)] == ["early"]

@@ -146,7 +146,7 @@ class TestDeleteDataset:
         def killed(_session, _identity):
             raise KeyboardInterrupt
 
-        monkeypatch.setattr(module, "delete_rows", killed)
+        monkeypatch.setattr(module.removal, "delete_rows", killed)
         with pytest.raises(KeyboardInterrupt):
             delete_dataset(two, "demo", confirm="demo", actor="eve")
         monkeypatch.undo()
