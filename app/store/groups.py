@@ -154,27 +154,6 @@ def group_of_view(session: Session, view_id: int) -> int:
     return int(found)
 
 
-def view_row(session: Session, view_id: int) -> Any:
-    """A view with what its frame needs of its station and its group, or None."""
-    statement = (
-        select(
-            ViewModel.group_id,
-            ViewModel.key,
-            ViewModel.media_path,
-            ViewModel.media_member,
-            ViewModel.media_frame,
-            StationModel.flipped,
-            StationModel.width,
-            StationModel.shared,
-            GroupModel.key.label("group_key"),
-        )
-        .join(StationModel, StationModel.id == ViewModel.station_id)
-        .join(GroupModel, GroupModel.id == ViewModel.group_id)
-        .where(ViewModel.id == view_id)
-    )
-    return session.execute(statement).one_or_none()
-
-
 def read_stations(session: Session, ids: Iterable[int]) -> dict[int, StoredStation]:
     """Stations by id."""
     statement = select(*StationModel.__table__.columns).where(StationModel.id.in_(list(ids)))

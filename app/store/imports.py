@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from app.store.groups import StoredStation, stored_station
 from app.store.log import LogEntry, read_log
-from app.store.models import GroupModel, LogModel, StationModel, VerdictModel, ViewModel
+from app.store.models import GroupModel, LogModel, StationModel, VerdictModel
 
 VERDICT = (
     "actor",
@@ -35,18 +35,6 @@ class KnownGroup:
     key: str
     match: str
     source_hash: str
-
-
-@dataclass(frozen=True)
-class CameraPlace:
-    """A view and the camera that it is seen by; ``group`` is the id of the view's group."""
-
-    station: int
-    station_key: str
-    shared: bool
-    group: int
-    match: str
-    view: str
 
 
 def known_groups(
@@ -83,18 +71,6 @@ def shared_stations(
     if key is not None:
         statement = statement.where(StationModel.key == key)
     return [stored_station(row) for row in session.execute(statement.order_by(StationModel.key))]
-
-
-def camera_places(session: Session, dataset_id: int) -> list[CameraPlace]:
-    """Every view of a dataset with its camera."""
-    station, group, view = StationModel, GroupModel, ViewModel
-    statement = (
-        select(station.id, station.key, station.shared, group.id, group.match, view.key)
-        .join(view, view.station_id == station.id)
-        .join(group, group.id == view.group_id)
-        .where(station.dataset_id == dataset_id)
-    )
-    return [CameraPlace(*row) for row in session.execute(statement)]
 
 
 def group_verdicts(session: Session, ids: Iterable[int]) -> dict[int, list[dict[str, Any]]]:

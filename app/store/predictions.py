@@ -13,7 +13,7 @@ from app.geometry.camera import Camera
 from app.store.codecs import Json, camera_from_json, camera_to_json, canonical, parse
 from app.store.digest import digest
 from app.store.group_rows import next_id
-from app.store.models import GroupModel, StationModel, ViewModel
+from app.store.models import ViewModel
 from app.store.prediction_models import (
     PredictedCameraModel,
     PredictionModel,
@@ -174,32 +174,6 @@ def read_predicted_cameras(session: Session, set_id: int) -> dict[int, Camera]:
     model = PredictedCameraModel
     rows = session.execute(select(model.view_id, model.camera).where(model.set_id == set_id))
     return {row.view_id: camera_from_json(parse(row.camera)) for row in rows}
-
-
-def read_view_rows(session: Session, dataset_id: int) -> list[Any]:
-    """The views of a dataset by every name that a file may give them.
-
-    Returns:
-        Rows (id, view, group_id, group, match, width, height, station, shared), by group.
-    """
-    statement = (
-        select(
-            ViewModel.id,
-            ViewModel.key.label("view"),
-            GroupModel.id.label("group_id"),
-            GroupModel.key.label("group"),
-            GroupModel.match,
-            StationModel.width,
-            StationModel.height,
-            StationModel.key.label("station"),
-            StationModel.shared,
-        )
-        .join(GroupModel, GroupModel.id == ViewModel.group_id)
-        .join(StationModel, StationModel.id == ViewModel.station_id)
-        .where(GroupModel.dataset_id == dataset_id)
-        .order_by(GroupModel.number, ViewModel.position)
-    )
-    return list(session.execute(statement))
 
 
 def _sets(session: Session, where: ColumnElement[bool]) -> list[PredictionSet]:

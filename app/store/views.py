@@ -1,9 +1,10 @@
-"""Views in the database, one by one: what predictions and detectors ask of them."""
+"""Views in the database, one by one, each with its group and its camera."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
@@ -17,12 +18,20 @@ from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
 
 @dataclass(frozen=True)
 class StoredView:
-    """A view with its annotated size in pixels, its frame, and its balls as they are stored."""
+    """A view with its annotated size in pixels, its frame, and its balls as they are stored.
+
+    Attributes:
+        group: Key; ``station`` that of its camera, which is ``shared`` where it stands still.
+    """
 
     id: int
     key: str
     group_id: int
     group: str
+    match: str
+    station_id: int
+    station: str
+    shared: bool
     width: int
     height: int
     flipped: bool
@@ -61,7 +70,10 @@ def dataset_views(
         ids: Only these views; None: all.
         without_ball: Only those in which nobody annotated a ball.
     """
-    where = [GroupModel.dataset_id == dataset_id, *conditions]
+    asked = list(conditions)
+    if asked:
+        asked.append(QueueModel.group_id == GroupModel.id)
+    where = [GroupModel.dataset_id == dataset_id, *asked]
     if ids is not None:
         where.append(ViewModel.id.in_(ids))
     if without_ball:
@@ -103,13 +115,14 @@ def _views(session: Session, *where: ColumnElement[bool]) -> list[StoredView]:
     view, group, station = ViewModel, GroupModel, StationModel
     statement = (
         select(
-            view.id, view.key, group.id, group.key, station.width, station.height,
-            station.flipped, view.media_path, view.media_member, view.media_frame, view.balls,
+            view.id, view.key, group.id, group.key, group.match, station.id, station.key,
+            station.shared, station.width, station.height, station.flipped, view.media_path,
+            view.media_member, view.media_frame, view.balls,
         )
         .join(group, group.id == view.group_id)
         .join(station, station.id == view.station_id)
-        .join(QueueModel, QueueModel.group_id == group.id)
         .where(*where)
         .order_by(group.number, view.position)
     )  # fmt: skip
-    return [StoredView(*row) for row in session.execute(statement)]
+    rows: Iterable[Any] = session.execute(statement)
+    return [StoredView(*row) for row in rows]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from app.errors import NotFoundError
 from app.soccer.group import Media
-from app.store.groups import view_row
+from app.store import views
 from app.store.session import Store
 
 
@@ -31,12 +31,15 @@ def find_view(store: Store, view_id: int) -> FoundView:
         NotFoundError: There is none.
     """
     with store.read() as session:
-        row = view_row(session, view_id)
-    if row is None:
+        found = views.find_view(session, view_id)
+    if found is None:
         raise NotFoundError(f"there is no view {view_id}")
-    media = None
-    if row.media_path is not None:
-        media = Media(row.media_path, row.media_member, row.media_frame)
     return FoundView(
-        row.group_id, row.key, media, row.flipped, row.width, row.group_key, row.shared
+        found.group_id,
+        found.key,
+        found.media,
+        found.flipped,
+        found.width,
+        found.group,
+        found.shared,
     )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from app.errors import InputError
 from app.soccer.frames import Box
-from app.store.predictions import PredictionSet, read_boxes, read_view_rows
+from app.store.predictions import PredictionSet, read_boxes
 from app.store.session import Session
+from app.store.views import StoredView, dataset_views
 
 LISTED = 5
 """Frames that a refusal names; all are counted."""
@@ -22,7 +21,7 @@ def careful_boxes(session: Session, careful: PredictionSet) -> dict[int, Box]:
     found = read_boxes(session, careful.id)
     several = {view for view, boxes in found.items() if len(boxes) > 1}
     if several:
-        rows = read_view_rows(session, careful.dataset_id)
+        rows = dataset_views(session, careful.dataset_id)
         names = [_frame_name(row) for row in rows if row.id in several]
         more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         raise InputError(
@@ -34,8 +33,8 @@ def careful_boxes(session: Session, careful: PredictionSet) -> dict[int, Box]:
     return {view: Box(box.x, box.y, box.width, box.height) for view, (box,) in found.items()}
 
 
-def _frame_name(row: Any) -> str:
+def _frame_name(row: StoredView) -> str:
     """A view as files of predictions call it."""
     if row.shared:
-        return f"{row.view}/{row.group}"
-    return f"{row.match}/{row.view}" if row.match else f"{row.group}/{row.view}"
+        return f"{row.key}/{row.group}"
+    return f"{row.match}/{row.key}" if row.match else f"{row.group}/{row.key}"

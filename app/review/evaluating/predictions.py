@@ -39,9 +39,9 @@ from app.store.predictions import (
     predictions_digest,
     read_prediction_sets,
     read_view_boxes,
-    read_view_rows,
 )
 from app.store.session import Session, Store
+from app.store.views import dataset_views
 
 LISTED = 100
 """Unknown frames and problems that a report names; all are counted."""
@@ -171,7 +171,7 @@ def save_predictions(
                 return known
             values["name"] = name = _free_name(name, {item.name for item in own})
         require_free(session, found.id, name)
-        present = {row.id for row in read_view_rows(session, found.id)}
+        present = {row.id for row in dataset_views(session, found.id)}
         identity = insert_prediction_set(
             session,
             {**values, "dataset_id": found.id},
@@ -185,12 +185,12 @@ def save_predictions(
 def frame_names(store: Store, dataset: str | int) -> FrameNames:
     """The frames of a dataset by every name that a file may give them."""
     with store.read() as session:
-        rows = read_view_rows(session, read_dataset(session, dataset).id)
+        rows = dataset_views(session, read_dataset(session, dataset).id)
     return FrameNames.of(
         NamedFrame(
             id=row.id,
             group=row.group,
-            view=row.view,
+            view=row.key,
             match=row.match,
             size=ImageSize(row.width, row.height),
             station=row.station if row.shared else "",

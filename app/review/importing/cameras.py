@@ -18,10 +18,10 @@ from app.store.groups import (
     refresh_inputs_hashes,
     save_station,
 )
-from app.store.imports import camera_places
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
+from app.store.views import dataset_views
 
 BATCH = 500
 """Cameras a transaction."""
@@ -83,10 +83,10 @@ def ingest_cameras(
 
 def _places(session: Session, dataset_id: int) -> dict[str, list[_Place]]:
     places: dict[str, list[_Place]] = {}
-    for row in camera_places(session, dataset_id):
-        stem = str(PurePosixPath(row.view).with_suffix(""))
-        names = {row.station_key} if row.shared else {stem, f"{row.match}/{stem}"}
-        place = _Place(row.station, None if row.shared else row.group)
+    for row in dataset_views(session, dataset_id):
+        stem = str(PurePosixPath(row.key).with_suffix(""))
+        names = {row.station} if row.shared else {stem, f"{row.match}/{stem}"}
+        place = _Place(row.station_id, None if row.shared else row.group_id)
         for name in names:
             known = places.setdefault(name, [])
             if place not in known:

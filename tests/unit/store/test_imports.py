@@ -2,9 +2,7 @@ from __future__ import annotations
 
 from app.store.imports import (
     VERDICT,
-    CameraPlace,
     KnownGroup,
-    camera_places,
     group_verdicts,
     known_groups,
     newest_imports,
@@ -41,15 +39,6 @@ class TestSharedStations:
             assert found.station == group.views[1].station
             assert shared_stations(session, 1, "cam1") == [found]
             assert shared_stations(session, 1, "m/7.png") == []
-
-
-class TestCameraPlaces:
-    def test_every_view_is_one(self, filled) -> None:
-        with filled.read() as session:
-            found = {place.view: place for place in camera_places(session, 1)}
-        assert list(found) == ["7.png", "cam1", "cam2"]
-        assert found["cam2"] == CameraPlace(1, "cam1", True, 1, "m", "cam2")
-        assert (found["7.png"].station_key, found["7.png"].shared) == ("m/7.png", False)
 
 
 class TestGroupVerdicts:

@@ -17,6 +17,9 @@ class TestDatasetViews:
             assert (stored.width, stored.height) == (view.size.width, view.size.height)
             assert (stored.flipped, stored.media) == (view.station.flipped, view.media)
             assert tuple(stored.balls) == view.balls
+            assert (stored.station, stored.shared) == (view.station.key, view.station.shared)
+        assert {view.match for view in found} == {"m"}
+        assert [view.station_id for view in found] == [2, 1, 1]
 
     def test_finds_only_the_views_that_are_asked_for(self, filled) -> None:
         with filled.read() as session:
