@@ -30,7 +30,9 @@ def keep_with_work(key: str, actor: str, answer: Answer, kept: Callable[[], None
 
     def keep(session: Session) -> None:
         if not keep_answer(session, key, actor, answer):
-            raise ConflictError("the same request was answered in the meantime", hint="Send it again.")
+            raise ConflictError(
+                "the same request was answered in the meantime", hint="Send it again."
+            )
         kept()
 
     return keep

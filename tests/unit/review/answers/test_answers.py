@@ -28,6 +28,9 @@ class TestFirstAnswers:
         assert find_first(store, "key", "ann") is None
         with store.write() as session:
             keep(session)
-        with pytest.raises(ConflictError, match="answered in the meantime"), store.write() as session:
+        with (
+            pytest.raises(ConflictError, match="answered in the meantime"),
+            store.write() as session,
+        ):
             keep(session)
         assert (noted, find_first(store, "key", "ann")) == ([True, True], ANSWER)
