@@ -21,11 +21,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.api.errors import RETRY_SECONDS, status_of
 from app.api.problem import make_problem, problem_response
 from app.api.reply import ASKED, KEPT_HEADERS, Asked
-from app.api.security.bodies import BYTES
+from app.api.security.bodies import BYTES, VALUE
 from app.api.security.origin import SAFE_METHODS
 from app.errors import OverloadedError, ReviewError, StorageError
 from app.store.answers import Answer, find_answer, forget_answers, keep_answer
-from app.store.codecs import canonical, parse
+from app.store.codecs import canonical
 from app.store.session import Store
 
 log = structlog.get_logger("touchline.api")
@@ -190,8 +190,7 @@ class _Request:
         if self.streamed:
             body = self._sum.hexdigest()
         else:
-            text = b"".join(self._body)
-            body = canonical(parse(text.decode())) if text else ""
+            body = canonical(self.scope[VALUE]) if VALUE in self.scope else ""
         return hashlib.sha256(canonical([*place, body]).encode()).hexdigest()
 
     async def _next(self) -> Message:

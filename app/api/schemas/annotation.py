@@ -21,7 +21,6 @@ from app.soccer.annotation import BallAnnotation, Lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.pitch import MARKINGS, canonical_marking
 
-MAX_POINTS = 1000
 MAX_PIXEL = 100_000.0
 """Annotated points may lie outside the image, but not that far."""
 
@@ -62,7 +61,7 @@ class Point(BaseModel):
 
 
 LineEdits = Annotated[
-    dict[Marking, Annotated[list[Point], Field(max_length=MAX_POINTS)] | None],
+    dict[Marking, list[Point] | None],
     BeforeValidator(_distinct),
 ]
 

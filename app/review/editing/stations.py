@@ -9,9 +9,10 @@ from sqlalchemy.orm import Session
 
 from app.errors import ConflictError, NotFoundError
 from app.review.editing.codec import edit_to_json, station_edit_from_json
-from app.review.editing.edit import StationEdit, with_station
+from app.review.editing.edit import SetStationLines, StationEdit, with_station
 from app.review.editing.encode import encode
 from app.review.editing.known import known_calibrations
+from app.review.editing.point_limits import require_few_points
 from app.review.editing.state import (
     GroupState,
     read_record,
@@ -114,6 +115,8 @@ def submit_station(
 
     def plan(_session: Session, state: StationState) -> _Change:
         station = state.station
+        if isinstance(edit, SetStationLines):
+            require_few_points(f"camera {station.key}", station.lines, edit.lines)
         body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(station))}
         return _Change("station_edit", body, edit.apply(station))
 

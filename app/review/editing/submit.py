@@ -18,6 +18,7 @@ from app.review.editing.edit import STATION_EDITS, Edit, need_view
 from app.review.editing.encode import encode
 from app.review.editing.etags import read_etags, read_head, require_said, require_unchanged
 from app.review.editing.known import known_calibrations
+from app.review.editing.point_limits import require_few_points_in_all
 from app.review.editing.state import GroupState, Record, read_record, read_state
 from app.soccer.group import Group
 from app.soccer.solution import Solution
@@ -170,7 +171,9 @@ def preview(
         if stored is None:
             raise NotFoundError(f"there is no group {group_id}")
         group = stored.group
-        for edit in edits_of(group):
+        edits = edits_of(group)
+        require_few_points_in_all(group, edits)
+        for edit in edits:
             group = edit.apply(group)
         known = known_calibrations(session, [group], stored.policy)
     return group, solve(group, stored.policy, known)
@@ -282,6 +285,7 @@ def _plan_edit(edit_of: Callable[[StoredGroup], Edit]) -> _Plan:
     def plan(_session: Session, record: Record) -> _Change:
         edit, group = edit_of(record.stored), record.stored.group
         refuse_shared(record.stored, edit)
+        require_few_points_in_all(group, [edit])
         body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(group))}
         return _Change("edit", body, edit.apply(group))
 
