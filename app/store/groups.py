@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import namedtuple
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 from sqlalchemy import BindParameter, bindparam, delete, null, select, update
@@ -12,7 +13,8 @@ from sqlalchemy.orm import Session
 from sqlalchemy.sql import FromClause
 
 from app.errors import NotFoundError
-from app.soccer.annotation import Extras
+from app.geometry.camera import Camera
+from app.soccer.annotation import Extras, Lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch
@@ -231,14 +233,24 @@ def stored_station(row: Any) -> StoredStation:
         key=row.key,
         size=ImageSize(row.width, row.height),
         shared=row.shared,
-        lines=codecs.lines_from_json(codecs.parse(row.lines)),
-        given=None if row.given is None else codecs.camera_from_json(codecs.parse(row.given)),
+        lines=_lines(row.lines),
+        given=None if row.given is None else _camera(row.given),
         calibration=row.calibration,
         flipped=row.flipped,
     )
     return StoredStation(
         row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
     )
+
+
+@lru_cache(maxsize=1024)
+def _lines(text: str) -> Lines:
+    return codecs.lines_from_json(codecs.parse(text))
+
+
+@lru_cache(maxsize=1024)
+def _camera(text: str) -> Camera:
+    return codecs.camera_from_json(codecs.parse(text))
 
 
 def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:

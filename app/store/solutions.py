@@ -6,6 +6,7 @@ import json
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 from sqlalchemy import ColumnElement, and_, bindparam, select
@@ -96,8 +97,9 @@ def encode_calibration(calibration: Calibration) -> bytes:
     return _compress(value_codec.to_json(calibration))
 
 
+@lru_cache(maxsize=256)
 def decode_calibration(body: bytes) -> Calibration:
-    """Back from ``encode_calibration``."""
+    """Back from ``encode_calibration``; one value for the same bytes, however often asked."""
     return value_codec.from_json(Calibration, json.loads(zlib.decompress(body)))
 
 

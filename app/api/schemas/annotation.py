@@ -16,6 +16,7 @@ from pydantic import (
     model_validator,
 )
 
+from app.api.schemas.identity_cache import IdentityCache
 from app.errors import UnknownMarkingError
 from app.soccer.annotation import BallAnnotation, Lines
 from app.soccer.frames import Box, ImagePoint
@@ -205,9 +206,16 @@ class Ball(BaseModel):
 LineDocuments = dict[str, list[Point]]
 
 
-def lines_document(lines: Lines) -> LineDocuments:
-    """Lines as they travel."""
+def _line_documents(lines: Lines) -> LineDocuments:
     return {
         marking: [Point.model_construct(x=point.x, y=point.y) for point in points]
         for marking, points in lines.items()
     }
+
+
+_kept_documents: IdentityCache[Lines, LineDocuments] = IdentityCache(_line_documents, size=1024)
+
+
+def lines_document(lines: Lines) -> LineDocuments:
+    """Lines as they travel."""
+    return _kept_documents(lines)
