@@ -22,6 +22,7 @@ T = TypeVar("T")
 KEPT_HOURS = 24
 """How long an answer is kept; what an edit builds on (If-Match) still stops a later repetition."""
 _FAST = 1
+_ANSWER = AnswerModel.__table__
 
 
 @dataclass(frozen=True)
@@ -64,12 +65,12 @@ def keep_answer(session: Session, key: str, actor: str, answer: Answer) -> bool:
         "body": zlib.compress(answer.body, _FAST),
         "at": now(),
     }
-    statement = insert(AnswerModel).values(key=key, actor=actor, **values)
+    statement = insert(_ANSWER).values(key=key, actor=actor, **values)
     fresh = statement.on_conflict_do_update(
-        index_elements=[AnswerModel.key, AnswerModel.actor],
+        index_elements=[_ANSWER.c.key, _ANSWER.c.actor],
         set_=values,
-        where=AnswerModel.at < _oldest(),
-    ).returning(AnswerModel.key)
+        where=_ANSWER.c.at < _oldest(),
+    ).returning(_ANSWER.c.key)
     return session.execute(fresh).one_or_none() is not None
 
 
@@ -83,8 +84,8 @@ def _oldest() -> str:
     return oldest.isoformat(timespec="microseconds")
 
 
-_FIND = select(*AnswerModel.__table__.columns).where(
-    AnswerModel.key == bindparam("key"),
-    AnswerModel.actor == bindparam("actor"),
-    AnswerModel.at >= bindparam("oldest"),
+_FIND = select(*_ANSWER.columns).where(
+    _ANSWER.c.key == bindparam("key"),
+    _ANSWER.c.actor == bindparam("actor"),
+    _ANSWER.c.at >= bindparam("oldest"),
 )

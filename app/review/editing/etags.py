@@ -11,23 +11,38 @@ from sqlalchemy.orm import Session
 
 from app.errors import NotFoundError, StaleRevisionError
 from app.soccer.solution import SOLVER_VERSION
-from app.store.codecs import parse
+from app.store.datasets import policy_of
 from app.store.digest import digest
 from app.store.models import DatasetModel, GroupModel, SolutionModel, VerdictModel
 from app.store.queue import import_findings
 from app.store.solutions import is_current
 
+_GROUP, _DATASET, _VERDICT = GroupModel.__table__, DatasetModel.__table__, VerdictModel.__table__
 _NEWEST = (
-    select(func.max(VerdictModel.id))
-    .where(VerdictModel.group_id == GroupModel.id)
-    .correlate(GroupModel)
+    select(func.max(_VERDICT.c.id))
+    .where(_VERDICT.c.group_id == _GROUP.c.id)
+    .correlate(_GROUP)
     .scalar_subquery()
     .label("last")
 )
 _HEAD = (
-    select(GroupModel.inputs_hash, GroupModel.revision, DatasetModel.policy_hash, _NEWEST)
-    .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-    .where(GroupModel.id == bindparam("group"))
+    select(_GROUP.c.inputs_hash, _GROUP.c.revision, _DATASET.c.policy_hash, _NEWEST)
+    .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
+    .where(_GROUP.c.id == bindparam("group"))
+)
+_STATES = (
+    select(
+        _GROUP.c.id,
+        _GROUP.c.inputs_hash,
+        _GROUP.c.revision,
+        _DATASET.c.policy,
+        _DATASET.c.policy_hash,
+        SolutionModel.__table__.c.summary,
+        _NEWEST,
+    )
+    .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
+    .outerjoin(SolutionModel.__table__, is_current())
+    .where(_GROUP.c.id.in_(bindparam("ids", expanding=True)))
 )
 
 
@@ -114,28 +129,14 @@ def require_said(session: Session, group_id: int, said: str, if_match: str, what
 
 def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
     """ETags by group id; at most a few hundred groups, those that do not exist are left out."""
-    statement = (
-        select(
-            GroupModel.id,
-            GroupModel.inputs_hash,
-            GroupModel.revision,
-            DatasetModel.policy,
-            DatasetModel.policy_hash,
-            SolutionModel.summary,
-            _NEWEST,
-        )
-        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(SolutionModel, is_current())
-        .where(GroupModel.id.in_(group_ids))
-    )
     noticed = import_findings(session, group_ids)
     etags = {}
-    for row in session.execute(statement):
+    for row in session.execute(_STATES, {"ids": list(group_ids)}):
         said = said_part(row.inputs_hash, row.revision, row.last or 0)
         findings = None
         if row.summary is not None:
             kinds = [item.kind for item in noticed[row.id]]
             findings = [*json.loads(row.summary)["findings"], *kinds]
-        name = parse(row.policy)["name"]
+        name = policy_of(row.policy).name
         etags[row.id] = group_etag(said, row.policy_hash, name, findings)
     return etags

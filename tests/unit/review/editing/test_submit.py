@@ -281,13 +281,13 @@ class TestCost:
         self, store: Store, state: GroupState, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         decoded: list[object] = []
-        plain = solutions.decode_solution
+        plain = solutions.with_calibrations
 
         def counted(*arguments):
             decoded.append(arguments)
             return plain(*arguments)
 
-        monkeypatch.setattr(solutions, "decode_solution", counted)
+        monkeypatch.setattr(solutions, "with_calibrations", counted)
         edit = SetBall("7.png", None)
         done = submit(store, state.id, edit, if_match=state.etag, actor="ann")
         assert decoded == []
