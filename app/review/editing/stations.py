@@ -10,9 +10,9 @@ from sqlalchemy.orm import Session
 from app.errors import ConflictError, NotFoundError
 from app.review.editing.codec import edit_to_json, station_edit_from_json
 from app.review.editing.edit import SetStationLines, StationEdit, with_station
-from app.review.editing.encode import encode
 from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points
+from app.review.editing.solve_encoded import solve_encoded
 from app.review.editing.state import (
     GroupState,
     read_record,
@@ -23,7 +23,6 @@ from app.review.editing.state import (
 from app.review.editing.undo import read_station_stacks
 from app.soccer.group import Group, Station
 from app.soccer.solution import Calibration
-from app.solving.solve import solve
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
@@ -200,7 +199,7 @@ def _solved(
     stored: StoredGroup, group: Group, known: Mapping[str, Calibration]
 ) -> tuple[SolutionKey, EncodedSolution]:
     key = SolutionKey(stored.id, group_inputs_hash(group), stored.policy.hash)
-    return key, encode(group, solve(group, stored.policy, known), known)
+    return key, solve_encoded(group, stored.policy, known)[1]
 
 
 def _save(session: Session, state: StationState, change: _Change, actor: str) -> None:

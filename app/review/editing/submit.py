@@ -7,7 +7,7 @@ revision, the solution, the queue's row and the answer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sqlalchemy.orm import Session
@@ -15,13 +15,13 @@ from sqlalchemy.orm import Session
 from app.errors import ConflictError, NotFoundError, SharedStationError
 from app.review.editing.codec import edit_from_json, edit_to_json
 from app.review.editing.edit import STATION_EDITS, Edit, need_view
-from app.review.editing.encode import encode
 from app.review.editing.etags import read_etags, read_head, require_said, require_unchanged
 from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points_in_all
+from app.review.editing.solve_encoded import solve_encoded
 from app.review.editing.state import GroupState, Record, read_record, read_state
 from app.soccer.group import Group
-from app.soccer.solution import Solution
+from app.soccer.solution import Calibration, Solution
 from app.solving.solve import solve
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
@@ -214,8 +214,7 @@ def read_solved(
         if solution is not None or not needed:
             return record, solution
         known = known_calibrations(session, [stored.group], stored.policy)
-    solution = solve(stored.group, stored.policy, known)
-    encoded = encode(stored.group, solution, known)
+    solution, encoded = solve_encoded(stored.group, stored.policy, known)
     with store.write() as session:
         insert_solutions(session, [(record.solution_key, encoded)])
         refresh_queue(session, [group_id])
@@ -249,7 +248,7 @@ def _change(
                 found = read_solutions(session, [before.solution_key])
                 return before.state(found.get(before.stored.id))
             known = known_calibrations(session, [change.group], before.stored.policy)
-        outcome = _outcome(before, change, solve(change.group, before.stored.policy, known), known)
+        outcome = _outcome(before, change, known)
         state = outcome.after.state(outcome.solution)
         kept = keep(state)
         with store.write() as session:
@@ -261,12 +260,10 @@ def _change(
         # Another policy judges the dataset by now, so another solution belongs to the edit.
 
 
-def _outcome(
-    before: Record, change: _Change, solution: Solution, known: Collection[str]
-) -> _Outcome:
+def _outcome(before: Record, change: _Change, known: Mapping[str, Calibration]) -> _Outcome:
     stored = next_revision(before.stored, change.group, now())
     after = replace(before, stored=stored, stacks=before.stacks.then(change.kind))
-    encoded = encode(change.group, solution, known)
+    solution, encoded = solve_encoded(change.group, stored.policy, known)
     return _Outcome(change, before, after, solution, encoded)
 
 

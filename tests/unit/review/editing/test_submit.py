@@ -20,6 +20,7 @@ from app.errors import (
 from app.review.editing import state as state_module
 from app.review.editing import submit as submit_module
 from app.review.editing.edit import IncludeView, SetBall, SetBalls, SetLines
+from app.review.editing.solve_encoded import solve_encoded
 from app.review.editing.state import GroupState
 from app.review.editing.submit import history, load, preview, redo, solved, submit, undo
 from app.review.policies.policy import change_policy
@@ -100,11 +101,11 @@ class TestSubmit:
         self, store, state, monkeypatch
     ) -> None:
         def slow(group, policy, calibrations):
-            monkeypatch.setattr(submit_module, "solve", solve)
+            monkeypatch.setattr(submit_module, "solve_encoded", solve_encoded)
             change(store, load(store, state.id), IncludeView("7_1.png", False))
-            return solve(group, policy, calibrations)
+            return solve_encoded(group, policy, calibrations)
 
-        monkeypatch.setattr(submit_module, "solve", slow)
+        monkeypatch.setattr(submit_module, "solve_encoded", slow)
         with pytest.raises(StaleRevisionError):
             change(store, state, SetBall("7.png", BALL))
         after = load(store, state.id)
@@ -115,11 +116,11 @@ class TestSubmit:
         self, store, state, monkeypatch
     ) -> None:
         def slow(group, policy, calibrations):
-            monkeypatch.setattr(submit_module, "solve", solve)
+            monkeypatch.setattr(submit_module, "solve_encoded", solve_encoded)
             change_policy(store, state.dataset_id, STRICT, if_match=None, actor="ann")
-            return solve(group, policy, calibrations)
+            return solve_encoded(group, policy, calibrations)
 
-        monkeypatch.setattr(submit_module, "solve", slow)
+        monkeypatch.setattr(submit_module, "solve_encoded", slow)
         after = change(store, state, SetBall("7.png", BALL))
         assert after.policy == STRICT
         assert after.solution == solve(after.group, STRICT)
