@@ -90,13 +90,13 @@ class Idempotency:
         except StorageError as error:
             await _refuse(error, request.scope, request.receive, send)
             return
-        if known is None:
-            await self._first(key, request, send)
-            await self._tidy(request.store)
-        else:
+        if known is not None and not (known.under_way and await request.asks_for(known)):
             await _again(known, request, send)
+        else:
+            await self._carry_out(key, request, send)
+            await self._tidy(request.store)
 
-    async def _first(self, key: str, request: _Request, send: Send) -> None:
+    async def _carry_out(self, key: str, request: _Request, send: Send) -> None:
         if request.streamed:
             # What is asked for is known once its bytes have passed.
             asked = None
@@ -141,8 +141,7 @@ async def _refuse(error: ReviewError, scope: Scope, receive: Receive, send: Send
 
 
 async def _again(known: Answer, request: _Request, send: Send) -> None:
-    await request.read()
-    if request.digest() != known.request_digest:
+    if not await request.asks_for(known):
         problem = make_problem(
             422, f"this {HEADER} was used for another request", hint="Send a new key with it."
         )
@@ -176,6 +175,11 @@ class _Request:
         """Read the rest of the body; one that is not streamed can be received once more."""
         while not self._ended:
             await self._next()
+
+    async def asks_for(self, known: Answer) -> bool:
+        """Whether it is the request that an answer was given to."""
+        await self.read()
+        return self.digest() == known.request_digest
 
     async def receive(self) -> Message:
         """The next message for whoever answers."""

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from starlette.responses import Response
 
 from app.errors import ConflictError
-from app.store.answers import Answer, Kept, keep_answer
+from app.store.answers import Answer, Kept, Progress, keep_answer
 
 T = TypeVar("T")
 
@@ -29,6 +29,11 @@ class Asked:
     actor: str
     digest: str
     kept: bool = False
+
+    @property
+    def progress(self) -> Progress:
+        """Where work of several transactions says how far it is."""
+        return Progress(self.key, self.actor, self.digest)
 
 
 class Reply(Generic[T]):
@@ -49,6 +54,11 @@ class Reply(Generic[T]):
         self._asked, self._make = asked, make
         self.made: Response | None = None
         self._of: T | None = None
+
+    @property
+    def progress(self) -> Progress | None:
+        """Where the work says how far it is; None for a request without a key."""
+        return None if self._asked is None else self._asked.progress
 
     def keep(self, outcome: T) -> Kept:
         """Make the answer; what is returned writes it into a transaction."""

@@ -7,14 +7,15 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import TypeVar
+from typing import TypeVar, cast
 
-from sqlalchemy import bindparam, delete, select
+from sqlalchemy import Table, bindparam, delete, or_, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
 from app.finite import json_text
 from app.store.clock import now
+from app.store.codecs import Json
 from app.store.job_models import AnswerModel
 
 T = TypeVar("T")
@@ -22,7 +23,8 @@ T = TypeVar("T")
 KEPT_HOURS = 24
 """How long an answer is kept; what an edit builds on (If-Match) still stops a later repetition."""
 _FAST = 1
-_ANSWER = AnswerModel.__table__
+_UNDER_WAY = 102
+_ANSWER = cast(Table, AnswerModel.__table__)
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,35 @@ class Answer:
     status: int
     headers: dict[str, str]
     body: bytes
+
+    @property
+    def under_way(self) -> bool:
+        """Whether it is none yet: the work was begun, and the body says how far it came."""
+        return self.status == _UNDER_WAY
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far work of several transactions has come that was asked for under a key.
+
+    Saved in each transaction, it lets the same request go on where a stopped server left it.
+    """
+
+    key: str
+    actor: str
+    request_digest: str
+
+    def read(self, session: Session) -> Json | None:
+        """What was saved last; None where the work has not begun."""
+        found = find_answer(session, self.key, self.actor)
+        return json.loads(found.body) if found is not None and found.under_way else None
+
+    def save(self, session: Session, value: Json) -> None:
+        """Say how far the work is."""
+        body = json_text(value).encode()
+        keep_answer(
+            session, self.key, self.actor, Answer(self.request_digest, _UNDER_WAY, {}, body)
+        )
 
 
 Kept = Callable[[Session], None]
@@ -69,7 +100,7 @@ def keep_answer(session: Session, key: str, actor: str, answer: Answer) -> bool:
     fresh = statement.on_conflict_do_update(
         index_elements=[_ANSWER.c.key, _ANSWER.c.actor],
         set_=values,
-        where=_ANSWER.c.at < _oldest(),
+        where=or_(_ANSWER.c.at < _oldest(), _ANSWER.c.status == _UNDER_WAY),
     ).returning(_ANSWER.c.key)
     return session.execute(fresh).one_or_none() is not None
 

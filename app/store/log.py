@@ -6,9 +6,9 @@ import hashlib
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
-from sqlalchemy import ColumnElement, bindparam, insert, select
+from sqlalchemy import ColumnElement, Table, bindparam, insert, select
 from sqlalchemy.orm import Session
 
 from app.errors import StorageError
@@ -68,7 +68,7 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
     return [row["id"] for row in rows]
 
 
-_LOG = LogModel.__table__
+_LOG = cast(Table, LogModel.__table__)
 _LAST = select(_LOG.c.id, _LOG.c.hash).order_by(_LOG.c.id.desc()).limit(1)
 _STEPS = (
     select(_LOG.c.group_id, _LOG.c.id, _LOG.c.kind)

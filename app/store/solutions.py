@@ -7,9 +7,9 @@ import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
-from sqlalchemy import BindParameter, ColumnElement, and_, bindparam, select
+from sqlalchemy import BindParameter, ColumnElement, Table, and_, bindparam, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
@@ -25,13 +25,13 @@ _ELSEWHERE = Calibration(source="", camera=None)
 """Stands in a stored solution for the calibration that is kept under its key."""
 
 
-_SOLUTION = SolutionModel.__table__
+_SOLUTION = cast(Table, SolutionModel.__table__)
 _SOLUTIONS = select(*_SOLUTION.columns).where(
     _SOLUTION.c.group_id.in_(bindparam("groups", expanding=True)),
     _SOLUTION.c.policy_hash.in_(bindparam("policies", expanding=True)),
     _SOLUTION.c.inputs_hash.in_(bindparam("inputs", expanding=True)),
 )
-_CALIBRATION = CalibrationModel.__table__
+_CALIBRATION = cast(Table, CalibrationModel.__table__)
 _KEYS: BindParameter[Any] = bindparam("keys", expanding=True)
 _CALIBRATIONS = select(*_CALIBRATION.columns).where(_CALIBRATION.c.key.in_(_KEYS))
 _KEPT = select(_CALIBRATION.c.key).where(_CALIBRATION.c.key.in_(_KEYS))

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
-from sqlalchemy import bindparam, insert, select
+from sqlalchemy import Table, bindparam, insert, select
 from sqlalchemy.orm import Session
 
 from app.store.group_rows import next_id
 from app.store.log import Entry, append
 from app.store.models import VerdictModel
+from app.store.view_models import VerdictBatchModel
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ class StoredVerdict:
     override: str | None
 
 
-_VERDICT = VerdictModel.__table__
+_VERDICT = cast(Table, VerdictModel.__table__)
 _OF_GROUPS = (
     select(*_VERDICT.columns)
     .where(_VERDICT.c.group_id.in_(bindparam("ids", expanding=True)))
@@ -50,6 +52,14 @@ def judged_between(session: Session, first: int, last: int) -> list[int]:
     """Ids of the groups that the verdicts of a range of ids judge."""
     statement = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
     return list(session.scalars(statement.order_by(VerdictModel.id)))
+
+
+def batch_undone(session: Session, batch_id: int) -> bool:
+    """Whether verdicts that were given at once have been taken back, or are being."""
+    model = VerdictBatchModel
+    statement = select(model.undone, model.undo_spans).where(model.id == batch_id)
+    row = session.execute(statement).one_or_none()
+    return row is None or row.undone is not None or row.undo_spans is not None
 
 
 def next_verdict_id(session: Session) -> int:

@@ -45,26 +45,32 @@ def undo_batch(
         batch = read_batch(session, batch_id)
     if batch.undone is not None:
         raise ConflictError(f"{batch.undone_by} has taken this batch back already")
-    restored, spans = 0, list[tuple[int, int]]()
+    # What a run that was killed has taken back is not taken back again: it is not the newest.
+    spans: list[tuple[int, int]] = [tuple(span) for span in json.loads(batch.undo_spans or "[]")]
     given: list[tuple[int, int]] = json.loads(batch.spans)
     for number, (first, last) in enumerate(given, 1):
         with store.write() as session:
             verdicts = _restore(session, batch, first, last, actor)
-            restored += len({verdict.group_id for verdict in verdicts})
             spans += [(verdicts[0].id, verdicts[-1].id)] if verdicts else []
+            _save_spans(session, batch_id, spans)
             if number == len(given):
-                report = UndoReport(batch_id, restored, batch.changed - restored)
-                _close(session, batch, report, spans, actor)
+                restored = {group for span in spans for group in judged_between(session, *span)}
+                report = UndoReport(batch_id, len(restored), batch.changed - len(restored))
+                _close(session, batch, report, actor)
                 keep(report)(session)
     return report
 
 
-def _close(
-    session: Session, batch: Any, report: UndoReport, spans: list[tuple[int, int]], actor: str
-) -> None:
+def _save_spans(session: Session, batch_id: int, spans: list[tuple[int, int]]) -> None:
+    """Say which verdicts have taken a batch back so far, so that a stop in between is no harm."""
+    mine = VerdictBatchModel.id == batch_id
+    session.execute(update(VerdictBatchModel).where(mine).values(undo_spans=json_text(spans)))
+
+
+def _close(session: Session, batch: Any, report: UndoReport, actor: str) -> None:
     """Say of a batch, and in the log, that it was taken back."""
     at = now()
-    values = {"undone": at, "undone_by": actor, "undo_spans": json_text(spans)}
+    values = {"undone": at, "undone_by": actor}
     session.execute(
         update(VerdictBatchModel).where(VerdictBatchModel.id == batch.id).values(values)
     )

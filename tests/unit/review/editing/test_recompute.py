@@ -17,6 +17,7 @@ from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
 from app.solving.solve import solve
+from app.store.solutions import EncodedSolution
 
 
 def stumbling(
