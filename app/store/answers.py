@@ -89,20 +89,17 @@ def find_answer(session: Session, key: str, actor: str) -> Answer | None:
 
 def keep_answer(session: Session, key: str, actor: str, answer: Answer) -> bool:
     """Keep an answer under a key; False where one is kept already, which stays."""
-    values = {
+    row = {
+        "key": key,
+        "actor": actor,
         "request_digest": answer.request_digest,
         "status": answer.status,
         "headers": json_text(answer.headers, ascii_=True),
         "body": zlib.compress(answer.body, _FAST),
         "at": now(),
+        "oldest": _oldest(),
     }
-    statement = insert(_ANSWER).values(key=key, actor=actor, **values)
-    fresh = statement.on_conflict_do_update(
-        index_elements=[_ANSWER.c.key, _ANSWER.c.actor],
-        set_=values,
-        where=or_(_ANSWER.c.at < _oldest(), _ANSWER.c.status == _UNDER_WAY),
-    ).returning(_ANSWER.c.key)
-    return session.execute(fresh).one_or_none() is not None
+    return session.execute(_KEEP, row).one_or_none() is not None
 
 
 def forget_answers(session: Session) -> None:
@@ -120,3 +117,13 @@ _FIND = select(*_ANSWER.columns).where(
     _ANSWER.c.actor == bindparam("actor"),
     _ANSWER.c.at >= bindparam("oldest"),
 )
+_NEW = insert(_ANSWER)
+_KEEP = _NEW.on_conflict_do_update(
+    index_elements=[_ANSWER.c.key, _ANSWER.c.actor],
+    set_={
+        column.name: _NEW.excluded[column.name]
+        for column in _ANSWER.columns
+        if not column.primary_key
+    },
+    where=or_(_ANSWER.c.at < bindparam("oldest"), _ANSWER.c.status == _UNDER_WAY),
+).returning(_ANSWER.c.key)
