@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import namedtuple
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 from sqlalchemy import BindParameter, bindparam, delete, null, select, update
@@ -317,7 +317,12 @@ def _differs(view: View, old: View) -> bool:
 
 
 def _update(session: Session, table: Any, identity: int, values: Mapping[str, Any]) -> None:
-    session.execute(update(table).where(table.c.id == identity).values(values))
+    session.execute(_update_of(table), {"row": identity, **values})
+
+
+@cache
+def _update_of(table: Any) -> Any:
+    return update(table).where(table.c.id == bindparam("row"))
 
 
 def save_group(

@@ -20,7 +20,7 @@ from app.review.editing.state import (
     require_etag,
     station_etag,
 )
-from app.review.editing.undo import read_station_stacks
+from app.review.editing.undo import next_step, read_station_stacks
 from app.soccer.group import Group, Station
 from app.soccer.solution import Calibration
 from app.store.answers import Keep, keep_nothing
@@ -36,7 +36,7 @@ from app.store.groups import (
     refresh_inputs_hashes,
     save_station,
 )
-from app.store.log import Entry, append, read_entry
+from app.store.log import Entry, append
 from app.store.queue import refresh_queue
 from app.store.session import Store
 from app.store.solutions import (
@@ -132,7 +132,7 @@ def undo_station(
     keep: Keep[GroupState] = keep_nothing,
 ) -> StationState:
     """Take the last edit of a static camera back; raises ConflictError without one."""
-    return _change(store, station_id, _plan_undo, if_match, actor, shown, keep)
+    return _change(store, station_id, _plan_step("undo"), if_match, actor, shown, keep)
 
 
 def redo_station(
@@ -145,7 +145,7 @@ def redo_station(
     keep: Keep[GroupState] = keep_nothing,
 ) -> StationState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    return _change(store, station_id, _plan_redo, if_match, actor, shown, keep)
+    return _change(store, station_id, _plan_step("redo"), if_match, actor, shown, keep)
 
 
 def _change(
@@ -228,24 +228,13 @@ def _read(session: Session, station_id: int) -> StationState:
     )
 
 
-def _plan_undo(session: Session, state: StationState) -> _Change:
-    done = read_station_stacks(session, state.id).done
-    if not done:
-        raise ConflictError("there is nothing to undo for this camera")
-    return _again(session, state, "station_undo", done[-1], forward="inverse", backward="edit")
+def _plan_step(kind: str) -> _Plan:
+    """Undo or redo."""
 
+    def plan(session: Session, state: StationState) -> _Change:
+        stacks = read_station_stacks(session, state.id)
+        body = next_step(session, stacks, kind, "for this camera")
+        station = station_edit_from_json(body["edit"]).apply(state.station)
+        return _Change(f"station_{kind}", body, station)
 
-def _plan_redo(session: Session, state: StationState) -> _Change:
-    undone = read_station_stacks(session, state.id).undone
-    if not undone:
-        raise ConflictError("there is nothing to redo for this camera")
-    return _again(session, state, "station_redo", undone[-1], forward="edit", backward="inverse")
-
-
-def _again(
-    session: Session, state: StationState, kind: str, log_id: int, *, forward: str, backward: str
-) -> _Change:
-    entry = read_entry(session, log_id)
-    body = {"edit": entry.body[forward], "inverse": entry.body[backward], "of": log_id}
-    station = station_edit_from_json(body["edit"]).apply(state.station)
-    return _Change(kind, body, station)
+    return plan

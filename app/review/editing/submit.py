@@ -20,6 +20,7 @@ from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points_in_all
 from app.review.editing.solve_encoded import solve_encoded
 from app.review.editing.state import GroupState, Record, read_record, read_state
+from app.review.editing.undo import next_step
 from app.soccer.group import Group
 from app.soccer.solution import Calibration, Solution
 from app.solving.solve import solve
@@ -33,7 +34,7 @@ from app.store.groups import (
     read_groups,
     save_revision,
 )
-from app.store.log import Entry, LogEntry, append, group_entries, read_entry
+from app.store.log import Entry, LogEntry, append, group_entries
 from app.store.queue import refresh_queue, update_row
 from app.store.session import Store
 from app.store.solutions import EncodedSolution, insert_solutions, read_solutions
@@ -144,7 +145,7 @@ def undo(
     keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Take the last edit of a group back, whoever made it; raises ConflictError without one."""
-    return _change(store, lambda _session: group_id, _plan_undo, if_match, actor, keep)
+    return _change(store, lambda _session: group_id, _plan_step("undo"), if_match, actor, keep)
 
 
 def redo(
@@ -156,7 +157,7 @@ def redo(
     keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    return _change(store, lambda _session: group_id, _plan_redo, if_match, actor, keep)
+    return _change(store, lambda _session: group_id, _plan_step("redo"), if_match, actor, keep)
 
 
 def preview(
@@ -289,27 +290,15 @@ def _plan_edit(edit_of: Callable[[StoredGroup], Edit]) -> _Plan:
     return plan
 
 
-def _plan_undo(session: Session, record: Record) -> _Change:
-    done = record.stacks.done
-    if not done:
-        raise ConflictError("there is nothing to undo in this group")
-    return _again(session, record, "undo", done[-1], forward="inverse", backward="edit")
+def _plan_step(kind: str) -> _Plan:
+    """Undo or redo."""
 
+    def plan(session: Session, record: Record) -> _Change:
+        body = next_step(session, record.stacks, kind, "in this group")
+        try:
+            group = edit_from_json(body["edit"]).apply(record.stored.group)
+        except NotFoundError as error:
+            raise ConflictError(f"this cannot be done any more: {error.message}") from error
+        return _Change(kind, body, group)
 
-def _plan_redo(session: Session, record: Record) -> _Change:
-    undone = record.stacks.undone
-    if not undone:
-        raise ConflictError("there is nothing to redo in this group")
-    return _again(session, record, "redo", undone[-1], forward="edit", backward="inverse")
-
-
-def _again(
-    session: Session, record: Record, kind: str, log_id: int, *, forward: str, backward: str
-) -> _Change:
-    entry = read_entry(session, log_id)
-    body = {"edit": entry.body[forward], "inverse": entry.body[backward], "of": log_id}
-    try:
-        group = edit_from_json(body["edit"]).apply(record.stored.group)
-    except NotFoundError as error:
-        raise ConflictError(f"this cannot be done any more: {error.message}") from error
-    return _Change(kind, body, group)
+    return plan
