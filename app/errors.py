@@ -5,6 +5,7 @@
         UnknownMarkingError
         DatasetFormatError  (path, record, field)
         UnsafePathError
+        TooManyPointsError
         TooLargeError
         ImageError
       NotFoundError
@@ -78,6 +79,10 @@ class DatasetFormatError(InputError):
 
 class UnsafePathError(InputError):
     """A path that would leave the folder it belongs to."""
+
+
+class TooManyPointsError(InputError):
+    """Lines of so many points that nobody drew them by hand."""
 
 
 class TooLargeError(InputError):

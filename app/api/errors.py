@@ -25,12 +25,14 @@ from app.errors import (
     StaleRevisionError,
     StorageError,
     TooLargeError,
+    TooManyPointsError,
 )
 
 log = structlog.get_logger("touchline.api")
 
 STATUSES: tuple[tuple[type[ReviewError], int], ...] = (
     (TooLargeError, 413),
+    (TooManyPointsError, 422),
     (ImageError, 422),
     (InputError, 400),
     (NotFoundError, 404),

@@ -21,12 +21,12 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.api.errors import RETRY_SECONDS, status_of
 from app.api.problem import make_problem, problem_response
 from app.api.reply import ASKED, KEPT_HEADERS, Asked
-from app.api.security.bodies import BYTES
+from app.api.security.bodies import BYTES, VALUE
 from app.api.security.origin import SAFE_METHODS
 from app.errors import OverloadedError, ReviewError, StorageError
 from app.review.answers.answers import find_first, forget_old, keep_first
 from app.store.answers import Answer
-from app.store.codecs import canonical, parse
+from app.store.codecs import canonical
 from app.store.session import Store
 
 log = structlog.get_logger("touchline.api")
@@ -91,13 +91,13 @@ class Idempotency:
         except StorageError as error:
             await _refuse(error, request.scope, request.receive, send)
             return
-        if known is None:
-            await self._first(key, request, send)
-            await self._tidy(request.store)
-        else:
+        if known is not None and not (known.under_way and await request.asks_for(known)):
             await _again(known, request, send)
+        else:
+            await self._carry_out(key, request, send)
+            await self._tidy(request.store)
 
-    async def _first(self, key: str, request: _Request, send: Send) -> None:
+    async def _carry_out(self, key: str, request: _Request, send: Send) -> None:
         if request.streamed:
             # What is asked for is known once its bytes have passed.
             asked = None
@@ -130,8 +130,7 @@ async def _refuse(error: ReviewError, scope: Scope, receive: Receive, send: Send
 
 
 async def _again(known: Answer, request: _Request, send: Send) -> None:
-    await request.read()
-    if request.digest() != known.request_digest:
+    if not await request.asks_for(known):
         problem = make_problem(
             422, f"this {HEADER} was used for another request", hint="Send a new key with it."
         )
@@ -166,6 +165,11 @@ class _Request:
         while not self._ended:
             await self._next()
 
+    async def asks_for(self, known: Answer) -> bool:
+        """Whether it is the request that an answer was given to."""
+        await self.read()
+        return self.digest() == known.request_digest
+
     async def receive(self) -> Message:
         """The next message for whoever answers."""
         if self.streamed or self._replayed:
@@ -179,8 +183,7 @@ class _Request:
         if self.streamed:
             body = self._sum.hexdigest()
         else:
-            text = b"".join(self._body)
-            body = canonical(parse(text.decode())) if text else ""
+            body = canonical(self.scope[VALUE]) if VALUE in self.scope else ""
         return hashlib.sha256(canonical([*place, body]).encode()).hexdigest()
 
     async def _next(self) -> Message:

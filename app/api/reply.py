@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from starlette.responses import Response
 
 from app.review.answers.answers import keep_with_work
-from app.store.answers import Answer, Kept, keep_nothing
+from app.store.answers import Answer, Kept, Progress, keep_nothing
 
 T = TypeVar("T")
 
@@ -33,6 +33,11 @@ class Asked:
         """Its answer is in the database."""
         self.kept = True
 
+    @property
+    def progress(self) -> Progress:
+        """Where work of several transactions says how far it is."""
+        return Progress(self.key, self.actor, self.digest)
+
 
 class Reply(Generic[T]):
     """The answer to one request.
@@ -52,6 +57,11 @@ class Reply(Generic[T]):
         self._asked, self._make = asked, make
         self.made: Response | None = None
         self._of: T | None = None
+
+    @property
+    def progress(self) -> Progress | None:
+        """Where the work says how far it is; None for a request without a key."""
+        return None if self._asked is None else self._asked.progress
 
     def keep(self, outcome: T) -> Kept:
         """Make the answer; what is returned writes it into a transaction."""

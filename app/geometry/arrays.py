@@ -19,9 +19,11 @@ def require_shape(array: FloatArray, shape: tuple[int | None, ...], name: str) -
         ShapeError: It has another shape.
     """
     array = np.asarray(array, dtype=np.float64)
-    fits = array.ndim == len(shape) and all(
-        wanted is None or wanted == got for wanted, got in zip(shape, array.shape, strict=True)
-    )
-    if not fits:
+    found = array.shape
+    # Called for every point of every camera: most shapes are equal as they stand.
+    if found != shape and (
+        len(found) != len(shape)
+        or any(w is not None and w != got for w, got in zip(shape, found, strict=True))
+    ):
         raise ShapeError(f"{name} has shape {array.shape}, needs {shape}")
     return array

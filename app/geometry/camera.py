@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -9,7 +10,14 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, require_shape
-from app.geometry.distortion import COEFFICIENTS, distort, distort_jacobian, fold_radius, undistort
+from app.geometry.distortion import (
+    COEFFICIENTS,
+    distort,
+    distort_jacobian,
+    distort_point,
+    fold_radius,
+    undistort,
+)
 from app.geometry.rotation import pan_tilt_roll_from_rotation
 
 MIN_DEPTH = 1e-3
@@ -64,11 +72,18 @@ class Camera:
         numbers = [*self.focal_length, *self.principal_point, self.skew]
         return np.concatenate([self.rotation.ravel(), self.position, numbers, self.distortion])
 
-    @property
+    @cached_property
+    def distorts(self) -> bool:
+        """Whether the lens distorts at all."""
+        return bool(self.distortion.any())
+
+    @cached_property
     def K(self) -> FloatArray:
         """Calibration matrix, shape (3, 3)."""
         (ax, ay), (x0, y0) = self.focal_length, self.principal_point
-        return np.array([[ax, self.skew, x0], [0.0, ay, y0], [0.0, 0.0, 1.0]])
+        matrix = np.array([[ax, self.skew, x0], [0.0, ay, y0], [0.0, 0.0, 1.0]])
+        matrix.setflags(write=False)
+        return matrix
 
     @property
     def P(self) -> FloatArray:
@@ -99,17 +114,32 @@ class Camera:
             or beyond the fold.
         """
         in_camera = self.pitch_to_camera(points)
+        if len(in_camera) == 1:
+            return np.array([self._pixel(in_camera[0].tolist(), folded)])
         depth = in_camera[:, 2]
         visible = depth > MIN_DEPTH
         safe = np.where(visible, depth, 1.0)
         ideal = in_camera[:, :2] / safe[:, None]
-        if self.distortion.any():
+        if self.distorts:
             if not folded:
                 visible &= np.hypot(ideal[:, 0], ideal[:, 1]) <= fold_radius(self.distortion)
             ideal = distort(np.where(visible[:, None], ideal, 0.0), self.distortion)
         pixels = self._unit_to_pixel(ideal)
         pixels[~visible] = np.nan
         return pixels
+
+    def _pixel(self, in_camera: Sequence[float], folded: bool) -> tuple[float, float]:
+        """``project`` for one point of the camera frame, the same bits in plain numbers."""
+        x, y, depth = in_camera
+        if not depth > MIN_DEPTH:
+            return np.nan, np.nan
+        x, y = x / depth, y / depth
+        if self.distorts:
+            if not (folded or np.hypot(x, y) <= fold_radius(self.distortion)):
+                return np.nan, np.nan
+            x, y = distort_point(x, y, self.distortion.tolist())
+        (ax, ay), (x0, y0) = self.focal_length, self.principal_point
+        return ax * x + self.skew * y + x0, ay * y + y0
 
     def jacobian(self, point: FloatArray) -> FloatArray:
         """Derivative of a point's pixel by the point, pixels per metre, shape (2, 3).
@@ -119,7 +149,7 @@ class Camera:
         """
         x, y, z = self.rotation @ (require_shape(point, (3,), "point") - self.position)
         ideal = np.array([[1.0, 0.0, -x / z], [0.0, 1.0, -y / z]]) / z @ self.rotation
-        if self.distortion.any():
+        if self.distorts:
             ideal = distort_jacobian(np.array([[x / z, y / z]]), self.distortion)[0] @ ideal
         slope: FloatArray = self.K[:2, :2] @ ideal
         return slope
@@ -127,7 +157,7 @@ class Camera:
     def undistort(self, pixels: FloatArray) -> FloatArray:
         """Pixels of the ideal pinhole for pixels of the image, both shape (N, 2)."""
         pixels = require_shape(pixels, (None, 2), "pixels")
-        if not self.distortion.any():
+        if not self.distorts:
             return pixels.copy()
         return self._unit_to_pixel(self.pixel_to_ideal(pixels))
 

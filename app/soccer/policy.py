@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, fields
+from functools import cached_property
 from typing import Any, get_args, get_type_hints
 
 from app.soccer.solution import GAMMAS_PERCENT, GATES
@@ -116,14 +117,14 @@ class Policy:
         68.0, PITCH, "Width of the pitch, where none is known", "m", 45.0, 90.0
     )
 
-    @property
+    @cached_property
     def hash(self) -> str:
         """Digest of every value but the name."""
         values = asdict(self)
         del values["name"]
         return _digest(values)
 
-    @property
+    @cached_property
     def calibration_hash(self) -> str:
         """Digest of what a calibration depends on."""
         return _digest(asdict(self.calibration))

@@ -26,7 +26,7 @@ from app.soccer.solution import (
 from app.solving.ball_box import expect_ball, fit_ball
 from app.solving.best_ball import best_ball
 from app.solving.calibrate import calibrate_station, calibration_key
-from app.solving.facts import facts_of
+from app.solving.facts import Facts, facts_of
 from app.solving.findings import find
 from app.solving.gates import JudgedView, describe
 from app.solving.mean_ball import judged_pairs, mean_ball
@@ -50,6 +50,13 @@ def solve(
         calibrations: Calibrations known from before under their ``calibration_key``; they save
             time and change nothing.
     """
+    return solve_with_facts(group, policy, calibrations)[0]
+
+
+def solve_with_facts(
+    group: Group, policy: Policy, calibrations: Mapping[str, Calibration]
+) -> tuple[Solution, Facts]:
+    """``solve``, and the facts that its gates were judged by."""
     known = dict(calibrations)
     keys = [_calibrated(view, group, policy, known) for view in group.views]
     found = [known[key] for key in keys]
@@ -67,7 +74,7 @@ def solve(
     left = {view.view for view in views if view.failed is None}
     usable = [sight for sight in sights if sight.view in left]
     judged, left_out = _judged(group, views, verdict, policy), _left_out(group)
-    return Solution(
+    solution = Solution(
         views=views,
         pairs=pairs,
         ball=ball,
@@ -77,6 +84,7 @@ def solve(
         policy_hash=policy.hash,
         solver_version=SOLVER_VERSION,
     )
+    return solution, facts
 
 
 def view_letter(index: int) -> str:

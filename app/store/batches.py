@@ -52,6 +52,11 @@ class Batch:
         """False while it runs, or when it was killed."""
         return self.log_id is not None
 
+    @property
+    def is_taken_back(self) -> bool:
+        """Whether its verdicts have been taken back, or are being."""
+        return self.undone is not None or self.undo_spans is not None
+
 
 def read_batches(session: Session, dataset_id: int, limit: int) -> list[Batch]:
     """The batches of a dataset, the newest first."""

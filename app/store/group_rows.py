@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
-from sqlalchemy import func, insert, select
+from sqlalchemy import Select, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.soccer.group import Group, Station, View
@@ -68,10 +69,15 @@ def next_id(session: Session, model: Any) -> int:
 
     Ids of deleted datasets are not given again: the log still speaks of what had them.
     """
-    newest = select(func.coalesce(func.max(model.id), 0)).scalar_subquery()
-    used = select(UsedIdModel.id).where(UsedIdModel.table == model.__tablename__)
-    given = func.max(newest, func.coalesce(used.scalar_subquery(), 0))
-    return int(session.scalar(select(given)) or 0) + 1
+    return int(session.scalar(_last_id(model)) or 0) + 1
+
+
+@cache
+def _last_id(model: Any) -> Select[Any]:
+    table, used_id = model.__table__, UsedIdModel.__table__
+    newest = select(func.coalesce(func.max(table.c.id), 0)).scalar_subquery()
+    used = select(used_id.c.id).where(used_id.c.table == table.name)
+    return select(func.max(newest, func.coalesce(used.scalar_subquery(), 0)))
 
 
 @dataclass

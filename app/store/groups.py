@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import namedtuple
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 from typing import Any
 
 from sqlalchemy import BindParameter, bindparam, delete, null, select, update
@@ -12,7 +13,8 @@ from sqlalchemy.orm import Session
 from sqlalchemy.sql import FromClause
 
 from app.errors import NotFoundError
-from app.soccer.annotation import Extras
+from app.geometry.camera import Camera
+from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch
@@ -92,29 +94,30 @@ def _row_of(table: FromClause) -> Any:
     return namedtuple("Row", table.columns.keys())
 
 
-_VIEW, _STATION = ViewModel.__table__, StationModel.__table__
+_GROUP, _VIEW, _STATION = GroupModel.__table__, ViewModel.__table__, StationModel.__table__
+_DATASET = DatasetModel.__table__
 _ViewRow, _StationRow = _row_of(_VIEW), _row_of(_STATION)
-_WIDTH = len(_VIEW.columns)
+_STATION_START = -len(_STATION.columns)
+_VIEW_START = _STATION_START - len(_VIEW.columns)
 _IDS: BindParameter[Any] = bindparam("ids", expanding=True)
-_HEADS = (
-    select(*GroupModel.__table__.columns, DatasetModel.name.label("dataset"), DatasetModel.policy)
-    .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-    .where(GroupModel.id.in_(_IDS))
-)
 
 
-def _views(*columns: Any) -> Any:
+def _whole(*columns: Any) -> Any:
+    """Groups with these columns of their views: a row a view, or one without any."""
+    head = (*_GROUP.columns, _DATASET.c.name.label("dataset"), _DATASET.c.policy)
     return (
-        select(*columns, *_STATION.columns)
-        .join_from(_VIEW, _STATION, _STATION.c.id == _VIEW.c.station_id)
-        .where(_VIEW.c.group_id.in_(_IDS))
+        select(*head, *columns, *_STATION.columns)
+        .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
+        .outerjoin(_VIEW, _VIEW.c.group_id == _GROUP.c.id)
+        .outerjoin(_STATION, _STATION.c.id == _VIEW.c.station_id)
+        .where(_GROUP.c.id.in_(_IDS))
         .order_by(_VIEW.c.position)
     )
 
 
 _OF_VIEW = select(_VIEW.c.group_id).where(_VIEW.c.id == bindparam("view"))
-_VIEWS = _views(*_VIEW.columns)
-_VIEWS_ALONE = _views(*(null() if c.name == "extras" else c for c in _VIEW.columns))
+_WHOLE = _whole(*_VIEW.columns)
+_WITHOUT_EXTRAS = _whole(*(null() if c.name == "extras" else c for c in _VIEW.columns))
 
 
 def read_groups(
@@ -127,14 +130,17 @@ def read_groups(
         ids: At most a few hundred.
         extras: Read what the ball pipeline does not use, too.
     """
-    heads = {row.id: row for row in session.execute(_HEADS, {"ids": list(ids)})}
+    heads: dict[int, Any] = {}
     views: dict[int, list[Any]] = {}
     stations: dict[int, StoredStation] = {}
-    for row in session.execute(_VIEWS if extras else _VIEWS_ALONE, {"ids": list(ids)}):
-        view, station = _ViewRow._make(row[:_WIDTH]), _StationRow._make(row[_WIDTH:])
-        views.setdefault(view.group_id, []).append(view)
-        if station.id not in stations:
-            stations[station.id] = stored_station(station)
+    for row in session.execute(_WHOLE if extras else _WITHOUT_EXTRAS, {"ids": list(ids)}):
+        heads[row.id] = row
+        view = _ViewRow._make(row[_VIEW_START:_STATION_START])
+        if view.id is None:
+            continue
+        views.setdefault(row.id, []).append(view)
+        if view.station_id not in stations:
+            stations[view.station_id] = stored_station(_StationRow._make(row[_STATION_START:]))
     return {
         number: _stored_group(heads[number], views.get(number, []), stations)
         for number in ids
@@ -196,10 +202,10 @@ def _view_from_row(row: Any, station: Station) -> View:
     return View(
         key=row.key,
         station=station,
-        balls=tuple(map(codecs.ball_from_json, codecs.parse(row.balls))),
+        balls=_balls(row.balls),
         media=media,
         included=row.included,
-        extras=Extras() if extras is None else codecs.extras_from_json(codecs.unpack(extras)),
+        extras=Extras() if extras is None else _extras(extras),
         left_out=None if why is None else codecs.left_out_from_json(codecs.parse(why)),
     )
 
@@ -210,14 +216,35 @@ def stored_station(row: Any) -> StoredStation:
         key=row.key,
         size=ImageSize(row.width, row.height),
         shared=row.shared,
-        lines=codecs.lines_from_json(codecs.parse(row.lines)),
-        given=None if row.given is None else codecs.camera_from_json(codecs.parse(row.given)),
+        lines=_lines(row.lines),
+        given=None if row.given is None else _camera(row.given),
         calibration=row.calibration,
         flipped=row.flipped,
     )
     return StoredStation(
         row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
     )
+
+
+# Most requests ask for what the one before asked for.
+@lru_cache(maxsize=1024)
+def _balls(text: str) -> tuple[BallAnnotation, ...]:
+    return tuple(map(codecs.ball_from_json, codecs.parse(text)))
+
+
+@lru_cache(maxsize=256)
+def _extras(data: bytes) -> Extras:
+    return codecs.extras_from_json(codecs.unpack(data))
+
+
+@lru_cache(maxsize=1024)
+def _lines(text: str) -> Lines:
+    return codecs.lines_from_json(codecs.parse(text))
+
+
+@lru_cache(maxsize=1024)
+def _camera(text: str) -> Camera:
+    return codecs.camera_from_json(codecs.parse(text))
 
 
 def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
@@ -269,7 +296,12 @@ def _differs(view: View, old: View) -> bool:
 
 
 def _update(session: Session, table: Any, identity: int, values: Mapping[str, Any]) -> None:
-    session.execute(update(table).where(table.c.id == identity).values(values))
+    session.execute(_update_of(table), {"row": identity, **values})
+
+
+@cache
+def _update_of(table: Any) -> Any:
+    return update(table).where(table.c.id == bindparam("row"))
 
 
 def save_group(

@@ -6,9 +6,9 @@ import hashlib
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
-from sqlalchemy import ColumnElement, bindparam, func, insert, select
+from sqlalchemy import ColumnElement, Table, bindparam, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.errors import StorageError
@@ -55,9 +55,7 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
     """
     if not entries:
         return []
-    last = session.execute(
-        select(LogModel.id, LogModel.hash).order_by(LogModel.id.desc()).limit(1)
-    ).one_or_none()
+    last = session.execute(_LAST).one_or_none()
     number, previous = (0, GENESIS) if last is None else last
     rows: list[dict[str, Any]] = []
     for entry in entries:
@@ -66,17 +64,19 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
         previous = chain_hash(previous, number, entry, body)
         row = {name: getattr(entry, name) for name in _COLUMNS}
         rows.append({**row, "id": number, "hash": previous, "body": zlib.compress(body)})
-    session.execute(insert(LogModel), rows, execution_options={"render_nulls": True})
+    session.execute(insert(_LOG), rows)
     return [row["id"] for row in rows]
 
 
+_LOG = cast(Table, LogModel.__table__)
+_LAST = select(_LOG.c.id, _LOG.c.hash).order_by(_LOG.c.id.desc()).limit(1)
 _STEPS = (
-    select(LogModel.group_id, LogModel.id, LogModel.kind)
+    select(_LOG.c.group_id, _LOG.c.id, _LOG.c.kind)
     .where(
-        LogModel.group_id.in_(bindparam("groups", expanding=True)),
-        LogModel.kind.in_(bindparam("kinds", expanding=True)),
+        _LOG.c.group_id.in_(bindparam("groups", expanding=True)),
+        _LOG.c.kind.in_(bindparam("kinds", expanding=True)),
     )
-    .order_by(LogModel.id)
+    .order_by(_LOG.c.id)
 )
 
 

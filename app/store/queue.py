@@ -21,7 +21,6 @@ from sqlalchemy import (
     update,
 )
 from sqlalchemy.orm import Session
-from sqlalchemy.sql.dml import Update
 
 from app.store.groups import StoredGroup
 from app.store.models import (
@@ -40,6 +39,7 @@ from app.store.verdicts import StoredVerdict
 
 _BATCH = 1000
 _QUEUE = cast(Table, QueueModel.__table__)
+_ROW = update(_QUEUE).where(_QUEUE.c.group_id == bindparam("row"))
 _NOTICE = ImportFindingModel.__table__
 _VIEW = ViewModel.__table__
 _IDS: BindParameter[Any] = bindparam("ids", expanding=True)
@@ -107,7 +107,7 @@ def update_row(
         **_judged(stored, verdict, edited, summary.passes),
         **_computed(summary, noticed),
     }
-    session.execute(_row_of(stored.id).values(values))
+    session.execute(_ROW, {"row": stored.id, **values})
 
 
 def update_verdict(
@@ -115,11 +115,7 @@ def update_verdict(
 ) -> None:
     """Show a new verdict in a group's row; the rest of it is in step."""
     edited = {stored.id} if stored.edited else set[int]()
-    session.execute(_row_of(stored.id).values(_judged(stored, verdict, edited, passes)))
-
-
-def _row_of(group_id: int) -> Update:
-    return update(_QUEUE).where(_QUEUE.c.group_id == group_id)
+    session.execute(_ROW, {"row": stored.id, **_judged(stored, verdict, edited, passes)})
 
 
 def _refresh(session: Session, ids: Sequence[int]) -> None:

@@ -6,9 +6,10 @@ import json
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import lru_cache
+from typing import Any, cast
 
-from sqlalchemy import ColumnElement, and_, bindparam, func, select
+from sqlalchemy import BindParameter, ColumnElement, Table, and_, bindparam, func, select
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
@@ -24,16 +25,16 @@ _ELSEWHERE = Calibration(source="", camera=None)
 """Stands in a stored solution for the calibration that is kept under its key."""
 
 
-_SOLUTION = SolutionModel.__table__
+_SOLUTION = cast(Table, SolutionModel.__table__)
 _SOLUTIONS = select(*_SOLUTION.columns).where(
     _SOLUTION.c.group_id.in_(bindparam("groups", expanding=True)),
     _SOLUTION.c.policy_hash.in_(bindparam("policies", expanding=True)),
     _SOLUTION.c.inputs_hash.in_(bindparam("inputs", expanding=True)),
 )
-_CALIBRATION = CalibrationModel.__table__
-_CALIBRATIONS = select(*_CALIBRATION.columns).where(
-    _CALIBRATION.c.key.in_(bindparam("keys", expanding=True))
-)
+_CALIBRATION = cast(Table, CalibrationModel.__table__)
+_KEYS: BindParameter[Any] = bindparam("keys", expanding=True)
+_CALIBRATIONS = select(*_CALIBRATION.columns).where(_CALIBRATION.c.key.in_(_KEYS))
+_KEPT = select(_CALIBRATION.c.key).where(_CALIBRATION.c.key.in_(_KEYS))
 
 
 def is_current() -> ColumnElement[bool]:
@@ -96,8 +97,9 @@ def encode_calibration(calibration: Calibration) -> bytes:
     return _compress(value_codec.to_json(calibration))
 
 
+@lru_cache(maxsize=256)
 def decode_calibration(body: bytes) -> Calibration:
-    """Back from ``encode_calibration``."""
+    """Back from ``encode_calibration``; one value for the same bytes, however often asked."""
     return value_codec.from_json(Calibration, json.loads(zlib.decompress(body)))
 
 
@@ -121,15 +123,14 @@ def insert_solutions(
     _require_calibrations(session, wanted - set(bodies))
     if solutions:
         session.execute(
-            insert(SolutionModel).on_conflict_do_nothing(),
+            insert(_SOLUTION).on_conflict_do_nothing(),
             [_row(key, encoded) for key, encoded in solutions],
         )
 
 
 def _require_calibrations(session: Session, wanted: set[str]) -> None:
     """A dataset that is deleted takes its calibrations along, and the solver may have read one."""
-    statement = select(CalibrationModel.key).where(CalibrationModel.key.in_(wanted))
-    if wanted and wanted - set(session.scalars(statement)):
+    if wanted and wanted - set(session.scalars(_KEPT, {"keys": list(wanted)})):
         raise ConflictError("a calibration was deleted while this was computed", hint="Try again.")
 
 
@@ -137,7 +138,7 @@ def insert_calibrations(session: Session, bodies: Mapping[str, bytes]) -> None:
     """Insert encoded calibrations by key; what is already there stays."""
     if bodies:
         session.execute(
-            insert(CalibrationModel).on_conflict_do_nothing(),
+            insert(_CALIBRATION).on_conflict_do_nothing(),
             [{"key": key, "body": body} for key, body in bodies.items()],
         )
 
@@ -171,19 +172,25 @@ def read_solutions(session: Session, keys: Iterable[SolutionKey]) -> dict[int, S
     ]
     names = {name for row in rows for name in json.loads(row.calibrations)}
     calibrations = read_calibrations(session, names)
-    return {
-        row.group_id: decode_solution(json.loads(zlib.decompress(row.body)), calibrations)
-        for row in rows
-    }
+    return {row.group_id: with_calibrations(_bare_solution(row.body), calibrations) for row in rows}
 
 
 def decode_solution(value: Any, calibrations: Mapping[str, Calibration]) -> Solution:
     """A solution from the JSON value of its body and the calibrations that it names."""
-    solution = value_codec.from_json(Solution, value)
+    return with_calibrations(value_codec.from_json(Solution, value), calibrations)
+
+
+def with_calibrations(solution: Solution, calibrations: Mapping[str, Calibration]) -> Solution:
+    """A solution as it is stored, with the calibrations that it names."""
     views = tuple(
         replace(view, calibration=calibrations[view.calibration_key]) for view in solution.views
     )
     return replace(solution, views=views)
+
+
+@lru_cache(maxsize=128)
+def _bare_solution(body: bytes) -> Solution:
+    return value_codec.from_json(Solution, json.loads(zlib.decompress(body)))
 
 
 def read_calibrations(session: Session, keys: Iterable[str]) -> dict[str, Calibration]:
@@ -204,8 +211,7 @@ def read_summary(text: str) -> Summary:
 
 def known_calibrations(session: Session, keys: Iterable[str]) -> set[str]:
     """Those of the keys under which a calibration is kept."""
-    statement = select(CalibrationModel.key).where(CalibrationModel.key.in_(list(keys)))
-    return set(session.scalars(statement))
+    return set(session.scalars(_KEPT, {"keys": list(keys)}))
 
 
 def present_keys(session: Session, group_ids: Sequence[int]) -> dict[int, SolutionKey]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
-from sqlalchemy import bindparam, case, func, insert, select
+from sqlalchemy import Table, bindparam, case, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.store.group_rows import next_id
@@ -31,10 +31,11 @@ class StoredVerdict:
     override: str | None
 
 
+_VERDICT = cast(Table, VerdictModel.__table__)
 _OF_GROUPS = (
-    select(*VerdictModel.__table__.columns)
-    .where(VerdictModel.group_id.in_(bindparam("ids", expanding=True)))
-    .order_by(VerdictModel.id.desc())
+    select(*_VERDICT.columns)
+    .where(_VERDICT.c.group_id.in_(bindparam("ids", expanding=True)))
+    .order_by(_VERDICT.c.id.desc())
 )
 
 
@@ -102,7 +103,7 @@ def insert_verdicts(
 ) -> None:
     """Insert verdicts on groups of a dataset, and log them under who gives them."""
     rows = [dict(vars(verdict)) for verdict in given]
-    session.execute(insert(VerdictModel), rows, execution_options={"render_nulls": True})
+    session.execute(insert(_VERDICT), rows)
     entries = []
     for row in rows:
         body = {name: value for name, value in row.items() if name not in ("id", "group_id")}

@@ -13,6 +13,7 @@ from tests.bench.ball import bench_ball
 from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
 from tests.bench.geometry import bench_geometry
+from tests.bench.requests import bench_requests
 
 REAL_DATA = Path(
     os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data")
@@ -27,6 +28,7 @@ def main() -> None:
         bench_calibration(REAL_DATA)
     else:
         print(f"\nCalibration on real lines: no data in {REAL_DATA}, left out")
+    bench_requests()
     bench_browser()
 
 

@@ -50,7 +50,13 @@ def post_verdicts(
         return document(BulkResult.planned(bulk.plan_verdicts(store, found, *said)))
     reply = Reply[bulk.BatchReport](asked, lambda report: document(BulkResult.done(report)))
     report = bulk.give_verdicts(
-        store, found, *said, actor=actor, expected=verdict.expected, keep=reply.keep
+        store,
+        found,
+        *said,
+        actor=actor,
+        expected=verdict.expected,
+        keep=reply.keep,
+        progress=reply.progress,
     )
     return reply.of(report)
 
@@ -83,7 +89,10 @@ def redo_batch(batch: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> R
     reply = Reply[bulk_redo.RedoReport](
         asked, lambda report: document(RedoDocument.model_validate(report))
     )
-    return reply.of(bulk_redo.redo_batch(store, batch, actor=actor, keep=reply.keep))
+    report = bulk_redo.redo_batch(
+        store, batch, actor=actor, keep=reply.keep, progress=reply.progress
+    )
+    return reply.of(report)
 
 
 @router.post(

@@ -16,12 +16,12 @@ from pydantic import (
     model_validator,
 )
 
+from app.api.schemas.identity_cache import IdentityCache
 from app.errors import UnknownMarkingError
 from app.soccer.annotation import BallAnnotation, Lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.pitch import MARKINGS, canonical_marking
 
-MAX_POINTS = 1000
 MAX_PIXEL = 100_000.0
 """Annotated points may lie outside the image, but not that far."""
 
@@ -62,7 +62,7 @@ class Point(BaseModel):
 
 
 LineEdits = Annotated[
-    dict[Marking, Annotated[list[Point], Field(max_length=MAX_POINTS)] | None],
+    dict[Marking, list[Point] | None],
     BeforeValidator(_distinct),
 ]
 
@@ -206,9 +206,16 @@ class Ball(BaseModel):
 LineDocuments = dict[str, list[Point]]
 
 
-def lines_document(lines: Lines) -> LineDocuments:
-    """Lines as they travel."""
+def _line_documents(lines: Lines) -> LineDocuments:
     return {
         marking: [Point.model_construct(x=point.x, y=point.y) for point in points]
         for marking, points in lines.items()
     }
+
+
+_kept_documents: IdentityCache[Lines, LineDocuments] = IdentityCache(_line_documents, size=1024)
+
+
+def lines_document(lines: Lines) -> LineDocuments:
+    """Lines as they travel."""
+    return _kept_documents(lines)

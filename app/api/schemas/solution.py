@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from app.api.schemas.document import Document
+from app.api.schemas.identity_cache import IdentityCache
 from app.datasets.camera_json import camera_to_json
 from app.geometry.camera import Camera
 from app.review.editing.codec import edit_to_json
@@ -125,6 +126,15 @@ class CalibrationDocument(Document):
         return value
 
 
+_calibration_document: IdentityCache[Calibration, CalibrationDocument] = IdentityCache(
+    CalibrationDocument.model_validate, size=256
+)
+
+
+def _kept_document(value: Any) -> Any:
+    return _calibration_document(value) if isinstance(value, Calibration) else value
+
+
 class BallFitDocument(Document):
     """The 3D ball seen again in one view."""
 
@@ -160,7 +170,7 @@ class ViewSolutionDocument(Document):
     view: str
     included: bool
     failed: str | None = Field(description="First gate that dropped this view.")
-    calibration: CalibrationDocument
+    calibration: Annotated[CalibrationDocument, BeforeValidator(_kept_document)]
     ball: BallFitDocument | None
     expected: ExpectedBallDocument | None
 

@@ -12,14 +12,13 @@ from dataclasses import dataclass, field
 from app.progress import Progress
 from app.review.datasets.dataset import Dataset, get_dataset, need_dataset, read_dataset
 from app.review.datasets.fan_out import fan_out
-from app.review.editing.encode import encode
 from app.review.editing.known import calibration_keys
+from app.review.editing.solve_encoded import solve_encoded
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_station, calibration_key
-from app.solving.solve import solve
 from app.store.codecs import group_from_json, group_to_json, pack, unpack
 from app.store.groups import read_groups, read_stations, station_pitches
 from app.store.queue import refresh_queue
@@ -114,8 +113,7 @@ def solve_task(task: Task) -> list[Result]:
 
 def _solve_one(key: SolutionKey, group: Group, task: Task, known: dict[str, Calibration]) -> Result:
     try:
-        solution = solve(group, task.policy, known)
-        encoded = encode(group, solution, known)
+        solution, encoded = solve_encoded(group, task.policy, known)
     except Exception as error:
         # One broken group must not stop the others; it stays stale and is reported by name.
         return Result(key, group.key, problem=f"{type(error).__name__}: {error}")

@@ -113,7 +113,10 @@ class Record:
         passes = None if solution is None else solution.passes
         if solution is not None and self.noticed:
             solution = replace(solution, findings=solution.findings + self.noticed)
-        verdicts = _last_of_each(_verdict_state(item, stored, passes) for item in self.verdicts)
+        edited = stored.edited
+        verdicts = [
+            _verdict_state(item, stored, edited, passes) for item in _last_of_each(self.verdicts)
+        ]
         kinds = None if solution is None else [item.kind for item in solution.findings]
         stations = stored.stations.values()
         return GroupState(
@@ -202,7 +205,9 @@ def require_etag(current: str, if_match: str, what: str) -> None:
         )
 
 
-def _verdict_state(given: StoredVerdict, stored: StoredGroup, passes: bool | None) -> VerdictState:
+def _verdict_state(
+    given: StoredVerdict, stored: StoredGroup, edited: bool, passes: bool | None
+) -> VerdictState:
     reviewed = given.state != "unreviewed"
     return VerdictState(
         state=given.state,
@@ -211,13 +216,13 @@ def _verdict_state(given: StoredVerdict, stored: StoredGroup, passes: bool | Non
         actor=given.actor,
         at=given.at,
         stale=reviewed and given.inputs_hash != stored.inputs_hash,
-        fixed=is_fixed(given, stored.edited, passes),
+        fixed=is_fixed(given, edited, passes),
         override=given.override,
     )
 
 
-def _last_of_each(verdicts: Iterable[VerdictState]) -> list[VerdictState]:
-    last: dict[str | None, VerdictState] = {}
+def _last_of_each(verdicts: Iterable[StoredVerdict]) -> list[StoredVerdict]:
+    last: dict[str, StoredVerdict] = {}
     for verdict in verdicts:
         last.setdefault(verdict.actor, verdict)
     return list(last.values())

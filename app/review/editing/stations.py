@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from app.errors import ConflictError, NotFoundError
 from app.review.editing.codec import edit_to_json, station_edit_from_json
-from app.review.editing.edit import StationEdit, with_station
-from app.review.editing.encode import encode
+from app.review.editing.edit import SetStationLines, StationEdit, with_station
 from app.review.editing.known import known_calibrations
+from app.review.editing.point_limits import require_few_points
+from app.review.editing.solve_encoded import solve_encoded
 from app.review.editing.state import (
     GroupState,
     read_record,
@@ -17,10 +18,9 @@ from app.review.editing.state import (
     require_etag,
     station_etag,
 )
-from app.review.editing.undo import read_station_stacks
+from app.review.editing.undo import next_step, read_station_stacks
 from app.soccer.group import Group, Station
 from app.soccer.solution import Calibration
-from app.solving.solve import solve
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
@@ -34,7 +34,7 @@ from app.store.groups import (
     refresh_inputs_hashes,
     save_station,
 )
-from app.store.log import Entry, append, read_entry
+from app.store.log import Entry, append
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
 from app.store.solutions import (
@@ -112,6 +112,8 @@ def submit_station(
 
     def plan(_session: Session, state: StationState) -> _Change:
         station = state.station
+        if isinstance(edit, SetStationLines):
+            require_few_points(f"camera {station.key}", station.lines, edit.lines)
         body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(station))}
         return _Change("station_edit", body, edit.apply(station))
 
@@ -128,7 +130,7 @@ def undo_station(
     keep: Keep[GroupState] = keep_nothing,
 ) -> StationState:
     """Take the last edit of a static camera back; raises ConflictError without one."""
-    return _change(store, station_id, _plan_undo, if_match, actor, shown, keep)
+    return _change(store, station_id, _plan_step("undo"), if_match, actor, shown, keep)
 
 
 def redo_station(
@@ -141,7 +143,7 @@ def redo_station(
     keep: Keep[GroupState] = keep_nothing,
 ) -> StationState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    return _change(store, station_id, _plan_redo, if_match, actor, shown, keep)
+    return _change(store, station_id, _plan_step("redo"), if_match, actor, shown, keep)
 
 
 def _change(
@@ -195,7 +197,7 @@ def _solved(
     stored: StoredGroup, group: Group, known: Mapping[str, Calibration]
 ) -> tuple[SolutionKey, EncodedSolution]:
     key = SolutionKey(stored.id, group_inputs_hash(group), stored.policy.hash)
-    return key, encode(group, solve(group, stored.policy, known), known)
+    return key, solve_encoded(group, stored.policy, known)[1]
 
 
 def _save(session: Session, state: StationState, change: _Change, actor: str) -> None:
@@ -224,24 +226,13 @@ def _read(session: Session, station_id: int) -> StationState:
     )
 
 
-def _plan_undo(session: Session, state: StationState) -> _Change:
-    done = read_station_stacks(session, state.id).done
-    if not done:
-        raise ConflictError("there is nothing to undo for this camera")
-    return _again(session, state, "station_undo", done[-1], forward="inverse", backward="edit")
+def _plan_step(kind: str) -> _Plan:
+    """Undo or redo."""
 
+    def plan(session: Session, state: StationState) -> _Change:
+        stacks = read_station_stacks(session, state.id)
+        body = next_step(session, stacks, kind, "for this camera")
+        station = station_edit_from_json(body["edit"]).apply(state.station)
+        return _Change(f"station_{kind}", body, station)
 
-def _plan_redo(session: Session, state: StationState) -> _Change:
-    undone = read_station_stacks(session, state.id).undone
-    if not undone:
-        raise ConflictError("there is nothing to redo for this camera")
-    return _again(session, state, "station_redo", undone[-1], forward="edit", backward="inverse")
-
-
-def _again(
-    session: Session, state: StationState, kind: str, log_id: int, *, forward: str, backward: str
-) -> _Change:
-    entry = read_entry(session, log_id)
-    body = {"edit": entry.body[forward], "inverse": entry.body[backward], "of": log_id}
-    station = station_edit_from_json(body["edit"]).apply(state.station)
-    return _Change(kind, body, station)
+    return plan

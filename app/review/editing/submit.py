@@ -7,18 +7,20 @@ revision, the solution, the queue's row and the answer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from app.errors import ConflictError, NotFoundError, SharedStationError
 from app.review.editing.codec import edit_from_json, edit_to_json
 from app.review.editing.edit import STATION_EDITS, Edit, need_view
-from app.review.editing.encode import encode
 from app.review.editing.etags import read_etags, read_head, require_said, require_unchanged
 from app.review.editing.known import known_calibrations
+from app.review.editing.point_limits import require_few_points_in_all
+from app.review.editing.solve_encoded import solve_encoded
 from app.review.editing.state import GroupState, Record, read_record, read_state
+from app.review.editing.undo import next_step
 from app.soccer.group import Group
-from app.soccer.solution import Solution
+from app.soccer.solution import Calibration, Solution
 from app.solving.solve import solve
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
@@ -30,7 +32,7 @@ from app.store.groups import (
     read_groups,
     save_revision,
 )
-from app.store.log import Entry, LogEntry, append, group_entries, read_entry
+from app.store.log import Entry, LogEntry, append, group_entries
 from app.store.queue import refresh_queue, update_row
 from app.store.session import Session, Store
 from app.store.solutions import EncodedSolution, insert_solutions, read_solutions
@@ -141,7 +143,7 @@ def undo(
     keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Take the last edit of a group back, whoever made it; raises ConflictError without one."""
-    return _change(store, lambda _session: group_id, _plan_undo, if_match, actor, keep)
+    return _change(store, lambda _session: group_id, _plan_step("undo"), if_match, actor, keep)
 
 
 def redo(
@@ -153,7 +155,7 @@ def redo(
     keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    return _change(store, lambda _session: group_id, _plan_redo, if_match, actor, keep)
+    return _change(store, lambda _session: group_id, _plan_step("redo"), if_match, actor, keep)
 
 
 def preview(
@@ -168,7 +170,9 @@ def preview(
         if stored is None:
             raise NotFoundError(f"there is no group {group_id}")
         group = stored.group
-        for edit in edits_of(group):
+        edits = edits_of(group)
+        require_few_points_in_all(group, edits)
+        for edit in edits:
             group = edit.apply(group)
         known = known_calibrations(session, [group], stored.policy)
     return group, solve(group, stored.policy, known)
@@ -209,8 +213,7 @@ def read_solved(
         if solution is not None or not needed:
             return record, solution
         known = known_calibrations(session, [stored.group], stored.policy)
-    solution = solve(stored.group, stored.policy, known)
-    encoded = encode(stored.group, solution, known)
+    solution, encoded = solve_encoded(stored.group, stored.policy, known)
     with store.write() as session:
         insert_solutions(session, [(record.solution_key, encoded)])
         refresh_queue(session, [group_id])
@@ -244,7 +247,7 @@ def _change(
                 found = read_solutions(session, [before.solution_key])
                 return before.state(found.get(before.stored.id))
             known = known_calibrations(session, [change.group], before.stored.policy)
-        outcome = _outcome(before, change, solve(change.group, before.stored.policy, known), known)
+        outcome = _outcome(before, change, known)
         state = outcome.after.state(outcome.solution)
         kept = keep(state)
         with store.write() as session:
@@ -256,12 +259,10 @@ def _change(
         # Another policy judges the dataset by now, so another solution belongs to the edit.
 
 
-def _outcome(
-    before: Record, change: _Change, solution: Solution, known: Collection[str]
-) -> _Outcome:
+def _outcome(before: Record, change: _Change, known: Mapping[str, Calibration]) -> _Outcome:
     stored = next_revision(before.stored, change.group, now())
     after = replace(before, stored=stored, stacks=before.stacks.then(change.kind))
-    encoded = encode(change.group, solution, known)
+    solution, encoded = solve_encoded(change.group, stored.policy, known)
     return _Outcome(change, before, after, solution, encoded)
 
 
@@ -280,33 +281,22 @@ def _plan_edit(edit_of: Callable[[StoredGroup], Edit]) -> _Plan:
     def plan(_session: Session, record: Record) -> _Change:
         edit, group = edit_of(record.stored), record.stored.group
         refuse_shared(record.stored, edit)
+        require_few_points_in_all(group, [edit])
         body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(group))}
         return _Change("edit", body, edit.apply(group))
 
     return plan
 
 
-def _plan_undo(session: Session, record: Record) -> _Change:
-    done = record.stacks.done
-    if not done:
-        raise ConflictError("there is nothing to undo in this group")
-    return _again(session, record, "undo", done[-1], forward="inverse", backward="edit")
+def _plan_step(kind: str) -> _Plan:
+    """Undo or redo."""
 
+    def plan(session: Session, record: Record) -> _Change:
+        body = next_step(session, record.stacks, kind, "in this group")
+        try:
+            group = edit_from_json(body["edit"]).apply(record.stored.group)
+        except NotFoundError as error:
+            raise ConflictError(f"this cannot be done any more: {error.message}") from error
+        return _Change(kind, body, group)
 
-def _plan_redo(session: Session, record: Record) -> _Change:
-    undone = record.stacks.undone
-    if not undone:
-        raise ConflictError("there is nothing to redo in this group")
-    return _again(session, record, "redo", undone[-1], forward="edit", backward="inverse")
-
-
-def _again(
-    session: Session, record: Record, kind: str, log_id: int, *, forward: str, backward: str
-) -> _Change:
-    entry = read_entry(session, log_id)
-    body = {"edit": entry.body[forward], "inverse": entry.body[backward], "of": log_id}
-    try:
-        group = edit_from_json(body["edit"]).apply(record.stored.group)
-    except NotFoundError as error:
-        raise ConflictError(f"this cannot be done any more: {error.message}") from error
-    return _Change(kind, body, group)
+    return plan

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from app.store.log import group_steps, station_steps
+from app.errors import ConflictError
+from app.store.codecs import Json
+from app.store.log import group_steps, read_entry, station_steps
 from app.store.session import Session
 
 GROUP_KINDS = {"edit": "edit", "undo": "undo", "redo": "redo"}
@@ -38,6 +40,26 @@ class Stacks:
         if kind == "undo":
             return Stacks(self.done[:-1], (*self.undone, self.done[-1]))
         return Stacks((*self.done, self.undone[-1]), self.undone[:-1])
+
+
+def next_step(session: Session, stacks: Stacks, kind: str, where: str) -> Json:
+    """Body of the entry that an undo or a redo writes: the edit that it makes, and back.
+
+    Args:
+        session: Any session.
+        stacks: Of the group or station.
+        kind: ``undo`` or ``redo``.
+        where: What it is asked for, as people call it.
+
+    Raises:
+        ConflictError: There is nothing to undo, or to do again.
+    """
+    steps = stacks.done if kind == "undo" else stacks.undone
+    if not steps:
+        raise ConflictError(f"there is nothing to {kind} {where}")
+    body = read_entry(session, steps[-1]).body
+    made, back = ("inverse", "edit") if kind == "undo" else ("edit", "inverse")
+    return {"edit": body[made], "inverse": body[back], "of": steps[-1]}
 
 
 def read_stacks(session: Session, group_ids: Sequence[int]) -> Mapping[int, Stacks]:

@@ -1,7 +1,7 @@
 """Bulk: one verdict for every group that a query matches, tried first.
 
 A batch is many short write transactions, so that others go on working; killed in between it
-leaves whole verdicts, and given again it does the rest. ``bulk_undo`` takes it back, and
+leaves whole verdicts, and given again it does the rest (under the same key as the same batch). ``bulk_undo`` takes it back, and
 ``bulk_redo`` gives it once more after that.
 """
 
@@ -14,8 +14,8 @@ from typing import Any
 from app.errors import ConflictError
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdicts.verdict import Verdict, check_verdict
-from app.store.answers import Keep, keep_nothing
-from app.store.batches import Batch, insert_batch, read_batches, update_batch
+from app.store.answers import Keep, Progress, keep_nothing
+from app.store.batches import Batch, find_batch, insert_batch, read_batches, update_batch
 from app.store.clock import now
 from app.store.listing import Listing, read_columns
 from app.store.log import Entry, append
@@ -118,6 +118,7 @@ def give_verdicts(
     actor: str,
     expected: int | None = None,
     keep: Keep[BatchReport] = keep_nothing,
+    progress: Progress | None = None,
 ) -> BatchReport:
     """Give a verdict to all groups of a query, as each of them is when its turn comes.
 
@@ -133,34 +134,48 @@ def give_verdicts(
         actor: Who says so.
         expected: How many groups ``plan_verdicts`` said would change; refuse another number.
         keep: Keeps the answer with the last verdicts.
+        progress: What a run that was killed has left to do, and where this one says so.
 
     Raises:
         InputError: The query or the verdict cannot be.
-        ConflictError: Another number of groups would change than the caller expects.
+        ConflictError: Another number of groups would change than the caller expects, or what was
+            given before the run was killed has been taken back.
     """
     verdict = check_verdict(state, reason, note)
     conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
+    run = BatchRun(dataset_id, query, verdict, actor, progress=progress)
     with store.read() as session:
-        rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
-    found = sort_out(rows, verdict)
+        begun = run.resume(session)
+        if begun is None:
+            rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
+            found = sort_out(rows, verdict)
+            _require_expected(found, expected)
+            ids, refused = [row.group_id for row in found.change], found.refused
+        else:
+            ids, refused = begun["ids"], tuple(Refusal(*item) for item in begun["refused"])
+    if not ids:
+        return BatchReport(None, 0, refused)
+    while ids:
+        chunk, ids = ids[:CHUNK], ids[CHUNK:]
+        with store.write() as session:
+            rows = read_columns(session, chunk, conditions, ASKED)
+            run.save(session, sort_out(rows, verdict).change)
+            if ids:
+                left = [[item.reason, item.groups] for item in refused]
+                run.interrupt(session, {"ids": ids, "refused": left})
+            else:
+                run.close(session)
+                report = BatchReport(run.batch, run.changed, refused)
+                keep(report)(session)
+    return report
+
+
+def _require_expected(found: SortedOut, expected: int | None) -> None:
     if expected is not None and expected != len(found.change):
         raise ConflictError(
             f"{len(found.change)} groups would change, not {expected}",
             hint="Look at what would happen once more (dry_run=true).",
         )
-    if not found.change:
-        return BatchReport(None, 0, found.refused)
-    run = BatchRun(dataset_id, query, verdict, actor)
-    ids = [row.group_id for row in found.change]
-    for start in range(0, len(ids), CHUNK):
-        with store.write() as session:
-            rows = read_columns(session, ids[start : start + CHUNK], conditions, ASKED)
-            run.save(session, sort_out(rows, verdict).change)
-            if start + CHUNK >= len(ids):
-                run.close(session)
-                report = BatchReport(run.batch, run.changed, found.refused)
-                keep(report)(session)
-    return report
 
 
 def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[Batch]:
@@ -204,7 +219,12 @@ def _has(row: Any, verdict: Verdict) -> bool:
 
 
 class BatchRun:
-    """A batch while it is given, chunk by chunk; ``again`` is the batch that it gives again."""
+    """A batch while it is given, chunk by chunk.
+
+    Args:
+        again: The batch that it gives again, or None.
+        progress: Where it says how far it is, so that it can go on after a stop.
+    """
 
     def __init__(
         self,
@@ -213,13 +233,45 @@ class BatchRun:
         verdict: Verdict,
         actor: str,
         again: int | None = None,
+        progress: Progress | None = None,
     ):
+        self._progress = progress
+        self._left: Any = None
         self._again = {} if again is None else {"again": again}
         self.batch: int | None = None
         self.changed = 0
         self._dataset_id, self._query = dataset_id, query
         self._verdict, self._actor = verdict, actor
         self._spans: list[tuple[int, int]] = []
+
+    def resume(self, session: Session) -> Any:
+        """Go on where a run was killed; returns what it said was left, None where none was.
+
+        Raises:
+            ConflictError: What it had given was taken back meanwhile.
+        """
+        self._left = None if self._progress is None else self._progress.read(session)
+        if self._left is None:
+            return None
+        self.batch, self.changed = self._left["batch"], self._left["changed"]
+        self._spans = [(first, last) for first, last in self._left["spans"]]
+        given = None if self.batch is None else find_batch(session, self.batch)
+        if self.batch is not None and (given is None or given.is_taken_back):
+            raise ConflictError(
+                "the verdicts that were given before the server stopped have been taken back",
+                hint="Give the verdict under another Idempotency-Key.",
+            )
+        return self._left
+
+    def interrupt(self, session: Session, left: dict[str, Any]) -> None:
+        """Say in the transaction of a chunk what is left once it is saved."""
+        if self._progress is None:
+            return
+        if self._progress.read(session) != self._left:
+            raise ConflictError("this very request is being carried out", hint="Send it again.")
+        spans = [list(span) for span in self._spans]
+        self._left = {"batch": self.batch, "changed": self.changed, "spans": spans, **left}
+        self._progress.save(session, self._left)
 
     def save(self, session: Session, rows: Sequence[Any]) -> None:
         """Save the verdicts of one chunk with its log entries, in one transaction."""

@@ -9,7 +9,7 @@ from app.errors import ConflictError
 from app.review.verdicts.bulk import ASKED, BatchRun, Refusal, sort_out
 from app.review.verdicts.bulk_undo import read_batch
 from app.review.verdicts.verdict import check_verdict
-from app.store.answers import Keep, keep_nothing
+from app.store.answers import Keep, Progress, keep_nothing
 from app.store.batches import Batch, Spans, update_batch
 from app.store.listing import read_columns
 from app.store.session import Session, Store
@@ -35,7 +35,12 @@ class RedoReport:
 
 
 def redo_batch(
-    store: Store, batch_id: int, *, actor: str, keep: Keep[RedoReport] = keep_nothing
+    store: Store,
+    batch_id: int,
+    *,
+    actor: str,
+    keep: Keep[RedoReport] = keep_nothing,
+    progress: Progress | None = None,
 ) -> RedoReport:
     """Give the verdicts of a batch again after they were taken back.
 
@@ -48,10 +53,11 @@ def redo_batch(
     """
     with store.read() as session:
         batch = read_batch(session, batch_id)
-    spans = _spans(batch)
-    verdict = check_verdict(batch.state, batch.reason, batch.note)
-    run = BatchRun(batch.dataset_id, batch.query, verdict, actor, batch_id)
-    refused: Counter[str] = Counter()
+        verdict = check_verdict(batch.state, batch.reason, batch.note)
+        run = BatchRun(batch.dataset_id, batch.query, verdict, actor, batch_id, progress)
+        begun = run.resume(session)
+    spans = _spans(batch) if begun is None else begun["left"]
+    refused: Counter[str] = Counter({} if begun is None else begun["refused"])
     if not spans:
         return _report(batch, run, refused)
     for number, (first, last) in enumerate(spans, 1):
@@ -62,7 +68,10 @@ def redo_batch(
             refused.update({item.reason: item.groups for item in found.refused})
             if run.batch is not None:
                 update_batch(session, batch_id, redone=run.batch)
-            if number == len(spans):
+            if number < len(spans):
+                left = [list(span) for span in spans[number:]]
+                run.interrupt(session, {"left": left, "refused": dict(refused)})
+            else:
                 run.close(session)
                 report = _report(batch, run, refused)
                 keep(report)(session)

@@ -39,25 +39,25 @@ def undo_batch(
         batch = read_batch(session, batch_id)
     if batch.undone is not None:
         raise ConflictError(f"{batch.undone_by} has taken this batch back already")
-    restored, spans = 0, list[tuple[int, int]]()
+    # What a run that was killed has taken back is not taken back again: it is not the newest.
+    spans = [(first, last) for first, last in batch.undo_spans or ()]
     for number, (first, last) in enumerate(batch.spans, 1):
         with store.write() as session:
             verdicts = _restore(session, batch, first, last, actor)
-            restored += len({verdict.group_id for verdict in verdicts})
             spans += [(verdicts[0].id, verdicts[-1].id)] if verdicts else []
+            update_batch(session, batch_id, undo_spans=spans)
             if number == len(batch.spans):
-                report = UndoReport(batch_id, restored, batch.changed - restored)
-                _close(session, batch, report, spans, actor)
+                restored = {group for span in spans for group in judged_between(session, *span)}
+                report = UndoReport(batch_id, len(restored), batch.changed - len(restored))
+                _close(session, batch, report, actor)
                 keep(report)(session)
     return report
 
 
-def _close(
-    session: Session, batch: Batch, report: UndoReport, spans: list[tuple[int, int]], actor: str
-) -> None:
+def _close(session: Session, batch: Batch, report: UndoReport, actor: str) -> None:
     """Say of a batch, and in the log, that it was taken back."""
     at = now()
-    update_batch(session, batch.id, undone=at, undone_by=actor, undo_spans=spans)
+    update_batch(session, batch.id, undone=at, undone_by=actor)
     entry = Entry("verdict_batch_undo", actor, at, dict(vars(report)), batch.dataset_id)
     append(session, [entry])
 

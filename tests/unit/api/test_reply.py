@@ -180,4 +180,4 @@ class TestCost:
             api.request(method, f"{API}{path}", json=body, headers={**headers, **KEY})
         # The key is looked for before the group is read; the answer is written with the edit.
         assert (cost.reads, cost.writes, cost.commits) == (2, 1, 1)
-        assert cost.statements <= 17
+        assert cost.statements <= 16

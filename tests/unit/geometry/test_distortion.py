@@ -1,5 +1,6 @@
 import cv2
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -58,3 +59,32 @@ class TestFoldRadius:
 
     def test_half_the_square_as_second_term_keeps_a_barrel_from_folding(self):
         assert fold_radius(np.array([-0.3, 0.045, *np.zeros(10)])) == np.inf
+
+
+class TestOnePoint:
+    """One point is worked out in plain numbers; it must be what arrays give, bit for bit."""
+
+    LENSES = (
+        np.array([-0.21, 0.07, 1e-3, -2e-3, 0.01, 0.02, -0.01, 0.003, 1e-4, 2e-4, -1e-4, 3e-4]),
+        np.array([0.11, *np.zeros(11)]),
+        # The denominator is 0 at radius 1.
+        np.array([0.1, 0, 0, 0, 0, -1.0, *np.zeros(6)]),
+    )
+    POINTS = np.array(
+        [[0.0, 0.0], [0.31, -0.17], [1.0, 0.0], [-0.6, 0.8], [40.0, 3.0], [np.nan, 0.1]]
+    )
+
+    @pytest.mark.parametrize("lens", LENSES)
+    @pytest.mark.parametrize("function", [distort, distort_jacobian])
+    def test_is_the_same_bits_alone_and_among_others(self, function, lens) -> None:
+        with np.errstate(all="ignore"):
+            together = function(self.POINTS, lens)
+            alone = np.concatenate([function(point[None], lens) for point in self.POINTS])
+        np.testing.assert_array_equal(alone, together)
+
+    @pytest.mark.parametrize("lens", LENSES)
+    def test_is_undistorted_to_the_same_bits_among_its_copies(self, lens) -> None:
+        for point in self.POINTS:
+            alone = undistort(point[None], lens)
+            many = undistort(np.repeat(point[None], 9, axis=0), lens)
+            np.testing.assert_array_equal(np.repeat(alone, 9, axis=0), many)

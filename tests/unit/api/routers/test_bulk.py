@@ -5,6 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from sqlalchemy import text
+
+from app.review.verdicts import bulk, bulk_undo
+from app.review.verdicts.bulk import BatchRun
 
 DATASET = "/api/v1/datasets/broadcast"
 VERDICTS = f"{DATASET}/verdicts"
@@ -92,3 +96,90 @@ class TestUndoBatch:
 
     def test_an_unknown_batch_is_404(self, api) -> None:
         assert api.post("/api/v1/verdict-batches/7/undo").status_code == 404
+
+
+class Stop:
+    """Lets a function run so many times, then fails once, as a server that is killed does."""
+
+    def __init__(self, plain: Any, after: int):
+        self._plain, self._left = plain, after
+
+    def __get__(self, run: Any, _kind: Any) -> Any:
+        return lambda *args: self(run, *args)
+
+    def __call__(self, *args: Any) -> Any:
+        self._left -= 1
+        if self._left == -1:
+            raise RuntimeError("killed")
+        return self._plain(*args)
+
+
+def log_kinds(app) -> list[str]:
+    with app.state.services.store.read() as session:
+        return list(session.scalars(text("SELECT kind FROM log WHERE kind LIKE 'verdict%'")))
+
+
+class TestStoppedBetweenChunks:
+    """The same Idempotency-Key goes on where it ended, and is answered as if nothing had been."""
+
+    BODY = {"state": "accepted", "note": "seen on video"}  # noqa: RUF012
+    KEY = {"Idempotency-Key": "once"}  # noqa: RUF012
+
+    @pytest.fixture(autouse=True)
+    def one_group_a_chunk(self, monkeypatch) -> None:
+        monkeypatch.setattr(bulk, "CHUNK", 1)
+
+    def test_verdicts_are_given_once(self, app, api, monkeypatch) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(BatchRun, "save", Stop(BatchRun.save, after=1))
+            assert api.post(VERDICTS, json=self.BODY, headers=self.KEY).status_code == 500
+        assert log_kinds(app) == ["verdict"]
+        done = api.post(VERDICTS, json={**self.BODY, "expected": None}, headers=self.KEY)
+        assert done.status_code == 422
+        done = api.post(VERDICTS, json=self.BODY, headers=self.KEY)
+        assert (done.json()["batch"], done.json()["changed"], done.json()["refused"]) == (1, 3, [])
+        assert log_kinds(app) == [*["verdict"] * 3, "verdict_batch"]
+        again = api.post(VERDICTS, json=self.BODY, headers=self.KEY)
+        assert (again.content, again.headers["idempotency-replayed"]) == (done.content, "true")
+        undone = api.post("/api/v1/verdict-batches/1/undo").json()
+        assert (undone["restored"], undone["kept"]) == (3, 0)
+
+    def test_what_was_expected_is_weighed_at_the_beginning_alone(self, api, monkeypatch) -> None:
+        body = {"state": "deferred", "expected": 3}
+        with monkeypatch.context() as patch:
+            patch.setattr(BatchRun, "save", Stop(BatchRun.save, after=2))
+            assert api.post(VERDICTS, json=body, headers=self.KEY).status_code == 500
+        assert api.post(VERDICTS, json=body, headers=self.KEY).json()["changed"] == 3
+
+    def test_what_was_given_and_is_taken_back_meanwhile_is_no_longer_gone_on_with(
+        self, api, monkeypatch
+    ) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(BatchRun, "save", Stop(BatchRun.save, after=1))
+            api.post(VERDICTS, json=self.BODY, headers=self.KEY)
+        api.post("/api/v1/verdict-batches/1/undo")
+        refused = api.post(VERDICTS, json=self.BODY, headers=self.KEY)
+        assert refused.status_code == 409
+        assert "taken back" in refused.json()["detail"]
+
+    def test_a_batch_is_taken_back_whole(self, app, api, monkeypatch) -> None:
+        api.post(VERDICTS, json=self.BODY)
+        with monkeypatch.context() as patch:
+            patch.setattr(bulk_undo, "_restore", Stop(bulk_undo._restore, after=2))
+            undo = "/api/v1/verdict-batches/1/undo"
+            assert api.post(undo, headers=self.KEY).status_code == 500
+        done = api.post(undo, headers=self.KEY).json()
+        assert (done["batch"], done["restored"], done["kept"]) == (1, 3, 0)
+        assert statuses(api) == {"unreviewed"}
+        again = api.post("/api/v1/verdict-batches/1/redo").json()
+        assert (again["changed"], again["kept"]) == (3, 0)
+
+    def test_a_batch_is_given_again_whole(self, api, monkeypatch) -> None:
+        api.post(VERDICTS, json=self.BODY)
+        api.post("/api/v1/verdict-batches/1/undo")
+        redo = "/api/v1/verdict-batches/1/redo"
+        with monkeypatch.context() as patch:
+            patch.setattr(BatchRun, "save", Stop(BatchRun.save, after=1))
+            assert api.post(redo, headers=self.KEY).status_code == 500
+        done = api.post(redo, headers=self.KEY).json()
+        assert (done["batch"], done["changed"], done["kept"], done["refused"]) == (2, 3, 0, [])

@@ -44,6 +44,15 @@ class TestLines:
         }
         assert after["can_undo"] is True
 
+    def test_more_points_than_anybody_draws_are_refused_with_their_count(
+        self, api, document
+    ) -> None:
+        points = [{"x": 1.0, "y": float(place)} for place in range(1001)]
+        refused = patch(api, document, "/lines", {"lines": {"Middle line": points}})
+        assert refused.status_code == 422
+        key = document["views"][0]["key"]
+        assert f"view {key}: Middle line has 1001 points" in refused.json()["detail"]
+
     def test_a_name_with_spaces_around_it_is_the_same_name(self, api, document) -> None:
         name = next(iter(document["views"][0]["lines"]))
         after = patch(api, document, "/lines", {"lines": {f"{name} ": None}}).json()

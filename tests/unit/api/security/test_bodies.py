@@ -11,19 +11,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.api.security.bodies import MAX_DEPTH, BodyError, JsonBodies, check_json, require_json_type
+from app.api.security.bodies import (
+    MAX_CONTAINERS,
+    MAX_DEPTH,
+    BodyError,
+    JsonBodies,
+    read_json,
+    require_json_type,
+)
 
 JSON = [(b"content-type", b"application/json")]
 
 
 def refusal(body: bytes) -> str:
     with pytest.raises(BodyError) as caught:
-        check_json(body)
+        read_json(body)
     assert caught.value.status == 400
     return caught.value.detail
 
 
-class TestCheckJson:
+class TestReadJson:
     @settings(deadline=None, derandomize=True)
     @given(
         st.recursive(
@@ -40,7 +47,7 @@ class TestCheckJson:
         )
     )
     def test_takes_every_json_value_that_is_flat_enough(self, value: Any) -> None:
-        check_json(json.dumps(value).encode())
+        read_json(json.dumps(value).encode())
 
     @pytest.mark.parametrize("word", [b"NaN", b"Infinity", b"-Infinity"])
     def test_constants_of_javascript_are_no_numbers(self, word: bytes) -> None:
@@ -53,11 +60,11 @@ class TestCheckJson:
         assert "not JSON" in refusal(b"1" * 5000)
 
     def test_one_level_too_deep_is_refused(self) -> None:
-        check_json(b"[" * MAX_DEPTH + b"]" * MAX_DEPTH)
+        read_json(b"[" * MAX_DEPTH + b"]" * MAX_DEPTH)
         assert "levels" in refusal(b"[" * (MAX_DEPTH + 1) + b"]" * (MAX_DEPTH + 1))
 
     def test_brackets_inside_of_texts_do_not_count(self) -> None:
-        check_json(json.dumps(["[" * 100, '"' + "{" * 100]).encode())
+        read_json(json.dumps(["[" * 100, '"' + "{" * 100]).encode())
 
     def test_two_million_brackets_are_refused_at_once(self) -> None:
         start = time.process_time()
@@ -70,12 +77,21 @@ class TestCheckJson:
         refusal(b'"' + b'\\"' * 1_000_000)
         assert time.process_time() - start < 0.5
 
+    def test_more_lists_and_objects_than_any_request_needs_are_refused(self) -> None:
+        read_json(b"[" + b"{}," * (MAX_CONTAINERS - 2) + b"[]]")
+        assert "lists and objects" in refusal(b"[" + b"{}," * (MAX_CONTAINERS - 1) + b"[]]")
+        read_json(json.dumps(["[]" * MAX_CONTAINERS]).encode())
+
+    def test_a_large_exponent_is_no_mistake_where_the_number_is_small(self) -> None:
+        assert read_json(b"[1e3, 0.000e400, 1e-999]") == [1000.0, 0.0, 0.0]
+        assert "too large" in refusal(b"[" + b"9" * 400 + b".0]")
+
     def test_another_encoding_is_refused(self) -> None:
         assert "UTF-8" in refusal('{"a": "ä"}'.encode("latin-1"))
         refusal('{"a": 1}'.encode("utf-16"))
 
     def test_half_of_a_unicode_surrogate_pair_is_refused(self) -> None:
-        check_json(rb'"\ud83d\ude00"')
+        read_json(rb'"\ud83d\ude00"')
         assert "Unicode" in refusal(rb'{"note": "\ud800"}')
 
     def test_the_place_of_a_mistake_is_told(self) -> None:

@@ -10,19 +10,23 @@ from sqlalchemy import text
 from app.review.editing import recompute as module
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset, stale_groups
+from app.review.editing.solve_encoded import solve_encoded
 from app.review.editing.submit import load, submit
 from app.review.queue.listing import list_groups
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
 from app.solving.solve import solve
+from app.store.solutions import EncodedSolution
 
 
-def stumbling(group: Group, policy: Policy, calibrations: Mapping[str, Calibration]) -> Solution:
+def stumbling(
+    group: Group, policy: Policy, calibrations: Mapping[str, Calibration]
+) -> tuple[Solution, EncodedSolution]:
     """A solver that one group breaks."""
     if group.key == "11":
         raise ZeroDivisionError("frame 11")
-    return solve(group, policy, calibrations)
+    return solve_encoded(group, policy, calibrations)
 
 
 @pytest.fixture
@@ -80,7 +84,7 @@ class TestSolveDataset:
         assert solve_dataset(store, "demo").solved == 2
 
     def test_a_group_that_breaks_the_solver_stops_no_other(self, store, ids, monkeypatch) -> None:
-        monkeypatch.setattr(module, "solve", stumbling)
+        monkeypatch.setattr(module, "solve_encoded", stumbling)
         report = solve_dataset(store, "demo")
         assert report.solved == 5
         assert report.failed == [("11", "ZeroDivisionError: frame 11")]
@@ -103,9 +107,9 @@ class TestSolveDataset:
                 edit = SetBall("cam1", None)
                 if state.revision == 1:
                     submit(store, ids[2], edit, if_match=state.etag, actor="ann")
-            return solve(group, policy, calibrations)
+            return solve_encoded(group, policy, calibrations)
 
-        monkeypatch.setattr(module, "solve", change)
+        monkeypatch.setattr(module, "solve_encoded", change)
         solve_dataset(store, "demo")
         state = load(store, ids[2])
         assert state.solution == solve(state.group, state.policy)

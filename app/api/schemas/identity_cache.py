@@ -1,0 +1,42 @@
+"""Identity cache: what was made of the last values that a function was given."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from threading import Lock
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class IdentityCache(Generic[T, R]):
+    """Calls a function once for each value; the value itself is the key, not what it equals.
+
+    For frozen values that are expensive to hash and live as long as their own cache keeps them.
+
+    Args:
+        make: The function; it depends on nothing but the value.
+        size: How many results are kept; the one that was not asked for the longest goes first.
+    """
+
+    def __init__(self, make: Callable[[T], R], size: int):
+        self._make, self._size = make, size
+        self._lock = Lock()
+        self._kept: OrderedDict[int, tuple[T, R]] = OrderedDict()
+
+    def __call__(self, value: T) -> R:
+        """What the function makes of the value."""
+        key = id(value)
+        with self._lock:
+            # A value that is kept lives, so no other has its id.
+            if key in self._kept:
+                self._kept.move_to_end(key)
+                return self._kept[key][1]
+        made = self._make(value)
+        with self._lock:
+            self._kept[key] = value, made
+            if len(self._kept) > self._size:
+                self._kept.popitem(last=False)
+        return made

@@ -1,0 +1,20 @@
+"""Solve and encode: a solution, and the same as it is stored with the facts that what-if reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from app.soccer.group import Group
+from app.soccer.policy import Policy
+from app.soccer.solution import Calibration, Solution
+from app.solving.facts_codec import facts_to_bytes
+from app.solving.solve import solve_with_facts
+from app.store.solutions import EncodedSolution, encode_solution
+
+
+def solve_encoded(
+    group: Group, policy: Policy, known: Mapping[str, Calibration]
+) -> tuple[Solution, EncodedSolution]:
+    """The solution of a group, and its bytes; calibrations that are known are not encoded again."""
+    solution, facts = solve_with_facts(group, policy, known)
+    return solution, encode_solution(group, solution, known, facts_to_bytes(facts))

@@ -1,0 +1,124 @@
+"""What a request costs the server: its processor time, and that as a multiple of a trivial route.
+
+The multiple compares machines, and moments of one machine, with each other; milliseconds do not.
+Requests of all kinds take turns, so that whatever else the machine does falls on each alike.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+
+from tests.bench.table import print_table
+from tests.e2e.service import run_touchline, serving
+
+GROUPS = 12
+ROUNDS = 5
+TURNS = 10
+API = "/api/v1"
+
+
+def bench_requests() -> None:
+    """Measure and print, on a group of four views of the sample."""
+    with tempfile.TemporaryDirectory() as folder:
+        home = Path(folder)
+        tree = home / "tree"
+        run_touchline(
+            home,
+            "migrate",
+            f"sample --groups {GROUPS} {tree}",
+            f"import soccernet-v3 {tree} --dataset sample",
+            "solve --dataset sample",
+        )
+        with serving(home) as address, httpx.Client(base_url=address, timeout=60) as client:
+            print_table(
+                "Requests, processor time of the server a request",
+                ("what", "ms", "times healthz", "limit, ms on a quiet machine"),
+                _measured(client),
+            )
+
+
+def _measured(client: httpx.Client) -> list[tuple[str, float, float, str]]:
+    group = _Group(client)
+    kinds: list[tuple[str, Callable[[], httpx.Response], str]] = [
+        ("GET /healthz, the reference", lambda: client.get("/healthz"), ""),
+        ("GET of a group", lambda: client.get(group.path), "< 4"),
+        ("PATCH of a ball", group.move_ball, "< 12"),
+        ("PATCH of a line", group.move_line, ""),
+        ("PUT of a verdict", group.judge, "< 5"),
+    ]
+    spent: dict[str, list[float]] = {what: [] for what, _, _ in kinds}
+    for number in range(ROUNDS + 1):
+        for what, ask, _ in kinds:
+            milliseconds = _cost(ask)
+            # The first round compiles statements and fills caches.
+            if number:
+                spent[what].append(milliseconds)
+    medians = {what: float(np.median(values)) for what, values in spent.items()}
+    reference = medians[kinds[0][0]]
+    return [(what, medians[what], medians[what] / reference, limit) for what, _, limit in kinds]
+
+
+def _cost(ask: Callable[[], httpx.Response]) -> float:
+    """Milliseconds of the server's processor time for one request, over many."""
+    before = _cpu_seconds()
+    for _ in range(TURNS):
+        ask().raise_for_status()
+    return 1000 * (_cpu_seconds() - before) / TURNS
+
+
+def _cpu_seconds() -> float:
+    """Processor time of the server, the one child of this process, so far (Linux tells it)."""
+    (server,) = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+    # The processor clock of another process, as clock_getcpuclockid(3) numbers it.
+    return time.clock_gettime((~int(server) << 3) | 2)
+
+
+class _Group:
+    """The first group of four views, and changes of it that build on each other."""
+
+    def __init__(self, client: httpx.Client):
+        rows = client.get(f"{API}/groups", params={"dataset": "sample", "limit": 500}).json()
+        found = next(row["id"] for row in rows["items"] if row["views"] == 4)
+        self._client, self.path = client, f"{API}/groups/{found}"
+        document = client.get(self.path).json()
+        self._etag: str = document["etag"]
+        self._view: dict[str, Any] = document["views"][0]
+        self._turn = itertools.count()
+
+    def move_ball(self) -> httpx.Response:
+        """The ball of the first view a little elsewhere."""
+        x, *rest = self._view["balls"][0]["box"]
+        body = {"box": [x + 0.01 * (next(self._turn) % 300), *rest]}
+        return self._change("PATCH", f"{API}/views/{self._view['id']}/ball", body)
+
+    def move_line(self) -> httpx.Response:
+        """One marking of the first view a little elsewhere: its camera is found again."""
+        marking, points = next(iter(self._view["lines"].items()))
+        aside = 0.01 * (next(self._turn) % 300)
+        moved = [{"x": point["x"] + aside, "y": point["y"]} for point in points]
+        body = {"lines": {marking: moved}}
+        return self._change("PATCH", f"{API}/views/{self._view['id']}/lines", body)
+
+    def judge(self) -> httpx.Response:
+        """Defer the group, or take that back."""
+        state = ("deferred", "unreviewed")[next(self._turn) % 2]
+        return self._change("PUT", f"{self.path}/verdict", {"state": state})
+
+    def _change(self, method: str, path: str, body: Any) -> httpx.Response:
+        headers = {"If-Match": self._etag, "Idempotency-Key": f"bench-{next(self._turn)}"}
+        answer = self._client.request(method, path, json=body, headers=headers)
+        self._etag = answer.headers.get("etag", self._etag)
+        return answer
+
+
+if __name__ == "__main__":
+    bench_requests()
