@@ -22,7 +22,6 @@ from app.store.uploads import (
     get_upload,
     list_uploads,
     require_size,
-    upload_path,
 )
 
 router = APIRouter(prefix="/uploads", tags=["imports"])
@@ -65,7 +64,7 @@ async def upload_file(
     await to_thread.run_sync(expire_uploads, services.settings)
     upload = await _receive(request, services.settings, name)
     response.headers["Location"] = f"/api/v1/uploads/{upload.id}"
-    return await to_thread.run_sync(_document, services.settings, upload)
+    return UploadDocument.of(upload)
 
 
 async def _receive(request: Request, settings: Settings, name: str) -> Upload:
@@ -79,7 +78,7 @@ async def _receive(request: Request, settings: Settings, name: str) -> Upload:
                 await to_thread.run_sync(writer.write, bytes(waiting))
                 waiting.clear()
         await to_thread.run_sync(writer.write, bytes(waiting))
-        return await to_thread.run_sync(writer.finish)
+        return await to_thread.run_sync(writer.finish, guess_format)
     except ClientDisconnect:
         await to_thread.run_sync(writer.abort)
         raise InputError("the upload was cut off") from None
@@ -94,7 +93,7 @@ def get_uploads(services: AppServices) -> UploadList:
     """Every file that is still here."""
     settings = services.settings
     return UploadList(
-        items=[_document(settings, item) for item in list_uploads(settings)],
+        items=[UploadDocument.of(item) for item in list_uploads(settings)],
         max_bytes=settings.max_upload_bytes,
         days=settings.upload_days,
     )
@@ -103,14 +102,10 @@ def get_uploads(services: AppServices) -> UploadList:
 @router.get("/{upload}", operation_id="getUpload", responses=responses(404))
 def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
     """One uploaded file, without its content."""
-    return _document(services.settings, get_upload(services.settings, upload))
+    return UploadDocument.of(get_upload(services.settings, upload))
 
 
 @router.delete("/{upload}", operation_id="deleteUpload", status_code=204, responses=responses(404))
 def delete_one(upload: UploadId, services: AppServices) -> None:
     """Delete a file; 400 while a dataset reads its frames from it."""
     delete_upload(services.settings, upload)
-
-
-def _document(settings: Settings, upload: Upload) -> UploadDocument:
-    return UploadDocument.of(upload, guess_format(upload_path(settings, upload.id)))
