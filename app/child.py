@@ -112,8 +112,14 @@ class Child:
             raise
         return self._outcome(kind, value)
 
+    def kill(self) -> None:
+        """End the process from another thread than the one that waits for its result."""
+        process = self._process
+        if process is not None:
+            process.kill()
+
     def close(self) -> None:
-        """End the process, in the midst of a task too."""
+        """End the process."""
         process, line = self._process, self._line
         self._process = self._line = None
         if process is not None:

@@ -33,6 +33,8 @@ class Settings(BaseSettings):
     """Host headers the server answers to, without the port."""
     workers: int = Field(default_factory=lambda: os.cpu_count() or 1)
     """Processes that solve in batches."""
+    image_workers: int = Field(default_factory=lambda: min(os.cpu_count() or 1, 4), ge=1)
+    """Processes that make pictures of frames."""
     max_upload_bytes: int = 2 * 1024**3
     """Largest uploaded file; a JSON body is smaller still."""
     upload_days: int = 7

@@ -23,6 +23,7 @@ from app.review.jobs.versions import resume_versions
 from app.review.practice.practice import resume_practice
 from app.review.yields.store import YieldStore
 from app.solving.warm import warm_up
+from app.store.frames import Frames
 from app.store.session import Store
 
 LOCAL_USER = "local"
@@ -37,6 +38,7 @@ class Services:
 
     settings: Settings
     store: Store
+    frames: Frames
     exports: ExportFolder
     jobs: Jobs
     events: Events
@@ -48,11 +50,13 @@ class Services:
         store = Store.open(settings)
         jobs = Jobs(store, pool=pool)
         exports = ExportFolder(settings.exports)
-        return Services(settings, store, exports, jobs, Events(store, jobs), YieldStore(store))
+        events, yields = Events(store, jobs), YieldStore(store)
+        return Services(settings, store, Frames(settings), exports, jobs, events, yields)
 
     def start(self) -> None:
         """Load the solver's kernels, and take up the work that an earlier run left undone."""
         Thread(target=warm_up, daemon=True).start()
+        self.frames.warm()
         resume_solving(self.jobs, self.store)
         resume_exports(self.jobs, self.store, self.exports)
         resume_versions(self.jobs, self.store)
@@ -63,9 +67,10 @@ class Services:
         solve_leftovers(self.jobs, self.store, actor=LOCAL_USER)
 
     def close(self) -> None:
-        """Let the running work end and close the database."""
+        """Let the running work end, and close processes and database."""
         self.events.close()
         self.jobs.close()
+        self.frames.close()
         self.store.close()
 
 
