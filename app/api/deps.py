@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from threading import Thread
+from dataclasses import dataclass, field
+from threading import Event, Thread
 from typing import Annotated
 
 from fastapi import Depends, Header, Path, Query, Request
@@ -34,7 +34,11 @@ _STRONG_ETAG = re.compile(r'"[\x21\x23-\x7e]*"')
 
 @dataclass(frozen=True)
 class Services:
-    """What lives as long as the application."""
+    """What lives as long as the application.
+
+    Attributes:
+        stopping: Set when the server is told to stop, before it waits for open requests.
+    """
 
     settings: Settings
     store: Store
@@ -43,6 +47,7 @@ class Services:
     jobs: Jobs
     events: Events
     yields: YieldStore
+    stopping: Event = field(default_factory=Event)
 
     @staticmethod
     def open(settings: Settings, pool: Pool | None = None) -> Services:
