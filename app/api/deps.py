@@ -63,7 +63,7 @@ class Services:
         Thread(target=warm_up, daemon=True).start()
         self.frames.warm()
         resume_solving(self.jobs, self.store)
-        resume_exports(self.jobs, self.store, self.exports)
+        resume_exports(self.jobs, self.store, self.exports, self.frames)
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
         resume_evaluations(self.jobs, self.store)
