@@ -7,6 +7,7 @@ Coefficients stand in the order k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 (OpenCV docu
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -116,6 +117,15 @@ def _fold_radius(
     slope = numerator * denominator + 2 * s * (
         numerator.deriv() * denominator - numerator * denominator.deriv()
     )
-    roots = np.concatenate([slope.roots(), denominator.roots()])
+    roots = np.concatenate([_roots(slope), _roots(denominator)])
     real = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
     return float(np.sqrt(real.min())) if len(real) else np.inf
+
+
+def _roots(polynomial: np.polynomial.Polynomial) -> np.ndarray[Any, Any]:
+    """Roots; a highest term that is too small to divide by counts as none."""
+    terms = polynomial.coef
+    with np.errstate(all="ignore"):
+        while len(terms) > 1 and not np.isfinite(terms[:-1] / terms[-1]).all():
+            terms = terms[:-1]
+    return np.polynomial.Polynomial(terms).roots()
