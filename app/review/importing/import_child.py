@@ -15,7 +15,8 @@ from typing import Any, Literal
 from app.child import Allowance, Child, ChildEnded
 from app.config import Settings
 from app.errors import TooLargeError
-from app.review.importing.sources import Progress, Source, import_source
+from app.progress import Progress
+from app.review.importing.sources import Source, import_source
 from app.store.session import Store
 
 SILENCE = 900.0
@@ -25,8 +26,8 @@ LIMITS_HINT = (
     "TOUCHLINE_IMPORT_SECONDS. What was imported before it ended stays, and is not brought twice."
 )
 
-Word = Literal["take", "give"] | int
-"""What the child says: that it wants to write, that it has written, or how many groups are done."""
+Word = Literal["take", "give"] | tuple[int, int | None, str]
+"""What the child says: that it wants to write, that it has written, or how far it is."""
 Tell = Callable[[Word], None]
 
 
@@ -79,7 +80,7 @@ def import_apart(
             elif word == "give":
                 turn.close()
             else:
-                progress(word)
+                progress(*word)
 
         try:
             outcome: Outcome = child.run(
@@ -94,9 +95,13 @@ def import_here(
     settings: Settings, dataset: str, source: Source, actor: str, dry_run: bool, tell: Tell
 ) -> Outcome:
     """The import itself, in this process."""
+
+    def told(done: int, total: int | None = None, sentence: str = "", /) -> None:
+        tell((done, total, sentence))
+
     with closing(Store.open(settings, _Turn(tell))) as store:
         imported = import_source(
-            store, dataset, source, settings, tell, actor=actor, dry_run=dry_run
+            store, dataset, source, settings, told, actor=actor, dry_run=dry_run
         )
     result = imported.result
     nothing = None if imported.something else imported.nothing_read()

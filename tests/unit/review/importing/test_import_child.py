@@ -11,6 +11,7 @@ import pytest
 
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import JobCancelled, TooLargeError
+from app.progress import Progress
 from app.review.datasets.dataset import list_datasets
 from app.review.importing.import_child import Outcome, import_apart
 from app.review.importing.sources import Source, import_source
@@ -30,7 +31,7 @@ def apart(
     dataset: str = "apart",
     *,
     dry_run: bool = False,
-    progress: Callable[[int], None] = lambda done: None,
+    progress: Progress = lambda *told: None,
     stop: Callable[[], None] = wanted,
 ) -> Outcome:
     source = Source("soccernet-v3", path, name="data")
@@ -61,13 +62,13 @@ def limit(monkeypatch: pytest.MonkeyPatch, store: Store, values: dict[str, int])
 
 class TestImportApart:
     def test_does_and_says_what_an_import_here_does(self, store: Store, tree: Path) -> None:
-        done: list[int] = []
-        outcome = apart(store, tree, progress=done.append)
+        done: list[tuple[int, int | None, str]] = []
+        outcome = apart(store, tree, progress=lambda *told: done.append(told))
         here = import_source(
             store, "here", Source("soccernet-v3", tree, name="data"), store.settings
         )
         assert outcome == Outcome(here.values(), True, None)
-        assert done == [1]
+        assert done == [(1, None, "")]
         assert [(item.name, item.groups) for item in list_datasets(store)] == [
             ("apart", 1),
             ("here", 1),
