@@ -16,6 +16,10 @@ def _user_data_folder() -> Path:
     return (Path(root) if root else Path.home() / ".local" / "share") / "touchline"
 
 
+def _memory() -> int:
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
 class Settings(BaseSettings):
     """Everything an operator can set; the defaults are safe on one machine for one person."""
 
@@ -33,6 +37,8 @@ class Settings(BaseSettings):
     """Host headers the server answers to, without the port."""
     workers: int = Field(default_factory=lambda: os.cpu_count() or 1)
     """Processes that solve in batches."""
+    image_workers: int = Field(default_factory=lambda: min(os.cpu_count() or 1, 4), ge=1)
+    """Processes that make pictures of frames."""
     max_upload_bytes: int = 2 * 1024**3
     """Largest uploaded file; a JSON body is smaller still."""
     upload_days: int = 7
@@ -41,6 +47,10 @@ class Settings(BaseSettings):
     """Folders below which imports over REST may read, separated by ``:`` (or a JSON list)."""
     max_file_bytes: int = 256 * 1024 * 1024
     """Largest single data file (JSON, XML, CSV) that an importer reads."""
+    import_memory: int = Field(default_factory=lambda: min(4 * 1024**3, _memory() // 2))
+    """Bytes of memory that an import over REST may use."""
+    import_seconds: int = 3600
+    """Seconds of processor time that an import over REST may take."""
     max_members: int = 200_000
     """Most members of an archive."""
     max_pixels: int = 50_000_000

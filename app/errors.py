@@ -25,6 +25,8 @@ exit code.
 
 from __future__ import annotations
 
+from typing import Any, Self
+
 
 class ReviewError(Exception):
     """Base of everything that a caller can cause or must be told.
@@ -40,6 +42,18 @@ class ReviewError(Exception):
         self.message = message
         self.hint = hint
         self.pointer = pointer
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travels from one process to another, with the disk's own error where it has one."""
+        cause = self.__cause__ if isinstance(self.__cause__, OSError) else None
+        return type(self)._again, (self.args, vars(self), cause)
+
+    @classmethod
+    def _again(cls, args: tuple[Any, ...], values: dict[str, Any], cause: OSError | None) -> Self:
+        error = cls.__new__(cls, *args)
+        vars(error).update(values)
+        error.__cause__ = cause
+        return error
 
 
 class InputError(ReviewError):

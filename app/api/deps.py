@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from threading import Thread
+from dataclasses import dataclass, field
+from threading import Event, Thread
 from typing import Annotated
 
 from fastapi import Depends, Header, Path, Query, Request
@@ -23,6 +23,7 @@ from app.review.jobs.versions import resume_versions
 from app.review.practice.practice import resume_practice
 from app.review.yields.store import YieldStore
 from app.solving.warm import warm_up
+from app.store.frames import Frames
 from app.store.session import Store
 
 LOCAL_USER = "local"
@@ -33,14 +34,20 @@ _STRONG_ETAG = re.compile(r'"[\x21\x23-\x7e]*"')
 
 @dataclass(frozen=True)
 class Services:
-    """What lives as long as the application."""
+    """What lives as long as the application.
+
+    Attributes:
+        stopping: Set when the server is told to stop, before it waits for open requests.
+    """
 
     settings: Settings
     store: Store
+    frames: Frames
     exports: ExportFolder
     jobs: Jobs
     events: Events
     yields: YieldStore
+    stopping: Event = field(default_factory=Event)
 
     @staticmethod
     def open(settings: Settings, pool: Pool | None = None) -> Services:
@@ -48,13 +55,15 @@ class Services:
         store = Store.open(settings)
         jobs = Jobs(store, pool=pool)
         exports = ExportFolder(settings.exports)
-        return Services(settings, store, exports, jobs, Events(store, jobs), YieldStore(store))
+        events, yields = Events(store, jobs), YieldStore(store)
+        return Services(settings, store, Frames(settings), exports, jobs, events, yields)
 
     def start(self) -> None:
         """Load the solver's kernels, and take up the work that an earlier run left undone."""
         Thread(target=warm_up, daemon=True).start()
+        self.frames.warm()
         resume_solving(self.jobs, self.store)
-        resume_exports(self.jobs, self.store, self.exports)
+        resume_exports(self.jobs, self.store, self.exports, self.frames)
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
         resume_evaluations(self.jobs, self.store)
@@ -63,9 +72,10 @@ class Services:
         solve_leftovers(self.jobs, self.store, actor=LOCAL_USER)
 
     def close(self) -> None:
-        """Let the running work end and close the database."""
+        """Let the running work end, and close processes and database."""
         self.events.close()
         self.jobs.close()
+        self.frames.close()
         self.store.close()
 
 

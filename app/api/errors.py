@@ -77,7 +77,8 @@ def _is_full(error: StorageError) -> bool:
     """Whether the disk is full, rather than the database busy or damaged."""
     cause = error.__cause__
     name = str(getattr(getattr(cause, "orig", None), "sqlite_errorname", ""))
-    return name.startswith("SQLITE_FULL") or getattr(cause, "errno", None) == errno.ENOSPC
+    full = getattr(cause, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
+    return name.startswith("SQLITE_FULL") or full
 
 
 def install_handlers(app: FastAPI) -> None:

@@ -79,13 +79,14 @@ def run(app: FastAPI, server: socket.socket) -> None:
 
 
 class Server(uvicorn.Server):
-    """Ends the streams that have no end before it waits for all answers to be sent."""
+    """Ends what has no end of its own before it waits for all answers to be sent."""
 
     def __init__(self, config: uvicorn.Config, app: FastAPI):
         super().__init__(config)
         self._app = app
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Stop; open event streams end at once."""
+        """Stop; open event streams and uploads end at once."""
+        self._app.state.services.stopping.set()
         self._app.state.services.events.close()
         await super().shutdown(sockets)

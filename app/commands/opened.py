@@ -42,7 +42,7 @@ def process_pool(workers: int) -> Iterator[Executor]:
 
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_leave_interrupts_to_the_parent
+        workers, mp_context=context, initializer=_belong_to_the_parent
     ) as executor:
         try:
             yield executor
@@ -52,8 +52,11 @@ def process_pool(workers: int) -> Iterator[Executor]:
             raise
 
 
-def _leave_interrupts_to_the_parent() -> None:
-    """Ctrl+C reaches every process of a terminal; the parent alone decides what ends."""
+def _belong_to_the_parent() -> None:
+    """End with it; and Ctrl+C reaches every process of a terminal, where it alone decides."""
     import signal
 
+    from app.child import end_with_parent
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()

@@ -99,10 +99,17 @@ class _File:
         self._top = str(PurePosixPath(name).parent.parent)
         self._categories = {
             str(item.get("id")): str(item.get("name", "")).strip().lower()
-            for item in value.get("categories") or []
+            for item in self._listed("categories")
             if isinstance(item, dict)
         }
         self._of_image = self._by_image()
+
+    def _listed(self, name: str) -> list[Any]:
+        """A list that need not be there."""
+        found = self._value.get(name)
+        if found is not None and not isinstance(found, list):
+            self._report.note(self.path, None, name, "is not a list; left out")
+        return found if isinstance(found, list) else []
 
     def _by_image(self) -> dict[str, list[Mapping[str, Any]]]:
         found: dict[str, list[Mapping[str, Any]]] = {}

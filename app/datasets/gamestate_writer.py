@@ -9,6 +9,7 @@ from itertools import groupby
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from app.datasets import fields
 from app.datasets.archive import resolve_inside
 from app.datasets.frame_names import view_stem
 from app.datasets.gamestate import BALL_ID, LABELS, METADATA, PITCH_ID
@@ -175,7 +176,7 @@ def _person(box: Mapping[str, Any]) -> dict[str, Any] | None:
     """A person of SoccerNet-v3 (``Player team left``, ``Main referee``); None without corners."""
     corners = box.get("points")
     try:
-        x1, y1, x2, y2 = (float(corners[name]) for name in ("x1", "y1", "x2", "y2"))  # type: ignore[index]
+        x1, y1, x2, y2 = (fields.number(corners[name]) for name in ("x1", "y1", "x2", "y2"))  # type: ignore[index]
     except (TypeError, KeyError, ValueError):
         return None
     words = str(box.get("class") or "").lower().split()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import struct
 import zipfile
 from collections.abc import Iterable, Iterator
 from itertools import islice
@@ -12,6 +13,10 @@ from pathlib import Path
 MAX_NAMES = 2000
 """Names that are looked at; a large folder must not hold a request up."""
 MAX_DEPTH = 4
+MAX_DIRECTORY = 32 * 1024**2
+"""Bytes of the list of a zip's members, which is read whole or not at all."""
+_END = struct.Struct("<4s4H2LH")
+_END_MARK = b"PK\x05\x06"
 _NAMES: tuple[tuple[str, re.Pattern[str]], ...] = (
     ("touchline", re.compile(r"(?:.*/)?touchline\.json")),
     ("soccernet-v3d", re.compile(r"(?:.*/)?(?:Labels-v3D\.json|SNv3D\.csv)")),
@@ -42,10 +47,23 @@ def _names(path: Path) -> Iterable[str]:
     if path.suffix.lower() != ".zip":
         return [path.name]
     try:
+        if _directory_bytes(path) > MAX_DIRECTORY:
+            return []
         with zipfile.ZipFile(path) as archive:
             return archive.namelist()
     except (zipfile.BadZipFile, OSError, ValueError):
         return []
+
+
+def _directory_bytes(path: Path) -> int:
+    """Size of the list of a zip's members, as the record at its end says; 0 without one."""
+    with path.open("rb") as file:
+        file.seek(0, os.SEEK_END)
+        # A comment of at most 64 KiB may follow the record.
+        file.seek(max(file.tell() - _END.size - 0xFFFF, 0))
+        tail = file.read()
+    place = tail.rfind(_END_MARK)
+    return 0 if place < 0 or len(tail) < place + _END.size else _END.unpack_from(tail, place)[5]
 
 
 def _below(root: Path, inside: str, depth: int) -> Iterator[str]:

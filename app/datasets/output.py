@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.datasets.manifest import MANIFEST, SOFTWARE
+from app.durable import sync
 from app.errors import InputError, StorageError
 
 _DATE = (1980, 1, 1, 0, 0, 0)
@@ -38,7 +39,9 @@ def output_tree(out: Path) -> Iterator[Path]:
         out.parent.mkdir(parents=True, exist_ok=True)
         staging = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent))
     except OSError as error:
-        raise StorageError(f"{out.parent} cannot be written ({error.strerror})") from error
+        raise StorageError(
+            f"the folder of {out.name} cannot be written ({error.strerror})"
+        ) from error
     try:
         yield staging
         if out.suffix.lower() == ".zip":
@@ -46,7 +49,7 @@ def output_tree(out: Path) -> Iterator[Path]:
         else:
             _publish_folder(staging, out)
     except OSError as error:
-        raise StorageError(f"{out} cannot be written ({error.strerror or error})") from error
+        raise StorageError(f"{out.name} cannot be written ({error.strerror or error})") from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 
@@ -89,7 +92,7 @@ def _publish_zip(staging: Path, out: Path) -> None:
         partial.replace(out)
     finally:
         partial.unlink(missing_ok=True)
-    _sync(out.parent)
+    sync(out.parent)
 
 
 def write_zip(root: Path, file: object) -> None:
@@ -108,8 +111,8 @@ def write_zip(root: Path, file: object) -> None:
 def _publish_folder(staging: Path, out: Path) -> None:
     for folder, _, files in os.walk(staging, topdown=False):
         for name in files:
-            _sync(Path(folder) / name)
-        _sync(Path(folder))
+            sync(Path(folder) / name)
+        sync(Path(folder))
     staging.chmod(0o755)
     if not out.exists():
         staging.rename(out)
@@ -119,12 +122,4 @@ def _publish_folder(staging: Path, out: Path) -> None:
         out.rename(aside)
         staging.rename(out)
         shutil.rmtree(aside, ignore_errors=True)
-    _sync(out.parent)
-
-
-def _sync(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+    sync(out.parent)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from app.datasets import fields
 from app.datasets.archive import resolve_inside
 from app.datasets.cameras_writer import placed_views, write_view_cameras
 from app.datasets.exact import exact_inverse
@@ -30,7 +31,7 @@ def lines_to_json(
     it would be taken for one. Not every pixel has a normalised number that gives it back to the
     last bit; numbers that came normalised have one.
     """
-    flat = [line.get("points") or [] for line in others]
+    flat = [_flat(line) for line in others]
     points = {spelling(marking): list(line) for marking, line in lines.items()}
     for line, numbers in zip(others, flat, strict=True):
         extra = [ImagePoint(x, y) for x, y in zip(numbers[::2], numbers[1::2], strict=False)]
@@ -62,6 +63,15 @@ def line_file_text(
 ) -> str:
     """The text of one line file."""
     return json_text(lines_to_json(lines, size, others, pixels=pixels), ascii_=True) + "\n"
+
+
+def _flat(line: Mapping[str, Any]) -> list[float]:
+    """Coordinates of a line that is no marking; none where they are not all numbers."""
+    points = line.get("points")
+    try:
+        return [fields.number(item) for item in points] if isinstance(points, (list, tuple)) else []
+    except ValueError:
+        return []
 
 
 def write_line_files(root: Path, files: Iterable[LineFile]) -> list[Path]:

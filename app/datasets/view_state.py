@@ -266,8 +266,12 @@ def extras_from_json(value: Any) -> Extras:
     if not isinstance(value, dict):
         return Extras()
     boxes, lines = (
-        tuple(item for item in value.get(name) or () if isinstance(item, dict))
+        tuple(item for item in _listed(value.get(name)) if isinstance(item, dict))
         for name in ("boxes", "lines")
     )
     metadata = value.get("metadata")
     return Extras(boxes, lines, metadata if isinstance(metadata, dict) else {})
+
+
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []

@@ -24,6 +24,9 @@ MAX_SPAN = 100_000
 MAX_ENTRIES = 5_000_000
 """Most entries of one file; ISSIA's have 42,000."""
 
+MAX_QUIET = 1_000_000
+"""Most bytes between two elements; an entry has a hundred."""
+
 _SPAN = re.compile(r"(\d{1,9}):(\d{1,9})", re.ASCII)
 _DATA = "{http://lamp.cfar.umd.edu/viperdata#}"
 _VIPER = "{http://lamp.cfar.umd.edu/viper#}"
@@ -91,10 +94,15 @@ def _so_far(track: ViperTrack) -> str:
 
 
 class _Capped:
-    """A stream that counts real bytes."""
+    """A stream that counts real bytes, in all and since the last element.
+
+    Expat before 2.6 looks at an unfinished tag again from its beginning with each piece of it.
+    """
 
     def __init__(self, stream: IO[bytes] | gzip.GzipFile, limit: int, shown: str):
         self._stream, self._left, self._limit, self._shown = stream, limit, limit, shown
+        self.quiet = 0
+        """Bytes since the last element; who reads elements sets it back."""
 
     def read(self, size: int = -1) -> bytes:
         content = self._stream.read(size)
@@ -102,12 +110,17 @@ class _Capped:
         if self._left < 0:
             problem = f"is longer than {self._limit:,} bytes"
             raise DatasetFormatError(self._shown, None, None, problem)
+        self.quiet += len(content)
+        if self.quiet > MAX_QUIET:
+            problem = f"holds more than {MAX_QUIET:,} bytes without an element"
+            raise DatasetFormatError(self._shown, None, None, problem)
         return content
 
 
 def _read_objects(stream: _Capped, track: ViperTrack, shown: str, report: Report) -> None:
     open_elements: list[Element] = []
     for event, element in iterparse(stream, events=("start", "end"), forbid_dtd=True):
+        stream.quiet = 0
         if event == "start":
             open_elements.append(element)
             continue

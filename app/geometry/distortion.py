@@ -177,6 +177,15 @@ def _fold_radius(
     slope = numerator * denominator + 2 * s * (
         numerator.deriv() * denominator - numerator * denominator.deriv()
     )
-    roots = np.concatenate([slope.roots(), denominator.roots()])
+    roots = np.concatenate([_roots(slope), _roots(denominator)])
     real = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
     return float(np.sqrt(real.min())) if len(real) else np.inf
+
+
+def _roots(polynomial: np.polynomial.Polynomial) -> np.ndarray[Any, Any]:
+    """Roots; a highest term that is too small to divide by counts as none."""
+    terms = polynomial.coef
+    with np.errstate(all="ignore"):
+        while len(terms) > 1 and not np.isfinite(terms[:-1] / terms[-1]).all():
+            terms = terms[:-1]
+    return np.polynomial.Polynomial(terms).roots()

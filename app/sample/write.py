@@ -15,6 +15,7 @@ from typing import TypeVar
 
 import cv2
 
+from app.child import end_with_parent
 from app.datasets.match_frames import ARCHIVE
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import InputError
@@ -196,9 +197,10 @@ def _mapper(workers: int | None, jobs: int) -> Iterator[_Mapper]:
         yield _Mapper(None)
         return
     # Spawned, not forked: a fork of a process with threads may hang.
-    with ProcessPoolExecutor(count, get_context("spawn"), _one_thread) as pool:
+    with ProcessPoolExecutor(count, get_context("spawn"), _settle) as pool:
         yield _Mapper(pool)
 
 
-def _one_thread() -> None:
+def _settle() -> None:
+    end_with_parent()
     cv2.setNumThreads(1)

@@ -11,6 +11,7 @@ from app.store.models import Base
 class JobModel(Base):
     """A piece of background work and how far it is.
 
+    ``tries`` counts the times that it was begun and neither ended nor was stopped in good order.
     ``request`` (JSON) is what it was asked for, enough to start it again where its kind can be;
     ``result`` and ``problem`` (JSON) are what came of it. A dataset may be gone before its jobs.
     """
@@ -33,6 +34,7 @@ class JobModel(Base):
     started: Mapped[str | None]
     ended: Mapped[str | None]
     actor: Mapped[str]
+    tries: Mapped[int] = mapped_column(server_default="0")
 
 
 class AnswerModel(Base):

@@ -33,6 +33,7 @@ class Job:
         sentence: What it is at, for people.
         request: What it was asked for.
         problem: ``{"detail", "hint", "pointer"}`` of what failed.
+        tries: How often it was begun and neither ended nor was stopped in good order.
     """
 
     id: int
@@ -51,6 +52,7 @@ class Job:
     started: str | None
     ended: str | None
     actor: str
+    tries: int
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,7 @@ def insert_job(session: Session, job: NewJob) -> int:
         "state": WAITING,
         "done": 0,
         "sentence": "",
+        "tries": 0,
         "request": _text(job.request),
         "created": now(),
     }
@@ -83,8 +86,10 @@ def insert_job(session: Session, job: NewJob) -> int:
     return identity
 
 
-def update_job(session: Session, job_id: int, **values: Any) -> None:
-    """Set columns of a job; ``result`` and ``problem`` are JSON values."""
+def update_job(session: Session, job_id: int, *, begun: int = 0, **values: Any) -> None:
+    """Set columns of a job; ``result`` and ``problem`` are JSON values, ``begun`` adds to its tries."""
+    if begun:
+        values["tries"] = JobModel.tries + begun
     for name in ("result", "problem"):
         if name in values:
             values[name] = _text(values[name])

@@ -18,8 +18,10 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.soccer.group import Media
 from app.store.archives import Archives
 from app.store.image_header import ImageHeader, check_size, read_header
+from app.store.video import open_video
 
 JPEG_QUALITY = 88
+LINK_HINT = "Put the file itself there, or import the folder again."
 _ARCHIVES = Archives()
 _FLAGS = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
 """Annotations were made on the pixels as stored, so no note about rotation counts."""
@@ -42,17 +44,42 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
         ImageError: It is no image of these kinds, or damaged.
         TooLargeError: It is larger than the limits, in bytes or in declared pixels.
     """
+    _require_contained(Path(media.path), settings)
     if media.frame is None and width is None and not flipped:
         return _checked(_source(media, settings), settings, frame_name(media))
-    place = settings.cache / "frames" / _cache_name(media, width, flipped)
-    with contextlib.suppress(OSError):
-        return place.read_bytes()
+    found = cached_frame(media, width, flipped, settings)
+    if found is not None:
+        return found
     picture = _decode(media, settings)
     if flipped:
         picture = cv2.flip(picture, 1)
     data = _encode(_narrowed(picture, width))
-    _keep(place, data)
+    _keep(_place(media, width, flipped, settings), data)
     return data
+
+
+def cached_frame(
+    media: Media, width: int | None, flipped: bool, settings: Settings
+) -> bytes | None:
+    """The JPEG that was made of a frame before, where it is kept; opens no file but that.
+
+    Raises:
+        NotFoundError: The frame's file is not there.
+    """
+    with contextlib.suppress(OSError):
+        return _place(media, width, flipped, settings).read_bytes()
+    return None
+
+
+def frame_stamp(media: Media) -> str:
+    """Name of a frame by content: another file under the same path has another time or size.
+
+    Raises:
+        NotFoundError: The file is not there.
+    """
+    status = _stat(Path(media.path))
+    place = (media.path, media.member, media.frame)
+    return repr((*place, status.st_ino, status.st_mtime_ns, status.st_size))
 
 
 def content_type(data: bytes) -> str:
@@ -108,10 +135,12 @@ def _source(media: Media, settings: Settings) -> bytes:
     path = Path(media.path)
     if media.member is not None:
         return _ARCHIVES.read(path, media.member, settings.max_file_bytes)
-    if _stat(path).st_size > settings.max_file_bytes:
+    size = _stat(path).st_size
+    if size > settings.max_file_bytes:
         raise TooLargeError(f"{path.name} is larger than {settings.max_file_bytes} bytes")
     try:
-        return path.read_bytes()
+        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
+            return file.read(size)
     except OSError as error:
         raise StorageError(f"{path.name} cannot be read") from error
 
@@ -122,6 +151,8 @@ def _pixels(data: bytes, settings: Settings, name: str) -> Any:
     try:
         picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), _FLAGS)
     except cv2.error as error:
+        if error.code == cv2.Error.StsNoMem:
+            raise MemoryError from error
         raise ImageError(f"{name} is damaged") from error
     if picture is None:
         raise ImageError(f"{name} is damaged")
@@ -137,18 +168,18 @@ def _require_declared(picture: Any, header: ImageHeader, name: str) -> None:
 
 def _video_frame(path: Path, number: int, settings: Settings) -> Any:
     _stat(path)
-    video = cv2.VideoCapture(str(path))
-    try:
+    with open_video(path) as video:
         if not video.isOpened():
             raise ImageError(f"{path.name} is no video that can be read")
         size = (video.get(cv2.CAP_PROP_FRAME_WIDTH), video.get(cv2.CAP_PROP_FRAME_HEIGHT))
         check_size(ImageHeader("video", int(size[0]), int(size[1])), settings, path.name)
         video.set(cv2.CAP_PROP_POS_FRAMES, number)
         done, picture = video.read()
-    finally:
-        video.release()
     if number < 0 or not done:
         raise NotFoundError(f"{path.name} has no frame {number}")
+    # A stream may change its size on the way.
+    height, width = picture.shape[:2]
+    check_size(ImageHeader("video", width, height), settings, path.name)
     return picture
 
 
@@ -167,25 +198,34 @@ def _encode(picture: Any) -> bytes:
     return bytes(data)
 
 
-def _cache_name(media: Media, width: int | None, flipped: bool) -> str:
-    """Name by content: another file under the same path has another time or size."""
-    path = Path(media.path)
-    status = _stat(path)
-    facts = _ARCHIVES.facts(path, media.member) if media.member is not None else ()
-    parts = (media.path, status.st_mtime_ns, status.st_size, media.member, *facts)
-    key = repr((*parts, media.frame, width, flipped, JPEG_QUALITY))
+def _place(media: Media, width: int | None, flipped: bool, settings: Settings) -> Path:
+    """Where what is made of a frame is kept."""
+    key = repr((frame_stamp(media), width, flipped, JPEG_QUALITY))
     name = hashlib.sha256(key.encode()).hexdigest()
-    return f"{name[:2]}/{name[2:34]}.jpg"
+    return settings.cache / "frames" / name[:2] / f"{name[2:34]}.jpg"
 
 
 def _stat(path: Path) -> os.stat_result:
     try:
-        status = path.stat()
+        status = path.lstat()
     except OSError as error:
         raise NotFoundError(f"the file {path.name} is not where it was imported from") from error
+    if stat.S_ISLNK(status.st_mode):
+        raise NotFoundError(f"{path.name} is a link now, which is not followed", hint=LINK_HINT)
     if not stat.S_ISREG(status.st_mode):
         raise NotFoundError(f"{path.name} is not a file")
     return status
+
+
+def _require_contained(path: Path, settings: Settings) -> None:
+    """Refuse a file that a folder on its way, swapped for a link, leads out of its root."""
+    for root in (settings.home, *settings.import_folders):
+        if not path.is_relative_to(root.absolute()):
+            continue
+        if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(root)):
+            raise NotFoundError(
+                f"{path.name} lies behind a link that leads out of its folder", hint=LINK_HINT
+            )
 
 
 def _keep(place: Path, data: bytes) -> None:

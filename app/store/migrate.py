@@ -11,7 +11,7 @@ from app.errors import StorageError
 from app.store.engine import WRITE, make_engine, reported
 from app.store.home import make_home
 
-KNOWN_REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008", "0009")
+KNOWN_REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008", "0009", "0012")
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]
 """The revision that this version works with."""

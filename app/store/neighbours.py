@@ -16,6 +16,7 @@ import cv2
 from app.errors import ImageError, NotFoundError, StorageError
 from app.soccer.group import Media
 from app.store.media import has_member
+from app.store.video import open_video
 
 FARTHEST = 5
 """Frames before and after that are looked for."""
@@ -60,11 +61,8 @@ def _of_video(media: Media, frame: int) -> Iterator[tuple[int, Media]]:
 def _video_length(path: Path) -> int:
     if not path.is_file():
         raise NotFoundError(f"the file {path.name} is not where it was imported from")
-    video = cv2.VideoCapture(str(path))
-    try:
+    with open_video(path) as video:
         return int(video.get(cv2.CAP_PROP_FRAME_COUNT)) if video.isOpened() else 0
-    finally:
-        video.release()
 
 
 def _of_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Media]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 from sqlalchemy import Engine
 from sqlalchemy.orm import Session as Session
@@ -20,22 +20,50 @@ TURN_SECONDS = 10.0
 processes (``busy_timeout``)."""
 
 
+class Turn:
+    """The turn to write among the threads of one process.
+
+    Raises:
+        StorageError: Others were writing all the while.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> None:
+        if not self._lock.acquire(timeout=TURN_SECONDS):
+            raise StorageError(
+                "other changes are still being written; this one was not saved",
+                hint="Try again in a moment.",
+            )
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
 class Store:
     """The database of one home: short read transactions, and one write at a time.
 
     Use ``Store.open``; the constructor trusts its engine.
+
+    Attributes:
+        turn: Held while something is written; writers of one process wait for it.
     """
 
-    def __init__(self, engine: Engine, settings: Settings):
+    def __init__(self, engine: Engine, settings: Settings, turn: AbstractContextManager[object]):
         self.settings = settings
         self._engine = engine
         self._writer = engine.execution_options(**WRITE)
-        self._turn = threading.Lock()
+        self.turn = turn
         self._listeners: list[Callable[[], None]] = []
 
     @staticmethod
-    def open(settings: Settings) -> Store:
+    def open(settings: Settings, turn: AbstractContextManager[object] | None = None) -> Store:
         """Open the database; an empty home is migrated, an older one must be first.
+
+        Args:
+            settings: Where it lies.
+            turn: The turn to write, where it is shared with another process.
 
         Raises:
             StorageError: The schema is older or newer than this version's, or the file is not
@@ -49,7 +77,7 @@ class Store:
             if schema_revision(engine) is None:
                 migrate(settings)
             _require_schema(engine)
-        return Store(engine, settings)
+        return Store(engine, settings, Turn() if turn is None else turn)
 
     @contextmanager
     def read(self) -> Iterator[Session]:
@@ -66,7 +94,7 @@ class Store:
         Raises:
             StorageError: Others were writing all the while; nothing was changed.
         """
-        with self._own_turn(), reported(self.settings), Session(self._writer) as session:
+        with self.turn, reported(self.settings), Session(self._writer) as session:
             # Take the lock before anything is read, so that what is read is still true when it
             # is written.
             session.connection()
@@ -74,18 +102,6 @@ class Store:
             session.commit()
         for listener in self._listeners:
             listener()
-
-    @contextmanager
-    def _own_turn(self) -> Iterator[None]:
-        if not self._turn.acquire(timeout=TURN_SECONDS):
-            raise StorageError(
-                "other changes are still being written; this one was not saved",
-                hint="Try again in a moment.",
-            )
-        try:
-            yield
-        finally:
-            self._turn.release()
 
     def listen(self, listener: Callable[[], None]) -> None:
         """Call a function after each commit of this process; it must be quick."""

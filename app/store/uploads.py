@@ -1,24 +1,29 @@
 """Uploads: files that a browser or script sends, one folder each, until they expire.
 
 An upload's id is the digest of its name and content: sending a file again makes no second one,
-and what an import noted about its place stays true.
+and what an import noted about its place stays true. Its folder holds a record (``upload.json``)
+and, in a folder of its own, the file under the name that it was sent with; it is complete before
+it gets its name.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
 import re
 import shutil
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from app.config import Settings
-from app.errors import InputError, NotFoundError, TooLargeError
+from app.durable import replace_file, sync
+from app.errors import InputError, NotFoundError, StorageError, TooLargeError
 from app.finite import json_text
 from app.store.clock import now
 
@@ -26,6 +31,7 @@ _ID = re.compile(r"[0-9a-f]{32}")
 _UNSAFE = re.compile(r"[^A-Za-z0-9._ -]")
 _MAX_NAME = 120
 _RECORD = "upload.json"
+_CONTENT = "content"
 _PART = ".part"
 _PART_HOURS = 24
 """After so many hours a half-sent file is nobody's any more."""
@@ -38,6 +44,7 @@ class Upload:
     Attributes:
         name: As it was sent, without what no file's name should have.
         kept: Whether a dataset reads frames from it, so that it does not expire.
+        format: What it most likely holds, as was seen when it came.
     """
 
     id: str
@@ -45,6 +52,7 @@ class Upload:
     bytes: int
     created: str
     kept: bool = False
+    format: str | None = None
 
 
 def upload_path(settings: Settings, upload_id: str) -> Path:
@@ -53,7 +61,10 @@ def upload_path(settings: Settings, upload_id: str) -> Path:
     Raises:
         NotFoundError: There is none of that id, or it has expired.
     """
-    return settings.uploads / upload_id / get_upload(settings, upload_id).name
+    upload = get_upload(settings, upload_id)
+    content = settings.uploads / upload.id / _CONTENT
+    # Uploads of earlier versions have their file beside the record.
+    return (content if content.is_dir() else content.parent) / upload.name
 
 
 def get_upload(settings: Settings, upload_id: str) -> Upload:
@@ -62,12 +73,12 @@ def get_upload(settings: Settings, upload_id: str) -> Upload:
     Raises:
         NotFoundError: There is none of that id, or it has expired.
     """
-    record = settings.uploads / upload_id / _RECORD
-    if not _ID.fullmatch(upload_id) or not record.is_file():
+    upload = _read(settings.uploads / upload_id) if _ID.fullmatch(upload_id) else None
+    if upload is None:
         raise NotFoundError(
             "there is no such upload", hint="Uploads expire after some days; send the file again."
         )
-    return Upload(**json.loads(record.read_bytes()))
+    return upload
 
 
 def list_uploads(settings: Settings) -> list[Upload]:
@@ -79,7 +90,8 @@ def keep_upload(settings: Settings, upload_id: str) -> None:
     """Let an upload never expire: a dataset reads frames from it."""
     upload = get_upload(settings, upload_id)
     if not upload.kept:
-        _write_record(settings.uploads / upload_id, replace(upload, kept=True))
+        with _reported():
+            _write_record(settings.uploads / upload_id, replace(upload, kept=True))
 
 
 def delete_upload(settings: Settings, upload_id: str) -> None:
@@ -91,7 +103,7 @@ def delete_upload(settings: Settings, upload_id: str) -> None:
     """
     if get_upload(settings, upload_id).kept:
         raise InputError("a dataset reads its frames from this upload, so it stays")
-    shutil.rmtree(settings.uploads / upload_id)
+    _remove(settings.uploads / upload_id)
 
 
 def expire_uploads(settings: Settings) -> int:
@@ -101,18 +113,31 @@ def expire_uploads(settings: Settings) -> int:
     for upload in list(_all(settings)):
         age = day - datetime.fromisoformat(upload.created)
         if not upload.kept and age > timedelta(days=settings.upload_days):
-            shutil.rmtree(settings.uploads / upload.id, ignore_errors=True)
+            _remove(settings.uploads / upload.id)
             gone += 1
     for path in settings.uploads.glob(f"*{_PART}"):
         if day.timestamp() - path.stat().st_mtime > _PART_HOURS * 3600:
-            path.unlink(missing_ok=True)
+            _clear(path)
             gone += 1
     return gone
 
 
 def _all(settings: Settings) -> Iterator[Upload]:
     for record in settings.uploads.glob(f"*/{_RECORD}"):
-        yield Upload(**json.loads(record.read_bytes()))
+        upload = _read(record.parent)
+        if upload is not None:
+            yield upload
+
+
+def _read(folder: Path) -> Upload | None:
+    """The upload of a folder; None where its record is missing or is none of ours."""
+    try:
+        upload = Upload(**json.loads((folder / _RECORD).read_bytes()))
+        named = upload.id == folder.name and upload.name == safe_name(upload.name)
+        sound = named and datetime.fromisoformat(upload.created).tzinfo is not None
+    except (OSError, ValueError, TypeError, InputError):
+        return None
+    return upload if sound else None
 
 
 def safe_name(name: str) -> str:
@@ -130,15 +155,23 @@ def safe_name(name: str) -> str:
 
 
 class UploadWriter:
-    """Takes an upload chunk by chunk; it is there when ``finish`` returns, or not at all."""
+    """Takes an upload chunk by chunk; it is there when ``finish`` returns, or not at all.
+
+    Raises:
+        StorageError: The disk refuses, here and in each method.
+    """
 
     def __init__(self, settings: Settings, name: str):
         self._settings, self._name = settings, safe_name(name)
-        settings.uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
-        self._path = settings.uploads / f"{uuid.uuid4().hex}{_PART}"
-        self._file = self._path.open("xb")
+        self._folder = settings.uploads / f"{uuid.uuid4().hex}{_PART}"
         self._digest = hashlib.sha256(self._name.encode() + b"\0")
         self.bytes = 0
+        with _reported():
+            settings.uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
+            content = self._folder / _CONTENT
+            content.mkdir(mode=0o700, parents=True)
+            self._folder.chmod(0o700)
+            self._file = (content / self._name).open("xb")
 
     def write(self, chunk: bytes) -> None:
         """Add some bytes.
@@ -149,10 +182,14 @@ class UploadWriter:
         self.bytes += len(chunk)
         require_size(self._settings, self.bytes)
         self._digest.update(chunk)
-        self._file.write(chunk)
+        with _reported():
+            self._file.write(chunk)
 
-    def finish(self) -> Upload:
+    def finish(self, guess: Callable[[Path], str | None] = lambda path: None) -> Upload:
         """Make it an upload.
+
+        Args:
+            guess: From the file to the format that it most likely has.
 
         Raises:
             InputError: Nothing was sent.
@@ -160,23 +197,46 @@ class UploadWriter:
         if not self.bytes:
             self.abort()
             raise InputError("the upload is empty", hint="Send the file as the request's body.")
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._file.close()
+        with _reported():
+            self._file.flush()
+            os.fsync(self._file.fileno())
+            self._file.close()
         upload = Upload(self._digest.hexdigest()[:32], self._name, self.bytes, now())
-        folder = self._settings.uploads / upload.id
-        if (folder / _RECORD).is_file():
-            self._path.unlink()
-            return get_upload(self._settings, upload.id)
-        folder.mkdir(mode=0o700, exist_ok=True)
-        self._path.replace(folder / upload.name)
-        _write_record(folder, upload)
-        return upload
+        known = _read(self._settings.uploads / upload.id)
+        if known is not None:
+            self.abort()
+            return known
+        upload = replace(upload, format=guess(Path(self._file.name)))
+        with _reported():
+            sync(self._folder / _CONTENT)
+            _write_record(self._folder, upload)
+            return self._publish(upload)
+
+    def _publish(self, upload: Upload) -> Upload:
+        """Give the complete folder its name, or find that somebody sent the same meanwhile."""
+        place = self._settings.uploads / upload.id
+        for _ in range(2):
+            try:
+                self._folder.rename(place)
+            except OSError as error:
+                if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
+                    raise
+            else:
+                sync(place.parent)
+                return upload
+            known = _read(place)
+            if known is not None:
+                self.abort()
+                return known
+            # What lies there has no record, so nobody can have been told of it.
+            _remove(place)
+        raise StorageError("the upload could not be put in its place", hint="Send it again.")
 
     def abort(self) -> None:
         """Leave nothing behind."""
-        self._file.close()
-        self._path.unlink(missing_ok=True)
+        with suppress(OSError):
+            self._file.close()
+        _clear(self._folder)
 
 
 def require_size(settings: Settings, size: int) -> None:
@@ -189,9 +249,31 @@ def require_size(settings: Settings, size: int) -> None:
 
 
 def _write_record(folder: Path, upload: Upload) -> None:
-    temporary = folder / f"{_RECORD}.new"
-    with temporary.open("wb") as file:
-        file.write(json_text(asdict(upload), ascii_=True).encode())
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(folder / _RECORD)
+    replace_file(folder / _RECORD, json_text(asdict(upload), ascii_=True).encode())
+
+
+def _remove(folder: Path) -> None:
+    """Delete an upload: it is gone at once, and what is left of it is half-sent."""
+    aside = folder.with_name(f"{uuid.uuid4().hex}{_PART}")
+    with suppress(FileNotFoundError):
+        folder.rename(aside)
+    _clear(aside)
+
+
+def _clear(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+@contextmanager
+def _reported() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        problem = "the disk is full" if full else f"the disk refuses ({error.strerror})"
+        raise StorageError(
+            f"{problem}: the upload was not kept", hint="Free some space and send it again."
+        ) from error

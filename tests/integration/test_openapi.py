@@ -62,7 +62,12 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
     order = {"dataset": "small", "format": "cameras", "all": True, "boxes": "optimized"}
     for name in (EXPORT, DELETED_EXPORT):
         job = request_export(
-            services.jobs, store, services.exports, {**order, "images": "none"}, actor="local"
+            services.jobs,
+            store,
+            services.exports,
+            services.frames,
+            {**order, "images": "none"},
+            actor="local",
         )
         assert (str(job.id), services.jobs.wait(job.id, 60).state) == (name, "done")
     add_evaluations(store)

@@ -56,6 +56,7 @@ def make_export(
         services.jobs,
         services.store,
         services.exports,
+        services.frames,
         request.model_dump(),
         actor=actor,
         keep=reply.keep,

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Annotated, Any
 
 from anyio import CancelScope, to_thread
 from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.requests import ClientDisconnect
 
-from app.api.deps import AppServices
+from app.api.deps import AppServices, Services
 from app.api.problem import responses
 from app.api.schemas.upload import UploadDocument, UploadList
-from app.config import Settings
 from app.datasets.guess_format import guess_format
-from app.errors import InputError
+from app.errors import InputError, OverloadedError
 from app.store.uploads import (
     Upload,
     UploadWriter,
@@ -22,13 +22,14 @@ from app.store.uploads import (
     get_upload,
     list_uploads,
     require_size,
-    upload_path,
 )
 
 router = APIRouter(prefix="/uploads", tags=["imports"])
 
 CHUNK = 1024 * 1024
 """Bytes that are gathered before they are written."""
+LOOK_SECONDS = 0.25
+"""Between two looks whether the server stops."""
 UploadId = Annotated[str, Path(max_length=64)]
 FileName = Annotated[
     str, Query(min_length=1, max_length=255, description="Name of the file; its ending matters.")
@@ -63,30 +64,40 @@ async def upload_file(
     if declared.isascii() and declared.isdigit() and len(declared) < 19:
         require_size(services.settings, int(declared))
     await to_thread.run_sync(expire_uploads, services.settings)
-    upload = await _receive(request, services.settings, name)
+    upload = await _receive(request, services, name)
     response.headers["Location"] = f"/api/v1/uploads/{upload.id}"
-    return await to_thread.run_sync(_document, services.settings, upload)
+    return UploadDocument.of(upload)
 
 
-async def _receive(request: Request, settings: Settings, name: str) -> Upload:
+async def _receive(request: Request, services: Services, name: str) -> Upload:
     """Write what comes, off the event loop; nothing stays of what does not come whole."""
-    writer = await to_thread.run_sync(UploadWriter, settings, name)
+    writer = await to_thread.run_sync(UploadWriter, services.settings, name)
+    writing = asyncio.ensure_future(_write(request, writer))
     try:
-        waiting = bytearray()
-        async for chunk in request.stream():
-            waiting += chunk
-            if len(waiting) >= CHUNK:
-                await to_thread.run_sync(writer.write, bytes(waiting))
-                waiting.clear()
-        await to_thread.run_sync(writer.write, bytes(waiting))
-        return await to_thread.run_sync(writer.finish)
-    except ClientDisconnect:
-        await to_thread.run_sync(writer.abort)
-        raise InputError("the upload was cut off") from None
-    except BaseException:
+        while not writing.done():
+            await asyncio.wait({writing}, timeout=LOOK_SECONDS)
+            if services.stopping.is_set():
+                raise OverloadedError("the server stops", hint="Send the file again in a while.")
+        writing.result()
+        return await to_thread.run_sync(writer.finish, guess_format)
+    except BaseException as error:
         with CancelScope(shield=True):
+            writing.cancel()
+            await asyncio.wait({writing})
             await to_thread.run_sync(writer.abort)
+        if isinstance(error, ClientDisconnect):
+            raise InputError("the upload was cut off") from None
         raise
+
+
+async def _write(request: Request, writer: UploadWriter) -> None:
+    waiting = bytearray()
+    async for chunk in request.stream():
+        waiting += chunk
+        if len(waiting) >= CHUNK:
+            await to_thread.run_sync(writer.write, bytes(waiting))
+            waiting.clear()
+    await to_thread.run_sync(writer.write, bytes(waiting))
 
 
 @router.get("", operation_id="listUploads")
@@ -94,7 +105,7 @@ def get_uploads(services: AppServices) -> UploadList:
     """Every file that is still here."""
     settings = services.settings
     return UploadList(
-        items=[_document(settings, item) for item in list_uploads(settings)],
+        items=[UploadDocument.of(item) for item in list_uploads(settings)],
         max_bytes=settings.max_upload_bytes,
         days=settings.upload_days,
     )
@@ -103,14 +114,10 @@ def get_uploads(services: AppServices) -> UploadList:
 @router.get("/{upload}", operation_id="getUpload", responses=responses(404))
 def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
     """One uploaded file, without its content."""
-    return _document(services.settings, get_upload(services.settings, upload))
+    return UploadDocument.of(get_upload(services.settings, upload))
 
 
 @router.delete("/{upload}", operation_id="deleteUpload", status_code=204, responses=responses(404))
 def delete_one(upload: UploadId, services: AppServices) -> None:
     """Delete a file; 400 while a dataset reads its frames from it."""
     delete_upload(services.settings, upload)
-
-
-def _document(settings: Settings, upload: Upload) -> UploadDocument:
-    return UploadDocument.of(upload, guess_format(upload_path(settings, upload.id)))

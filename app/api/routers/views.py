@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
+import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Annotated
 
+from anyio import to_thread
 from fastapi import APIRouter, Body, Query, Request, Response
 
 from app.api.conflicts import current_state
@@ -16,6 +17,7 @@ from app.api.deps import (
     AppStore,
     Id,
     IfMatch,
+    Services,
     etag_matches,
 )
 from app.api.problem import Responses, responses
@@ -24,14 +26,14 @@ from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_docume
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
-from app.config import Settings
+from app.child_pool import PoolTask
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.editing.edit import Edit, IncludeView, SetBall, SetCalibrationSource, SetLines
 from app.review.editing.places import FoundView, find_view
 from app.review.editing.submit import submit_view
 from app.soccer.group import Media
-from app.store.media import content_type, read_frame
-from app.store.neighbours import FARTHEST, neighbours
+from app.store.frames import Frames, Picture
+from app.store.neighbours import FARTHEST
 from app.store.session import Store
 
 router = APIRouter(prefix="/views", tags=["views"])
@@ -40,6 +42,10 @@ WIDTH_STEP = 16
 """Asked widths are rounded up to a multiple, so that few sizes fill the cache."""
 MIN_WIDTH, MAX_WIDTH = 16, 4096
 SECONDS = 3600
+LOOK_SECONDS = 0.25
+"""Between two looks whether the client still waits."""
+CLIENT_GONE = 499
+"""What the log calls the answer that nobody reads."""
 NO_FRAME_HINT = (
     "The import's report says why; importing again after the files are mended attaches the frames."
 )
@@ -136,9 +142,9 @@ def _submit(
     "/{view}/image",
     operation_id="getImage",
     response_class=Response,
-    responses={**responses(404, 413), **IMAGES},
+    responses={**responses(404, 413, 503), **IMAGES},
 )
-def get_image(
+async def get_image(
     view: Id,
     services: AppServices,
     request: Request,
@@ -156,53 +162,77 @@ def get_image(
     ] = 0,
 ) -> Response:
     """The frame of a view, or one just before or after it, scaled down when a width is given."""
-    found = find_view(services.store, view)
-    content = _frame(_moved(found, offset), width, services.settings)
-    etag = f'"{hashlib.sha256(content).hexdigest()[:32]}"'
+    found = await to_thread.run_sync(_asked, services, view, offset)
+    picture = await _picture(request, services.frames, found, clamp_width(width))
+    if picture is None:
+        return Response(status_code=CLIENT_GONE)
+    etag = f'"{picture.digest}"'
     headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
     if etag_matches(request, etag):
         return Response(status_code=304, headers=headers)
-    return Response(content, media_type=content_type(content), headers=headers)
+    return Response(picture.data, media_type=picture.kind, headers=headers)
 
 
-@router.get("/{view}/neighbours", operation_id="getFramesAround", responses=responses(404))
-def get_neighbours(view: Id, store: AppStore) -> NeighbourList:
+@router.get("/{view}/neighbours", operation_id="getFramesAround", responses=responses(404, 503))
+def get_neighbours(view: Id, services: AppServices) -> NeighbourList:
     """The frames of the same camera just before and after a view's, where they are on disk.
 
     Only videos and folders of frames that are numbered by time have them: the files of most
     datasets are numbered by action.
     """
-    found = neighbours_of(find_view(store, view))
+    found = _neighbours(services.frames, find_view(services.store, view))
     return NeighbourList.of(view, sorted(found), NO_NEIGHBOURS)
 
 
-def neighbours_of(view: FoundView) -> dict[int, Media]:
+def _neighbours(frames: Frames, view: FoundView) -> dict[int, Media]:
     """Where the frames before and after a view's lie, by how many frames later."""
-    return {} if view.media is None else neighbours(view.media, view.group_key, view.static)
+    return {} if view.media is None else frames.neighbours(view.media, view.group_key, view.static)
 
 
-def _moved(view: FoundView, offset: int) -> FoundView:
-    """The same view so many frames later."""
+def _asked(services: Services, view: int, offset: int) -> FoundView:
+    """The view, its frame so many frames later."""
+    found = find_view(services.store, view)
     if offset == 0:
-        return view
-    found = neighbours_of(view)
-    if not found:
-        raise NotFoundError(f"view {view.key}: {NO_NEIGHBOURS}")
-    if offset not in found:
-        raise NotFoundError(f"view {view.key}: there is no frame {frames_away(offset)}")
-    return replace(view, media=found[offset])
+        return found
+    around = _neighbours(services.frames, found)
+    if not around:
+        raise NotFoundError(f"view {found.key}: {NO_NEIGHBOURS}")
+    if offset not in around:
+        raise NotFoundError(f"view {found.key}: there is no frame {frames_away(offset)}")
+    return replace(found, media=around[offset])
 
 
-def _frame(view: FoundView, width: int | None, settings: Settings) -> bytes:
-    """The frame; what is wrong with it is said with the view that it belongs to."""
+async def _picture(
+    request: Request, frames: Frames, view: FoundView, width: int | None
+) -> Picture | None:
+    """The frame, or None where nobody waits for it any more.
+
+    What is wrong with it is said with the view that it belongs to.
+    """
     if view.media is None:
         raise NotFoundError("this view has no frame that could be read", hint=NO_FRAME_HINT)
     try:
-        return read_frame(view.media, clamp_width(width), view.flipped, settings)
+        found = await to_thread.run_sync(frames.cached, view.media, width, view.flipped)
+        if found is not None:
+            return found
+        return await while_wanted(request, frames.ask(view.media, width, view.flipped))
     except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
         # The cause decides between a full disk and one that fails.
         cause = error.__cause__ or error
         raise type(error)(f"view {view.key}: {error.message}", hint=error.hint) from cause
+
+
+async def while_wanted(request: Request, task: PoolTask) -> Picture | None:
+    """The result of a task, which is given up when the client has left."""
+    result: asyncio.Future[Picture] = asyncio.wrap_future(task.future)
+    try:
+        while not result.done():
+            await asyncio.wait({result}, timeout=LOOK_SECONDS)
+            if not result.done() and await request.is_disconnected():
+                return None
+        return result.result()
+    finally:
+        task.leave()
 
 
 def clamp_width(width: int | None) -> int | None:

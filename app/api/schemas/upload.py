@@ -20,9 +20,9 @@ class UploadDocument(BaseModel):
     format: str | None = Field(description="Format that it most likely has.")
 
     @staticmethod
-    def of(upload: Upload, guessed: str | None) -> UploadDocument:
+    def of(upload: Upload) -> UploadDocument:
         """The document of an upload."""
-        return UploadDocument.model_validate({**vars(upload), "format": guessed})
+        return UploadDocument.model_validate(vars(upload))
 
 
 class UploadList(BaseModel):

@@ -5,7 +5,7 @@ Killed anywhere it loses nothing but the chunks in hand.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
@@ -34,8 +34,9 @@ from app.store.solutions import (
     unsolved_groups,
 )
 
-CHUNK = 40
-"""Groups a task: a second of work, or a few when lines must be calibrated."""
+FIRST_CHUNK, CHUNK = 2, 40
+"""Groups a task: a second of work, or a few when lines must be calibrated. The first ones are
+small, so that a run that is killed early, again and again, comes to its end all the same."""
 
 
 @dataclass
@@ -94,13 +95,19 @@ def solve_dataset(
     if progress is not None:
         progress(0, report.total)
     _calibrate_shared(store, found)
-    chunks = (ids[start : start + CHUNK] for start in range(0, len(ids), CHUNK))
-    tasks = (_task(store, found, chunk) for chunk in chunks)
+    tasks = (_task(store, found, chunk) for chunk in _chunks(ids))
     for results in fan_out(solve_task, tasks, executor):
         _save(store, results, report)
         if progress is not None:
             progress(report.solved + len(report.failed), report.total)
     return report
+
+
+def _chunks(ids: Sequence[int]) -> Iterator[Sequence[int]]:
+    start, size = 0, FIRST_CHUNK
+    while start < len(ids):
+        yield ids[start : start + size]
+        start, size = start + size, min(2 * size, CHUNK)
 
 
 def solve_task(task: Task) -> list[Result]:

@@ -24,13 +24,14 @@ from app.review.exporting.formats import (
     missing_sentence,
     write_format,
 )
-from app.review.exporting.images import ExportImages
+from app.review.exporting.images import ExportImages, ReadPicture
 from app.review.exporting.source import ExportSource, LiveSource, VersionSource
 from app.review.importing.carry import FORMAT as CARRY
 from app.review.importing.carry import carry_out
 from app.review.importing.spare import spare_persons
 from app.review.versions.version import find_version
 from app.soccer.ball_boxes import BOX_KINDS
+from app.store.frames import make_picture
 from app.store.session import Session, Store
 
 IMAGES = ("none", "copy", "link")
@@ -87,6 +88,7 @@ def export(
     images: str = "none",
     version: str | None = None,
     progress: Progress | None = None,
+    read: ReadPicture | None = None,
 ) -> ExportReport:
     """Write a dataset's accepted groups, or all groups, in a format that consumers read.
 
@@ -106,6 +108,7 @@ def export(
         version: Name, id or hash of a frozen version to export instead of the dataset as it is:
             the same bytes every time.
         progress: Called as groups are written.
+        read: Reads frames; in this process by default.
 
     Raises:
         InputError: Nothing to export, or the groups do not fit the format.
@@ -118,7 +121,7 @@ def export(
     with store.read() as session:
         source = _source(session, store, dataset, everything, version)
         with output_tree(out) as root:
-            frames = ExportImages(root, images, store.settings, frame_layout(format))
+            frames = ExportImages(root, images, read or _here(store), frame_layout(format))
             run = _Run(source, options, frames, progress)
             # A version is the same every time; spare frames are the dataset's as it is.
             if format == "issia" and isinstance(source, LiveSource):
@@ -128,6 +131,10 @@ def export(
             write_manifest(root, run.manifest(counts))
     left_out = source.left_out if isinstance(source, LiveSource) else {}
     return ExportReport(out, format, counts, left_out, tuple(frames.missing))
+
+
+def _here(store: Store) -> ReadPicture:
+    return lambda media, width, flipped: make_picture(media, width, flipped, store.settings)
 
 
 def _carry(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 from collections.abc import Mapping
@@ -11,6 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from app.durable import replace_file
 from app.errors import NotFoundError
 from app.finite import json_text
 from app.review.exporting.export import ExportReport
@@ -65,7 +65,7 @@ class ExportFolder:
             missing_images=list(report.missing_images),
             bytes=self.content(name).stat().st_size,
         )
-        _write_atomically(self._record(name), json_text(asdict(entry), ascii_=True).encode())
+        replace_file(self._record(name), json_text(asdict(entry), ascii_=True).encode())
         return entry
 
     def find(self, name: str) -> ExportEntry | None:
@@ -97,13 +97,3 @@ class ExportFolder:
 
     def _record(self, name: str) -> Path:
         return self.folder / f"{name}.json"
-
-
-def _write_atomically(path: Path, content: bytes) -> None:
-    """A reader sees the whole file or none, also after a power cut."""
-    temporary = path.with_name(f".{path.name}.partial")
-    with temporary.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from app.config import Settings
 from app.datasets.archive import resolve_inside
 from app.datasets.frame_names import FrameName, match_frame
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.soccer.group import Group, Media, View
-from app.store.media import content_type, media_facts, read_frame
+from app.store.frames import Picture
+from app.store.media import media_facts
 
+ReadPicture = Callable[[Media, int | None, bool], Picture]
+"""From where a frame lies, its width (None: as it is) and whether it is mirrored."""
 _SUFFIXES = {"image/jpeg": ".jpg", "image/png": ".png", "image/webp": ".webp"}
 
 
@@ -25,13 +27,11 @@ class ExportImages:
         placed: Where the frames of the newest group are, by view; relative to the export.
     """
 
-    def __init__(
-        self, root: Path, images: str, settings: Settings, layout: FrameName = match_frame
-    ):
+    def __init__(self, root: Path, images: str, read: ReadPicture, layout: FrameName = match_frame):
         self.media: list[Mapping[str, Any]] = []
         self.missing: list[str] = []
         self.placed: dict[str, str] = {}
-        self._root, self._images, self._settings = root, images, settings
+        self._root, self._images, self._read = root, images, read
         self._layout = layout
         self._splits: Mapping[str, str] = {}
 
@@ -76,9 +76,9 @@ class ExportImages:
             target = self._target(group, view, PurePosixPath(media.path).suffix.lower())
             target.symlink_to(media.path)
             return
-        data = read_frame(media, None, view.station.flipped, self._settings)
-        target = self._target(group, view, _SUFFIXES[content_type(data)])
-        target.write_bytes(data)
+        picture = self._read(media, None, view.station.flipped)
+        target = self._target(group, view, _SUFFIXES[picture.kind])
+        target.write_bytes(picture.data)
 
     def _target(self, group: Group, view: View, suffix: str) -> Path:
         """Where a frame goes, in folders that are there."""

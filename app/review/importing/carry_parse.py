@@ -77,7 +77,7 @@ def read_head(tree: FileTree) -> CarriedHead:
         # Its values reach the solver: a text in place of a number would break there.
         assert policy.hash
         return CarriedHead(_text(value["dataset"]), policy)
-    except (ReviewError, KeyError, TypeError, ValueError) as error:
+    except (ReviewError, AttributeError, KeyError, TypeError, ValueError) as error:
         raise DatasetFormatError(shown, None, "policy", "is not a policy") from error
 
 

@@ -170,7 +170,10 @@ def _sound(groups: Iterable[Group], seen: set[str], report: IngestReport) -> Ite
 def _absolute(view: View) -> View:
     if view.media is None:
         return view
-    return replace(view, media=replace(view.media, path=str(Path(view.media.path).absolute())))
+    path = Path(view.media.path).absolute()
+    # The reader saw where a link leads; one that comes later is not followed.
+    path = path.resolve() if path.is_symlink() else path
+    return replace(view, media=replace(view.media, path=str(path)))
 
 
 def ingest_batch(

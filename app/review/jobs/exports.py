@@ -14,6 +14,7 @@ from app.review.jobs.jobs import JobProgress, Jobs, Work, counting
 from app.review.versions.version import find_version
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
+from app.store.frames import Frames
 from app.store.jobs import Job
 from app.store.session import Store
 
@@ -24,6 +25,7 @@ def request_export(
     jobs: Jobs,
     store: Store,
     folder: ExportFolder,
+    frames: Frames,
     request: Mapping[str, Any],
     *,
     actor: str,
@@ -35,6 +37,7 @@ def request_export(
         jobs: Where it is queued.
         store: The database.
         folder: Where it is written.
+        frames: Reads the frames that go into it.
         request: The fields of an export request, plain JSON values.
         actor: Who wants it.
         keep: Keeps the answer with the job.
@@ -56,7 +59,7 @@ def request_export(
     return jobs.submit(
         KIND,
         f"Export {found.name} as {request['format']}",
-        export_work(store, folder, found.id, asked),
+        export_work(store, folder, frames, found.id, asked),
         dataset_id=found.id,
         actor=actor,
         request=asked,
@@ -64,12 +67,18 @@ def request_export(
     )
 
 
-def resume_exports(jobs: Jobs, store: Store, folder: ExportFolder) -> None:
+def resume_exports(jobs: Jobs, store: Store, folder: ExportFolder, frames: Frames) -> None:
     """Let exports that an earlier server was at be written from their beginning."""
-    jobs.resumes(KIND, lambda job: export_work(store, folder, job.dataset_id or 0, job.request))
+
+    def work_of(job: Job) -> Work:
+        return export_work(store, folder, frames, job.dataset_id or 0, job.request)
+
+    jobs.resumes(KIND, work_of)
 
 
-def export_work(store: Store, folder: ExportFolder, dataset_id: int, request: Json) -> Work:
+def export_work(
+    store: Store, folder: ExportFolder, frames: Frames, dataset_id: int, request: Json
+) -> Work:
     """The work itself; the zip appears whole or not at all, and its record after it."""
 
     def work(progress: JobProgress) -> Json:
@@ -86,6 +95,7 @@ def export_work(store: Store, folder: ExportFolder, dataset_id: int, request: Js
             images=request["images"],
             version=None if version is None else str(version),
             progress=counting(progress, "groups written"),
+            read=frames.read,
         )
         entry = folder.keep(name, request, report)
         return {

@@ -12,7 +12,8 @@ from app.errors import InputError
 from app.progress import Progress
 from app.review.datasets.dataset import dataset_id, require_name
 from app.review.importing.folders import resolve_folder
-from app.review.importing.sources import FORMATS, Imported, Source, import_source
+from app.review.importing.import_child import Outcome, import_apart
+from app.review.importing.sources import FORMATS, Source
 from app.review.jobs.jobs import FailedWithReportError, JobProgress, Jobs, Work
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
@@ -114,21 +115,20 @@ def import_work(
         if not request.dry_run and "upload" in request.source:
             # Frames are read where they are, so the file must stay from the first group on.
             keep_upload(settings, request.source["upload"])
-        imported = import_source(
+        outcome = import_apart(
             store,
             request.dataset,
             source,
-            settings,
-            _step(progress, sentence),
             actor=actor,
             dry_run=request.dry_run,
+            progress=_step(progress, sentence),
+            stop=progress.check,
         )
-        if not imported.something:
-            problem, hint = imported.nothing_read()
-            raise FailedWithReportError(problem, hint, _result(imported, request))
-        if not request.dry_run and imported.result.new + imported.result.changed:
+        if outcome.nothing is not None:
+            raise FailedWithReportError(*outcome.nothing, _result(outcome, request))
+        if not request.dry_run and outcome.fresh:
             _solve(jobs, store, request.dataset, actor)
-        return _result(imported, request)
+        return _result(outcome, request)
 
     return work
 
@@ -144,8 +144,8 @@ def _solve(jobs: Jobs, store: Store, dataset: str, actor: str) -> None:
     request_solve(jobs, store, dataset_id(store, dataset), actor=actor)
 
 
-def _result(imported: Imported, request: ImportRequest) -> Json:
-    values = imported.values()
+def _result(outcome: Outcome, request: ImportRequest) -> Json:
+    values = outcome.values
     hidden = max(len(values["skipped"]) - SHOWN, 0)
     return {
         **values,

@@ -58,6 +58,9 @@ PROMPT = frozenset({"solve"})
 KEPT = {"solve": 200, "bulk": 200, "verify": 200}
 """How many finished jobs of a kind are remembered; kinds that are not named keep all."""
 
+MOST_TRIES = 2
+"""So many times a server may die at a job before it is left alone."""
+
 Work = Callable[["JobProgress"], Json]
 """What a job does; returns its result. It must be safe to start again from the beginning."""
 Listener = Callable[[Job], None]
@@ -109,6 +112,10 @@ class JobProgress:
         """
         _, last_total, last_sentence = self.place
         self.place = (done, last_total if total is None else total, sentence or last_sentence)
+        self.check()
+
+    def check(self) -> None:
+        """Raise ``JobCancelled`` where the work shall end here."""
         if self.cancelled.is_set() or self._closing.is_set():
             raise JobCancelled
 
@@ -163,7 +170,7 @@ class Jobs:
             for job in left:
                 update_job(session, job.id, **self._settled(job))
         with self._changed:
-            self._waiting += [self._run(job) for job in left if job.kind in self._resumers]
+            self._waiting += [self._run(job) for job in left if self._is_resumed(job)]
             self._wake()
 
     def submit(
@@ -307,11 +314,16 @@ class Jobs:
 
     def _settled(self, job: Job) -> dict[str, Any]:
         """What an earlier server's job becomes."""
-        if job.kind in self._resumers:
+        if self._is_resumed(job):
             return {"state": WAITING, "started": None, "sentence": "Started again."}
         sentence = "The server stopped before this was done. Start it again."
+        if job.kind in self._resumers:
+            sentence = f"The server died {job.tries} times at this, so it is not begun again."
         problem = {"detail": sentence, "hint": None, "pointer": None}
         return {"state": FAILED, "ended": now(), "sentence": sentence, "problem": problem}
+
+    def _is_resumed(self, job: Job) -> bool:
+        return job.kind in self._resumers and job.tries < MOST_TRIES
 
     def _run(self, job: Job) -> _Run:
         work = self._resumers[job.kind](job)
@@ -347,7 +359,7 @@ class Jobs:
             return run
 
     def _carry_out(self, run: _Run) -> None:
-        self._save(run.id, state=RUNNING, started=now())
+        self._save(run.id, state=RUNNING, started=now(), begun=1)
         ended = threading.Event()
         ticker = threading.Thread(target=self._tick, args=(run, ended), daemon=True)
         ticker.start()
@@ -358,6 +370,10 @@ class Jobs:
             ticker.join()
         if values is not None:
             self._finish(run, **values)
+            return
+        with suppress(StorageError):
+            # The server stops in good order; that is none of this job's doing.
+            self._save(run.id, begun=-1)
 
     def _outcome(self, run: _Run) -> dict[str, Any] | None:
         """How a job ended, as columns; None where the server stops and the next one decides."""

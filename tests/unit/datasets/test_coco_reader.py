@@ -114,6 +114,15 @@ class TestReadCoco:
         assert list(read_coco(tmp_path, report)) == []
         assert [item.record for item in report.problems] == [f"images[{n}]" for n in range(3)]
 
+    def test_categories_that_are_no_list_are_named(
+        self, read: Callable[[Any], list[Group]], report: Report
+    ) -> None:
+        (group,) = read(foreign(categories=3.5))
+        assert group.views[0].balls == ()
+        assert [(problem.field, problem.problem) for problem in report.problems] == [
+            ("categories", "is not a list; left out")
+        ]
+
     def test_infinity_is_no_number(
         self, read: Callable[[Any], list[Group]], report: Report
     ) -> None:

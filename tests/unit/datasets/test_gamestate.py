@@ -171,9 +171,11 @@ class TestWriteGamestate:
             {"class": "Goalkeeper team right", "ID": "1", "points": corners},
             {"class": "Main referee", "ID": "x", "points": corners},
             {"class": None, "ID": None, "points": None},
+            {"class": "Main referee", "ID": "2", "points": {**corners, "x2": "Infinity"}},
         )
         group = soccer_group(replays=0)
-        view = replace(group.views[0], extras=Extras(boxes))
+        odd = ({"class": "Odd", "points": "text"}, {"class": "Odder", "points": [1, "x"]})
+        view = replace(group.views[0], extras=Extras(boxes, odd))
         write_gamestate(tmp_path, [replace(group, views=(view,))])
         (path,) = tmp_path.rglob("Labels-GameState.json")
         written = json.loads(path.read_text())["annotations"]

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from app.datasets import guess_format as module
 from app.datasets.guess_format import guess_format
 
 CASES = [
@@ -38,6 +39,14 @@ class TestGuessFormat:
         for name in ("camera_00002.json", "00002.json", "manifest.json"):
             (tmp_path / name).write_text("{}")
         assert guess_format(tmp_path) == "sn-calibration"
+
+    def test_a_zip_with_too_long_a_list_is_not_looked_into(
+        self, make_zip: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        path = make_zip({"Labels-v3.json": "x", "b.txt": "x"})
+        monkeypatch.setattr(module, "MAX_DIRECTORY", 100)
+        monkeypatch.setattr(module.zipfile, "ZipFile", lambda *_: pytest.fail("opened"))
+        assert guess_format(path) is None
 
     def test_a_damaged_zip_and_a_missing_file_are_nothing(self, tmp_path: Path) -> None:
         (tmp_path / "a.zip").write_bytes(b"PK\x03\x04")

@@ -84,4 +84,5 @@ class TestExtras:
         assert extras_from_json(None) == Extras()
 
     def test_values_that_are_no_extras_are_left_out(self) -> None:
+        assert extras_from_json({"boxes": 5, "lines": "text"}) == Extras()
         assert extras_from_json({"boxes": [1, {"a": 1}], "metadata": []}) == Extras(({"a": 1},))

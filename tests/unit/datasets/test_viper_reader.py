@@ -44,7 +44,32 @@ def _read(tmp_path: Path, content: str | bytes, report: Report, name: str = "1.x
     return read_viper(tree, name, report, Limits(file_bytes=1_000_000))
 
 
+ENDLESS = {
+    "a tag": lambda size: f'<attribute name="{"x" * size}"/>',
+    "a comment": lambda size: f"<!-- {'<>' * (size // 2)} -->",
+    "text": lambda size: "x" * size,
+}
+
+
 class TestReadViper:
+    @pytest.mark.parametrize("what", ENDLESS)
+    def test_a_megabyte_without_an_element_is_refused(
+        self, tmp_path: Path, report: Report, what: str
+    ) -> None:
+        points = ball('<data:point framespan="9:9" x="100" y="50"/>')
+        text = HEAD + points + ENDLESS[what](900_000) + points + TAIL
+        assert _read(tmp_path, text, report).ball_points == 1
+        assert report.problems == []
+        text = HEAD + points + ENDLESS[what](20_000_000) + points + TAIL
+        content = gzip.compress(text.encode())
+        (tmp_path / "2.xgtf.gz").write_bytes(content)
+        tree = open_tree(tmp_path, report)
+        assert tree is not None
+        track = read_viper(tree, "2.xgtf.gz", report)
+        assert track.ball_points == 1
+        (problem,) = report.problems
+        assert problem.problem == "holds more than 1,000,000 bytes without an element"
+
     @pytest.mark.parametrize("name", ["1.xgtf", "1.xgtf.gz"])
     def test_ball_points_and_boxes_plain_or_packed(
         self, tmp_path: Path, report: Report, name: str

@@ -20,6 +20,14 @@ class TestDistort:
         assert np.array_equal(distort(POINTS, np.zeros(12)), POINTS)
 
 
+class TestATermThatIsNextToNothing:
+    def test_counts_as_none_where_the_picture_folds(self):
+        lens, tiny = np.zeros(12), np.zeros(12)
+        lens[:2] = tiny[:2] = (-0.3, 0.01)
+        tiny[4] = 1e-320
+        assert fold_radius(tiny) == fold_radius(lens)
+
+
 class TestDistortJacobian:
     def test_equals_its_finite_difference(self):
         step = 1e-6

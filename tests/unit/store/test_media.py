@@ -4,6 +4,7 @@ import struct
 import threading
 import zipfile
 import zlib
+from contextlib import nullcontext
 from pathlib import Path
 
 import cv2
@@ -12,6 +13,7 @@ import pytest
 
 from app.errors import ImageError, NotFoundError, TooLargeError
 from app.soccer.group import Media
+from app.store import media as media_module
 from app.store.archives import Archives
 from app.store.media import content_type, frame_name, media_facts, read_frame
 
@@ -163,6 +165,63 @@ class TestReadFrame:
         assert decoded(data).mean() == pytest.approx(200, abs=6)
         with pytest.raises(NotFoundError, match="no frame 7"):
             read_frame(Media(str(path), frame=7), None, False, settings)
+
+    def test_a_list_of_other_files_is_no_video(self, tmp_path, settings) -> None:
+        hidden = tmp_path / "hidden.avi"
+        video = cv2.VideoWriter(str(hidden), cv2.VideoWriter_fourcc(*"MJPG"), 25, (160, 96))
+        for _ in range(3):
+            video.write(np.full((96, 160, 3), 90, np.uint8))
+        video.release()
+        path = tmp_path / "cam1.mp4"
+        path.write_text(f"ffconcat version 1.0\nfile {hidden.name}\n")
+        with pytest.raises(ImageError, match=r"cam1\.mp4 is no video that can be read"):
+            read_frame(Media(str(path), frame=1), None, False, settings)
+
+    def test_a_video_that_grows_on_its_way_is_refused(self, tmp_path, settings) -> None:
+        class Growing:
+            def isOpened(self) -> bool:
+                return True
+
+            def get(self, _: int) -> float:
+                return 16.0
+
+            def set(self, *_: float) -> None: ...
+
+            def read(self) -> tuple[bool, np.ndarray]:
+                return True, np.empty((8000, 8000, 3), np.uint8)
+
+        path = tmp_path / "cam1.mp4"
+        path.write_bytes(b"")
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(media_module, "open_video", lambda _: nullcontext(Growing()))
+            with pytest.raises(TooLargeError, match="8000 x 8000"):
+                read_frame(Media(str(path), frame=1), None, False, settings)
+
+    @pytest.mark.parametrize("width", [None, 40])
+    def test_a_file_swapped_for_a_link_is_not_followed(self, tmp_path, settings, width) -> None:
+        secret, path = tmp_path / "secret.png", tmp_path / "7.png"
+        secret.write_bytes(PNG)
+        path.symlink_to(secret)
+        with pytest.raises(NotFoundError, match=r"7\.png is a link now"):
+            read_frame(Media(str(path)), width, False, settings)
+
+    def test_a_folder_swapped_for_a_link_does_not_lead_out(self, tmp_path, settings) -> None:
+        outside, root = tmp_path / "outside", tmp_path / "root"
+        outside.mkdir()
+        root.mkdir()
+        (outside / "7.png").write_bytes(PNG)
+        (root / "match").symlink_to(outside)
+        allowed = settings.model_copy(update={"import_folders": [root]})
+        with pytest.raises(NotFoundError, match="leads out of its folder"):
+            read_frame(Media(str(root / "match" / "7.png")), None, False, allowed)
+
+    def test_a_root_that_is_a_link_itself_is_the_operators_own(self, tmp_path, settings) -> None:
+        real, root = tmp_path / "real", tmp_path / "root"
+        real.mkdir()
+        (real / "7.png").write_bytes(PNG)
+        root.symlink_to(real)
+        allowed = settings.model_copy(update={"import_folders": [root]})
+        assert read_frame(Media(str(root / "7.png")), None, False, allowed) == PNG
 
     @pytest.mark.parametrize("width", [None, 40])
     def test_a_bomb_is_refused_before_it_is_decoded(

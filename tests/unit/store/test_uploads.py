@@ -1,14 +1,18 @@
 from __future__ import annotations
 
+import errno
 import json
 import os
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
 from app.config import Settings
-from app.errors import InputError, NotFoundError, TooLargeError
+from app.errors import InputError, NotFoundError, StorageError, TooLargeError
+from app.store import uploads
 from app.store.uploads import (
     Upload,
     UploadWriter,
@@ -20,6 +24,8 @@ from app.store.uploads import (
     safe_name,
     upload_path,
 )
+
+THEN = "2030-01-01T00:00:00+00:00"
 
 
 @pytest.fixture
@@ -66,6 +72,77 @@ class TestUploadWriter:
         with pytest.raises(InputError, match="empty"):
             send(settings, content=b"")
 
+    def test_a_file_named_like_the_record_is_a_file(self, settings: Settings) -> None:
+        said = {"id": "a" * 32, "name": "/etc/passwd", "bytes": 1, "created": "2030-01-01"}
+        upload = send(settings, "upload.json", json.dumps(said).encode()[:90])
+        assert get_upload(settings, upload.id) == upload
+        path = upload_path(settings, upload.id)
+        assert (path.name, path.read_bytes()) == ("upload.json", json.dumps(said).encode()[:90])
+
+    def test_it_is_nowhere_before_it_is_complete(
+        self, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        seen: list[list[str]] = []
+        rename = Path.rename
+
+        def watched(path: Path, target: Path) -> Path:
+            seen.append([item.id for item in list_uploads(settings)])
+            assert (path / "upload.json").is_file()
+            assert (path / "content" / "a.zip").read_bytes() == b"content"
+            return rename(path, target)
+
+        monkeypatch.setattr(Path, "rename", watched)
+        upload = send(settings)
+        assert seen == [[]]
+        assert [item.id for item in list_uploads(settings)] == [upload.id]
+
+    def test_eight_equal_ones_at_once_are_one(self, settings: Settings) -> None:
+        writers = [UploadWriter(settings, "a.zip") for _ in range(8)]
+        for writer in writers:
+            writer.write(b"content")
+        ready = threading.Barrier(8)
+
+        def guess(path: Path) -> str:
+            ready.wait(10)
+            return "coco"
+
+        with ThreadPoolExecutor(8) as pool:
+            uploads = set(pool.map(lambda writer: writer.finish(guess).id, writers))
+        assert len(uploads) == 1
+        assert [item.id for item in list_uploads(settings)] == list(uploads)
+        assert len(list(settings.uploads.iterdir())) == 1
+
+    def test_a_folder_without_record_makes_way(self, settings: Settings) -> None:
+        upload = send(settings)
+        (settings.uploads / upload.id / "upload.json").unlink()
+        assert send(settings).id == upload.id
+        assert list_uploads(settings) != []
+
+    def test_its_name_is_on_disk_before_it_is_acknowledged(
+        self, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        synced: list[tuple[str, bool]] = []
+        monkeypatch.setattr(
+            uploads, "sync", lambda path: synced.append((path.name, bool(list_uploads(settings))))
+        )
+        send(settings)
+        assert synced == [("content", False), ("uploads", True)]
+
+    def test_a_full_disk_is_a_sentence_and_leaves_nothing(
+        self, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def full(_: int) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        writer = UploadWriter(settings, "a.zip")
+        writer.write(b"content")
+        monkeypatch.setattr(os, "fsync", full)
+        with pytest.raises(StorageError, match="the disk is full") as caught:
+            writer.finish()
+        assert isinstance(caught.value.__cause__, OSError)
+        writer.abort()
+        assert list(settings.uploads.iterdir()) == []
+
     def test_nobody_else_may_read_it(self, settings: Settings) -> None:
         upload = send(settings)
         for folder in (settings.uploads, settings.uploads / upload.id):
@@ -100,6 +177,41 @@ class TestUploadPath:
         send(settings)
         with pytest.raises(NotFoundError):
             upload_path(settings, upload_id)
+
+
+class TestGetUpload:
+    @pytest.mark.parametrize(
+        ("field", "said"),
+        [
+            ("name", "../../secret"),
+            ("name", "/etc/passwd"),
+            ("name", 7),
+            ("id", "b" * 32),
+            ("created", "yesterday"),
+            ("created", "2030-01-01"),
+            ("more", 1),
+        ],
+    )
+    def test_a_record_that_nobody_wrote_so_is_none(
+        self, settings: Settings, field: str, said: object
+    ) -> None:
+        upload = send(settings)
+        record = settings.uploads / upload.id / "upload.json"
+        record.write_text(json.dumps({**json.loads(record.read_text()), field: said}))
+        with pytest.raises(NotFoundError):
+            upload_path(settings, upload.id)
+        assert list_uploads(settings) == []
+
+    def test_one_of_an_earlier_version_has_its_file_beside_the_record(
+        self, settings: Settings
+    ) -> None:
+        folder = settings.uploads / ("c" * 32)
+        folder.mkdir(parents=True)
+        (folder / "a.zip").write_bytes(b"content")
+        said = {"id": "c" * 32, "name": "a.zip", "bytes": 7, "created": THEN, "kept": True}
+        (folder / "upload.json").write_text(json.dumps(said))
+        assert upload_path(settings, "c" * 32).read_bytes() == b"content"
+        assert [item.name for item in list_uploads(settings)] == ["a.zip"]
 
 
 class TestExpireUploads:

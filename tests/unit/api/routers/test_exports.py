@@ -5,12 +5,17 @@ from __future__ import annotations
 import io
 import threading
 import zipfile
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from app.api.routers import exports as module
+from app.review.editing.recompute import solve_dataset
+from app.review.importing.ingest import ingest
 from app.review.jobs.jobs import Jobs
+from app.soccer.group import Media
+from app.store.frames import Picture
 
 SECONDS = 30
 API = "/api/v1/exports"
@@ -151,6 +156,27 @@ class TestDeleteExport:
 
 
 class TestRestart:
+    def test_its_frames_are_read_by_other_processes(
+        self, app, api, group, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        services, read = app.state.services, list[str]()
+        views = [replace(view, media=Media(f"/frames/{view.key}")) for view in group.views]
+        framed = replace(group, views=tuple(views))
+        ingest(services.store, "framed", [framed], source="test", actor="local")
+        solve_dataset(services.store, "framed")
+
+        def reader(media: Media, *_: object) -> Picture:
+            read.append(media.path)
+            return Picture.of("image/png", b"a picture")
+
+        monkeypatch.setattr(services.frames, "read", reader)
+        order = {**ORDER, "dataset": "framed", "all": True, "images": "copy"}
+        job = api.post(API, json=order).json()
+        done = services.jobs.wait(job["id"], SECONDS)
+        assert done.state == "done", done.problem
+        assert done.result["missing_images"] == 0
+        assert read == ["/frames/7.png", "/frames/7_1.png"]
+
     def test_an_export_that_was_under_way_is_written_by_the_next_server(
         self, app, api, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -162,7 +188,7 @@ class TestRestart:
         services.jobs._closing.set()
         job = api.post(API, json=ORDER).json()
         again = Jobs(services.store)
-        resume_exports(again, services.store, services.exports)
+        resume_exports(again, services.store, services.exports, services.frames)
         again.start()
         assert again.wait(job["id"], SECONDS).state == "done"
         again.close()

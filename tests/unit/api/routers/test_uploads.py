@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import zipfile
 from collections.abc import Iterator
 from typing import Any
+
+import pytest
 
 API = "/api/v1/uploads"
 BYTES = {"Content-Type": "application/octet-stream"}
@@ -29,7 +34,7 @@ class TestUploadFile:
         listed = api.get(API).json()
         assert listed["items"] == [body]
         folder = app.state.services.settings.uploads
-        assert (folder / body["id"] / "ISSIA-3D.csv").stat().st_size == 4_000_000
+        assert (folder / body["id"] / "content" / "ISSIA-3D.csv").stat().st_size == 4_000_000
 
     def test_the_same_file_again_is_the_same_upload(self, api) -> None:
         assert send(api).json() == send(api).json()
@@ -58,6 +63,22 @@ class TestUploadFile:
     def test_other_routes_take_no_bytes(self, api) -> None:
         answer = api.post("/api/v1/imports", content=b"x", headers=BYTES)
         assert answer.status_code == 415
+
+    def test_a_full_disk_is_507(self, api, monkeypatch) -> None:
+        def full(_: int) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        monkeypatch.setattr(os, "fsync", full)
+        answer = send(api)
+        assert answer.status_code == 507
+        assert answer.json()["detail"] == "the disk is full: the upload was not kept"
+        assert api.get(API).json()["items"] == []
+
+    def test_a_list_opens_no_file(self, api, monkeypatch) -> None:
+        body = send(api, b"PK", "frames.zip").json()
+        monkeypatch.setattr(zipfile, "ZipFile", lambda *_: pytest.fail("opened"))
+        assert api.get(API).json()["items"] == [body]
+        assert api.get(f"{API}/{body['id']}").json() == body
 
     def test_a_page_of_another_site_sends_nothing(self, api) -> None:
         assert send(api, Origin="http://evil.example").status_code == 403

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
-from app.api.routers.views import MAX_WIDTH, MIN_WIDTH, clamp_width
+from app.api.routers.views import MAX_WIDTH, MIN_WIDTH, clamp_width, while_wanted
+from app.child_pool import PoolTask
+from app.errors import OverloadedError
 from app.review.importing.ingest import ingest
 from app.soccer.group import Media
 
@@ -220,6 +225,37 @@ class TestImage:
             "view 7_1.png: Frames-v3.zip has no member 7_1.png",
         )
         assert str(frames.parent) not in answer.text + missing.text
+
+    def test_a_frame_that_is_one_comes_with_its_type_and_etag(self, api, frames) -> None:
+        picture = cv2.imencode(".png", np.full((90, 160, 3), 90, np.uint8))[1].tobytes()
+        with zipfile.ZipFile(frames, "w") as archive:
+            archive.writestr("7.png", picture)
+        row = api.get(f"{API}/groups", params={"dataset": "framed"}).json()["items"][0]
+        first = api.get(f"{API}/groups/{row['id']}").json()["views"][0]
+        answer = api.get(first["image"])
+        assert (answer.status_code, answer.headers["content-type"]) == (200, "image/png")
+        assert answer.content == picture
+        again = api.get(first["image"], headers={"If-None-Match": answer.headers["etag"]})
+        assert again.status_code == 304
+
+    def test_more_pictures_than_may_wait_are_503(self, app, api, frames, monkeypatch) -> None:
+        def refuse(*_: object, **__: object) -> None:
+            raise OverloadedError("68 pictures are being made or wait already")
+
+        monkeypatch.setattr(app.state.services.frames._pool, "submit", refuse)
+        row = api.get(f"{API}/groups", params={"dataset": "framed"}).json()["items"][0]
+        first = api.get(f"{API}/groups/{row['id']}").json()["views"][0]
+        answer = api.get(first["image"])
+        assert (answer.status_code, answer.headers["retry-after"]) == (503, "5")
+
+    def test_a_picture_that_nobody_waits_for_is_given_up(self) -> None:
+        class Gone:
+            async def is_disconnected(self) -> bool:
+                return True
+
+        task = PoolTask(lambda error: error)
+        assert asyncio.run(while_wanted(Gone(), task)) is None
+        assert task.future.cancelled()
 
 
 class TestClampWidth:

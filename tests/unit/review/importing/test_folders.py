@@ -63,7 +63,7 @@ class TestResolveFolder:
         with pytest.raises(UnsafePathError):
             resolve_folder(settings, path)
 
-    @pytest.mark.parametrize("path", ["data/none", "etc", "home"])
+    @pytest.mark.parametrize("path", ["data/none", "etc", "home", "data/" + "x" * 300])
     def test_a_folder_that_is_not_there_is_not_found(self, settings: Settings, path: str) -> None:
         with pytest.raises(NotFoundError):
             resolve_folder(settings, path)

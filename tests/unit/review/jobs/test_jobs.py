@@ -15,7 +15,7 @@ from app.review.importing.ingest import ensure_dataset
 from app.review.jobs import jobs as module
 from app.review.jobs.jobs import JobProgress, Jobs
 from app.store.codecs import Json
-from app.store.jobs import Job
+from app.store.jobs import Job, NewJob, insert_job
 from app.store.session import Store
 
 SECONDS = 20
@@ -224,6 +224,21 @@ class TestCancel:
         assert jobs.wait(kept.id, SECONDS).result == 7
 
 
+def job_that_servers_died_at(store: Store, deaths: int) -> int:
+    """A job as servers leave it that end in its midst."""
+    with store.write() as session:
+        job = insert_job(session, NewJob("import", "Import", "ann"))
+    for _ in range(deaths):
+        jobs, gate = Jobs(store), Gate()
+        jobs.resumes("import", lambda found, gate=gate: gate)
+        jobs.start()
+        assert gate.started.wait(SECONDS)
+        # What a server says that is killed: nothing any more.
+        jobs._save = lambda *_, **__: None  # type: ignore[method-assign]
+        jobs.close()
+    return job
+
+
 class TestRestart:
     def test_a_job_under_way_when_the_server_stopped_fails_with_a_sentence(
         self, store: Store
@@ -252,6 +267,36 @@ class TestRestart:
         done = second.wait(job.id, SECONDS)
         assert (done.state, done.result, second.find()) == ("done", 6, [done])
         second.close()
+
+    @pytest.mark.parametrize(("deaths", "state"), [(1, "done"), (2, "failed")])
+    def test_a_job_at_which_servers_died_twice_is_left_alone(
+        self, store: Store, deaths: int, state: str
+    ) -> None:
+        job = job_that_servers_died_at(store, deaths)
+        later = Jobs(store)
+        later.resumes("import", lambda found: lambda progress: 7)
+        later.start()
+        found = later.wait(job, SECONDS)
+        assert found.state == state
+        if state == "failed":
+            assert found.problem["detail"] == (
+                "The server died 2 times at this, so it is not begun again."
+            )
+        later.close()
+
+    def test_servers_that_stop_in_good_order_do_not_count(self, store: Store) -> None:
+        first, gate = Jobs(store), Gate()
+        job = submit(first, gate, kind="import")
+        for _ in range(3):
+            assert gate.started.wait(SECONDS)
+            first.close()
+            assert first.get(job.id).tries == 0
+            first, gate = Jobs(store), Gate(9)
+            first.resumes("import", lambda found, gate=gate: gate)
+            first.start()
+        gate.finish.set()
+        assert first.wait(job.id, SECONDS).result == 9
+        first.close()
 
     def test_finished_jobs_stay_as_they_were_after_a_restart(
         self, jobs: Jobs, store: Store

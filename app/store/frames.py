@@ -1,0 +1,132 @@
+"""Frames: pictures of views, made in processes of their own.
+
+A frame is a file of somebody else. What decodes it may need more memory or time than there is, or
+crash; then one process ends, one request is refused, and the service goes on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections import OrderedDict
+from dataclasses import dataclass
+
+from app.child import Allowance, ChildEnded
+from app.child_pool import ChildPool, PoolTask
+from app.config import Settings
+from app.errors import ImageError, ReviewError, TooLargeError
+from app.soccer.group import Media
+from app.store.image_header import JPEG
+from app.store.media import cached_frame, content_type, frame_name, frame_stamp, read_frame
+from app.store.neighbours import neighbours
+
+ALLOWANCE = Allowance(memory=1024 * 2**20, processor=10.0, silence=60.0)
+"""For one picture: one of 50 megapixels takes a few hundred MiB and two seconds."""
+WAITING = 64
+"""Pictures that may wait; one more is told to come back."""
+REMEMBERED = 256
+"""Frames that went beyond the allowance and are not tried again."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A frame as it is sent.
+
+    Attributes:
+        kind: Media type, by the bytes themselves.
+        data: The bytes.
+        digest: Of the bytes, 32 hexadecimal digits.
+    """
+
+    kind: str
+    data: bytes
+    digest: str
+
+    @staticmethod
+    def of(kind: str, data: bytes) -> Picture:
+        """The picture of these bytes."""
+        return Picture(kind, data, hashlib.sha256(data).hexdigest()[:32])
+
+
+class Frames:
+    """Makes pictures; few at once, and none that nobody waits for."""
+
+    def __init__(self, settings: Settings):
+        self._settings = settings
+        self._pool = ChildPool(ALLOWANCE, settings.image_workers, WAITING, "pictures")
+        self._refused: OrderedDict[str, ReviewError] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def warm(self) -> None:
+        """Start a process before anybody waits for it."""
+        self._pool.submit(ready, bounded=False)
+
+    def cached(self, media: Media, width: int | None, flipped: bool) -> Picture | None:
+        """What was made before, where it is kept.
+
+        Raises:
+            NotFoundError: The file is not there.
+            TooLargeError, ImageError: It was tried before, and went beyond the allowance.
+        """
+        with self._lock:
+            error = self._refused.get(frame_stamp(media))
+        if error is not None:
+            raise error
+        data = cached_frame(media, width, flipped, self._settings)
+        return None if data is None else Picture.of(JPEG, data)
+
+    def ask(self, media: Media, width: int | None, flipped: bool) -> PoolTask:
+        """Have a picture made; its future has it, or the errors of ``read_frame``.
+
+        Raises:
+            OverloadedError: Too many wait.
+        """
+        return self._submit(media, width, flipped, bounded=True)
+
+    def read(self, media: Media, width: int | None, flipped: bool) -> Picture:
+        """A picture, waited for however many others wait: for background work."""
+        found = self.cached(media, width, flipped)
+        if found is not None:
+            return found
+        made: Picture = self._submit(media, width, flipped, bounded=False).future.result()
+        return made
+
+    def neighbours(self, media: Media, group: str, static: bool) -> dict[int, Media]:
+        """``neighbours``, which opens videos and archives."""
+        task = self._pool.submit(neighbours, media, group, static)
+        try:
+            found: dict[int, Media] = task.future.result()
+        except ChildEnded:
+            return {}
+        return found
+
+    def close(self) -> None:
+        """End the processes."""
+        self._pool.close()
+
+    def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
+        def explain(error: ChildEnded) -> ReviewError:
+            kind = ImageError if error.reason == "crash" else TooLargeError
+            refusal = kind(f"{frame_name(media)} {error}")
+            self._remember(media, refusal)
+            return refusal
+
+        return self._pool.submit(
+            make_picture, media, width, flipped, self._settings, explain=explain, bounded=bounded
+        )
+
+    def _remember(self, media: Media, refusal: ReviewError) -> None:
+        with self._lock:
+            self._refused[frame_stamp(media)] = refusal
+            while len(self._refused) > REMEMBERED:
+                self._refused.popitem(last=False)
+
+
+def make_picture(media: Media, width: int | None, flipped: bool, settings: Settings) -> Picture:
+    """A picture, made in this process."""
+    data = read_frame(media, width, flipped, settings)
+    return Picture.of(content_type(data), data)
+
+
+def ready() -> None:
+    """What a process does that shall only be there: it has loaded what it needs."""

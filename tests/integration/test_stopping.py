@@ -1,0 +1,117 @@
+"""A server that stops, or is killed, leaves neither processes nor half of an upload."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import httpx
+import pytest
+
+from tests.integration.conftest import COMMAND, environment
+
+SECONDS = 60
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    return tmp_path / "home"
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A folder whose one file takes a long time to read."""
+    match = tmp_path / "data" / "league" / "season" / "match"
+    match.mkdir(parents=True)
+    (match / "Labels-v3.json").write_bytes(b'{"a":[%s{}]}' % (b"{}," * 30_000_000))
+    return tmp_path / "data"
+
+
+@pytest.fixture
+def server(home: Path, data: Path) -> Iterator[subprocess.Popen[str]]:
+    started = subprocess.Popen(
+        [sys.executable, "-c", COMMAND, "serve", "--port", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**environment(home), "TOUCHLINE_IMPORT_FOLDERS": str(data)},
+    )
+    yield started
+    started.kill()
+    started.communicate()
+
+
+@pytest.fixture
+def address(server: subprocess.Popen[str]) -> str:
+    assert server.stdout is not None
+    return server.stdout.readline().split()[-1]
+
+
+def until(happens: Callable[[], Any]) -> Any:
+    end = time.monotonic() + SECONDS
+    while time.monotonic() < end:
+        if found := happens():
+            return found
+        time.sleep(0.02)
+    raise AssertionError("it did not happen")
+
+
+def children(pid: int) -> list[int]:
+    """Processes that a process started, without those that are over."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, parent = stat.read_text().rpartition(")")[2].split()[:2]
+        except OSError:
+            continue
+        if int(parent) == pid and state != "Z":
+            found.append(int(stat.parent.name))
+    return found
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+class TestStopping:
+    @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+    def test_no_process_outlives_the_server(
+        self, server: subprocess.Popen[str], address: str, number: int
+    ) -> None:
+        body = {"dataset": "d", "format": "soccernet-v3", "source": {"folder": "data"}}
+        with httpx.Client(base_url=address, headers={"Origin": address}) as client:
+            job = client.post("/api/v1/imports", json=body).json()["id"]
+            place = f"/api/v1/jobs/{job}"
+            until(lambda: client.get(place).json()["state"] == "running")
+        # One for the pictures, one for the import, and multiprocessing's own.
+        workers = until(lambda: len(found := children(server.pid)) >= 3 and found)
+        server.send_signal(number)
+        server.wait(SECONDS)
+        until(lambda: not any(map(is_alive, workers)))
+
+    def test_nothing_stays_of_an_upload_that_stalls(
+        self, server: subprocess.Popen[str], address: str, home: Path
+    ) -> None:
+        where = urlsplit(address)
+        with socket.create_connection((where.hostname, where.port)) as line:
+            head = (
+                f"POST /api/v1/uploads?name=a.zip HTTP/1.1\r\nHost: {where.netloc}\r\n"
+                "Content-Type: application/octet-stream\r\nContent-Length: 1000\r\n\r\nstart"
+            )
+            line.sendall(head.encode())
+            until(lambda: list((home / "uploads").glob("*.part")))
+            server.send_signal(signal.SIGTERM)
+            line.settimeout(SECONDS)
+            assert line.recv(12) == b"HTTP/1.1 503"
+            server.wait(SECONDS)
+        assert list((home / "uploads").iterdir()) == []

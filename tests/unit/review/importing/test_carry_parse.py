@@ -1,0 +1,25 @@
+"""What is carried between installations is read as somebody else's."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.datasets.archive import open_tree
+from app.datasets.report import Report
+from app.errors import DatasetFormatError
+from app.review.importing.carry_parse import FORMAT, FORMAT_VERSION, HEAD, read_head
+
+
+class TestReadHead:
+    @pytest.mark.parametrize("policy", [{"calibration": 12}, {"calibration": None}, 5, None])
+    def test_a_policy_that_is_none_is_named(self, tmp_path: Path, policy: Any) -> None:
+        head = {"format": FORMAT, "version": FORMAT_VERSION, "dataset": "demo", "policy": policy}
+        (tmp_path / HEAD).write_text(json.dumps(head))
+        tree = open_tree(tmp_path, Report())
+        assert tree is not None
+        with pytest.raises(DatasetFormatError, match=r"touchline\.json, policy: is not a policy"):
+            read_head(tree)

@@ -1,0 +1,165 @@
+"""An import in a child does the same as one here, and ends within limits or when it is told to."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from app.datasets.soccernet_v3_writer import write_soccernet_v3
+from app.errors import JobCancelled, TooLargeError
+from app.progress import Progress
+from app.review.datasets.dataset import list_datasets
+from app.review.importing.import_child import Outcome, import_apart
+from app.review.importing.sources import Source, import_source
+from app.soccer.group import Group
+from app.store.session import Store
+
+SECONDS = 60
+
+
+def wanted() -> None:
+    """Nobody ends it."""
+
+
+def apart(
+    store: Store,
+    path: Path,
+    dataset: str = "apart",
+    *,
+    dry_run: bool = False,
+    progress: Progress = lambda *told: None,
+    stop: Callable[[], None] = wanted,
+) -> Outcome:
+    source = Source("soccernet-v3", path, name="data")
+    return import_apart(
+        store, dataset, source, actor="ann", dry_run=dry_run, progress=progress, stop=stop
+    )
+
+
+@pytest.fixture
+def tree(tmp_path: Path, make_group: Callable[..., Group]) -> Path:
+    root = tmp_path / "data"
+    root.mkdir()
+    write_soccernet_v3(root, [make_group()])
+    return root
+
+
+def heavy(root: Path, objects: int) -> Path:
+    """A folder with little JSON that becomes many objects."""
+    match = root / "league" / "season" / "match"
+    match.mkdir(parents=True)
+    (match / "Labels-v3.json").write_bytes(b'{"a":[%s{}]}' % (b"{}," * objects))
+    return root
+
+
+def limit(monkeypatch: pytest.MonkeyPatch, store: Store, values: dict[str, int]) -> None:
+    monkeypatch.setattr(store, "settings", store.settings.model_copy(update=values))
+
+
+class TestImportApart:
+    def test_does_and_says_what_an_import_here_does(self, store: Store, tree: Path) -> None:
+        done: list[tuple[int, int | None, str]] = []
+        outcome = apart(store, tree, progress=lambda *told: done.append(told))
+        here = import_source(
+            store, "here", Source("soccernet-v3", tree, name="data"), store.settings
+        )
+        assert outcome == Outcome(here.values(), True, None)
+        assert done == [(1, None, "")]
+        assert [(item.name, item.groups) for item in list_datasets(store)] == [
+            ("apart", 1),
+            ("here", 1),
+        ]
+
+    def test_what_holds_nothing_says_why(self, store: Store, tmp_path: Path) -> None:
+        outcome = apart(store, tmp_path)
+        assert outcome.nothing is not None
+        assert outcome.nothing[0].startswith("nothing could be imported from data")
+
+    def test_it_writes_in_its_turn(
+        self, store: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        own, turns = store.turn, list[str]()
+
+        @contextmanager
+        def watched() -> Iterator[None]:
+            with own:
+                turns.append("taken")
+                yield
+                turns.append("given")
+
+        class Turn:
+            def __enter__(self) -> None:
+                self.held = watched()
+                self.held.__enter__()
+
+            def __exit__(self, *_: object) -> None:
+                self.held.__exit__(None, None, None)
+
+        monkeypatch.setattr(store, "turn", Turn())
+        apart(store, tree)
+        assert turns == ["taken", "given"] * (len(turns) // 2)
+        assert turns
+
+    def test_while_somebody_writes_it_waits(
+        self, store: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        asked = threading.Event()
+        own = store.turn
+
+        class Turn:
+            def __enter__(self) -> None:
+                asked.set()
+                own.__enter__()
+
+            def __exit__(self, *_: object) -> None:
+                own.__exit__(None, None, None)
+
+        running = threading.Thread(target=apart, args=(store, tree))
+        with store.write():
+            monkeypatch.setattr(store, "turn", Turn())
+            running.start()
+            assert asked.wait(SECONDS)
+            with store.read() as session:
+                assert (
+                    session.connection().exec_driver_sql("SELECT count(*) FROM dataset").scalar()
+                    == 0
+                )
+        running.join(SECONDS)
+        assert [item.name for item in list_datasets(store)] == ["apart"]
+
+    def test_one_that_is_told_to_end_ends_and_lets_others_write(
+        self, store: Store, tree: Path
+    ) -> None:
+        def stop() -> None:
+            raise JobCancelled
+
+        with pytest.raises(JobCancelled):
+            apart(store, tree, stop=stop)
+        with store.write():
+            pass
+
+    def test_what_needs_too_much_memory_is_a_sentence(
+        self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        path = heavy(tmp_path / "heavy", 8_000_000)
+        limit(monkeypatch, store, {"import_memory": 400 * 2**20})
+        with pytest.raises(
+            TooLargeError, match=r"^data needs more than 400 MiB of memory$"
+        ) as caught:
+            apart(store, path)
+        assert "TOUCHLINE_IMPORT_MEMORY" in (caught.value.hint or "")
+        assert list_datasets(store) == []
+        with store.write():
+            pass
+
+    def test_what_takes_too_long_is_a_sentence(
+        self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        path = heavy(tmp_path / "heavy", 16_000_000)
+        limit(monkeypatch, store, {"import_seconds": 1})
+        with pytest.raises(TooLargeError, match=r"^data takes more than 1 seconds to work out$"):
+            apart(store, path)

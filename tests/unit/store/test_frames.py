@@ -1,0 +1,125 @@
+"""Pictures are made in other processes, and what is too much for one is refused."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.child import Allowance
+from app.config import Settings
+from app.errors import ImageError, NotFoundError, TooLargeError
+from app.soccer.group import Media
+from app.store import frames as module
+from app.store.frames import Frames, make_picture
+
+PICTURE = np.full((90, 160, 3), 90, np.uint8)
+PNG = cv2.imencode(".png", PICTURE)[1].tobytes()
+
+
+def deep_png(side: int) -> bytes:
+    """A black PNG with 16 bits a channel: a few hundred times smaller than its pixels."""
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        whole = kind + body
+        return struct.pack(">I", len(body)) + whole + struct.pack(">I", zlib.crc32(whole))
+
+    packer, row = zlib.compressobj(9), bytes(side * 6 + 1)
+    data = b"".join(packer.compress(row) for _ in range(side)) + packer.flush()
+    header = struct.pack(">IIBBBBB", side, side, 16, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        (chunk(b"IHDR", header), chunk(b"IDAT", data), chunk(b"IEND", b""))
+    )
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(home=tmp_path / "home", image_workers=1)
+
+
+@pytest.fixture
+def frames(settings: Settings) -> Iterator[Frames]:
+    made = Frames(settings)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def media(tmp_path: Path) -> Media:
+    path = tmp_path / "7.png"
+    path.write_bytes(PNG)
+    return Media(str(path))
+
+
+class TestFrames:
+    def test_makes_the_same_picture_as_this_process(
+        self, frames: Frames, media: Media, settings: Settings
+    ) -> None:
+        for width in (None, 40):
+            assert frames.read(media, width, False) == make_picture(media, width, False, settings)
+
+    def test_a_picture_that_was_made_needs_no_process(
+        self, frames: Frames, media: Media, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        assert frames.cached(media, 40, False) is None
+        made = make_picture(media, 40, False, settings)
+        monkeypatch.setattr(frames._pool, "submit", lambda *_, **__: pytest.fail("asked"))
+        assert frames.read(media, 40, False) == made
+
+    def test_what_needs_too_much_is_refused_by_its_name_and_not_tried_again(
+        self,
+        tmp_path: Path,
+        settings: Settings,
+        media: Media,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        path = tmp_path / "deep.png"
+        path.write_bytes(deep_png(7000))
+        monkeypatch.setattr(module, "ALLOWANCE", Allowance(200 * 2**20, 60.0, 60.0))
+        frames = Frames(settings)
+        try:
+            frames.read(media, None, False)
+            with pytest.raises(TooLargeError, match=r"^frame deep\.png needs more than 200 MiB"):
+                frames.read(Media(str(path)), None, False)
+            assert frames.read(media, None, False).data == PNG
+        finally:
+            frames.close()
+
+    def test_what_ended_its_process_is_not_tried_again(
+        self, tmp_path: Path, frames: Frames, media: Media, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "make_picture", crash)
+        with pytest.raises(ImageError, match=r"frame 7\.png made the process crash"):
+            frames.read(media, None, False)
+        monkeypatch.undo()
+        for width in (None, 40):
+            with pytest.raises(ImageError, match="crash"):
+                frames.read(media, width, False)
+        Path(media.path).write_bytes(PNG + b"\0")
+        assert frames.read(media, None, False).kind == "image/png"
+
+    def test_a_refusal_is_that_of_this_process(self, frames: Frames, tmp_path: Path) -> None:
+        with pytest.raises(NotFoundError, match=r"gone\.png is not where it was imported from"):
+            frames.read(Media(str(tmp_path / "gone.png")), None, False)
+        path = tmp_path / "x.png"
+        path.write_bytes(b"hello")
+        with pytest.raises(ImageError, match=r"frame x\.png is no JPEG, PNG or WebP image"):
+            frames.read(Media(str(path)), None, False)
+
+    def test_the_frames_around_one_are_found(self, frames: Frames, tmp_path: Path) -> None:
+        folder = tmp_path / "img1"
+        folder.mkdir()
+        for number in (1, 2, 3):
+            (folder / f"00000{number}.png").write_bytes(PNG)
+        found = frames.neighbours(Media(str(folder / "000002.png")), "2", False)
+        assert sorted(found) == [-1, 1]
+
+
+def crash(*_: object) -> None:
+    os.abort()

@@ -1,0 +1,111 @@
+"""A pool has a few children, and a bound on what waits for them."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from concurrent.futures import CancelledError
+from pathlib import Path
+
+import pytest
+
+from app.child import Allowance, ChildEnded
+from app.child_pool import ChildPool
+from app.errors import ImageError, OverloadedError
+
+ALLOWANCE = Allowance(memory=300 * 2**20, processor=60.0, silence=60.0)
+
+
+@pytest.fixture
+def pool() -> Iterator[ChildPool]:
+    made = ChildPool(ALLOWANCE, 1, 2, "pictures")
+    yield made
+    made.close()
+
+
+class Gate:
+    """Holds a child until it is opened."""
+
+    def __init__(self, folder: Path):
+        self.reached, self.open = folder / "reached", folder / "open"
+
+    def wait_until_reached(self) -> None:
+        until = time.monotonic() + 60
+        while not self.reached.exists() and time.monotonic() < until:
+            time.sleep(0.01)
+        assert self.reached.exists()
+
+
+def pass_gate(gate: Gate, name: str) -> str:
+    gate.reached.write_text(name)
+    while not gate.open.exists():
+        time.sleep(0.01)
+    return name
+
+
+def note(folder: Path, name: str) -> None:
+    (folder / name).write_text("done")
+
+
+class TestSubmit:
+    def test_one_child_does_one_task_after_the_other(self, pool: ChildPool) -> None:
+        tasks = [pool.submit(os.getpid) for _ in range(3)]
+        pids = {task.future.result(60) for task in tasks}
+        assert len(pids) == 1
+        assert pids != {os.getpid()}
+
+    def test_more_than_may_wait_are_refused_and_later_taken(
+        self, pool: ChildPool, tmp_path: Path
+    ) -> None:
+        gate = Gate(tmp_path)
+        tasks = [pool.submit(pass_gate, gate, "a") for _ in range(3)]
+        with pytest.raises(OverloadedError, match="3 pictures are being made or wait already"):
+            pool.submit(pass_gate, gate, "b")
+        patient = pool.submit(pass_gate, gate, "c", bounded=False)
+        gate.open.touch()
+        assert [task.future.result(60) for task in (*tasks, patient)] == ["a", "a", "a", "c"]
+        assert pool.submit(pass_gate, gate, "d").future.result(60) == "d"
+
+    def test_what_nobody_waits_for_is_not_begun(self, pool: ChildPool, tmp_path: Path) -> None:
+        gate = Gate(tmp_path)
+        first = pool.submit(pass_gate, gate, "a")
+        gate.wait_until_reached()
+        left = pool.submit(note, tmp_path, "left")
+        last = pool.submit(note, tmp_path, "last")
+        left.leave()
+        gate.open.touch()
+        first.future.result(60)
+        last.future.result(60)
+        assert not (tmp_path / "left").exists()
+        with pytest.raises(CancelledError):
+            left.future.result(60)
+        assert (tmp_path / "last").exists()
+
+    def test_what_nobody_waits_for_any_more_is_ended(self, pool: ChildPool, tmp_path: Path) -> None:
+        task = pool.submit(pass_gate, Gate(tmp_path), "a")
+        Gate(tmp_path).wait_until_reached()
+        task.leave()
+        with pytest.raises(CancelledError):
+            task.future.result(60)
+        assert pool.submit(os.getpid).future.result(60) != os.getpid()
+
+    def test_a_child_that_ends_is_explained_and_replaced(self, pool: ChildPool) -> None:
+        def explain(error: ChildEnded) -> Exception:
+            return ImageError(f"7.png {error}")
+
+        task = pool.submit(os.abort, explain=explain)
+        with pytest.raises(ImageError, match=r"^7\.png made the process crash that read it$"):
+            task.future.result(60)
+        assert pool.submit(os.getpid).future.result(60) != os.getpid()
+
+
+class TestClose:
+    def test_ends_what_runs_and_what_waits(self, pool: ChildPool, tmp_path: Path) -> None:
+        running = pool.submit(pass_gate, Gate(tmp_path), "a")
+        waiting = pool.submit(note, tmp_path, "b")
+        Gate(tmp_path).wait_until_reached()
+        pool.close()
+        for task in (running, waiting):
+            with pytest.raises((ChildEnded, CancelledError)):
+                task.future.result(0)
