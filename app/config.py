@@ -68,6 +68,11 @@ class Settings(BaseSettings):
         return self.database_url or f"sqlite+pysqlite:///{self.home / 'touchline.db'}"
 
     @property
+    def database_file(self) -> Path:
+        """The file of the database."""
+        return Path(self.database.partition("///")[2].partition("?")[0])
+
+    @property
     def cache(self) -> Path:
         """Derived images; can be deleted at any time."""
         return self.home / "cache"

@@ -24,7 +24,7 @@ def doctor(
     """Look whether the database is whole and its tables are what the log says; 1 if they are not."""
     from app.review.editing.doctor import examine
     from app.review.editing.replay import rebuild as rebuild_tables
-    from app.store.home import server_lock
+    from app.store.locks import server_lock
 
     settings = read_settings()
     if rebuild:

@@ -11,13 +11,15 @@ from typing import Any
 from sqlalchemy import ColumnElement, bindparam, insert, select
 from sqlalchemy.orm import Session
 
-from app.errors import StorageError
+from app.errors import DamagedError
 from app.store.codecs import Json, canonical, unpack
 from app.store.models import LogModel
 
 GENESIS = "0" * 64
 """The hash before the first row."""
 
+LOG_END = "touchline_log_end"
+"""Where a session notes id and hash of the last entry that it wrote."""
 _BATCH = 500
 
 
@@ -67,6 +69,7 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
         row = {name: getattr(entry, name) for name in _COLUMNS}
         rows.append({**row, "id": number, "hash": previous, "body": zlib.compress(body)})
     session.execute(insert(LogModel), rows, execution_options={"render_nulls": True})
+    session.info[LOG_END] = (number, previous)
     return [row["id"] for row in rows]
 
 
@@ -126,16 +129,16 @@ def verify_chain(session: Session) -> int:
     """Check every hash of the log; returns the number of rows.
 
     Raises:
-        StorageError: A row was changed, removed or put in from outside.
+        DamagedError: A row was changed, removed or put in from outside.
     """
     count, previous = 0, GENESIS
     for entry in read_log(session):
         count += 1
         previous = chain_hash(previous, count, entry, canonical(entry.body).encode())
         if entry.id != count or entry.hash != previous:
-            raise StorageError(
+            raise DamagedError(
                 f"row {entry.id} of the log is not what was written",
-                hint="Restore the database from a backup.",
+                hint="Run touchline restore BACKUP.",
             )
     return count
 

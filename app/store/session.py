@@ -5,15 +5,28 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 from sqlalchemy import Engine, text
 from sqlalchemy.orm import Session
 
 from app.config import Settings
-from app.errors import StorageError
-from app.store.engine import WRITE, make_engine, reported, require_pragmas
-from app.store.home import make_home
-from app.store.migrate import KNOWN_REVISIONS, SCHEMA_REVISION, migrate, schema_revision
+from app.errors import DamagedError, StorageError
+from app.store.anchor import move_anchor, read_anchor, sync_anchor
+from app.store.durable import make_file
+from app.store.engine import EXAMINE, WRITE, make_engine, reported, require_pragmas
+from app.store.first_look import require_sound
+from app.store.locks import DatabaseLock
+from app.store.log import LOG_END
+from app.store.migrate import (
+    KNOWN_REVISIONS,
+    SCHEMA_REVISION,
+    bring_up_to_date,
+    newer_schema,
+    renew_anchor,
+    require_own_database,
+    schema_revision,
+)
 
 TURN_SECONDS = 10.0
 """How long a thread waits for the writes of others in its process; SQLite waits for other
@@ -26,35 +39,42 @@ class Store:
     Use ``Store.open``; the constructor trusts its engine.
     """
 
-    def __init__(self, engine: Engine, settings: Settings):
+    def __init__(self, engine: Engine, settings: Settings, lock: DatabaseLock):
         self.settings = settings
         self._engine = engine
         self._writer = engine.execution_options(**WRITE)
+        self._lock = lock
         self._turn = threading.Lock()
         self._listeners: list[Callable[[], None]] = []
+        self._anchor = read_anchor(settings.database_file)
+        self._damage: str | None = None
 
     @staticmethod
     def open(settings: Settings) -> Store:
         """Open the database; an empty home is migrated, an older one must be first.
 
         Raises:
-            StorageError: The schema is older or newer than this version's, or the file is not
-                a database, or SQLite does not keep the promises asked of it.
+            StorageError: The schema is older or newer than this version's, or SQLite does not keep
+                the promises asked of it.
+            DamagedError: The database is not what was written, or not the one of its home.
             InputError: The URL is not one of SQLite.
         """
-        make_home(settings)
-        engine = make_engine(settings)
-        with reported(settings):
-            require_pragmas(engine)
-            if schema_revision(engine) is None:
-                migrate(settings)
-            _require_schema(engine)
-        return Store(engine, settings)
+        lock = DatabaseLock(settings)
+        engine: Engine | None = None
+        try:
+            engine = _open(settings, lock.alone)
+            lock.share()
+            return Store(engine, settings, lock)
+        except BaseException:
+            if engine is not None:
+                engine.dispose()
+            lock.release()
+            raise
 
     @contextmanager
     def read(self) -> Iterator[Session]:
         """A session on one consistent snapshot; nothing that it changes is kept."""
-        with reported(self.settings), Session(self._engine, autoflush=False) as session:
+        with self._watched(), Session(self._engine, autoflush=False) as session:
             yield session
 
     @contextmanager
@@ -66,12 +86,14 @@ class Store:
         Raises:
             StorageError: Others were writing all the while; nothing was changed.
         """
-        with self._own_turn(), reported(self.settings), Session(self._writer) as session:
+        self.require_undamaged()
+        with self._own_turn(), self._watched(), Session(self._writer) as session:
             # Take the lock before anything is read, so that what is read is still true when it
             # is written.
             session.connection()
             yield session
             session.commit()
+            self._anchored(session)
         for listener in self._listeners:
             listener()
 
@@ -87,6 +109,30 @@ class Store:
         finally:
             self._turn.release()
 
+    def require_undamaged(self) -> None:
+        """Raise DamagedError once the database was seen to be damaged.
+
+        What is left of it is read as long as it can be; another change could only spoil more.
+        """
+        if self._damage is not None:
+            raise DamagedError(self._damage, hint=EXAMINE)
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        try:
+            with reported(self.settings):
+                yield
+        except DamagedError as error:
+            self._damage = error.message
+            raise
+
+    def _anchored(self, session: Session) -> None:
+        """Tell the home how long the log is by now."""
+        end = session.info.get(LOG_END)
+        if end is not None and self._anchor is not None:
+            self._anchor = replace(self._anchor, entries=end[0], hash=end[1])
+            move_anchor(self.settings.database_file, self._anchor)
+
     def listen(self, listener: Callable[[], None]) -> None:
         """Call a function after each commit of this process; it must be quick."""
         self._listeners.append(listener)
@@ -94,9 +140,30 @@ class Store:
     def close(self) -> None:
         """Close all connections."""
         self._engine.dispose()
+        sync_anchor(self.settings.database_file)
+        self._lock.release()
 
 
-def _require_schema(engine: Engine) -> None:
+def _open(settings: Settings, alone: bool) -> Engine:
+    engine = make_engine(settings)
+    if alone:
+        require_sound(settings)
+    make_file(settings.database_file)
+    try:
+        with reported(settings):
+            require_pragmas(engine)
+            if schema_revision(engine) is None:
+                bring_up_to_date(settings, alone=alone)
+            _require_schema(engine, settings)
+            require_own_database(engine, settings)
+            renew_anchor(engine, settings)
+    except BaseException:
+        engine.dispose()
+        raise
+    return engine
+
+
+def _require_schema(engine: Engine, settings: Settings) -> None:
     revision = schema_revision(engine)
     if revision == SCHEMA_REVISION:
         return
@@ -104,13 +171,14 @@ def _require_schema(engine: Engine) -> None:
         raise StorageError(
             "the database was made by an older version of Touchline", hint="Run touchline migrate."
         )
-    raise StorageError(
-        f"the database was made by a newer version of Touchline (schema {revision})",
-        hint="Update Touchline; an older version would damage the data.",
-    )
+    raise newer_schema(str(revision), settings)
 
 
 def ping(store: Store) -> None:
-    """Ask the database one question; raises ``StorageError`` when it does not answer."""
+    """Ask the database one question; raises ``StorageError`` when it does not answer.
+
+    A database that was seen to be damaged does not, whatever it answers.
+    """
+    store.require_undamaged()
     with store.read() as session:
         session.execute(text("SELECT 1"))

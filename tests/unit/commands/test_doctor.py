@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from app.cli import app
 from app.config import Settings
 from app.review.importing.ingest import ensure_dataset
-from app.store.home import server_lock
+from app.store.locks import server_lock
 from app.store.session import Store
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import StorageError
-from app.store.home import file_system, make_home, server_lock
+from app.store.home import file_system, make_home
 
 MOUNTS = """\
 /dev/vda / ext4 rw 0 0
@@ -46,12 +46,3 @@ class TestMakeHome:
         other = settings.model_copy(update={"home": tmp_path / "file" / "home"})
         with pytest.raises(StorageError, match="cannot be made"):
             make_home(other)
-
-
-class TestServerLock:
-    def test_a_home_has_one_server(self, settings) -> None:
-        refused = pytest.raises(StorageError, match="another Touchline server")
-        with server_lock(settings), refused, server_lock(settings):
-            pass
-        with server_lock(settings):
-            pass

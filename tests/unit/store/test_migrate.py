@@ -14,7 +14,7 @@ from app.store.tables import Base
 
 class TestMigrate:
     def test_makes_the_tables_of_the_models(self, settings) -> None:
-        assert migrate(settings) == KNOWN_REVISIONS[-1]
+        assert migrate(settings).revision == KNOWN_REVISIONS[-1]
         with make_engine(settings).connect() as connection:
             context = MigrationContext.configure(connection)
             assert compare_metadata(context, Base.metadata) == []

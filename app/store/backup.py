@@ -1,0 +1,291 @@
+"""Backups: a home in one zip, with a manifest that tells every byte, taken beside a running server.
+
+``touchline.db`` is the database as one transaction saw it, ``manifest.json`` says what it holds;
+files of the home lie under their own names. Any zip program unpacks it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+import zipfile
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import pysqlite3.dbapi2
+from sqlalchemy import Connection, Engine, inspect, text
+from sqlalchemy.orm import Session
+
+from app.config import Settings
+from app.errors import DamagedError, InputError, StorageError
+from app.finite import json_text
+from app.store.anchor import Anchor, anchor_of
+from app.store.clock import now
+from app.store.durable import sync
+from app.store.engine import EXAMINE, make_engine, reported
+from app.store.home import refused
+from app.store.log import verify_chain
+
+FORMAT, FORMAT_VERSION = "touchline-backup", 1
+DATABASE, MANIFEST = "touchline.db", "manifest.json"
+FRAMES = ("uploads", "sample", "practice")
+"""Folders of a home that hold frames, and the files that were imported from."""
+EXPORTS = ("exports",)
+_CHUNK = 1 << 20
+_QUICK = 1
+_COUNTED = ("dataset", "groups", "view", "station", "verdict", "version", "solution", "log")
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a backup holds.
+
+    Attributes:
+        made: When.
+        home: Where the home was, which frames are read from.
+        schema: Revision of the database's schema.
+        installation: Id of the installation, empty where it had none yet.
+        entries: Length of the log; ``hash`` is that of its last entry.
+        rows: Rows by table.
+        files: Bytes and SHA-256 by name.
+        format: What kind of file this is.
+        version: Of the format.
+    """
+
+    made: str
+    home: str
+    schema: str
+    installation: str
+    entries: int
+    hash: str
+    rows: dict[str, int]
+    files: dict[str, dict[str, int | str]]
+    format: str = FORMAT
+    version: int = FORMAT_VERSION
+
+
+def write_backup(
+    settings: Settings, out: Path, folders: Sequence[str] = (), *, replace: bool = False
+) -> Manifest:
+    """Write a backup and read it once more; it is at its place when it is good, or not at all.
+
+    Args:
+        settings: Which home.
+        out: The zip.
+        folders: Folders of the home that go with it (``FRAMES``, ``EXPORTS``).
+        replace: Whether a file of that name may be replaced.
+
+    Raises:
+        InputError: There is such a file already, or no such folder.
+        DamagedError: The database is damaged; nothing is written.
+        StorageError: The disk is full, or somebody writes the same backup.
+    """
+    _require_place(out, replace)
+    try:
+        with _workshop(out) as folder:
+            copy, partial = folder / DATABASE, folder / "backup.zip"
+            _copy_database(settings, copy)
+            manifest = _write_zip(settings, copy, partial, folders)
+            verify_backup(partial)
+            _require_place(out, replace)
+            partial.replace(out)
+            sync(out.parent)
+    except OSError as error:
+        raise refused(Path(error.filename or out), error) from error
+    return manifest
+
+
+def read_manifest(backup: zipfile.ZipFile) -> Manifest:
+    """What a backup says that it holds.
+
+    Raises:
+        InputError: It is no backup, or one of a newer version.
+    """
+    try:
+        values = json.loads(backup.read(MANIFEST))
+        if values["format"] != FORMAT:
+            raise ValueError(values["format"])
+        if values["version"] != FORMAT_VERSION:
+            raise InputError("the backup was made by a newer version of Touchline")
+        return Manifest(**values)
+    except (KeyError, ValueError, TypeError) as error:
+        raise InputError(
+            f"{backup.filename} is no backup of Touchline: its manifest.json is missing or unknown"
+        ) from error
+
+
+def verify_backup(path: Path) -> Manifest:
+    """Read every byte of a backup and compare it with its manifest.
+
+    Raises:
+        InputError: It is no backup, or not what was written.
+    """
+    try:
+        with zipfile.ZipFile(path) as backup:
+            manifest = read_manifest(backup)
+            names = [info.filename for info in backup.infolist() if info.filename != MANIFEST]
+            if sorted(names) != sorted(manifest.files):
+                raise InputError(f"{path} does not hold the files that its manifest names")
+            for name in names:
+                with backup.open(name) as member:
+                    if _digest(member) != manifest.files[name]:
+                        raise InputError(f"{path}, {name}: not what was written")
+    except (zipfile.BadZipFile, EOFError, OSError, zipfile.zlib.error) as error:
+        raise InputError(
+            f"{path} is damaged or no backup of Touchline ({error})", hint="Take another one."
+        ) from error
+    return manifest
+
+
+def examine_database(settings: Settings, file: Path) -> tuple[Anchor, dict[str, int]]:
+    """Look at every page of a database that nobody else has open, and at the log's hash chain.
+
+    Returns:
+        What its anchor is, and its rows by table.
+
+    Raises:
+        DamagedError: Something is not as it was written.
+    """
+    own = settings.model_copy(update={"database_url": f"sqlite+pysqlite:///{file}"})
+    engine = make_engine(own)
+    try:
+        with reported(own):
+            return _examine(engine, file)
+    finally:
+        engine.dispose()
+
+
+def _examine(engine: Engine, file: Path) -> tuple[Anchor, dict[str, int]]:
+    with Session(engine) as session:
+        connection = session.connection()
+        tables = set(inspect(connection).get_table_names())
+        if "alembic_version" not in tables or "log" not in tables:
+            raise DamagedError(f"{file} is no database of Touchline", hint=EXAMINE)
+        faults = connection.execute(text("PRAGMA integrity_check(3)")).scalars().all()
+        if faults != ["ok"]:
+            raise DamagedError(f"{file} is damaged: {'; '.join(faults)}", hint=EXAMINE)
+        if connection.execute(text("PRAGMA foreign_key_check")).first() is not None:
+            raise DamagedError(f"{file} has rows that refer to rows that are gone", hint=EXAMINE)
+        verify_chain(session)
+        counts = {
+            name: connection.execute(text(f"SELECT count(*) FROM {name}")).scalar_one()
+            for name in _COUNTED
+            if name in tables
+        }
+        return anchor_of(connection) or _without_installation(connection), counts
+
+
+def _without_installation(connection: Connection) -> Anchor:
+    schema = connection.execute(text("SELECT version_num FROM alembic_version")).scalar_one()
+    last = connection.execute(text("SELECT id, hash FROM log ORDER BY id DESC LIMIT 1")).first()
+    return Anchor("", "", schema, *(tuple(last) if last else (0, "")))
+
+
+def _require_place(out: Path, replace: bool) -> None:
+    if out.exists() and not replace:
+        raise InputError(f"{out} is there already", hint="Name a file that does not exist yet.")
+    if not out.parent.is_dir():
+        raise InputError(f"there is no folder {out.parent}")
+
+
+@contextmanager
+def _workshop(out: Path) -> Iterator[Path]:
+    """A folder beside the backup, gone at the end; what a killed run left in it goes first."""
+    folder = out.with_name(f".{out.name}.partial")
+    folder.mkdir(mode=0o700, exist_ok=True)
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(handle)
+        raise StorageError(f"another process is writing {out}") from error
+    try:
+        for path in folder.iterdir():
+            path.unlink()
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(handle)
+
+
+def _copy_database(settings: Settings, copy: Path) -> None:
+    """The database as it is at one moment, in a file of its own that needs no log beside it."""
+    os.close(os.open(copy, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
+    engine = make_engine(settings)
+    try:
+        with (
+            reported(settings),
+            engine.connect() as connection,
+            closing(pysqlite3.dbapi2.connect(str(copy))) as target,
+        ):
+            # All pages at once: writers go on meanwhile, and none of their changes is in it.
+            connection.connection.dbapi_connection.backup(target)
+    except pysqlite3.dbapi2.Error as error:
+        raise StorageError(
+            f"the database cannot be copied: {error}", hint="Is there room on the disk? " + EXAMINE
+        ) from error
+    finally:
+        engine.dispose()
+
+
+def _write_zip(settings: Settings, copy: Path, partial: Path, folders: Sequence[str]) -> Manifest:
+    anchor, rows = examine_database(settings, copy)
+    with closing(pysqlite3.dbapi2.connect(str(copy))) as connection:
+        connection.execute("PRAGMA journal_mode=DELETE")
+    files: dict[str, dict[str, int | str]] = {}
+    handle = os.open(partial, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(handle, "w+b") as file:
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=_QUICK) as backup:
+            files[DATABASE] = _add(backup, DATABASE, copy, zipfile.ZIP_DEFLATED)
+            for path in _files(settings.home, folders):
+                name = path.relative_to(settings.home).as_posix()
+                files[name] = _add(backup, name, path, zipfile.ZIP_STORED)
+            manifest = Manifest(
+                made=now(),
+                home=str(settings.home.resolve()),
+                schema=anchor.schema,
+                installation=anchor.installation,
+                entries=anchor.entries,
+                hash=anchor.hash,
+                rows=rows,
+                files=files,
+            )
+            backup.writestr(MANIFEST, json_text(asdict(manifest), indent=1))
+        file.flush()
+        os.fsync(file.fileno())
+    return manifest
+
+
+def _files(home: Path, folders: Sequence[str]) -> Iterator[Path]:
+    """Files of folders, in order; half-written ones are nobody's yet."""
+    for name in folders:
+        for path in sorted((home / name).rglob("*")):
+            if path.is_file() and not path.is_symlink() and not _is_half_written(path):
+                yield path
+
+
+def _is_half_written(path: Path) -> bool:
+    return path.name.endswith((".part", ".partial", ".new"))
+
+
+def _add(backup: zipfile.ZipFile, name: str, path: Path, packed: int) -> dict[str, int | str]:
+    info = zipfile.ZipInfo.from_file(path, name)
+    info.compress_type = packed
+    with path.open("rb") as source, backup.open(info, "w", force_zip64=True) as target:
+        return _digest(source, target)
+
+
+def _digest(source: BinaryIO, target: BinaryIO | None = None) -> dict[str, int | str]:
+    digest, size = hashlib.sha256(), 0
+    while chunk := source.read(_CHUNK):
+        digest.update(chunk)
+        size += len(chunk)
+        if target is not None:
+            target.write(chunk)
+    return {"bytes": size, "sha256": digest.hexdigest()}
