@@ -17,8 +17,9 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from sqlalchemy import Connection, inspect, text
+from sqlalchemy import Connection, Engine, inspect, text
 
+from app.config import Settings
 from app.errors import DamagedError
 from app.finite import json_text
 from app.store.durable import sync, write_durably
@@ -103,18 +104,33 @@ def anchor_of(connection: Connection) -> Anchor | None:
     tables = inspect(connection).get_table_names()
     if "installation" not in tables:
         return None
-    one = connection.execute(
+    key, created, schema, entries, last = connection.execute(
         text(
             "SELECT installation.key, created, version_num, coalesce(log.id, 0), log.hash"
             " FROM installation JOIN alembic_version"
             " LEFT JOIN log ON log.id = (SELECT max(id) FROM log)"
         )
     ).one()
-    return Anchor(*one[:4], one[4] or "")
+    return Anchor(key, created, schema, entries, last or "")
 
 
-def require_anchored(connection: Connection, anchor: Anchor, database: Path) -> None:
-    """Raise DamagedError where a database is not the one that the home had."""
+def require_own_database(engine: Engine, settings: Settings) -> None:
+    """Raise DamagedError where a database is not the one that its home had."""
+    anchor = read_anchor(settings.database_file)
+    if anchor is not None:
+        with engine.connect() as connection:
+            _require_anchored(connection, anchor, settings.database_file)
+
+
+def renew_anchor(engine: Engine, settings: Settings) -> None:
+    """Write the anchor of a database that is in order, where it says anything else."""
+    with engine.connect() as connection:
+        anchor = anchor_of(connection)
+    if anchor is not None and anchor != read_anchor(settings.database_file):
+        make_anchor(settings.database_file, anchor)
+
+
+def _require_anchored(connection: Connection, anchor: Anchor, database: Path) -> None:
     hint = RESTORE.format(file=database)
     tables = inspect(connection).get_table_names()
     if "log" not in tables:

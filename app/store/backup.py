@@ -12,11 +12,12 @@ import json
 import os
 import shutil
 import zipfile
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO, Any
 
 import pysqlite3.dbapi2
 from sqlalchemy import Connection, Engine, inspect, text
@@ -25,11 +26,13 @@ from sqlalchemy.orm import Session
 from app.config import Settings
 from app.errors import DamagedError, InputError, StorageError
 from app.finite import json_text
-from app.store.anchor import Anchor, anchor_of
+from app.store.anchor import Anchor, anchor_of, require_own_database
 from app.store.clock import now
 from app.store.durable import sync
 from app.store.engine import EXAMINE, make_engine, reported
+from app.store.first_look import require_sound, signs_of_use
 from app.store.home import refused
+from app.store.locks import DatabaseLock
 from app.store.log import verify_chain
 
 FORMAT, FORMAT_VERSION = "touchline-backup", 1
@@ -53,6 +56,7 @@ class Manifest:
         installation: Id of the installation, empty where it had none yet.
         entries: Length of the log; ``hash`` is that of its last entry.
         rows: Rows by table.
+        frames_elsewhere: How many files hold frames that are not in it.
         files: Bytes and SHA-256 by name.
         format: What kind of file this is.
         version: Of the format.
@@ -65,15 +69,36 @@ class Manifest:
     entries: int
     hash: str
     rows: dict[str, int]
+    frames_elsewhere: int
     files: dict[str, dict[str, int | str]]
     format: str = FORMAT
     version: int = FORMAT_VERSION
+
+
+def back_up(settings: Settings, out: Path, folders: Sequence[str] = ()) -> Manifest:
+    """``write_backup`` of a home whose files belong together, beside whoever works in it.
+
+    Raises:
+        InputError: The home has no database.
+    """
+    if not settings.database_file.exists() and not any(signs_of_use(settings)):
+        raise InputError(f"there is no database in {settings.home}", hint="Set TOUCHLINE_HOME.")
+    lock = DatabaseLock(settings)
+    try:
+        if lock.alone:
+            require_sound(settings)
+        lock.share()
+        return write_backup(settings, out, folders)
+    finally:
+        lock.release()
 
 
 def write_backup(
     settings: Settings, out: Path, folders: Sequence[str] = (), *, replace: bool = False
 ) -> Manifest:
     """Write a backup and read it once more; it is at its place when it is good, or not at all.
+
+    The caller holds a lock of the database, and has looked at its files.
 
     Args:
         settings: Which home.
@@ -136,15 +161,22 @@ def verify_backup(path: Path) -> Manifest:
                 with backup.open(name) as member:
                     if _digest(member) != manifest.files[name]:
                         raise InputError(f"{path}, {name}: not what was written")
-    except (zipfile.BadZipFile, EOFError, OSError, zipfile.zlib.error) as error:
+    except (zipfile.BadZipFile, EOFError, OSError, zlib.error) as error:
         raise InputError(
             f"{path} is damaged or no backup of Touchline ({error})", hint="Take another one."
         ) from error
     return manifest
 
 
-def examine_database(settings: Settings, file: Path) -> tuple[Anchor, dict[str, int]]:
+def examine_database(
+    settings: Settings, file: Path, known_as: Path
+) -> tuple[Anchor, dict[str, int]]:
     """Look at every page of a database that nobody else has open, and at the log's hash chain.
+
+    Args:
+        settings: Any.
+        file: The database.
+        known_as: What complaints call it.
 
     Returns:
         What its anchor is, and its rows by table.
@@ -156,7 +188,7 @@ def examine_database(settings: Settings, file: Path) -> tuple[Anchor, dict[str, 
     engine = make_engine(own)
     try:
         with reported(own):
-            return _examine(engine, file)
+            return _examine(engine, known_as)
     finally:
         engine.dispose()
 
@@ -219,13 +251,16 @@ def _copy_database(settings: Settings, copy: Path) -> None:
     os.close(os.open(copy, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
     engine = make_engine(settings)
     try:
+        with reported(settings):
+            require_own_database(engine, settings)
         with (
             reported(settings),
             engine.connect() as connection,
             closing(pysqlite3.dbapi2.connect(str(copy))) as target,
         ):
             # All pages at once: writers go on meanwhile, and none of their changes is in it.
-            connection.connection.dbapi_connection.backup(target)
+            driver: Any = connection.connection.dbapi_connection
+            driver.backup(target)
     except pysqlite3.dbapi2.Error as error:
         raise StorageError(
             f"the database cannot be copied: {error}", hint="Is there room on the disk? " + EXAMINE
@@ -235,9 +270,10 @@ def _copy_database(settings: Settings, copy: Path) -> None:
 
 
 def _write_zip(settings: Settings, copy: Path, partial: Path, folders: Sequence[str]) -> Manifest:
-    anchor, rows = examine_database(settings, copy)
+    anchor, rows = examine_database(settings, copy, settings.database_file)
     with closing(pysqlite3.dbapi2.connect(str(copy))) as connection:
         connection.execute("PRAGMA journal_mode=DELETE")
+        elsewhere = _frames_elsewhere(connection, [settings.home / name for name in folders])
     files: dict[str, dict[str, int | str]] = {}
     handle = os.open(partial, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(handle, "w+b") as file:
@@ -254,12 +290,19 @@ def _write_zip(settings: Settings, copy: Path, partial: Path, folders: Sequence[
                 entries=anchor.entries,
                 hash=anchor.hash,
                 rows=rows,
+                frames_elsewhere=elsewhere,
                 files=files,
             )
             backup.writestr(MANIFEST, json_text(asdict(manifest), indent=1))
         file.flush()
         os.fsync(file.fileno())
     return manifest
+
+
+def _frames_elsewhere(connection: Any, folders: Sequence[Path]) -> int:
+    statement = "SELECT DISTINCT media_path FROM view WHERE media_path IS NOT NULL"
+    paths = [Path(path) for (path,) in connection.execute(statement)]
+    return sum(not any(path.is_relative_to(folder) for folder in folders) for path in paths)
 
 
 def _files(home: Path, folders: Sequence[str]) -> Iterator[Path]:
@@ -281,7 +324,7 @@ def _add(backup: zipfile.ZipFile, name: str, path: Path, packed: int) -> dict[st
         return _digest(source, target)
 
 
-def _digest(source: BinaryIO, target: BinaryIO | None = None) -> dict[str, int | str]:
+def _digest(source: IO[bytes], target: IO[bytes] | None = None) -> dict[str, int | str]:
     digest, size = hashlib.sha256(), 0
     while chunk := source.read(_CHUNK):
         digest.update(chunk)

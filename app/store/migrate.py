@@ -9,7 +9,7 @@ from sqlalchemy import Connection, Engine, inspect, text
 
 from app.config import Settings
 from app.errors import StorageError
-from app.store.anchor import anchor_of, make_anchor, read_anchor, require_anchored
+from app.store.anchor import renew_anchor, require_own_database
 from app.store.backup import write_backup
 from app.store.durable import make_file
 from app.store.engine import WRITE, make_engine, reported
@@ -102,22 +102,6 @@ def _run(engine: Engine) -> None:
     with engine.execution_options(**WRITE).begin() as connection:
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
-
-
-def require_own_database(engine: Engine, settings: Settings) -> None:
-    """Raise DamagedError where a database is not the one that its home had."""
-    anchor = read_anchor(settings.database_file)
-    if anchor is not None:
-        with engine.connect() as connection:
-            require_anchored(connection, anchor, settings.database_file)
-
-
-def renew_anchor(engine: Engine, settings: Settings) -> None:
-    """Write the anchor of a database that is in order, where it says anything else."""
-    with engine.connect() as connection:
-        anchor = anchor_of(connection)
-    if anchor is not None and anchor != read_anchor(settings.database_file):
-        make_anchor(settings.database_file, anchor)
 
 
 def _backups(settings: Settings) -> Path:

@@ -12,7 +12,13 @@ from sqlalchemy.orm import Session
 
 from app.config import Settings
 from app.errors import DamagedError, StorageError
-from app.store.anchor import move_anchor, read_anchor, sync_anchor
+from app.store.anchor import (
+    move_anchor,
+    read_anchor,
+    renew_anchor,
+    require_own_database,
+    sync_anchor,
+)
 from app.store.durable import make_file
 from app.store.engine import EXAMINE, WRITE, make_engine, reported, require_pragmas
 from app.store.first_look import require_sound
@@ -23,8 +29,6 @@ from app.store.migrate import (
     SCHEMA_REVISION,
     bring_up_to_date,
     newer_schema,
-    renew_anchor,
-    require_own_database,
     schema_revision,
 )
 
