@@ -134,6 +134,10 @@ class StorageError(ReviewError):
     """The disk or the database refuses; what was acknowledged before is safe."""
 
 
+EXAMINE = "Run touchline doctor: it says what is damaged, and how to restore a backup."
+"""What to do about a damaged database."""
+
+
 class DamagedError(StorageError):
     """The database is not what was written, or not the one of its home: nothing is written to it."""
 

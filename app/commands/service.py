@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 
 commands = typer.Typer()
 
+QUICK_BYTES = 256 * 2**20
+"""A database up to this size is looked through before it is served (about a second), a larger one
+while it is."""
+
 
 @commands.command()
 def serve(
@@ -41,6 +45,8 @@ def serve(
             # One processor is left for the requests.
             workers = max(1, settings.workers - 1)
             application = create_app(settings, pool=lambda: process_pool(workers))
+            if settings.database_file.stat().st_size <= QUICK_BYTES:
+                application.state.services.store.require_whole()
             say(f"Touchline is at {address}")
             run(application, socket)
 

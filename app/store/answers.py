@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 
 from app.finite import json_text
 from app.store.clock import now
+from app.store.codecs import inflate
 from app.store.job_models import AnswerModel
 
 T = TypeVar("T")
@@ -51,7 +52,7 @@ def find_answer(session: Session, key: str, actor: str) -> Answer | None:
     row = session.execute(_FIND, {"key": key, "actor": actor, "oldest": _oldest()}).one_or_none()
     if row is None:
         return None
-    body = zlib.decompress(row.body)
+    body = inflate(row.body)
     return Answer(row.request_digest, row.status, json.loads(row.headers), body)
 
 

@@ -24,12 +24,12 @@ from sqlalchemy import Connection, Engine, inspect, text
 from sqlalchemy.orm import Session
 
 from app.config import Settings
-from app.errors import DamagedError, InputError, StorageError
+from app.errors import EXAMINE, DamagedError, InputError, StorageError
 from app.finite import json_text
 from app.store.anchor import Anchor, anchor_of, require_own_database
 from app.store.clock import now
 from app.store.durable import sync
-from app.store.engine import EXAMINE, make_engine, reported
+from app.store.engine import make_engine, reported
 from app.store.first_look import require_sound, signs_of_use
 from app.store.home import refused
 from app.store.locks import DatabaseLock

@@ -12,7 +12,7 @@ from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.exc import DBAPIError, OperationalError
 
 from app.config import Settings
-from app.errors import DamagedError, InputError, StorageError
+from app.errors import EXAMINE, DamagedError, InputError, StorageError
 
 PRAGMAS: dict[str, tuple[str, object]] = {
     "journal_mode": ("WAL", "wal"),
@@ -24,7 +24,6 @@ PRAGMAS: dict[str, tuple[str, object]] = {
 }
 """What each connection sets, and what SQLite must answer when asked."""
 
-EXAMINE = "Run touchline doctor: it says what is damaged, and how to restore a backup."
 _DAMAGE = ("SQLITE_CORRUPT", "SQLITE_NOTADB")
 
 MIN_SQLITE = (3, 51, 3)

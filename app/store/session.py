@@ -11,7 +11,7 @@ from sqlalchemy import Engine, text
 from sqlalchemy.orm import Session
 
 from app.config import Settings
-from app.errors import DamagedError, StorageError
+from app.errors import EXAMINE, DamagedError, StorageError
 from app.store.anchor import (
     move_anchor,
     read_anchor,
@@ -20,7 +20,7 @@ from app.store.anchor import (
     sync_anchor,
 )
 from app.store.durable import make_file
-from app.store.engine import EXAMINE, WRITE, make_engine, reported, require_pragmas
+from app.store.engine import WRITE, make_engine, reported, require_pragmas
 from app.store.first_look import require_sound
 from app.store.locks import DatabaseLock
 from app.store.log import LOG_END
@@ -119,7 +119,15 @@ class Store:
         What is left of it is read as long as it can be; another change could only spoil more.
         """
         if self._damage is not None:
-            raise DamagedError(self._damage, hint=EXAMINE)
+            raise DamagedError(f"no change is taken: {self._damage}", hint=EXAMINE)
+
+    def require_whole(self) -> None:
+        """Let SQLite look at every page and index; raise DamagedError where it finds a fault."""
+        with self.read() as session:
+            fault = session.execute(text("PRAGMA quick_check(1)")).scalar_one()
+            if fault != "ok":
+                file = self.settings.database_file
+                raise DamagedError(f"{file} is damaged: {fault}", hint=EXAMINE)
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
@@ -127,8 +135,12 @@ class Store:
             with reported(self.settings):
                 yield
         except DamagedError as error:
-            self._damage = error.message
+            self.note_damage(error)
             raise
+
+    def note_damage(self, error: DamagedError) -> None:
+        """Refuse writes from now on: something read was not what was written."""
+        self._damage = error.message
 
     def _anchored(self, session: Session) -> None:
         """Tell the home how long the log is by now."""

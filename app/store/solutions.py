@@ -17,6 +17,7 @@ from app.finite import json_text
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
 from app.store import value_codec
+from app.store.codecs import inflate
 from app.store.models import CalibrationModel, DatasetModel, GroupModel, SolutionModel
 from app.store.summary import Summary, summarize
 
@@ -98,7 +99,7 @@ def encode_calibration(calibration: Calibration) -> bytes:
 
 def decode_calibration(body: bytes) -> Calibration:
     """Back from ``encode_calibration``."""
-    return value_codec.from_json(Calibration, json.loads(zlib.decompress(body)))
+    return value_codec.from_json(Calibration, json.loads(inflate(body)))
 
 
 def _compress(value: object) -> bytes:
@@ -172,8 +173,7 @@ def read_solutions(session: Session, keys: Iterable[SolutionKey]) -> dict[int, S
     names = {name for row in rows for name in json.loads(row.calibrations)}
     calibrations = read_calibrations(session, names)
     return {
-        row.group_id: decode_solution(json.loads(zlib.decompress(row.body)), calibrations)
-        for row in rows
+        row.group_id: decode_solution(json.loads(inflate(row.body)), calibrations) for row in rows
     }
 
 
