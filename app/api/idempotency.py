@@ -10,8 +10,6 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import re
-import time
-from contextlib import suppress
 
 import structlog
 from anyio.to_thread import run_sync
@@ -24,7 +22,7 @@ from app.api.reply import ASKED, KEPT_HEADERS, Asked
 from app.api.security.bodies import BYTES
 from app.api.security.origin import SAFE_METHODS
 from app.errors import OverloadedError, ReviewError, StorageError
-from app.store.answers import Answer, find_answer, forget_answers, keep_answer
+from app.store.answers import Answer, find_answer, keep_answer
 from app.store.codecs import canonical, parse
 from app.store.session import Store
 
@@ -36,8 +34,6 @@ REPLAYED = "Idempotency-Replayed"
 """Says that an answer is not a new one."""
 MAX_ANSWER_BYTES = 8 * 1024 * 1024
 """Larger answers are not kept; no route that changes something gives one."""
-TIDY_SECONDS = 3600.0
-"""Between two looks for answers that are too old."""
 PATIENCE = 60.0
 """Seconds that a repetition waits for the first one to be answered."""
 
@@ -53,7 +49,6 @@ class Idempotency:
     def __init__(self, app: ASGIApp, actor: str):
         self.app, self._actor = app, actor
         self._under_way: dict[str, asyncio.Event] = {}
-        self._tidied = -TIDY_SECONDS
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One request."""
@@ -92,7 +87,6 @@ class Idempotency:
             return
         if known is None:
             await self._first(key, request, send)
-            await self._tidy(request.store)
         else:
             await _again(known, request, send)
 
@@ -113,18 +107,6 @@ class Idempotency:
             except StorageError as error:
                 # It is sent already; a repetition is answered with the state as it is then.
                 log.warning("an answer could not be kept", error=str(error))
-
-    async def _tidy(self, store: Store) -> None:
-        """Forget old answers from time to time, after an answer that was sent."""
-        if time.monotonic() - self._tidied < TIDY_SECONDS:
-            return
-        self._tidied = time.monotonic()
-        with suppress(StorageError):
-            await run_sync(self._forget, store)
-
-    def _forget(self, store: Store) -> None:
-        with store.write() as session:
-            forget_answers(session)
 
     def _find(self, store: Store, key: str) -> Answer | None:
         with store.read() as session:
@@ -147,6 +129,14 @@ async def _again(known: Answer, request: _Request, send: Send) -> None:
             422, f"this {HEADER} was used for another request", hint="Send a new key with it."
         )
         await problem_response(problem)(request.scope, request.receive, send)
+        return
+    if known.body is None:
+        problem = make_problem(
+            409,
+            "this request was answered before, and its answer is no longer kept",
+            hint="It counts, once. Load the present state.",
+        )
+        await problem_response(problem, {REPLAYED: "true"})(request.scope, request.receive, send)
         return
     headers = [(name.encode(), text.encode("latin-1")) for name, text in known.headers.items()]
     headers.append((REPLAYED.lower().encode(), b"true"))

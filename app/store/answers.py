@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import TypeVar
 
-from sqlalchemy import bindparam, delete, select
+from sqlalchemy import bindparam, delete, select, text
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
@@ -27,12 +27,15 @@ _FAST = 1
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer as it was sent; ``request_digest`` is that of the request."""
+    """An answer as it was sent; ``request_digest`` is that of the request.
+
+    The body is None where it is no longer kept: the request was answered, and shall not be again.
+    """
 
     request_digest: str
     status: int
     headers: dict[str, str]
-    body: bytes
+    body: bytes | None
 
 
 Kept = Callable[[Session], None]
@@ -52,7 +55,7 @@ def find_answer(session: Session, key: str, actor: str) -> Answer | None:
     row = session.execute(_FIND, {"key": key, "actor": actor, "oldest": _oldest()}).one_or_none()
     if row is None:
         return None
-    body = inflate(row.body)
+    body = inflate(row.body) if row.body else None
     return Answer(row.request_digest, row.status, json.loads(row.headers), body)
 
 
@@ -62,7 +65,7 @@ def keep_answer(session: Session, key: str, actor: str, answer: Answer) -> bool:
         "request_digest": answer.request_digest,
         "status": answer.status,
         "headers": json_text(answer.headers, ascii_=True),
-        "body": zlib.compress(answer.body, _FAST),
+        "body": zlib.compress(answer.body or b"", _FAST),
         "at": now(),
     }
     statement = insert(AnswerModel).values(key=key, actor=actor, **values)
@@ -74,9 +77,21 @@ def keep_answer(session: Session, key: str, actor: str, answer: Answer) -> bool:
     return session.execute(fresh).one_or_none() is not None
 
 
-def forget_answers(session: Session) -> None:
-    """Forget the answers that are too old."""
-    session.execute(delete(AnswerModel).where(AnswerModel.at < _oldest()))
+def forget_answers(session: Session) -> int:
+    """Forget the answers that are too old; returns how many."""
+    gone = delete(AnswerModel).where(AnswerModel.at < _oldest()).returning(AnswerModel.key)
+    return len(session.scalars(gone).all())
+
+
+def shorten_answers(session: Session, most: int) -> int:
+    """Forget the text of the oldest answers, so that all take at most so many bytes.
+
+    Their keys stay for as long as was promised: the requests still count once.
+
+    Returns:
+        How many lost it.
+    """
+    return len(session.scalars(_SHORTEN, {"most": most}).all())
 
 
 def _oldest() -> str:
@@ -84,6 +99,11 @@ def _oldest() -> str:
     return oldest.isoformat(timespec="microseconds")
 
 
+_SHORTEN = text(
+    "UPDATE answer SET body = x'' WHERE rowid IN (SELECT rowid FROM (SELECT rowid, length(body) AS"
+    " size, sum(length(body)) OVER (ORDER BY at DESC, rowid DESC) AS total FROM answer)"
+    " WHERE total > :most AND size > 0) RETURNING key"
+)
 _FIND = select(*AnswerModel.__table__.columns).where(
     AnswerModel.key == bindparam("key"),
     AnswerModel.actor == bindparam("actor"),

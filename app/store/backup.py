@@ -31,7 +31,7 @@ from app.store.clock import now
 from app.store.durable import sync
 from app.store.engine import make_engine, reported
 from app.store.first_look import require_sound, signs_of_use
-from app.store.home import refused
+from app.store.home import half_written, refused
 from app.store.locks import DatabaseLock
 from app.store.log import verify_chain
 
@@ -307,14 +307,12 @@ def _frames_elsewhere(connection: Any, folders: Sequence[Path]) -> int:
 
 def _files(home: Path, folders: Sequence[str]) -> Iterator[Path]:
     """Files of folders, in order; half-written ones are nobody's yet."""
+    half = set(half_written(home))
     for name in folders:
         for path in sorted((home / name).rglob("*")):
-            if path.is_file() and not path.is_symlink() and not _is_half_written(path):
+            complete = half.isdisjoint((path, *path.parents))
+            if complete and path.is_file() and not path.is_symlink():
                 yield path
-
-
-def _is_half_written(path: Path) -> bool:
-    return path.name.endswith((".part", ".partial", ".new"))
 
 
 def _add(backup: zipfile.ZipFile, name: str, path: Path, packed: int) -> dict[str, int | str]:

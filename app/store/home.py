@@ -19,6 +19,9 @@ FOLDERS = ("uploads", "exports", "cache", "sample", "practice", "backups")
 """What we make in a home beside the database and its side files."""
 FOLDER_MODE, FILE_MODE = 0o700, 0o600
 
+_HALF_WRITTEN = (".*.partial", "*/.*.partial", "uploads/*.part", "uploads/*/upload.json.new")
+"""Names that we give to what is not complete yet, in the places where we do; anywhere else a file
+of such a name is somebody's."""
 _MOUNTS = Path("/proc/mounts")
 
 
@@ -45,11 +48,12 @@ def make_home(settings: Settings) -> Path:
 
 
 def make_private(settings: Settings) -> int:
-    """Take a home's folders and files from everybody but their owner; returns how many that were.
+    """Take a home's folders and files from everybody but their owner, from now on, too.
 
-    From now on this process makes no file that others may read.
+    Returns:
+        How many could be read by others.
     """
-    os.umask(0o077)
+    keep_private()
     mended = 0
     for path in private_files(settings):
         mode = path.lstat().st_mode
@@ -60,12 +64,20 @@ def make_private(settings: Settings) -> int:
     return mended
 
 
+def keep_private() -> None:
+    """From now on this process makes no file that others than its owner may read."""
+    os.umask(0o077)
+
+
 def open_to_others(settings: Settings) -> list[Path]:
-    """What of a home others than its owner may read or write."""
+    """What of a home others than its owner can read or write: a closed home closes all in it."""
+    closed = not settings.home.stat().st_mode & 0o077
     return [
         path
         for path in private_files(settings)
-        if path.lstat().st_mode & 0o077 and not path.is_symlink()
+        if path.lstat().st_mode & 0o077
+        and not path.is_symlink()
+        and not (closed and path.is_relative_to(settings.home))
     ]
 
 
@@ -80,6 +92,12 @@ def private_files(settings: Settings) -> Iterator[Path]:
         for folder, _folders, names in os.walk(home / name):
             yield Path(folder)
             yield from (Path(folder, file) for file in names)
+
+
+def half_written(home: Path) -> Iterator[Path]:
+    """What something is writing in a home, or was when it was killed."""
+    for pattern in _HALF_WRITTEN:
+        yield from home.glob(pattern)
 
 
 def refused(path: Path, error: OSError) -> StorageError:

@@ -125,6 +125,11 @@ def read_log(session: Session, *where: ColumnElement[bool], after: int = 0) -> I
         after = rows[-1].id
 
 
+def last_time(session: Session) -> str | None:
+    """When the last entry was written; None for an empty log."""
+    return session.scalar(select(LogModel.at).order_by(LogModel.id.desc()).limit(1))
+
+
 def verify_chain(session: Session) -> int:
     """Check every hash of the log; returns the number of rows.
 

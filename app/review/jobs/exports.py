@@ -14,10 +14,10 @@ from app.review.jobs.jobs import JobProgress, Jobs, Work, counting
 from app.review.versions.version import find_version
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
-from app.store.jobs import Job
+from app.store.jobs import EXPORT, Job
 from app.store.session import Store
 
-KIND = "export"
+KIND = EXPORT
 
 
 def request_export(
