@@ -201,7 +201,8 @@ def _examine(engine: Engine, file: Path) -> tuple[Anchor, dict[str, int]]:
             raise DamagedError(f"{file} is no database of Touchline", hint=EXAMINE)
         faults = connection.execute(text("PRAGMA integrity_check(3)")).scalars().all()
         if faults != ["ok"]:
-            raise DamagedError(f"{file} is damaged: {'; '.join(faults)}", hint=EXAMINE)
+            sentence = " ".join("; ".join(faults).split())
+            raise DamagedError(f"{file} is damaged: {sentence}", hint=EXAMINE)
         if connection.execute(text("PRAGMA foreign_key_check")).first() is not None:
             raise DamagedError(f"{file} has rows that refer to rows that are gone", hint=EXAMINE)
         verify_chain(session)

@@ -127,7 +127,7 @@ class Store:
             fault = session.execute(text("PRAGMA quick_check(1)")).scalar_one()
             if fault != "ok":
                 file = self.settings.database_file
-                raise DamagedError(f"{file} is damaged: {fault}", hint=EXAMINE)
+                raise DamagedError(f"{file} is damaged: {' '.join(fault.split())}", hint=EXAMINE)
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
