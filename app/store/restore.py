@@ -18,10 +18,10 @@ from app.store.backup import (
     DATABASE,
     EXPORTS,
     FRAMES,
-    examine_database,
     verify_backup,
 )
 from app.store.durable import sync
+from app.store.examination import examine_database
 from app.store.first_look import log_file
 from app.store.home import FOLDER_MODE, make_private, refused
 from app.store.locks import database_alone, server_lock

@@ -90,7 +90,7 @@ class WriteAheadLog:
         if database.tag not in (first.tag, 0):
             return False
         # Another program that writes to the database counts nothing.
-        return database.count in (first.count, max(first.count - 1, 0))
+        return database.count in (first.count, (first.count - 1) % 2**31)
 
 
 def read_header(database: Path) -> DatabaseHeader | None:
