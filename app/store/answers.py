@@ -100,9 +100,9 @@ def _oldest() -> str:
 
 
 _SHORTEN = text(
-    "UPDATE answer SET body = x'' WHERE rowid IN (SELECT rowid FROM (SELECT rowid, length(body) AS"
-    " size, sum(length(body)) OVER (ORDER BY at DESC, rowid DESC) AS total FROM answer)"
-    " WHERE total > :most AND size > 0) RETURNING key"
+    "UPDATE answer SET body = x'' WHERE rowid IN (SELECT rowid FROM (SELECT rowid, status,"
+    " length(body) AS size, sum(length(body)) OVER (ORDER BY at DESC, rowid DESC) AS total"
+    " FROM answer) WHERE total > :most AND size > 0 AND status >= 200) RETURNING key"
 )
 _FIND = select(*AnswerModel.__table__.columns).where(
     AnswerModel.key == bindparam("key"),

@@ -35,6 +35,8 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], home
     for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("TOUCHLINE_HOME", str(home))
+    # A home that is served all the same shall fail the test, and not hold it.
+    monkeypatch.setattr("app.api.server.run", lambda *_arguments: None)
     before = os.umask(0o022)
 
     def command(*arguments: object) -> tuple[int, str, str]:
