@@ -138,6 +138,16 @@ class TestVerifyBackup:
         with pytest.raises(InputError):
             verify_backup(backup)
 
+    def test_a_file_that_was_put_in_afterwards_is_noticed(
+        self, backup: Path, tmp_path: Path
+    ) -> None:
+        other = tmp_path / "other.zip"
+        with zipfile.ZipFile(backup) as source, zipfile.ZipFile(other, "w") as target:
+            target.writestr("manifest.json", source.read("manifest.json"))
+            target.writestr("touchline.db", source.read("touchline.db") + b"x")
+        with pytest.raises(InputError, match=r"touchline\.db: not what was written"):
+            verify_backup(other)
+
     def test_a_cut_one_is_noticed(self, backup: Path) -> None:
         backup.write_bytes(backup.read_bytes()[:-100])
         with pytest.raises(InputError, match="damaged or no backup"):
