@@ -6,6 +6,7 @@ import errno
 import os
 import stat
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from app.config import Settings
@@ -50,17 +51,21 @@ def make_home(settings: Settings) -> Path:
 def make_private(settings: Settings) -> int:
     """Take a home's folders and files from everybody but their owner, from now on, too.
 
+    What belongs to another user stays as it is; ``open_to_others`` finds it.
+
     Returns:
         How many could be read by others.
     """
     keep_private()
     mended = 0
     for path in private_files(settings):
-        mode = path.lstat().st_mode
-        wanted = FOLDER_MODE if stat.S_ISDIR(mode) else mode & 0o700
-        if not stat.S_ISLNK(mode) and stat.S_IMODE(mode) != wanted:
-            path.chmod(wanted)
-            mended += 1
+        # Other commands may delete files meanwhile.
+        with suppress(FileNotFoundError, PermissionError):
+            mode = path.lstat().st_mode
+            wanted = FOLDER_MODE if stat.S_ISDIR(mode) else mode & 0o700
+            if not stat.S_ISLNK(mode) and stat.S_IMODE(mode) != wanted:
+                path.chmod(wanted)
+                mended += 1
     return mended
 
 
@@ -72,13 +77,14 @@ def keep_private() -> None:
 def open_to_others(settings: Settings) -> list[Path]:
     """What of a home others than its owner can read or write: a closed home closes all in it."""
     closed = not settings.home.stat().st_mode & 0o077
-    return [
-        path
-        for path in private_files(settings)
-        if path.lstat().st_mode & 0o077
-        and not path.is_symlink()
-        and not (closed and path.is_relative_to(settings.home))
-    ]
+    found = []
+    for path in private_files(settings):
+        with suppress(FileNotFoundError):
+            mode = path.lstat().st_mode
+            inside = closed and path.is_relative_to(settings.home)
+            if mode & 0o077 and not stat.S_ISLNK(mode) and not inside:
+                found.append(path)
+    return found
 
 
 def private_files(settings: Settings) -> Iterator[Path]:
