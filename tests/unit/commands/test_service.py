@@ -37,13 +37,11 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], home
     monkeypatch.setenv("TOUCHLINE_HOME", str(home))
     # A home that is served all the same shall fail the test, and not hold it.
     monkeypatch.setattr("app.api.server.run", lambda *_arguments: None)
-    before = os.umask(0o022)
 
     def command(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["touchline", *map(str, arguments)])
         with pytest.raises(SystemExit) as ended:
             main()
-        os.umask(before)
         out, err = capfd.readouterr()
         return int(ended.value.code or 0), out, err
 

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -52,12 +51,6 @@ class TestMakeHome:
 
 
 class TestMakePrivate:
-    @pytest.fixture(autouse=True)
-    def usual_umask(self):
-        before = os.umask(0o022)
-        yield
-        os.umask(before)
-
     def test_a_home_is_its_owners_alone_whatever_the_umask(self, settings) -> None:
         store = Store.open(settings)
         say(store)
