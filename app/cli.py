@@ -13,6 +13,7 @@ import sys
 import typer
 
 from app.commands import (
+    backup,
     datasets,
     doctor,
     evaluation,
@@ -35,7 +36,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for part in (service, sample, files, solving, lines, versions, evaluation, predictions, doctor):
+PARTS = (service, sample, files, solving, lines, versions, evaluation, predictions, doctor, backup)
+for part in PARTS:
     app.add_typer(part.commands)
 app.add_typer(datasets.commands, name="datasets")
 app.add_typer(policy.commands, name="policy")

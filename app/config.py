@@ -43,6 +43,13 @@ class Settings(BaseSettings):
     """Largest uploaded file; a JSON body is smaller still."""
     upload_days: int = 7
     """After so many days an uploaded file that no dataset reads its frames from is deleted."""
+    answer_bytes: int = 64 * 2**20
+    """Room for answers under Idempotency-Keys; beyond it the oldest lose their text, not their
+    key."""
+    job_days: int = 90
+    """After so many days a job that is over is forgotten, unless it made an export."""
+    cache_days: int = 30
+    """After so many days a derived image is made anew."""
     import_folders: Annotated[list[Path], NoDecode] = []
     """Folders below which imports over REST may read, separated by ``:`` (or a JSON list)."""
     max_file_bytes: int = 256 * 1024 * 1024
@@ -76,6 +83,11 @@ class Settings(BaseSettings):
     def database(self) -> str:
         """URL of the database."""
         return self.database_url or f"sqlite+pysqlite:///{self.home / 'touchline.db'}"
+
+    @property
+    def database_file(self) -> Path:
+        """The file of the database."""
+        return Path(self.database.partition("///")[2].partition("?")[0])
 
     @property
     def cache(self) -> Path:

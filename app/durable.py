@@ -16,9 +16,11 @@ def sync(path: Path) -> None:
 
 
 def replace_file(path: Path, content: bytes) -> None:
-    """Write a file; a reader sees all of it or what was there before, after a power cut too."""
+    """Write a file for its owner alone: a reader sees all of it or what was there before, after a
+    power cut too."""
     partial = path.with_name(f".{path.name}.partial")
-    with partial.open("wb") as file:
+    handle = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    with os.fdopen(handle, "wb") as file:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())

@@ -15,6 +15,7 @@
       GeometryError
         DegenerateGeometryError
       StorageError          the disk or the database refuses
+        DamagedError        the database is not what was written
       OverloadedError       more work waits than is taken
     ShapeError(ValueError)  our own mistake, outside the tree
     JobCancelled            no error at all: somebody wants the work to end
@@ -150,6 +151,14 @@ class DegenerateGeometryError(GeometryError):
 
 class StorageError(ReviewError):
     """The disk or the database refuses; what was acknowledged before is safe."""
+
+
+EXAMINE = "Run touchline doctor: it says what is damaged, and how to restore a backup."
+"""What to do about a damaged database."""
+
+
+class DamagedError(StorageError):
+    """The database is not what was written, or not the one of its home: nothing is written to it."""
 
 
 class OverloadedError(ReviewError):

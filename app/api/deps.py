@@ -19,6 +19,7 @@ from app.review.jobs.exports import resume_exports
 from app.review.jobs.imports import resume_imports
 from app.review.jobs.jobs import Jobs, Pool
 from app.review.jobs.solve import resume_solving, solve_leftovers
+from app.review.jobs.upkeep import Upkeep
 from app.review.jobs.versions import resume_versions
 from app.review.practice.practice import resume_practice
 from app.review.yields.store import YieldStore
@@ -47,6 +48,7 @@ class Services:
     jobs: Jobs
     events: Events
     yields: YieldStore
+    upkeep: Upkeep
     stopping: Event = field(default_factory=Event)
 
     @staticmethod
@@ -55,8 +57,16 @@ class Services:
         store = Store.open(settings)
         jobs = Jobs(store, pool=pool)
         exports = ExportFolder(settings.exports)
-        events, yields = Events(store, jobs), YieldStore(store)
-        return Services(settings, store, Frames(settings), exports, jobs, events, yields)
+        return Services(
+            settings,
+            store,
+            Frames(settings),
+            exports,
+            jobs,
+            Events(store, jobs),
+            YieldStore(store),
+            Upkeep(store, jobs),
+        )
 
     def start(self) -> None:
         """Load the solver's kernels, and take up the work that an earlier run left undone."""
@@ -70,10 +80,12 @@ class Services:
         resume_practice(self.jobs, self.store, self.settings)
         self.jobs.start()
         solve_leftovers(self.jobs, self.store, actor=LOCAL_USER)
+        self.upkeep.start()
 
     def close(self) -> None:
         """Let the running work end, and close processes and database."""
         self.events.close()
+        self.upkeep.close()
         self.jobs.close()
         self.frames.close()
         self.store.close()

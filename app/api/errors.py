@@ -15,6 +15,7 @@ from app.api.problem import TITLES, make_problem, problem_response
 from app.api.schemas.problem import FieldProblem
 from app.errors import (
     ConflictError,
+    DamagedError,
     GeometryError,
     ImageError,
     InputError,
@@ -104,6 +105,8 @@ async def _review_error(request: Request, error: Exception) -> Response:
         headers["ETag"] = error.etag
     if isinstance(error, StorageError):
         headers["Retry-After"] = RETRY_SECONDS
+    if isinstance(error, DamagedError):
+        request.app.state.services.store.note_damage(error)
     if status >= 500:
         cause = error.__cause__
         log.error("request refused", instance=problem.instance, error=str(error), exc_info=cause)

@@ -10,8 +10,6 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import re
-import time
-from contextlib import suppress
 
 import structlog
 from anyio.to_thread import run_sync
@@ -24,7 +22,7 @@ from app.api.reply import ASKED, KEPT_HEADERS, Asked
 from app.api.security.bodies import BYTES, VALUE
 from app.api.security.origin import SAFE_METHODS
 from app.errors import OverloadedError, ReviewError, StorageError
-from app.review.answers.answers import find_first, forget_old, keep_first
+from app.review.answers.answers import find_first, keep_first
 from app.store.answers import Answer
 from app.store.codecs import canonical
 from app.store.session import Store
@@ -37,8 +35,6 @@ REPLAYED = "Idempotency-Replayed"
 """Says that an answer is not a new one."""
 MAX_ANSWER_BYTES = 8 * 1024 * 1024
 """Larger answers are not kept; no route that changes something gives one."""
-TIDY_SECONDS = 3600.0
-"""Between two looks for answers that are too old."""
 PATIENCE = 60.0
 """Seconds that a repetition waits for the first one to be answered."""
 
@@ -54,7 +50,6 @@ class Idempotency:
     def __init__(self, app: ASGIApp, actor: str):
         self.app, self._actor = app, actor
         self._under_way: dict[str, asyncio.Event] = {}
-        self._tidied = -TIDY_SECONDS
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One request."""
@@ -95,7 +90,6 @@ class Idempotency:
             await _again(known, request, send)
         else:
             await self._carry_out(key, request, send)
-            await self._tidy(request.store)
 
     async def _carry_out(self, key: str, request: _Request, send: Send) -> None:
         if request.streamed:
@@ -115,14 +109,6 @@ class Idempotency:
                 # It is sent already; a repetition is answered with the state as it is then.
                 log.warning("an answer could not be kept", error=str(error))
 
-    async def _tidy(self, store: Store) -> None:
-        """Forget old answers from time to time, after an answer that was sent."""
-        if time.monotonic() - self._tidied < TIDY_SECONDS:
-            return
-        self._tidied = time.monotonic()
-        with suppress(StorageError):
-            await run_sync(forget_old, store)
-
 
 async def _refuse(error: ReviewError, scope: Scope, receive: Receive, send: Send) -> None:
     problem = make_problem(status_of(error), error.message, hint=error.hint)
@@ -135,6 +121,14 @@ async def _again(known: Answer, request: _Request, send: Send) -> None:
             422, f"this {HEADER} was used for another request", hint="Send a new key with it."
         )
         await problem_response(problem)(request.scope, request.receive, send)
+        return
+    if known.body is None:
+        problem = make_problem(
+            409,
+            "this request was answered before, and its answer is no longer kept",
+            hint="It counts, once. Load the present state.",
+        )
+        await problem_response(problem, {REPLAYED: "true"})(request.scope, request.receive, send)
         return
     headers = [(name.encode(), text.encode("latin-1")) for name, text in known.headers.items()]
     headers.append((REPLAYED.lower().encode(), b"true"))

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from app.commands.opened import opened_store
 from app.commands.options import Json, read_settings
 from app.commands.terminal import print_json, say
+
+if TYPE_CHECKING:
+    from app.config import Settings
+    from app.review.editing.check import Check
 
 commands = typer.Typer()
 
@@ -21,17 +25,15 @@ def doctor(
     ] = False,
     json_: Json = False,
 ) -> None:
-    """Look whether the database is whole and its tables are what the log says; 1 if they are not."""
-    from app.review.editing.doctor import examine
+    """Look whether home and database are whole and the tables are what the log says; 1 if not."""
     from app.review.editing.replay import rebuild as rebuild_tables
-    from app.store.home import server_lock
+    from app.store.locks import server_lock
 
     settings = read_settings()
     if rebuild:
         with server_lock(settings), opened_store(settings) as store:
             rebuild_tables(store)
-    with opened_store(settings) as store:
-        checks = examine(store)
+    checks = _examine(settings)
     if json_:
         print_json([vars(check) for check in checks])
     else:
@@ -41,3 +43,20 @@ def doctor(
                 say(f"      {'':24} {check.mend}")
     if not all(check.ok for check in checks):
         raise typer.Exit(1)
+
+
+def _examine(settings: Settings) -> list[Check]:
+    """Everything; where the database cannot be opened, why, and what lies around it."""
+    from app.errors import StorageError
+    from app.review.editing.check import Check
+    from app.review.editing.checkup import examine_home, examine_surroundings
+    from app.review.editing.doctor import examine
+    from app.store.home import make_home
+
+    make_home(settings)
+    checks = examine_home(settings)
+    try:
+        with opened_store(settings) as store:
+            return [*checks, *examine_surroundings(store), *examine(store)]
+    except StorageError as error:
+        return [*checks, Check("database", False, error.message, error.hint)]

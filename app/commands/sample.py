@@ -10,6 +10,7 @@ import typer
 from app.commands.opened import executor_of, opened_store
 from app.commands.options import Json, Workers, read_settings
 from app.commands.terminal import print_values, show_progress
+from app.store.home import keep_private
 
 if TYPE_CHECKING:
     from app.config import Settings
@@ -48,6 +49,8 @@ def sample(
     if dataset is not None and _is_solved(settings, dataset):
         print_values({**_progress_of(settings, dataset), "written": False}, json_)
         return
+    if out is None:
+        keep_private()
     folder = out or settings.home / SAMPLE
     report = _write_sample(
         folder,
@@ -73,6 +76,7 @@ def practice(
     """Make eight practice groups with known answers, as the dataset practice; done once."""
     from app.review.practice.practice import make_practice_dataset
 
+    keep_private()
     settings = read_settings()
     with opened_store(settings) as store, show_progress("Making the practice groups") as progress:
         made = make_practice_dataset(store, settings, progress, again=again, actor="local")

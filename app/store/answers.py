@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import TypeVar, cast
 
-from sqlalchemy import Table, bindparam, delete, or_, select
+from sqlalchemy import Table, bindparam, delete, or_, select, text
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
 from app.finite import json_text
 from app.store.clock import now
-from app.store.codecs import Json
+from app.store.codecs import Json, inflate
 from app.store.job_models import AnswerModel
 
 T = TypeVar("T")
@@ -29,12 +29,15 @@ _ANSWER = cast(Table, AnswerModel.__table__)
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer as it was sent; ``request_digest`` is that of the request."""
+    """An answer as it was sent; ``request_digest`` is that of the request.
+
+    The body is None where it is no longer kept: the request was answered, and shall not be again.
+    """
 
     request_digest: str
     status: int
     headers: dict[str, str]
-    body: bytes
+    body: bytes | None
 
     @property
     def under_way(self) -> bool:
@@ -56,7 +59,9 @@ class Progress:
     def read(self, session: Session) -> Json | None:
         """What was saved last; None where the work has not begun."""
         found = find_answer(session, self.key, self.actor)
-        return json.loads(found.body) if found is not None and found.under_way else None
+        if found is None or found.body is None or not found.under_way:
+            return None
+        return json.loads(found.body)
 
     def save(self, session: Session, value: Json) -> None:
         """Say how far the work is."""
@@ -83,7 +88,7 @@ def find_answer(session: Session, key: str, actor: str) -> Answer | None:
     row = session.execute(_FIND, {"key": key, "actor": actor, "oldest": _oldest()}).one_or_none()
     if row is None:
         return None
-    body = zlib.decompress(row.body)
+    body = inflate(row.body) if row.body else None
     return Answer(row.request_digest, row.status, json.loads(row.headers), body)
 
 
@@ -95,16 +100,28 @@ def keep_answer(session: Session, key: str, actor: str, answer: Answer) -> bool:
         "request_digest": answer.request_digest,
         "status": answer.status,
         "headers": json_text(answer.headers, ascii_=True),
-        "body": zlib.compress(answer.body, _FAST),
+        "body": zlib.compress(answer.body or b"", _FAST),
         "at": now(),
         "oldest": _oldest(),
     }
     return session.execute(_KEEP, row).one_or_none() is not None
 
 
-def forget_answers(session: Session) -> None:
-    """Forget the answers that are too old."""
-    session.execute(delete(AnswerModel).where(AnswerModel.at < _oldest()))
+def forget_answers(session: Session) -> int:
+    """Forget the answers that are too old; returns how many."""
+    gone = delete(AnswerModel).where(AnswerModel.at < _oldest()).returning(AnswerModel.key)
+    return len(session.scalars(gone).all())
+
+
+def shorten_answers(session: Session, most: int) -> int:
+    """Forget the text of the oldest answers, so that all take at most so many bytes.
+
+    Their keys stay for as long as was promised: the requests still count once.
+
+    Returns:
+        How many lost it.
+    """
+    return len(session.scalars(_SHORTEN, {"most": most}).all())
 
 
 def _oldest() -> str:
@@ -112,6 +129,11 @@ def _oldest() -> str:
     return oldest.isoformat(timespec="microseconds")
 
 
+_SHORTEN = text(
+    "UPDATE answer SET body = x'' WHERE rowid IN (SELECT rowid FROM (SELECT rowid, status,"
+    " length(body) AS size, sum(length(body)) OVER (ORDER BY at DESC, rowid DESC) AS total"
+    " FROM answer) WHERE total > :most AND size > 0 AND status >= 200) RETURNING key"
+)
 _FIND = select(*_ANSWER.columns).where(
     _ANSWER.c.key == bindparam("key"),
     _ANSWER.c.actor == bindparam("actor"),

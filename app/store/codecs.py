@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from app.errors import EXAMINE, DamagedError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
@@ -43,8 +44,31 @@ def pack(value: Json) -> bytes:
 
 
 def unpack(data: bytes) -> Json:
-    """The value of compressed JSON."""
-    return json.loads(zlib.decompress(data))
+    """The value of compressed JSON.
+
+    Raises:
+        DamagedError: The bytes are not what was written.
+    """
+    try:
+        return json.loads(inflate(data))
+    except ValueError as error:
+        raise _damaged() from error
+
+
+def inflate(data: bytes) -> bytes:
+    """What was compressed.
+
+    Raises:
+        DamagedError: The bytes are not what was written.
+    """
+    try:
+        return zlib.decompress(data)
+    except zlib.error as error:
+        raise _damaged() from error
+
+
+def _damaged() -> DamagedError:
+    return DamagedError("the database holds a record that is not what was written", hint=EXAMINE)
 
 
 def lines_to_json(lines: Lines) -> Json:

@@ -12,7 +12,7 @@ from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.exc import DBAPIError, OperationalError
 
 from app.config import Settings
-from app.errors import InputError, StorageError
+from app.errors import EXAMINE, DamagedError, InputError, StorageError
 
 PRAGMAS: dict[str, tuple[str, object]] = {
     "journal_mode": ("WAL", "wal"),
@@ -24,9 +24,13 @@ PRAGMAS: dict[str, tuple[str, object]] = {
 }
 """What each connection sets, and what SQLite must answer when asked."""
 
+_DAMAGE = ("SQLITE_CORRUPT", "SQLITE_NOTADB")
+
 MIN_SQLITE = (3, 51, 3)
 """Older ones can corrupt the file when the WAL is reset."""
 
+_BEFORE = "touchline_changes"
+"""Where a connection notes how many rows it had changed before its transaction."""
 WRITE = {"touchline_write": True}
 """Options of an engine whose transactions take the write lock at their start."""
 
@@ -45,6 +49,7 @@ def make_engine(settings: Settings) -> Engine:
     )
     event.listen(engine, "connect", _set_pragmas)
     event.listen(engine, "begin", _begin)
+    event.listen(engine, "commit", _count)
     return engine
 
 
@@ -60,8 +65,26 @@ def _set_pragmas(connection: Any, _record: object) -> None:
 
 
 def _begin(connection: Connection) -> None:
-    write = connection.get_execution_options().get("touchline_write", False)
+    write = _writes(connection)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN")
+    if write:
+        connection.info[_BEFORE] = _driver(connection).total_changes
+
+
+def _count(connection: Connection) -> None:
+    """Count a write in the first page, by which a write-ahead log knows its database (``wal``)."""
+    driver = _driver(connection)
+    if _writes(connection) and driver.total_changes != connection.info[_BEFORE]:
+        (count,) = driver.execute("PRAGMA user_version").fetchone()
+        driver.execute(f"PRAGMA user_version = {(count + 1) % 2**31}")
+
+
+def _writes(connection: Connection) -> bool:
+    return bool(connection.get_execution_options().get("touchline_write", False))
+
+
+def _driver(connection: Connection) -> Any:
+    return connection.connection.dbapi_connection
 
 
 def require_pragmas(engine: Engine) -> None:
@@ -81,15 +104,24 @@ def reported(settings: Settings) -> Iterator[None]:
     except OperationalError as error:
         raise _storage_error(error, settings) from error
     except DBAPIError as error:
-        if getattr(error.orig, "sqlite_errorname", "") in ("SQLITE_NOTADB", "SQLITE_CORRUPT"):
+        if _is_damage(error):
             raise _storage_error(error, settings) from error
         raise StorageError(
             "the database could not carry out the request", hint="Nothing was saved. Try again."
         ) from error
 
 
+def _is_damage(error: DBAPIError) -> bool:
+    # Text that is no UTF-8 has no name of its own.
+    return _name(error).startswith(_DAMAGE) or "Could not decode to UTF-8" in str(error.orig)
+
+
+def _name(error: DBAPIError) -> str:
+    return str(getattr(error.orig, "sqlite_errorname", ""))
+
+
 def _storage_error(error: DBAPIError, settings: Settings) -> StorageError:
-    name = str(getattr(error.orig, "sqlite_errorname", ""))
+    name = _name(error)
     file = Path(settings.database.partition("///")[2]).name
     if name.startswith("SQLITE_FULL"):
         return StorageError(
@@ -100,10 +132,16 @@ def _storage_error(error: DBAPIError, settings: Settings) -> StorageError:
         return StorageError(
             "another process is writing; the change was not saved", hint="Try again in a moment."
         )
-    if name.startswith(("SQLITE_CORRUPT", "SQLITE_NOTADB")):
+    if _is_damage(error):
+        return DamagedError(f"{file} is damaged or not a database", hint=EXAMINE)
+    if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM")):
         return StorageError(
-            f"{file} is damaged or not a database", hint="Put a backup in its place."
+            f"{file} cannot be read and written ({name})",
+            hint="Make the home folder and its files writable, or set TOUCHLINE_HOME to another.",
         )
-    if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_IOERR", "SQLITE_PERM")):
-        return StorageError(f"{file} cannot be read or written ({name})")
+    if name.startswith("SQLITE_IOERR"):
+        return StorageError(
+            f"the disk does not read or write {file} ({name})",
+            hint="Look after the disk; touchline doctor says what is left.",
+        )
     return StorageError(f"the database refuses the statement ({name or type(error).__name__})")

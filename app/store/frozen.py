@@ -21,6 +21,7 @@ from app.store.codecs import (
     Json,
     canonical,
     group_head_to_json,
+    inflate,
     parse,
     station_from_json,
     station_to_json,
@@ -157,7 +158,7 @@ def read_frozen(session: Session, dataset_id: int, keys: Iterable[str]) -> dict[
 
 def text_of(body: bytes) -> str:
     """The text of frozen JSON."""
-    return zlib.decompress(body).decode()
+    return inflate(body).decode()
 
 
 def json_of(body: bytes) -> Json:

@@ -1,10 +1,12 @@
-"""The home folder: made private, refused on network file systems, one server at a time."""
+"""The home folder: made private, refused on network file systems."""
 
 from __future__ import annotations
 
-import fcntl
+import errno
+import os
+import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import suppress
 from pathlib import Path
 
 from app.config import Settings
@@ -14,7 +16,13 @@ NETWORK_FILE_SYSTEMS = frozenset(
     {"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "fuse.sshfs", "fuse.s3fs", "9p", "glusterfs"}
 )
 """Where file locks and shared memory do not hold, SQLite's WAL loses data."""
+FOLDERS = ("uploads", "exports", "cache", "sample", "practice", "backups")
+"""What we make in a home beside the database and its side files."""
+FOLDER_MODE, FILE_MODE = 0o700, 0o600
 
+_HALF_WRITTEN = (".*.partial", "*/.*.partial", "uploads/*.part", "uploads/*/upload.json.new")
+"""Names that we give to what is not complete yet, in the places where we do; anywhere else a file
+of such a name is somebody's."""
 _MOUNTS = Path("/proc/mounts")
 
 
@@ -25,9 +33,12 @@ def make_home(settings: Settings) -> Path:
         StorageError: It cannot be made, or lies on a network file system.
     """
     try:
-        settings.home.mkdir(mode=0o700, parents=True, exist_ok=True)
+        settings.home.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
     except OSError as error:
-        raise StorageError(f"the home folder cannot be made: {error.strerror}") from error
+        raise StorageError(
+            f"the home folder {settings.home} cannot be made: {error.strerror}",
+            hint="Set TOUCHLINE_HOME to a folder that this user may write to.",
+        ) from error
     kind = file_system(settings.home)
     if kind in NETWORK_FILE_SYSTEMS:
         raise StorageError(
@@ -35,6 +46,85 @@ def make_home(settings: Settings) -> Path:
             hint="Set TOUCHLINE_HOME to a folder on a local disk.",
         )
     return settings.home
+
+
+def make_private(settings: Settings) -> int:
+    """Take a home's folders and files from everybody but their owner, from now on, too.
+
+    What belongs to another user stays as it is; ``open_to_others`` finds it.
+
+    Returns:
+        How many could be read by others.
+    """
+    keep_private()
+    mended = 0
+    for path in private_files(settings):
+        # Other commands may delete files meanwhile.
+        with suppress(FileNotFoundError, PermissionError):
+            mode = path.lstat().st_mode
+            wanted = FOLDER_MODE if stat.S_ISDIR(mode) else mode & 0o700
+            if not stat.S_ISLNK(mode) and stat.S_IMODE(mode) != wanted:
+                path.chmod(wanted)
+                mended += 1
+    return mended
+
+
+def keep_private() -> None:
+    """From now on this process makes no file that others than its owner may read."""
+    os.umask(0o077)
+
+
+def open_to_others(settings: Settings) -> list[Path]:
+    """What of a home others than its owner can read or write: a closed home closes all in it."""
+    closed = not settings.home.stat().st_mode & 0o077
+    found = []
+    for path in private_files(settings):
+        with suppress(FileNotFoundError):
+            mode = path.lstat().st_mode
+            inside = closed and path.is_relative_to(settings.home)
+            if mode & 0o077 and not stat.S_ISLNK(mode) and not inside:
+                found.append(path)
+    return found
+
+
+def private_files(settings: Settings) -> Iterator[Path]:
+    """The home, and all in it that is ours; whatever else somebody keeps there is theirs."""
+    home, database = settings.home, settings.database_file
+    yield home
+    yield from (home / name for name in ("server.lock", "database.lock") if (home / name).exists())
+    yield from database.parent.glob(f"{database.name}*")
+    yield from database.parent.glob("home.json")
+    for name in FOLDERS:
+        for folder, _folders, names in os.walk(home / name):
+            yield Path(folder)
+            yield from (Path(folder, file) for file in names)
+
+
+def half_written(home: Path) -> Iterator[Path]:
+    """What something is writing in a home, or was when it was killed."""
+    for pattern in _HALF_WRITTEN:
+        yield from home.glob(pattern)
+
+
+def refused(path: Path, error: OSError) -> StorageError:
+    """What a disk said about a file of the home, as a sentence with its remedy."""
+    if error.errno == errno.ENOSPC:
+        return StorageError(
+            f"the disk is full: {path} cannot be written", hint="Free some space and try again."
+        )
+    return StorageError(
+        f"{path} cannot be written: {error.strerror}",
+        hint="Make the home folder and its files writable for this user, or set TOUCHLINE_HOME"
+        " to another folder.",
+    )
+
+
+def make_file(path: Path) -> None:
+    """An empty file for its owner alone, where there is none."""
+    try:
+        os.close(os.open(path, os.O_WRONLY | os.O_CREAT, 0o600))
+    except OSError as error:
+        raise refused(path, error) from error
 
 
 def file_system(folder: Path, mounts: Path = _MOUNTS) -> str:
@@ -49,22 +139,3 @@ def file_system(folder: Path, mounts: Path = _MOUNTS) -> str:
         if place.is_relative_to(mount) and len(mount.parts) >= best:
             best, kind = len(mount.parts), this_kind
     return kind
-
-
-@contextmanager
-def server_lock(settings: Settings) -> Iterator[None]:
-    """Hold the home for one server; the lock ends with the process, however it ends.
-
-    Raises:
-        StorageError: Another server holds it.
-    """
-    path = make_home(settings) / "server.lock"
-    with path.open("a") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise StorageError(
-                "another Touchline server already uses this home folder",
-                hint="Stop it, or set TOUCHLINE_HOME to another folder.",
-            ) from error
-        yield

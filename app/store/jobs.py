@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from sqlalchemy import delete, insert, select, update
@@ -18,6 +19,8 @@ from app.store.models import DatasetModel
 
 WAITING, RUNNING = "waiting", "running"
 DONE, FAILED, CANCELLED = "done", "failed", "cancelled"
+EXPORT = "export"
+"""The kind of job whose row is the only way to its file."""
 OPEN = (WAITING, RUNNING)
 """States that are not the last one of a job."""
 
@@ -142,6 +145,21 @@ def trim_jobs(session: Session, kind: str, keep: int) -> None:
         .offset(keep)
     )
     session.execute(delete(JobModel).where(JobModel.id.in_(oldest)))
+
+
+def forget_jobs(session: Session, days: int) -> int:
+    """Forget jobs that ended so many days ago; one that made an export goes with its file.
+
+    Returns:
+        How many.
+    """
+    oldest = (datetime.now(UTC) - timedelta(days=days)).isoformat(timespec="microseconds")
+    gone = (
+        delete(JobModel)
+        .where(JobModel.state.not_in(OPEN), JobModel.ended < oldest, JobModel.kind != EXPORT)
+        .returning(JobModel.id)
+    )
+    return len(session.scalars(gone).all())
 
 
 def _text(value: Json) -> str | None:

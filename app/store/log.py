@@ -11,13 +11,15 @@ from typing import Any, cast
 from sqlalchemy import ColumnElement, Table, bindparam, func, insert, select
 from sqlalchemy.orm import Session
 
-from app.errors import StorageError
+from app.errors import DamagedError
 from app.store.codecs import Json, canonical, unpack
 from app.store.models import LogModel
 
 GENESIS = "0" * 64
 """The hash before the first row."""
 
+LOG_END = "touchline_log_end"
+"""Where a session notes id and hash of the last entry that it wrote."""
 _BATCH = 500
 
 
@@ -65,6 +67,7 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
         row = {name: getattr(entry, name) for name in _COLUMNS}
         rows.append({**row, "id": number, "hash": previous, "body": zlib.compress(body)})
     session.execute(insert(_LOG), rows)
+    session.info[LOG_END] = (number, previous)
     return [row["id"] for row in rows]
 
 
@@ -145,20 +148,25 @@ def read_log(session: Session, *where: ColumnElement[bool], after: int = 0) -> I
         after = rows[-1].id
 
 
+def last_time(session: Session) -> str | None:
+    """When the last entry was written; None for an empty log."""
+    return session.scalar(select(LogModel.at).order_by(LogModel.id.desc()).limit(1))
+
+
 def verify_chain(session: Session) -> int:
     """Check every hash of the log; returns the number of rows.
 
     Raises:
-        StorageError: A row was changed, removed or put in from outside.
+        DamagedError: A row was changed, removed or put in from outside.
     """
     count, previous = 0, GENESIS
     for entry in read_log(session):
         count += 1
         previous = chain_hash(previous, count, entry, canonical(entry.body).encode())
         if entry.id != count or entry.hash != previous:
-            raise StorageError(
+            raise DamagedError(
                 f"row {entry.id} of the log is not what was written",
-                hint="Restore the database from a backup.",
+                hint="Run touchline restore BACKUP.",
             )
     return count
 

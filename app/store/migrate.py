@@ -2,19 +2,50 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from sqlalchemy import Connection, Engine, inspect, text
 
 from app.config import Settings
 from app.errors import StorageError
+from app.store.anchor import renew_anchor, require_own_database
+from app.store.backup import write_backup
 from app.store.engine import WRITE, make_engine, reported
-from app.store.home import make_home
+from app.store.first_look import require_sound
+from app.store.home import make_file
+from app.store.locks import DatabaseLock
 
-KNOWN_REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008", "0009", "0012")
+KNOWN_REVISIONS = (
+    "0001",
+    "0002",
+    "0003",
+    "0004",
+    "0005",
+    "0006",
+    "0007",
+    "0008",
+    "0009",
+    "0010",
+    "0011",
+)
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]
 """The revision that this version works with."""
+COPY = "before-schema-{}.zip"
+
+
+@dataclass(frozen=True)
+class Migrated:
+    """What a migration came to.
+
+    Attributes:
+        revision: The schema's revision now.
+        copy: The backup that was taken before; None where nothing had to be changed.
+    """
+
+    revision: str
+    copy: Path | None = None
 
 
 def migrations_folder() -> Path:
@@ -26,28 +57,76 @@ def migrations_folder() -> Path:
     raise StorageError("the migration scripts are missing from this installation")
 
 
-def migrate(settings: Settings) -> str:
-    """Run the migrations that are missing; returns the revision reached.
+def migrate(settings: Settings) -> Migrated:
+    """Run the migrations that are missing, after a backup of what is there.
 
-    Each migration is one transaction: killed midway it has not happened.
+    All of them are one transaction: killed midway nothing has happened.
 
     Raises:
-        StorageError: The database is newer than this version.
+        StorageError: The database is newer than this version, or somebody has it open.
+        DamagedError: The database is not what was written, or not the one of its home.
     """
+    lock = DatabaseLock(settings)
+    try:
+        if lock.alone:
+            require_sound(settings)
+        return bring_up_to_date(settings, alone=lock.alone)
+    finally:
+        lock.release()
+
+
+def bring_up_to_date(settings: Settings, *, alone: bool) -> Migrated:
+    """The same for who holds the database's lock; ``alone``: and nobody else has it open."""
+    make_file(settings.database_file)
+    engine = make_engine(settings)
+    copy = None
+    try:
+        with reported(settings):
+            revision = schema_revision(engine)
+            _refuse_newer(revision, settings)
+            require_own_database(engine, settings)
+            if revision not in (None, SCHEMA_REVISION):
+                if not alone:
+                    raise StorageError(
+                        "another Touchline process has the database open: its schema cannot be"
+                        " changed meanwhile",
+                        hint="Stop it, then run touchline migrate.",
+                    )
+                copy = _backups(settings) / COPY.format(SCHEMA_REVISION)
+                write_backup(settings, copy, replace=True)
+            if revision != SCHEMA_REVISION:
+                _run(engine)
+            renew_anchor(engine, settings)
+    finally:
+        engine.dispose()
+    if copy is not None:
+        _forget_other_copies(copy)
+    return Migrated(SCHEMA_REVISION, copy)
+
+
+def _run(engine: Engine) -> None:
     # Alembic is slow to import and seldom needed.
     from alembic import command
     from alembic.config import Config
 
-    make_home(settings)
-    engine = make_engine(settings).execution_options(**WRITE)
     config = Config()
     config.set_main_option("script_location", str(migrations_folder()).replace("%", "%%"))
-    with reported(settings), engine.begin() as connection:
-        _refuse_newer(_revision(connection))
+    with engine.execution_options(**WRITE).begin() as connection:
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
-    engine.dispose()
-    return SCHEMA_REVISION
+
+
+def _backups(settings: Settings) -> Path:
+    folder = settings.home / "backups"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
+
+
+def _forget_other_copies(copy: Path) -> None:
+    """Of an earlier migration, which this one has shown to be good."""
+    for other in copy.parent.glob(COPY.format("*")):
+        if other != copy:
+            other.unlink()
 
 
 def schema_revision(engine: Engine) -> str | None:
@@ -63,9 +142,17 @@ def _revision(connection: Connection) -> str | None:
     return None if revision is None else str(revision)
 
 
-def _refuse_newer(revision: str | None) -> None:
+def _refuse_newer(revision: str | None, settings: Settings) -> None:
     if revision is not None and revision not in KNOWN_REVISIONS:
-        raise StorageError(
-            f"the database was made by a newer version of Touchline (schema {revision})",
-            hint="Update Touchline; an older version would damage the data.",
-        )
+        raise newer_schema(revision, settings)
+
+
+def newer_schema(revision: str, settings: Settings) -> StorageError:
+    """The refusal of a database that a newer version made, with the way back."""
+    copy = settings.home / "backups" / COPY.format(revision)
+    back = f" To go back to the state before its migration, run touchline restore {copy}."
+    return StorageError(
+        f"the database was made by a newer version of Touchline (schema {revision})",
+        hint="Update Touchline; an older version would damage the data."
+        + (back if copy.exists() else ""),
+    )

@@ -5,15 +5,32 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 
-from sqlalchemy import Engine
+from sqlalchemy import Engine, text
 from sqlalchemy.orm import Session as Session
 
 from app.config import Settings
-from app.errors import StorageError
+from app.errors import EXAMINE, DamagedError, StorageError
+from app.store.anchor import (
+    move_anchor,
+    read_anchor,
+    renew_anchor,
+    require_own_database,
+    sync_anchor,
+)
 from app.store.engine import WRITE, make_engine, reported, require_pragmas
-from app.store.home import make_home
-from app.store.migrate import KNOWN_REVISIONS, SCHEMA_REVISION, migrate, schema_revision
+from app.store.first_look import require_sound
+from app.store.home import make_file
+from app.store.locks import DatabaseLock
+from app.store.log import LOG_END
+from app.store.migrate import (
+    KNOWN_REVISIONS,
+    SCHEMA_REVISION,
+    bring_up_to_date,
+    newer_schema,
+    schema_revision,
+)
 
 TURN_SECONDS = 10.0
 """How long a thread waits for the writes of others in its process; SQLite waits for other
@@ -50,12 +67,21 @@ class Store:
         turn: Held while something is written; writers of one process wait for it.
     """
 
-    def __init__(self, engine: Engine, settings: Settings, turn: AbstractContextManager[object]):
+    def __init__(
+        self,
+        engine: Engine,
+        settings: Settings,
+        lock: DatabaseLock,
+        turn: AbstractContextManager[object],
+    ):
         self.settings = settings
         self._engine = engine
         self._writer = engine.execution_options(**WRITE)
+        self._lock = lock
         self.turn = turn
         self._listeners: list[Callable[[], None]] = []
+        self._anchor = read_anchor(settings.database_file)
+        self._damage: str | None = None
 
     @staticmethod
     def open(settings: Settings, turn: AbstractContextManager[object] | None = None) -> Store:
@@ -66,23 +92,27 @@ class Store:
             turn: The turn to write, where it is shared with another process.
 
         Raises:
-            StorageError: The schema is older or newer than this version's, or the file is not
-                a database, or SQLite does not keep the promises asked of it.
+            StorageError: The schema is older or newer than this version's, or SQLite does not keep
+                the promises asked of it.
+            DamagedError: The database is not what was written, or not the one of its home.
             InputError: The URL is not one of SQLite.
         """
-        make_home(settings)
-        engine = make_engine(settings)
-        with reported(settings):
-            require_pragmas(engine)
-            if schema_revision(engine) is None:
-                migrate(settings)
-            _require_schema(engine)
-        return Store(engine, settings, Turn() if turn is None else turn)
+        lock = DatabaseLock(settings)
+        engine: Engine | None = None
+        try:
+            engine = _open(settings, lock.alone)
+            lock.share()
+            return Store(engine, settings, lock, Turn() if turn is None else turn)
+        except BaseException:
+            if engine is not None:
+                engine.dispose()
+            lock.release()
+            raise
 
     @contextmanager
     def read(self) -> Iterator[Session]:
         """A session on one consistent snapshot; nothing that it changes is kept."""
-        with reported(self.settings), Session(self._engine, autoflush=False) as session:
+        with self._watched(), Session(self._engine, autoflush=False) as session:
             yield session
 
     @contextmanager
@@ -94,14 +124,52 @@ class Store:
         Raises:
             StorageError: Others were writing all the while; nothing was changed.
         """
-        with self.turn, reported(self.settings), Session(self._writer) as session:
+        self.require_undamaged()
+        with self.turn, self._watched(), Session(self._writer) as session:
             # Take the lock before anything is read, so that what is read is still true when it
             # is written.
             session.connection()
             yield session
             session.commit()
+            self._anchored(session)
         for listener in self._listeners:
             listener()
+
+    def require_undamaged(self) -> None:
+        """Raise DamagedError once the database was seen to be damaged.
+
+        What is left of it is read as long as it can be; another change could only spoil more.
+        """
+        if self._damage is not None:
+            raise DamagedError(f"no change is taken: {self._damage}", hint=EXAMINE)
+
+    def require_whole(self) -> None:
+        """Let SQLite look at every page and index; raise DamagedError where it finds a fault."""
+        with self.read() as session:
+            fault = session.execute(text("PRAGMA quick_check(1)")).scalar_one()
+            if fault != "ok":
+                file = self.settings.database_file
+                raise DamagedError(f"{file} is damaged: {' '.join(fault.split())}", hint=EXAMINE)
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        try:
+            with reported(self.settings):
+                yield
+        except DamagedError as error:
+            self.note_damage(error)
+            raise
+
+    def note_damage(self, error: DamagedError) -> None:
+        """Refuse writes from now on: something read was not what was written."""
+        self._damage = error.message
+
+    def _anchored(self, session: Session) -> None:
+        """Tell the home how long the log is by now."""
+        end = session.info.get(LOG_END)
+        if end is not None and self._anchor is not None:
+            self._anchor = replace(self._anchor, entries=end[0], hash=end[1])
+            move_anchor(self.settings.database_file, self._anchor)
 
     def listen(self, listener: Callable[[], None]) -> None:
         """Call a function after each commit of this process; it must be quick."""
@@ -110,9 +178,30 @@ class Store:
     def close(self) -> None:
         """Close all connections."""
         self._engine.dispose()
+        sync_anchor(self.settings.database_file)
+        self._lock.release()
 
 
-def _require_schema(engine: Engine) -> None:
+def _open(settings: Settings, alone: bool) -> Engine:
+    engine = make_engine(settings)
+    if alone:
+        require_sound(settings)
+    make_file(settings.database_file)
+    try:
+        with reported(settings):
+            require_pragmas(engine)
+            if schema_revision(engine) is None:
+                bring_up_to_date(settings, alone=alone)
+            _require_schema(engine, settings)
+            require_own_database(engine, settings)
+            renew_anchor(engine, settings)
+    except BaseException:
+        engine.dispose()
+        raise
+    return engine
+
+
+def _require_schema(engine: Engine, settings: Settings) -> None:
     revision = schema_revision(engine)
     if revision == SCHEMA_REVISION:
         return
@@ -120,7 +209,4 @@ def _require_schema(engine: Engine) -> None:
         raise StorageError(
             "the database was made by an older version of Touchline", hint="Run touchline migrate."
         )
-    raise StorageError(
-        f"the database was made by a newer version of Touchline (schema {revision})",
-        hint="Update Touchline; an older version would damage the data.",
-    )
+    raise newer_schema(str(revision), settings)

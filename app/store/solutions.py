@@ -18,6 +18,7 @@ from app.finite import json_text
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
 from app.store import value_codec
+from app.store.codecs import inflate
 from app.store.models import CalibrationModel, DatasetModel, GroupModel, SolutionModel
 from app.store.summary import Summary, summarize
 
@@ -100,7 +101,7 @@ def encode_calibration(calibration: Calibration) -> bytes:
 @lru_cache(maxsize=256)
 def decode_calibration(body: bytes) -> Calibration:
     """Back from ``encode_calibration``; one value for the same bytes, however often asked."""
-    return value_codec.from_json(Calibration, json.loads(zlib.decompress(body)))
+    return value_codec.from_json(Calibration, json.loads(inflate(body)))
 
 
 def _compress(value: object) -> bytes:

@@ -19,6 +19,7 @@ from tests.docs.pages import (
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
+    anchor backup durable examination first home locks look orphans restore wal
     3d accept action actions address adjust adjustments advice ahead annotate answers app
     application archive archives arrays arrival ask axis bar bars batches best binned bodies
     body boxes bulk button buttons cache calibrate canvas caption card cards cell changes chart

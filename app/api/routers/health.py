@@ -21,7 +21,8 @@ async def get_health(request: Request) -> Health:
 
 @router.get("/readyz", operation_id="getReadiness", responses=responses())
 def get_readiness(store: AppStore) -> Readiness:
-    """Whether the database answers; 503 while it does not."""
+    """Whether the database answers, and was not seen to be damaged; 503 while it does not."""
+    store.require_undamaged()
     read_position(store)
     return Readiness(status="ready")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.errors import ConflictError
-from app.store.answers import Answer, Kept, find_answer, forget_answers, keep_answer
+from app.store.answers import Answer, Kept, find_answer, keep_answer
 from app.store.session import Session, Store
 
 
@@ -36,9 +36,3 @@ def keep_with_work(key: str, actor: str, answer: Answer, kept: Callable[[], None
         kept()
 
     return keep
-
-
-def forget_old(store: Store) -> None:
-    """Forget the answers that are too old."""
-    with store.write() as session:
-        forget_answers(session)

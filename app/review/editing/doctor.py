@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from app.errors import StorageError
 from app.review.datasets.dataset import list_datasets
+from app.review.editing.check import Check
 from app.review.editing.ledger import Ledger, read_ledger
 from app.review.editing.recompute import stale_groups
 from app.review.editing.replay import replay
@@ -16,7 +16,7 @@ from app.store.session import Session, Store
 from app.store.soundness import count_lost_references, file_faults
 
 REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
-RESTORE = "Restore the database from a backup."
+RESTORE = "Run touchline restore BACKUP: it takes the place of the database, which is kept."
 SHOWN = 5
 """Records that a sentence names."""
 REBUILT = {
@@ -28,23 +28,6 @@ REBUILT = {
 """Parts of the ledger that ``rebuild`` writes, with the words for them."""
 KEPT = {"datasets": "datasets", "verdicts": "groups' verdicts"}
 """Parts that it leaves as they are."""
-
-
-@dataclass(frozen=True)
-class Check:
-    """One thing that was looked at.
-
-    Attributes:
-        name: What was looked at.
-        ok: Whether it is as it must be.
-        sentence: What was found.
-        mend: What to do; None where nothing is to be done.
-    """
-
-    name: str
-    ok: bool
-    sentence: str
-    mend: str | None = None
 
 
 def examine(store: Store) -> list[Check]:

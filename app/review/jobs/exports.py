@@ -15,10 +15,10 @@ from app.review.versions.version import find_version
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.frames import Frames
-from app.store.jobs import Job
+from app.store.jobs import EXPORT, Job
 from app.store.session import Store
 
-KIND = "export"
+KIND = EXPORT
 
 
 def request_export(

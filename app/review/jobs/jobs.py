@@ -297,6 +297,11 @@ class Jobs:
             runs = [*self._waiting, *([self._running] if self._running else [])]
         return any((run.id, run.kind) == (job_id, kind) for run in runs)
 
+    def are_idle(self) -> bool:
+        """Whether none waits or runs."""
+        with self._changed:
+            return not self._waiting and self._running is None
+
     def close(self) -> None:
         """Stop after the running job's next step; its record says where it was."""
         with self._changed:

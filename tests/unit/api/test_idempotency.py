@@ -18,6 +18,7 @@ from app.api.idempotency import Idempotency
 from app.api.server import Server, listen
 from app.errors import StorageError
 from app.review.answers import answers
+from app.store.answers import shorten_answers
 from app.store.job_models import AnswerModel
 
 API = "/api/v1"
@@ -42,6 +43,14 @@ class TestRepetition:
         assert again.headers["idempotency-replayed"] == "true"
         assert "idempotency-replayed" not in first.headers
         assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"
+
+    def test_counts_once_when_the_first_answer_is_no_longer_kept(self, app, api) -> None:
+        accept(api)
+        with app.state.services.store.write() as session:
+            assert shorten_answers(session, 0) == 1
+        again = accept(api)
+        assert (again.status_code, again.headers["idempotency-replayed"]) == (409, "true")
+        assert "counts, once" in again.json()["hint"]
 
     def test_is_known_by_what_it_says_and_not_by_how_it_is_written(self, api) -> None:
         body = '{"state": "rejected", "reason": "sides_confused"}'

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from app.cli import app
 from app.config import Settings
 from app.review.importing.ingest import ensure_dataset
-from app.store.home import server_lock
+from app.store.locks import server_lock
 from app.store.session import Store
 
 
@@ -40,7 +40,7 @@ class TestDoctor:
         done = CliRunner().invoke(app, ["doctor", "--json"])
         assert done.exit_code == 1
         (fault,) = (check for check in json.loads(done.stdout) if not check["ok"])
-        assert (fault["name"], "backup" in fault["mend"]) == ("datasets", True)
+        assert (fault["name"], "touchline restore" in fault["mend"]) == ("datasets", True)
 
     def test_rebuilding_waits_for_no_server(self, settings: Settings) -> None:
         assert CliRunner().invoke(app, ["doctor", "--rebuild"]).exit_code == 0
@@ -48,3 +48,11 @@ class TestDoctor:
             refused = CliRunner().invoke(app, ["doctor", "--rebuild"])
         assert refused.exit_code == 1
         assert "another Touchline server" in str(refused.exception)
+
+    def test_a_home_that_is_refused_is_explained(self, settings: Settings) -> None:
+        settings.database_file.write_bytes(b"")
+        done = CliRunner().invoke(app, ["doctor", "--json"])
+        assert done.exit_code == 1
+        (fault,) = (check for check in json.loads(done.stdout) if not check["ok"])
+        assert (fault["name"], "touchline restore" in fault["mend"]) == ("database", True)
+        assert settings.database_file.stat().st_size == 0

@@ -148,6 +148,8 @@ def there(empty: Path, tmp_path: Path) -> Iterator[Store]:
 
 
 def _copy(source: Path, target: Path) -> None:
+    # What the home knows of the database that was there before is not true of this one.
+    target.with_name("home.json").unlink(missing_ok=True)
     with closing(sqlite.connect(str(source))) as one, closing(sqlite.connect(str(target))) as two:
         one.backup(two)
 

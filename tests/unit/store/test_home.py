@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 
 from app.errors import StorageError
-from app.store.home import file_system, make_home, server_lock
+from app.store.home import file_system, make_home, make_private
+from app.store.session import Store
+from tests.unit.store.homes import say
 
 MOUNTS = """\
 /dev/vda / ext4 rw 0 0
@@ -48,10 +50,30 @@ class TestMakeHome:
             make_home(other)
 
 
-class TestServerLock:
-    def test_a_home_has_one_server(self, settings) -> None:
-        refused = pytest.raises(StorageError, match="another Touchline server")
-        with server_lock(settings), refused, server_lock(settings):
-            pass
-        with server_lock(settings):
-            pass
+class TestMakePrivate:
+    def test_a_home_is_its_owners_alone_whatever_the_umask(self, settings) -> None:
+        store = Store.open(settings)
+        say(store)
+        files = [settings.home, *settings.home.iterdir()]
+        assert {path.stat().st_mode & 0o077 for path in files} == {0}
+        assert {"touchline.db", "touchline.db-wal", "home.json"} <= {path.name for path in files}
+        store.close()
+
+    def test_an_open_home_is_mended_and_nothing_of_others_is_touched(self, settings) -> None:
+        upload = settings.uploads / "1"
+        upload.mkdir(parents=True)
+        (upload / "frames.zip").touch()
+        settings.database_file.touch()
+        (settings.home / "letter.txt").touch()
+        (settings.uploads / "link").symlink_to(settings.home / "letter.txt")
+        assert make_private(settings) == 5
+        assert make_private(settings) == 0
+        assert settings.home.stat().st_mode & 0o777 == 0o700
+        assert (upload / "frames.zip").stat().st_mode & 0o777 == 0o600
+        assert (settings.home / "letter.txt").stat().st_mode & 0o777 == 0o644
+
+    def test_from_then_on_new_files_are_private(self, settings) -> None:
+        make_home(settings)
+        make_private(settings)
+        (settings.home / "new").touch()
+        assert (settings.home / "new").stat().st_mode & 0o777 == 0o600

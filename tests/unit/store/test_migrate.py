@@ -1,20 +1,60 @@
 from __future__ import annotations
 
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
 import pytest
+from alembic import command
 from alembic.autogenerate import compare_metadata
+from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import text
 
-from app.store.engine import make_engine
+from app.config import Settings
+from app.errors import StorageError
+from app.store.backup import verify_backup
+from app.store.engine import WRITE, make_engine
+from app.store.home import make_home
+from app.store.locks import DatabaseLock
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
+from app.store.restore import restore
 from app.store.session import Store
 from app.store.tables import Base
+from tests.unit.store.homes import say
+
+RELEASED = KNOWN_REVISIONS[:-1]
+DATASET = "INSERT INTO dataset (name, created, policy, policy_hash) VALUES ('old', '', '', '')"
+
+
+def make_old(settings: Settings, revision: str) -> None:
+    """A home as an earlier version left it: its schema, a dataset, and no anchor."""
+    make_home(settings)
+    config = Config()
+    config.set_main_option("script_location", str(migrations_folder()))
+    engine = make_engine(settings).execution_options(**WRITE)
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, revision)
+        connection.execute(text(DATASET))
+    engine.dispose()
+
+
+def state(settings: Settings) -> tuple[str | None, str]:
+    """Schema and dataset of a home."""
+    engine = make_engine(settings)
+    with engine.connect() as connection:
+        name = connection.execute(text("SELECT name FROM dataset")).scalar_one()
+    revision = schema_revision(engine)
+    engine.dispose()
+    return revision, name
 
 
 class TestMigrate:
     def test_makes_the_tables_of_the_models(self, settings) -> None:
-        assert migrate(settings) == KNOWN_REVISIONS[-1]
+        assert migrate(settings).revision == KNOWN_REVISIONS[-1]
         with make_engine(settings).connect() as connection:
             context = MigrationContext.configure(connection)
             assert compare_metadata(context, Base.metadata) == []
@@ -50,3 +90,84 @@ class TestMigrate:
             assert connection.execute(text("SELECT count(*) FROM sqlite_master")).scalar() == 0
         monkeypatch.undo()
         Store.open(settings).close()
+
+
+class TestOldHomes:
+    @pytest.mark.parametrize("revision", RELEASED)
+    def test_every_released_schema_is_migrated_after_a_backup(
+        self, settings: Settings, revision: str
+    ) -> None:
+        make_old(settings, revision)
+        migrated = migrate(settings)
+        assert state(settings) == (KNOWN_REVISIONS[-1], "old")
+        assert (
+            migrated.copy == settings.home / "backups" / f"before-schema-{KNOWN_REVISIONS[-1]}.zip"
+        )
+        assert verify_backup(migrated.copy).schema == revision
+        with closing(Store.open(settings)) as store:
+            say(store)
+
+    @pytest.mark.parametrize("revision", (RELEASED[0], RELEASED[-1]))
+    def test_killed_midway_it_is_as_before_and_migrates_again(
+        self, settings: Settings, revision: str
+    ) -> None:
+        make_old(settings, revision)
+        script = (
+            "import os, sys; from pathlib import Path; from alembic.operations import Operations\n"
+            "from app.config import Settings; from app.store.migrate import migrate\n"
+            "execute = Operations.execute\n"
+            "def killed(self, sql, **options):\n"
+            "    execute(self, sql, **options)\n"
+            "    'application_id' in str(sql) and os.kill(os.getpid(), 9)\n"
+            "Operations.execute = killed\n"
+            "migrate(Settings(home=Path(sys.argv[1])))\n"
+        )
+        command = [sys.executable, "-c", script, str(settings.home)]
+        done = subprocess.run(command, cwd=Path(__file__).parents[3], check=False)
+        assert done.returncode == -9
+        assert state(settings) == (revision, "old")
+        assert migrate(settings).revision == KNOWN_REVISIONS[-1]
+        assert state(settings)[1] == "old"
+
+    def test_the_way_back_is_the_backup(self, settings: Settings) -> None:
+        make_old(settings, "0009")
+        copy = migrate(settings).copy
+        assert copy is not None
+        restore(settings, copy)
+        assert state(settings) == ("0009", "old")
+
+    def test_an_older_version_names_the_way_back(self, settings: Settings, monkeypatch) -> None:
+        make_old(settings, "0009")
+        copy = migrate(settings).copy
+        monkeypatch.setattr("app.store.migrate.KNOWN_REVISIONS", RELEASED)
+        with pytest.raises(StorageError, match=r"newer version .* \(schema 0010\)") as caught:
+            migrate(settings)
+        assert f"touchline restore {copy}" in str(caught.value.hint)
+
+    def test_backups_of_earlier_migrations_go_with_the_next(self, settings: Settings) -> None:
+        make_old(settings, "0009")
+        earlier = settings.home / "backups" / "before-schema-0009.zip"
+        earlier.parent.mkdir()
+        earlier.write_bytes(b"")
+        copy = migrate(settings).copy
+        assert list(earlier.parent.iterdir()) == [copy]
+
+    def test_without_a_backup_nothing_is_migrated(self, settings: Settings, monkeypatch) -> None:
+        def full(*_arguments, **_options):
+            raise StorageError("the disk is full")
+
+        make_old(settings, "0009")
+        monkeypatch.setattr("app.store.migrate.write_backup", full)
+        with pytest.raises(StorageError, match="disk is full"):
+            migrate(settings)
+        assert state(settings) == ("0009", "old")
+
+    def test_is_refused_while_somebody_has_the_database_open(self, settings: Settings) -> None:
+        make_old(settings, "0009")
+        lock = DatabaseLock(settings)
+        lock.share()
+        with pytest.raises(StorageError, match="another Touchline process has the database open"):
+            migrate(settings)
+        assert state(settings) == ("0009", "old")
+        lock.release()
+        migrate(settings)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from app.errors import ConflictError
-from app.review.answers.answers import find_first, forget_old, keep_first, keep_with_work
+from app.review.answers.answers import find_first, keep_first, keep_with_work
 from app.store.answers import Answer
 from app.store.session import Store
 
@@ -15,7 +15,6 @@ class TestFirstAnswers:
         assert find_first(store, "key", "ann") is None
         keep_first(store, "key", "ann", ANSWER)
         keep_first(store, "key", "ann", Answer("other", 200, {}, b""))
-        forget_old(store)
         assert find_first(store, "key", "ann") == ANSWER
         assert find_first(store, "key", "ben") is None
 

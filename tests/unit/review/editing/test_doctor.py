@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import text
 
-from app.review.editing.doctor import REBUILD, RESTORE, Check, examine
+from app.review.editing.check import Check
+from app.review.editing.doctor import REBUILD, RESTORE, examine
 from app.review.editing.replay import rebuild
 from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict

@@ -1,0 +1,78 @@
+"""Commands that copy a home and bring it back: backup and restore."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.commands.options import Json, read_settings
+from app.commands.terminal import print_json, say
+
+commands = typer.Typer()
+
+
+@commands.command()
+def backup(
+    out: Annotated[Path, typer.Argument(help="A zip that does not exist yet.")],
+    with_frames: Annotated[
+        bool,
+        typer.Option("--with-frames", help="Uploads, sample and practice frames in the home, too."),
+    ] = False,
+    with_exports: Annotated[
+        bool, typer.Option("--with-exports", help="Exports made over REST, too.")
+    ] = False,
+    json_: Json = False,
+) -> None:
+    """Copy the database of the home, beside a running server; the copy is read again and compared.
+
+    Frames are read where they are: those outside the home are in no backup.
+    """
+    from app.store.backup import EXPORTS, FRAMES, back_up
+
+    folders = (*(FRAMES if with_frames else ()), *(EXPORTS if with_exports else ()))
+    manifest = back_up(read_settings(), out, folders)
+    if json_:
+        print_json({"out": str(out), **vars(manifest)})
+        return
+    size = out.stat().st_size / 1e6
+    say(f"{out} ({size:,.1f} MB) is written and verified")
+    say(f"  {_contents(manifest.entries, manifest.rows)}, {len(manifest.files) - 1:,} files")
+    if manifest.frames_elsewhere:
+        say(
+            f"  {manifest.frames_elsewhere:,} files with frames are not in it; they stay as they are"
+        )
+
+
+@commands.command()
+def restore(
+    source: Annotated[
+        Path, typer.Argument(metavar="BACKUP", help="A zip of touchline backup, or a touchline.db.")
+    ],
+    home: Annotated[Path | None, typer.Option(help="Default: TOUCHLINE_HOME.")] = None,
+    json_: Json = False,
+) -> None:
+    """Put a backup into the place of the home's database; what is there is moved aside, not deleted.
+
+    The backup is verified first. No server may run.
+    """
+    from app.store.restore import restore as run_restore
+
+    restored = run_restore(read_settings(home=home), source)
+    if json_:
+        values = {name: str(v) if isinstance(v, Path) else v for name, v in vars(restored).items()}
+        print_json(values)
+        return
+    say(f"{restored.home} is restored from {source}")
+    say(f"  {_contents(restored.entries, restored.rows)}, {restored.files:,} files")
+    if restored.foreign_log:
+        say("  the write-ahead log beside it was another database's, and is left out")
+    if restored.aside is not None:
+        say(f"  what was there is in {restored.aside}")
+    say("  touchline doctor compares every table with the log")
+
+
+def _contents(entries: int, rows: dict[str, int]) -> str:
+    groups, verdicts = rows.get("groups", 0), rows.get("verdict", 0)
+    return f"{entries:,} entries of the log, {groups:,} groups, {verdicts:,} verdicts"

@@ -1,0 +1,136 @@
+"""A check-up of a home beside its tables: settings, permissions, room, clock, leftovers, versions."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from datetime import UTC, datetime, timedelta
+
+import cv2
+import pysqlite3.dbapi2
+
+from app.config import Settings
+from app.errors import StorageError
+from app.review.editing.check import Check
+from app.store.anchor import read_anchor
+from app.store.engine import MIN_SQLITE
+from app.store.home import open_to_others
+from app.store.log import last_time
+from app.store.orphans import leftovers, spare_calibrations, unread_uploads
+from app.store.session import Session, Store
+
+ROOM_BYTES = 2**30
+"""Room on the disk below which the next import may not fit."""
+_PREFIX = "TOUCHLINE_"
+_MANY = 1_000_000
+_FORMATS = (".jpg", ".png", ".webp")
+
+
+def examine_home(settings: Settings) -> list[Check]:
+    """What can be said of a home without its database."""
+    return [_settings(settings), _permissions(settings), _room(settings), _versions()]
+
+
+def examine_surroundings(store: Store) -> list[Check]:
+    """What lies around the tables of a database that can be opened."""
+    settings = store.settings
+    with store.read() as session:
+        return [
+            _anchor(settings),
+            _clock(session),
+            _leftovers(settings),
+            _calibrations(session),
+            _uploads(session, settings),
+        ]
+
+
+def _settings(settings: Settings) -> Check:
+    known = {_PREFIX + name.upper() for name in Settings.model_fields}
+    unknown = sorted(name for name in os.environ if name.startswith(_PREFIX) and name not in known)
+    gone = [str(folder) for folder in settings.import_folders if not folder.is_dir()]
+    if unknown:
+        sentence = f"{', '.join(unknown)} is no setting, and is not heeded"
+        return Check("settings", False, sentence, "app/config.py lists all; correct or unset it.")
+    if gone:
+        sentence = f"TOUCHLINE_IMPORT_FOLDERS names {', '.join(gone)}, which is no folder"
+        return Check("settings", False, sentence, "Make the folder, or take it out.")
+    return Check("settings", True, f"home {settings.home}")
+
+
+def _permissions(settings: Settings) -> Check:
+    found = open_to_others(settings)
+    if found:
+        sentence = f"others than its owner may read {len(found):,} files and folders: {found[0]}"
+        more = "" if len(found) == 1 else " and others"
+        mend = f"Start touchline serve, or run chmod -R go= {settings.home}"
+        return Check("permissions", False, sentence + more, mend)
+    return Check("permissions", True, "the home is its owner's alone")
+
+
+def _room(settings: Settings) -> Check:
+    free = shutil.disk_usage(settings.home).free
+    # A migration copies the database twice: once as it is, once packed.
+    database = settings.database_file
+    needed = max(ROOM_BYTES, 2 * (database.stat().st_size if database.exists() else 0))
+    sentence = f"{free / 1e9:,.1f} GB are free"
+    if free < needed:
+        mend = f"Free some space: at least {needed / 1e9:,.1f} GB."
+        return Check("room", False, sentence, mend)
+    return Check("room", True, sentence)
+
+
+def _versions() -> Check:
+    sqlite = pysqlite3.dbapi2.sqlite_version
+    lacking = [ending for ending in _FORMATS if not cv2.haveImageWriter(ending)]
+    sentence = f"SQLite {sqlite}, OpenCV {cv2.__version__}"
+    if pysqlite3.dbapi2.sqlite_version_info < MIN_SQLITE:
+        mend = "Install the packages of requirements.lock: this SQLite can corrupt its file."
+        return Check("versions", False, sentence, mend)
+    if lacking:
+        sentence += f", which knows no {', '.join(lacking)}"
+        return Check("versions", False, sentence, "Install the packages of requirements.lock.")
+    return Check("versions", True, sentence)
+
+
+def _anchor(settings: Settings) -> Check:
+    try:
+        anchor = read_anchor(settings.database_file)
+    except StorageError as error:
+        return Check("anchor", False, error.message, error.hint)
+    if anchor is None:
+        return Check("anchor", False, "home.json is missing", "Start touchline serve: it is made.")
+    sentence = f"installation {anchor.installation[:8]}, {anchor.entries:,} entries or more"
+    return Check("anchor", True, sentence)
+
+
+def _clock(session: Session) -> Check:
+    last = last_time(session)
+    now = datetime.now(UTC)
+    # Two machines that edit in turn may differ by a little.
+    if last is not None and datetime.fromisoformat(last) > now + timedelta(minutes=5):
+        sentence = f"the log's last entry is of {last}, and the clock says {now.isoformat()}"
+        return Check("clock", False, sentence, "Set the clock of this machine.")
+    return Check("clock", True, "not behind the log")
+
+
+def _leftovers(settings: Settings) -> Check:
+    found = [str(path.relative_to(settings.home)) for path in leftovers(settings)]
+    if found:
+        sentence = f"{len(found):,} half-written files are left: {found[0]}"
+        return Check(
+            "leftovers", True, sentence, "The server deletes them when it has nothing to do."
+        )
+    return Check("leftovers", True, "none")
+
+
+def _calibrations(session: Session) -> Check:
+    count = len(spare_calibrations(session, _MANY))
+    mend = "The server deletes them when it has nothing to do." if count else None
+    return Check("spare calibrations", True, f"{count:,} that no solution rests on", mend)
+
+
+def _uploads(session: Session, settings: Settings) -> Check:
+    found = unread_uploads(session, settings)
+    sentence = f"{len(found):,} kept for frames that no dataset reads"
+    mend = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
+    return Check("uploads", True, sentence, mend)

@@ -1,0 +1,100 @@
+"""A first look at a home's files, before SQLite opens the database and mends what it should not.
+
+Only headers are read. What is refused here stays as it is: SQLite would take an empty file for a
+new database, and any log beside it for its own.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from app.config import Settings
+from app.errors import DamagedError, StorageError
+from app.store.anchor import read_anchor
+from app.store.wal import DatabaseHeader, WriteAheadLog, read_header, read_log
+
+
+def log_file(database: Path) -> Path:
+    """The write-ahead log beside a database."""
+    return database.with_name(f"{database.name}-wal")
+
+
+def require_sound(settings: Settings) -> None:
+    """Raise where the files of a home do not belong together.
+
+    Nobody may have the database open meanwhile: both files change under a writer.
+
+    Raises:
+        DamagedError: The database is gone, emptied, cut short, no database, or lies beside the log
+            of another one.
+        StorageError: A file cannot be read.
+    """
+    database = settings.database_file
+    try:
+        if not _size(database):
+            _require_new(settings)
+            return
+        header = read_header(database)
+        log = read_log(log_file(database))
+    except OSError as error:
+        raise StorageError(
+            f"{error.filename or database} cannot be read ({error.strerror})",
+            hint="Make the home folder and its files readable and writable for this user.",
+        ) from error
+    if header is None:
+        raise DamagedError(
+            f"{database} is damaged or not a database",
+            hint="Run touchline restore BACKUP; it moves the file aside.",
+        )
+    _require_whole(database, header, log)
+
+
+def _require_whole(database: Path, header: DatabaseHeader, log: WriteAheadLog) -> None:
+    if not log.belongs_to(header):
+        raise DamagedError(
+            f"{log_file(database)} is the write-ahead log of another database than {database}:"
+            " together they would destroy each other",
+            hint="If a backup was copied here, run touchline restore with it; "
+            f"touchline restore {database} goes on without the log. Both keep all files.",
+        )
+    size, expected = _size(database), header.pages * header.page_bytes
+    if not log.commits and size < expected:
+        raise DamagedError(
+            f"{database} is cut short: {size:,} of {expected:,} bytes are there",
+            hint="Run touchline restore BACKUP; it moves the file aside.",
+        )
+
+
+def _require_new(settings: Settings) -> None:
+    """Raise DamagedError where a home without a database has had one."""
+    database = settings.database_file
+    signs = [sign for sign in signs_of_use(settings) if sign is not None]
+    if signs:
+        state = "is empty" if database.exists() else "is missing"
+        raise DamagedError(
+            f"{database} {state}, but this home has been used: {', '.join(signs)}",
+            hint="Run touchline restore BACKUP. To begin anew, set TOUCHLINE_HOME to another"
+            " folder, or move this one away.",
+        )
+
+
+def signs_of_use(settings: Settings) -> list[str | None]:
+    """What a home without a database holds that only a database explains; None: no such thing."""
+    database = settings.database_file
+    anchor = read_anchor(database)
+    log = log_file(database)
+    return [
+        None if anchor is None else f"home.json knows {anchor.entries:,} entries of its log",
+        f"{log.name} holds changes" if _size(log) else None,
+        _filled(settings.uploads, "*/upload.json"),
+        _filled(settings.exports, "*.json"),
+    ]
+
+
+def _filled(folder: Path, pattern: str) -> str | None:
+    count = sum(1 for _ in folder.glob(pattern))
+    return f"{folder.name}/ holds {count:,}" if count else None
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0

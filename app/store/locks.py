@@ -1,0 +1,94 @@
+"""Locks of a home: one server, and who has the database open. They end with their process."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from app.config import Settings
+from app.errors import StorageError
+from app.store.home import make_home, refused
+
+SERVER_LOCK, DATABASE_LOCK = "server.lock", "database.lock"
+
+
+class DatabaseLock:
+    """Says that a process has the database open.
+
+    Attributes:
+        alone: Whether nobody else has; others wait until ``share`` before they open it.
+    """
+
+    def __init__(self, settings: Settings):
+        self._handle = _open(make_home(settings) / DATABASE_LOCK)
+        try:
+            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self.alone = True
+        except BlockingIOError:
+            fcntl.flock(self._handle, fcntl.LOCK_SH)
+            self.alone = False
+
+    def share(self) -> None:
+        """Let others open it, too."""
+        fcntl.flock(self._handle, fcntl.LOCK_SH)
+        self.alone = False
+
+    def release(self) -> None:
+        """It is closed."""
+        if self._handle >= 0:
+            os.close(self._handle)
+        self._handle = -1
+
+
+@contextmanager
+def database_alone(settings: Settings, why: str) -> Iterator[None]:
+    """Hold the database while its file is replaced or its schema changed.
+
+    Raises:
+        StorageError: Somebody has it open; ``why`` says what cannot be done meanwhile.
+    """
+    lock = DatabaseLock(settings)
+    try:
+        if not lock.alone:
+            raise StorageError(
+                f"another Touchline command has the database open: {why}",
+                hint="Wait until it is done, or stop it; then run this command again.",
+            )
+        yield
+    finally:
+        lock.release()
+
+
+@contextmanager
+def server_lock(settings: Settings) -> Iterator[None]:
+    """Hold the home for one server; the file tells its process id.
+
+    Raises:
+        StorageError: Another server holds it.
+    """
+    handle = _open(make_home(settings) / SERVER_LOCK)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            holder = os.pread(handle, 32, 0).decode(errors="replace").strip()
+            process = f" (process {holder})" if holder.isdigit() else ""
+            raise StorageError(
+                f"another Touchline server already uses this home folder{process}",
+                hint="Stop it, or set TOUCHLINE_HOME to another folder.",
+            ) from error
+        os.ftruncate(handle, 0)
+        os.pwrite(handle, f"{os.getpid()}\n".encode(), 0)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _open(path: Path) -> int:
+    try:
+        return os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    except OSError as error:
+        raise refused(path, error) from error

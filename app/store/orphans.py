@@ -1,0 +1,83 @@
+"""Orphans: what lies in a home and nothing uses, such as a killed deletion leaves behind."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from sqlalchemy import select, text
+from sqlalchemy.orm import Session
+
+from app.config import Settings
+from app.store.home import half_written
+from app.store.models import QueueModel, ViewModel
+from app.store.uploads import list_uploads
+
+DAY = 86_400.0
+"""Seconds."""
+_UNUSED = (
+    "SELECT key FROM calibration WHERE key NOT IN"
+    " (SELECT json_each.value FROM solution, json_each(solution.calibrations)) LIMIT :limit"
+)
+
+
+def spare_calibrations(session: Session, limit: int) -> list[str]:
+    """Keys of calibrations that no solution rests on; none while groups wait to be solved.
+
+    A solver may have read them already for the solution that it is about to save.
+    """
+    waiting = select(QueueModel.group_id).where(QueueModel.solved.is_(False)).limit(1)
+    if session.scalar(waiting) is not None:
+        return []
+    return list(session.scalars(text(_UNUSED), {"limit": limit}))
+
+
+def delete_calibrations(session: Session, keys: list[str]) -> None:
+    """Delete calibrations; those that a version needs go on in it (a trigger sees to that)."""
+    if keys:
+        statement = text("DELETE FROM calibration WHERE key = :key")
+        session.execute(statement, [{"key": key} for key in keys])
+
+
+def unread_uploads(session: Session, settings: Settings) -> list[str]:
+    """Ids of uploads that are kept for their frames, though no view has its frame there."""
+    statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
+    paths = [Path(path) for path in session.scalars(statement) if path is not None]
+    folders = {parent for path in paths for parent in path.parents}
+    return [
+        upload.id
+        for upload in list_uploads(settings)
+        if upload.kept and settings.uploads / upload.id not in folders
+    ]
+
+
+def leftovers(settings: Settings, seconds: float = DAY) -> Iterator[Path]:
+    """Files and folders of a home that something killed was writing, and has not for some time."""
+    oldest = time.time() - seconds
+    for path in half_written(settings.home):
+        if path.lstat().st_mtime < oldest:
+            yield path
+
+
+def delete_leftovers(settings: Settings) -> int:
+    """Delete them; returns how many there were."""
+    found = list(leftovers(settings))
+    for path in found:
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+    return len(found)
+
+
+def expire_cache(settings: Settings) -> int:
+    """Delete derived files that were made longer ago than the settings allow; returns how many."""
+    oldest = time.time() - settings.cache_days * DAY
+    gone = 0
+    for path in settings.cache.rglob("*"):
+        if path.is_file() and path.lstat().st_mtime < oldest:
+            path.unlink(missing_ok=True)
+            gone += 1
+    return gone

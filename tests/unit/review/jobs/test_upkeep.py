@@ -1,0 +1,147 @@
+"""Upkeep: what is old, too large or nobody's goes; what is promised or used stays."""
+
+from __future__ import annotations
+
+import os
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from sqlalchemy import text, update
+from structlog.testing import capture_logs
+
+from app.review.datasets.dataset import list_datasets
+from app.review.datasets.delete import delete_dataset
+from app.review.jobs.jobs import Jobs
+from app.review.jobs.upkeep import Tidied, Upkeep, tidy
+from app.store.answers import Answer, find_answer, keep_answer
+from app.store.job_models import AnswerModel, JobModel
+from app.store.jobs import NewJob, insert_job, update_job
+from app.store.session import Store
+
+OLD = time.time() - 40 * 86_400
+
+
+def keys(store: Store, table: str = "calibration") -> int:
+    with store.read() as session:
+        return session.execute(text(f"SELECT count(*) FROM {table}")).scalar_one()
+
+
+def place(path: Path, when: float) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"x")
+    os.utime(path, (when, when))
+    return path
+
+
+@pytest.fixture
+def killed_deletion(store: Store, fill, make_group, monkeypatch: pytest.MonkeyPatch) -> Store:
+    """A dataset was deleted by a process that was killed before its calibrations went."""
+    fill(make_group(7), make_group(8))
+
+    def kill(*_arguments):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("app.review.datasets.delete._delete_calibrations", kill)
+        with suppress(KeyboardInterrupt):
+            delete_dataset(store, "demo", confirm="demo", actor="a")
+    return store
+
+
+class TestCalibrations:
+    def test_those_of_a_killed_deletion_go(self, killed_deletion: Store) -> None:
+        assert list_datasets(killed_deletion) == []
+        left = keys(killed_deletion)
+        assert left > 0
+        assert tidy(killed_deletion).calibrations == left
+        assert keys(killed_deletion) == 0
+
+    def test_those_of_present_solutions_stay(self, store: Store, fill, make_group) -> None:
+        fill(make_group(7))
+        before = keys(store)
+        assert tidy(store) == Tidied()
+        assert keys(store) == before > 0
+
+    def test_none_go_while_groups_wait_to_be_solved(
+        self, killed_deletion: Store, fill, make_group
+    ) -> None:
+        before = keys(killed_deletion)
+        fill(make_group(9), solved=False)
+        assert tidy(killed_deletion).calibrations == 0
+        assert keys(killed_deletion) == before > 0
+
+
+class TestAnswers:
+    def test_old_ones_go_and_the_oldest_beyond_the_room_lose_their_text(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        body = os.urandom(1000)
+        for number in range(5):
+            with store.write() as session:
+                keep_answer(session, f"k{number}", "ann", Answer("d", 200, {}, body))
+        with store.write() as session:
+            oldest = update(AnswerModel).where(AnswerModel.key == "k0")
+            session.execute(oldest.values(at="2020-01-01T00:00:00"))
+        monkeypatch.setattr(
+            store, "settings", store.settings.model_copy(update={"answer_bytes": 2100})
+        )
+        assert tidy(store).answers == 3
+        with store.read() as session:
+            found = [find_answer(session, f"k{number}", "ann") for number in range(5)]
+        assert [answer and answer.body for answer in found] == [None, None, None, body, body]
+        assert [answer is None for answer in found] == [True, False, False, False, False]
+
+
+class TestJobs:
+    def test_those_that_ended_long_ago_go_but_for_exports_and_open_ones(self, store: Store) -> None:
+        with store.write() as session:
+            for kind in ("import", "import", "import", "export"):
+                insert_job(session, NewJob(kind, "t", "ann"))
+            session.execute(update(JobModel).values(state="done", ended="2020-01-01T00:00:00"))
+            update_job(session, 2, ended="9999-01-01T00:00:00")
+            update_job(session, 3, state="waiting", ended=None)
+        assert tidy(store).jobs == 1
+        with store.read() as session:
+            assert list(session.scalars(text("SELECT id FROM job ORDER BY id"))) == [2, 3, 4]
+
+
+class TestFiles:
+    def test_old_images_and_half_written_files_go(self, store: Store) -> None:
+        home = store.settings.home
+        gone = [
+            place(home / "cache" / "frames" / "ab" / "c.jpg", OLD),
+            place(home / "uploads" / "1.part", OLD),
+            place(home / "exports" / ".7.zip.partial", OLD),
+        ]
+        stay = [
+            place(home / "cache" / "frames" / "ab" / "d.jpg", time.time()),
+            place(home / "uploads" / "2.part", time.time()),
+            place(home / "uploads" / "f" / "content" / "photos.part", OLD),
+            place(home / "exports" / "8.zip", OLD),
+        ]
+        tidied = tidy(store)
+        assert (tidied.cached, tidied.uploads + tidied.leftovers) == (1, 2)
+        assert [path.exists() for path in gone] == [False] * 3
+        assert [path.exists() for path in stay] == [True] * 4
+
+
+class TestUpkeep:
+    def test_a_fault_is_logged_and_ends_changes(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def damaged() -> None:
+            raise OSError("the disk is gone")
+
+        upkeep = Upkeep(store, Jobs(store))
+        monkeypatch.setattr(store, "require_whole", damaged)
+        with capture_logs() as logs:
+            upkeep.round()
+        assert logs[-1]["error"] == "the disk is gone"
+
+    def test_ends_at_once(self, store: Store) -> None:
+        upkeep = Upkeep(store, Jobs(store))
+        upkeep.start()
+        upkeep.close()
+        upkeep.close()

@@ -1,0 +1,160 @@
+"""Backups: whole and verified or not there at all, and never in the place of another file."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from sqlalchemy import text
+
+from app.config import Settings
+from app.errors import DamagedError, InputError, StorageError
+from app.store.backup import FRAMES, back_up, verify_backup
+from app.store.session import Store
+from tests.unit.store.homes import killed, say
+
+
+class TestBackUp:
+    def test_holds_what_was_acknowledged_beside_a_running_server(
+        self, filled: Store, tmp_path: Path
+    ) -> None:
+        say(filled, 30)
+        manifest = back_up(filled.settings, tmp_path / "b.zip")
+        say(filled, 5)
+        assert (manifest.entries, manifest.rows["groups"], manifest.rows["view"]) == (30, 1, 3)
+        assert verify_backup(tmp_path / "b.zip") == manifest
+        assert manifest.frames_elsewhere == 2
+
+    def test_writers_go_on_while_it_is_taken(
+        self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        say(store, 3)
+        examine = "app.store.backup.examine_database"
+        from app.store.examination import examine_database
+
+        def meanwhile(*arguments):
+            say(store, 4)
+            return examine_database(*arguments)
+
+        monkeypatch.setattr(examine, meanwhile)
+        assert back_up(store.settings, tmp_path / "b.zip").entries == 3
+        with store.read() as session:
+            assert session.execute(text("SELECT count(*) FROM log")).scalar() == 7
+
+    def test_files_of_the_home_go_with_it_when_asked_for(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        upload = store.settings.uploads / "1"
+        upload.mkdir(parents=True)
+        (upload / "frames.zip").write_bytes(b"frames")
+        (store.settings.uploads / "2.part").write_bytes(b"half")
+        assert list(back_up(store.settings, tmp_path / "a.zip").files) == ["touchline.db"]
+        back_up(store.settings, tmp_path / "b.zip", FRAMES)
+        with zipfile.ZipFile(tmp_path / "b.zip") as backup:
+            assert backup.testzip() is None
+            assert backup.read("uploads/1/frames.zip") == b"frames"
+            assert "uploads/2.part" not in backup.namelist()
+
+    def test_is_for_its_owner_alone(self, store: Store, tmp_path: Path) -> None:
+        back_up(store.settings, tmp_path / "b.zip")
+        assert (tmp_path / "b.zip").stat().st_mode & 0o777 == 0o600
+
+    def test_never_replaces_a_file(self, store: Store, tmp_path: Path) -> None:
+        (tmp_path / "b.zip").write_bytes(b"mine")
+        with pytest.raises(InputError, match="there already"):
+            back_up(store.settings, tmp_path / "b.zip")
+        assert (tmp_path / "b.zip").read_bytes() == b"mine"
+
+    @pytest.mark.parametrize("step", ["verify_backup", "sync"])
+    def test_leaves_nothing_when_it_fails(
+        self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
+    ) -> None:
+        def full(*_arguments):
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr(f"app.store.backup.{step}", full)
+        folder = tmp_path / "out"
+        folder.mkdir()
+        with pytest.raises(StorageError, match="disk is full"):
+            back_up(store.settings, folder / "b.zip")
+        assert [path for path in folder.iterdir() if path.name.startswith(".")] == []
+
+    def test_what_a_killed_one_left_goes_with_the_next(self, store: Store, tmp_path: Path) -> None:
+        left = tmp_path / ".b.zip.partial"
+        left.mkdir()
+        (left / "touchline.db").write_bytes(b"half")
+        back_up(store.settings, tmp_path / "b.zip")
+        assert not left.exists()
+
+    def test_a_damaged_database_makes_no_backup(self, store: Store, tmp_path: Path) -> None:
+        say(store, 40)
+        store.close()
+        settings = killed(store, tmp_path / "left", "touchline.db", "home.json")
+        content = bytearray(settings.database_file.read_bytes())
+        page = content.rindex(b"\x0d", 0, -4096) // 4096 * 4096
+        content[page : page + 4096] = b"\xff" * 4096
+        settings.database_file.write_bytes(content)
+        with pytest.raises(DamagedError, match=r"left/touchline\.db"):
+            back_up(settings, tmp_path / "b.zip")
+        assert not (tmp_path / "b.zip").exists()
+
+    def test_a_log_that_was_changed_makes_no_backup(self, store: Store, tmp_path: Path) -> None:
+        say(store, 3)
+        with store.write() as session:
+            session.execute(text("DROP TRIGGER log_refuses_update"))
+            session.execute(text("UPDATE log SET actor = 'eve' WHERE id = 2"))
+        with pytest.raises(DamagedError, match="row 2 of the log"):
+            back_up(store.settings, tmp_path / "b.zip")
+
+    def test_a_home_whose_files_do_not_belong_together_is_not_touched(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        say(store, 5)
+        settings = killed(store, tmp_path / "left", "touchline.db-wal")
+        with pytest.raises(DamagedError, match="is missing"):
+            back_up(settings, tmp_path / "b.zip")
+        assert not settings.database_file.exists()
+
+    def test_a_home_that_is_none_has_nothing_to_back_up(self, tmp_path: Path) -> None:
+        with pytest.raises(InputError, match="no database"):
+            back_up(Settings(home=tmp_path / "none"), tmp_path / "b.zip")
+
+
+class TestVerifyBackup:
+    @pytest.fixture
+    def backup(self, store: Store, tmp_path: Path) -> Path:
+        say(store, 3)
+        back_up(store.settings, tmp_path / "b.zip")
+        return tmp_path / "b.zip"
+
+    @pytest.mark.parametrize("place", [200, -200, 0.5])
+    def test_a_flipped_byte_is_noticed(self, backup: Path, place: float) -> None:
+        content = bytearray(backup.read_bytes())
+        content[int(len(content) * place) if isinstance(place, float) else place] ^= 1
+        backup.write_bytes(content)
+        with pytest.raises(InputError):
+            verify_backup(backup)
+
+    def test_a_file_that_was_put_in_afterwards_is_noticed(
+        self, backup: Path, tmp_path: Path
+    ) -> None:
+        other = tmp_path / "other.zip"
+        with zipfile.ZipFile(backup) as source, zipfile.ZipFile(other, "w") as target:
+            target.writestr("manifest.json", source.read("manifest.json"))
+            target.writestr("touchline.db", source.read("touchline.db") + b"x")
+        with pytest.raises(InputError, match=r"touchline\.db: not what was written"):
+            verify_backup(other)
+
+    def test_a_cut_one_is_noticed(self, backup: Path) -> None:
+        backup.write_bytes(backup.read_bytes()[:-100])
+        with pytest.raises(InputError, match="damaged or no backup"):
+            verify_backup(backup)
+
+    def test_another_zip_is_no_backup(self, tmp_path: Path) -> None:
+        with closing(zipfile.ZipFile(tmp_path / "z.zip", "w")) as other:
+            other.writestr("manifest.json", json.dumps({"format": "soccernet-v3"}))
+        with pytest.raises(InputError, match="no backup of Touchline"):
+            verify_backup(tmp_path / "z.zip")

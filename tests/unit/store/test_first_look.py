@@ -1,0 +1,181 @@
+"""Homes whose files do not belong together: never a new start, never served, nothing changed."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from contextlib import closing
+from pathlib import Path
+
+import pysqlite3.dbapi2 as sqlite
+import pytest
+from sqlalchemy import text
+
+from app.config import Settings
+from app.errors import DamagedError, StorageError
+from app.store.migrate import migrate
+from app.store.session import Store
+from tests.unit.store.homes import killed, say
+
+
+def content(home: Path) -> dict[str, bytes]:
+    """The files of a home but its locks."""
+    return {path.name: path.read_bytes() for path in home.iterdir() if path.suffix != ".lock"}
+
+
+def refused(settings: Settings, match: str) -> None:
+    """Neither opened nor migrated, with a way out, and not one byte is changed."""
+    before = content(settings.home)
+    for attempt in (Store.open, migrate):
+        with pytest.raises(DamagedError, match=match) as caught:
+            attempt(settings)
+        assert "touchline restore" in str(caught.value.hint)
+    assert content(settings.home) == before
+
+
+def entries(settings: Settings) -> int:
+    with closing(Store.open(settings)) as store, store.read() as session:
+        return session.execute(text("SELECT count(*) FROM log")).scalar_one()
+
+
+class TestRequireSound:
+    def test_what_a_killed_server_left_is_taken_up(self, store: Store, tmp_path: Path) -> None:
+        say(store, 40)
+        assert entries(killed(store, tmp_path / "left")) == 40
+
+    @pytest.mark.parametrize("further", [1, 100])
+    def test_a_backup_copied_beside_the_log_of_later_changes_is_refused(
+        self, store: Store, tmp_path: Path, further: int
+    ) -> None:
+        say(store, 3)
+        backup = tmp_path / "backup.db"
+        with closing(sqlite.connect(str(backup))) as copy:
+            store._engine.raw_connection().driver_connection.backup(copy)
+        say(store, 2)
+        checkpoint(store)
+        say(store, further)
+        settings = killed(store, tmp_path / "left")
+        shutil.copy(backup, settings.database_file)
+        refused(settings, "log of another database")
+
+    def test_the_database_of_another_home_beside_a_log_is_refused(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        with closing(Store.open(Settings(home=tmp_path / "other"))) as other:
+            say(other, 10)
+        checkpoint(store)
+        say(store, 40)
+        settings = killed(store, tmp_path / "left")
+        shutil.copy(tmp_path / "other" / "touchline.db", settings.database_file)
+        refused(settings, "log of another database")
+
+    @pytest.mark.parametrize("missing", [True, False])
+    def test_a_log_without_its_database_is_no_new_home(
+        self, store: Store, tmp_path: Path, missing: bool
+    ) -> None:
+        say(store, 40)
+        settings = killed(store, tmp_path / "left", "touchline.db-wal")
+        if not missing:
+            settings.database_file.touch()
+        refused(settings, "is missing" if missing else "is empty")
+
+    @pytest.mark.parametrize("sign", ["home.json", "uploads/1/upload.json", "exports/1.json"])
+    def test_a_home_that_was_used_is_no_new_home(
+        self, store: Store, tmp_path: Path, sign: str
+    ) -> None:
+        place = tmp_path / "left" / sign
+        place.parent.mkdir(parents=True)
+        shutil.copy(store.settings.home / "home.json", place)
+        settings = Settings(home=tmp_path / "left")
+        with pytest.raises(DamagedError, match="is missing, but this home has been used"):
+            Store.open(settings)
+        assert not settings.database_file.exists()
+
+    def test_a_home_with_nothing_but_locks_and_cache_is_new(self, settings: Settings) -> None:
+        (settings.home / "cache").mkdir(parents=True)
+        (settings.home / "server.lock").touch()
+        assert entries(settings) == 0
+
+    def test_a_database_that_is_cut_short_is_refused(self, store: Store, tmp_path: Path) -> None:
+        say(store, 20)
+        store.close()
+        settings = killed(store, tmp_path / "left", "touchline.db", "home.json")
+        whole = settings.database_file.read_bytes()
+        settings.database_file.write_bytes(whole[: len(whole) // 2])
+        refused(settings, "is cut short")
+
+    def test_a_file_that_is_no_database_is_named(self, settings: Settings) -> None:
+        settings.home.mkdir()
+        settings.database_file.write_bytes(b"certainly not a database\n" * 100)
+        refused(settings, r"touchline\.db is damaged or not a database")
+
+
+class TestAnchor:
+    def test_follows_every_commit(self, store: Store) -> None:
+        say(store, 7)
+        known = json.loads((store.settings.home / "home.json").read_bytes())
+        assert known["entries"] == 7
+
+    def test_a_log_whose_end_is_missing_is_refused(self, store: Store, tmp_path: Path) -> None:
+        say(store, 5)
+        checkpoint(store)
+        early = killed(store, tmp_path / "left", "touchline.db")
+        say(store, 1)
+        killed(store, tmp_path / "left", "home.json")
+        refused(early, "ends after 5 entries, but 6 were said")
+
+    def test_a_log_that_says_something_else_is_refused(self, store: Store, tmp_path: Path) -> None:
+        checkpoint(store)
+        other = killed(store, tmp_path / "left", "touchline.db")
+        with closing(Store.open(other)) as twin:
+            say(twin, 5)
+        say(store, 4)
+        killed(store, tmp_path / "left", "home.json")
+        refused(other, "entry 4 of the log .* is not the one")
+
+    def test_an_emptied_database_is_refused(self, store: Store, tmp_path: Path) -> None:
+        say(store, 4)
+        settings = killed(store, tmp_path / "left", "home.json")
+        with closing(sqlite.connect(str(settings.database_file))) as empty:
+            empty.execute("PRAGMA journal_mode = WAL")
+            empty.execute("CREATE TABLE something (id)")
+        refused(settings, "is empty, but 4 entries")
+
+    def test_the_database_of_another_installation_is_refused(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        with closing(Store.open(Settings(home=tmp_path / "other"))) as other:
+            say(other, 10)
+        settings = killed(store, tmp_path / "other", "home.json")
+        refused(settings, "of another installation")
+
+    def test_a_log_that_a_power_cut_left_longer_than_the_anchor_is_fine(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        say(store, 2)
+        settings = killed(store, tmp_path / "left", "home.json")
+        say(store, 3)
+        killed(store, tmp_path / "left", "touchline.db", "touchline.db-wal")
+        assert entries(settings) == 5
+
+    def test_a_home_from_before_there_were_anchors_gets_one(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        say(store, 2)
+        settings = killed(store, tmp_path / "left", "touchline.db", "touchline.db-wal")
+        assert entries(settings) == 2
+        known = json.loads((settings.home / "home.json").read_bytes())
+        assert (known["entries"], len(known["installation"])) == (2, 32)
+
+    def test_a_damaged_anchor_is_named(self, store: Store, tmp_path: Path) -> None:
+        settings = killed(store, tmp_path / "left")
+        (settings.home / "home.json").write_bytes(b'{"half')
+        with pytest.raises(StorageError, match=r"home\.json is not what was written"):
+            Store.open(settings)
+
+
+def checkpoint(store: Store) -> None:
+    """Everything goes into the database's own file, and the log begins anew."""
+    with store._engine.connect() as connection:
+        connection.exec_driver_sql("ROLLBACK")
+        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
