@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TextIO, cast
 
 from app.finite import finite, json_text
 from app.progress import Progress
@@ -119,6 +119,16 @@ def only_finite(_logger: Any, _method: str, event: MutableMapping[str, Any]) -> 
     return {name: finite(value) for name, value in event.items()}
 
 
+class _Stderr:
+    """The stderr of the moment: what a logger is given once may be closed later."""
+
+    def write(self, line: str) -> None:
+        sys.stderr.write(line)
+
+    def flush(self) -> None:
+        sys.stderr.flush()
+
+
 def log_to_stderr() -> None:
     """Keep what is logged apart from what is printed."""
     import structlog
@@ -132,7 +142,7 @@ def log_to_stderr() -> None:
             structlog.processors.format_exc_info,
             structlog.processors.KeyValueRenderer(key_order=["timestamp", "level", "event"]),
         ],
-        logger_factory=structlog.WriteLoggerFactory(file=sys.stderr),
+        logger_factory=structlog.WriteLoggerFactory(file=cast(TextIO, _Stderr())),
         cache_logger_on_first_use=True,
     )
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)

@@ -161,8 +161,8 @@ class Store:
             raise
 
     def note_damage(self, error: DamagedError) -> None:
-        """Refuse writes from now on: something read was not what was written."""
-        self._damage = error.message
+        """Refuse writes from now on: something read was not what was written. The first sign stays."""
+        self._damage = self._damage or error.message
 
     def _anchored(self, session: Session) -> None:
         """Tell the home how long the log is by now."""

@@ -191,7 +191,7 @@ def with_calibrations(solution: Solution, calibrations: Mapping[str, Calibration
 
 @lru_cache(maxsize=128)
 def _bare_solution(body: bytes) -> Solution:
-    return value_codec.from_json(Solution, json.loads(zlib.decompress(body)))
+    return value_codec.from_json(Solution, json.loads(inflate(body)))
 
 
 def read_calibrations(session: Session, keys: Iterable[str]) -> dict[str, Calibration]:

@@ -19,31 +19,30 @@ from tests.docs.pages import (
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
-    anchor backup durable examination first home locks look orphans restore wal
-    3d accept action actions address adjust adjustments advice ahead annotate answers app
-    application archive archives arrays arrival ask axis bar bars batches best binned bodies
+    3d accept action actions address adjust adjustments advice ahead anchor annotate answers app
+    application archive archives arrays arrival ask axis backup bar bars batches best binned bodies
     body boxes bulk button buttons cache calibrate canvas caption card cards cell changes chart
-    chip choice chooser class cli client clock codec codecs colours comparison completion config
-    confirm connections contact cross csv cursor curve damped delete deps details detect diagram
-    dialog diff doctor document documents drags drawing editor empty encode engine environment
-    estimator etags evaluate event events exact export exports facets facts failures fan faults
-    fields figure figures files finite fixes fixture folder folders form format formats frozen
-    gestures glossary grid guess guide header headers health heat help histograms history hit
-    home hooks idempotency if image images import imports in info init insight items jaccard
-    json key keys known konva last latest lazy least legend lesson lessons letter licence list
-    listing live look loupe main map markdown marks match matrix meant membership menu merge
-    metrics migrate mini missing model models modules name names navigation neighbours nested
-    notice nudge numbers object observability onnx open openapi opened options order origin
-    output overlap page pages paint palette panel parquet parse parts patch pen pins pitch pixel
-    place places png pointer policies popover pose preview problem progress props query rail
-    reader reasons recompute record remedies render reply report requests resect resource result
-    revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes
-    score scoreboard sending server service session sets shadows shared sheet singular site
-    smallest solve solving source sources sphere spill spread squares stage staging standpoints
-    starts state statistics steps storage store stream submit summary surface swap tab table
-    tables term terminal text textures threshold ticks tools triangulate truth types undo
-    undrawn upload uploads v3 v3d viewport viewports virtual walk warm what when words workspace
-    write writer zip
+    child chip choice chooser class cli client clock codec codecs colours comparison completion
+    conditions config confirm connections contact cross csv cursor curve damped delete deps details
+    detect diagram dialog diff doctor document documents drags drawing durable editor empty encode
+    encoded engine environment estimator etags evaluate event events exact examination export
+    exports facets facts failures fan faults fields figure figures files finite first fixes fixture
+    folder folders form format formats frozen gestures glossary grid guess guide header headers
+    heads health heat help histograms history hit home hooks idempotency identity if image images
+    import imports in info init insight items jaccard json key keys known konva last latest lazy
+    least legend lesson lessons letter licence limits list listing live locks look loupe main map
+    markdown marks match matrix meant membership menu merge metrics migrate mini missing model
+    models modules name names navigation neighbours nested notice nudge numbers object observability
+    onnx open openapi opened options order origin orphans output overlap page pages paint palette
+    panel parquet parse parts patch pen pins pitch pixel place places png pointer policies pool
+    popover pose preview problem progress projection props query rail reader reasons recompute
+    record remedies removal render reply report requests resect resource restore result revert
+    reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
+    scoreboard sending server service session sets shadows shared sheet singular site smallest solve
+    solving soundness source sources sphere spill spread squares stage staging standpoints starts
+    state statistics steps storage store stream submit summary surface swap tab table tables term
+    terminal text textures threshold ticks tools triangulate truth types undo undrawn upload uploads
+    v3 v3d video viewport viewports virtual wal walk warm what when words workspace write writer zip
 """
 PLAIN = frozenset(PLAIN_WORDS.split())
 """Words of file names that are plain English, or that every programmer knows; any other has to be

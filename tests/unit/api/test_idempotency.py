@@ -142,7 +142,10 @@ class TestFailure:
         monkeypatch.setattr(answers, "keep_answer", full)
         with capture_logs() as logs:
             assert api.post(f"{API}/practice", json={}, headers=KEY).status_code == 202
-        assert [entry["event"] for entry in logs] == ["an answer could not be kept"]
+        assert [entry["event"] for entry in logs] == [
+            "an answer could not be kept",
+            "request answered",
+        ]
 
     def test_work_whose_answer_cannot_be_kept_is_not_done(
         self, api, monkeypatch: pytest.MonkeyPatch

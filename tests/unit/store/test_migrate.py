@@ -115,11 +115,11 @@ class TestOldHomes:
         script = (
             "import os, sys; from pathlib import Path; from alembic.operations import Operations\n"
             "from app.config import Settings; from app.store.migrate import migrate\n"
-            "execute = Operations.execute\n"
-            "def killed(self, sql, **options):\n"
-            "    execute(self, sql, **options)\n"
-            "    'application_id' in str(sql) and os.kill(os.getpid(), 9)\n"
-            "Operations.execute = killed\n"
+            "add_column = Operations.add_column\n"
+            "def killed(self, table, column, **options):\n"
+            "    add_column(self, table, column, **options)\n"
+            "    column.name == 'tries' and os.kill(os.getpid(), 9)\n"
+            "Operations.add_column = killed\n"
             "migrate(Settings(home=Path(sys.argv[1])))\n"
         )
         command = [sys.executable, "-c", script, str(settings.home)]
@@ -140,7 +140,9 @@ class TestOldHomes:
         make_old(settings, "0009")
         copy = migrate(settings).copy
         monkeypatch.setattr("app.store.migrate.KNOWN_REVISIONS", RELEASED)
-        with pytest.raises(StorageError, match=r"newer version .* \(schema 0010\)") as caught:
+        with pytest.raises(
+            StorageError, match=f"newer version .* .schema {KNOWN_REVISIONS[-1]}"
+        ) as caught:
             migrate(settings)
         assert f"touchline restore {copy}" in str(caught.value.hint)
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import pysqlite3.dbapi2 as sqlite
 import pytest
 from sqlalchemy import text
 
+from app.config import Settings
 from app.errors import StorageError
 from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict
@@ -24,6 +28,8 @@ def as_before(store: Store) -> None:
     """Take back what migration 0005 does, and what came after it."""
     with store.write() as session:
         session.execute(text("DROP TABLE version_check"))
+        session.execute(text("DROP TABLE installation"))
+        session.execute(text("ALTER TABLE job DROP COLUMN tries"))
         session.execute(text("ALTER TABLE solution DROP COLUMN facts"))
         session.execute(text("CREATE TABLE idempotency (key TEXT)"))
         session.execute(text("ALTER TABLE view DROP COLUMN left_out"))
@@ -51,6 +57,23 @@ def as_before(store: Store) -> None:
         session.execute(text("UPDATE alembic_version SET version_num = '0004'"))
 
 
+def upgraded(store: Store, home: Path) -> Store:
+    """A copy of the store after everything from migration 0005 on has been done again."""
+    settings = Settings(home=home)
+    home.mkdir()
+    with (
+        closing(sqlite.connect(str(store.settings.database_file))) as source,
+        closing(sqlite.connect(str(settings.database_file))) as target,
+    ):
+        source.backup(target)
+    with closing(Store.open(settings)) as copy:
+        as_before(copy)
+    # A home of that time had none.
+    (home / "home.json").unlink()
+    migrate(settings)
+    return Store.open(settings)
+
+
 def read(store: Store, statement: str) -> list[Any]:
     with store.read() as session:
         return list(session.execute(text(statement)).all())
@@ -73,7 +96,7 @@ def filled(store: Store, fill, make_group, make_static) -> Store:
 
 
 class TestUpgrade:
-    def test_places_are_as_a_new_solution_has_them(self, filled: Store) -> None:
+    def test_places_are_as_a_new_solution_has_them(self, filled: Store, tmp_path: Path) -> None:
         queue, summaries = read(filled, QUEUE), read(filled, SUMMARIES)
         assert queue[0].distance_m == pytest.approx(62.57, abs=0.1)
         assert (queue[0].x_m, queue[0].y_m) == pytest.approx((5.0, 2.0), abs=0.1)
@@ -82,26 +105,25 @@ class TestUpgrade:
         # Static cameras come without frames here.
         assert [(row.pictures, row.views) for row in queue] == [(2, 2), (0, 3), (2, 2), (2, 2)]
         assert queue[2].x_m is None and queue[3].box_px is None
-        as_before(filled)
-        migrate(filled.settings)
-        assert schema_revision(make_engine(filled.settings)) == KNOWN_REVISIONS[-1]
-        assert read(filled, QUEUE) == queue
-        again = read(filled, SUMMARIES)
+        with closing(upgraded(filled, tmp_path / "home")) as store:
+            assert schema_revision(make_engine(store.settings)) == KNOWN_REVISIONS[-1]
+            assert read(store, QUEUE) == queue
+            again = read(store, SUMMARIES)
         assert [json.loads(row.summary) for row in again] == [
             json.loads(row.summary) for row in summaries
         ]
 
-    def test_the_queue_stays_so_when_it_is_written_again(self, filled: Store) -> None:
+    def test_the_queue_stays_so_when_it_is_written_again(
+        self, filled: Store, tmp_path: Path
+    ) -> None:
         queue = read(filled, QUEUE)
-        as_before(filled)
-        migrate(filled.settings)
-        with filled.write() as session:
-            refresh_queue(session, [row.group_id for row in queue])
-        assert read(filled, QUEUE) == queue
+        with closing(upgraded(filled, tmp_path / "home")) as store:
+            with store.write() as session:
+                refresh_queue(session, [row.group_id for row in queue])
+            assert read(store, QUEUE) == queue
 
-    def test_solutions_and_verdicts_are_guarded_again(self, filled: Store) -> None:
-        as_before(filled)
-        migrate(filled.settings)
-        for statement in ("UPDATE solution SET summary = '{}'", "DELETE FROM verdict"):
-            with pytest.raises(StorageError), filled.write() as session:
-                session.execute(text(statement))
+    def test_solutions_and_verdicts_are_guarded_again(self, filled: Store, tmp_path: Path) -> None:
+        with closing(upgraded(filled, tmp_path / "home")) as store:
+            for statement in ("UPDATE solution SET summary = '{}'", "DELETE FROM verdict"):
+                with pytest.raises(StorageError), store.write() as session:
+                    session.execute(text(statement))
