@@ -44,7 +44,7 @@ from app.api.routers import (
 from app.api.security.bodies import MAX_JSON_BYTES, JsonBodies
 from app.api.security.failures import Failures
 from app.api.security.headers import SecurityHeaders
-from app.api.security.lanes import THREADS, Gates, Lanes
+from app.api.security.lanes import THREADS, Doors, Lanes
 from app.api.security.origin import KnownHosts, SameOrigin
 from app.api.security.requests import HeadAsGet, OneLength, OneRange
 from app.api.site import STATIC, Site
@@ -120,9 +120,9 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None =
 
 def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
     """The first one added is the innermost."""
-    gates = Gates()
+    doors = Doors()
     app.add_middleware(Idempotency, actor=LOCAL_USER)
-    app.add_middleware(Lanes, gates=gates)
+    app.add_middleware(Lanes, doors=doors)
     app.add_middleware(OneRange)
     app.add_middleware(HeadAsGet)
     app.add_middleware(
@@ -133,7 +133,7 @@ def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
     app.add_middleware(OneLength)
     app.add_middleware(SameOrigin)
     app.add_middleware(KnownHosts, allowed=settings.allowed_hosts)
-    install_metrics(app, gates)
+    install_metrics(app, doors)
     app.add_middleware(Failures)
     app.add_middleware(RequestLog)
     app.add_middleware(SecurityHeaders, policy=site.policy)

@@ -11,15 +11,15 @@ from prometheus_client.registry import Collector
 from prometheus_fastapi_instrumentator import Instrumentator
 
 from app.api.deps import Services
-from app.api.security.lanes import Gates
+from app.api.security.lanes import Doors
 from app.errors import StorageError
 from app.review.jobs.vitals import Home, read_home
 
 
-def install_metrics(app: FastAPI, gates: Gates) -> None:
+def install_metrics(app: FastAPI, doors: Doors) -> None:
     """Count requests by route, each application for itself, and watch its services."""
     registry = app.state.metrics = CollectorRegistry()
-    registry.register(ServerCollector(app.state.services, gates))
+    registry.register(ServerCollector(app.state.services, doors))
     instrumentator = Instrumentator(
         registry=registry, excluded_handlers=["/metrics", "/healthz", "/readyz"]
     )
@@ -29,8 +29,8 @@ def install_metrics(app: FastAPI, gates: Gates) -> None:
 class ServerCollector(Collector):
     """Reads the server's own numbers when it is asked; those of the database while it answers."""
 
-    def __init__(self, services: Services, gates: Gates):
-        self._services, self._gates = services, gates
+    def __init__(self, services: Services, doors: Doors):
+        self._services, self._doors = services, doors
 
     def describe(self) -> Iterator[Metric]:
         """Nothing beforehand: what there is is read when it is asked for."""
@@ -49,12 +49,12 @@ class ServerCollector(Collector):
         yield from _home(home)
 
     def _lanes(self) -> Iterator[Metric]:
-        gates = self._gates.all
-        busy = {gate.lane.name: gate.busy for gate in gates}
+        doors = self._doors.all
+        busy = {door.lane.name: door.busy for door in doors}
         yield _gauges("lane_busy", "Requests at work, by kind.", "lane", busy)
-        waiting = {gate.lane.name: gate.waiting for gate in gates}
+        waiting = {door.lane.name: door.waiting for door in doors}
         yield _gauges("lane_waiting", "Requests that wait for their turn.", "lane", waiting)
-        refused = {gate.lane.name: gate.refused for gate in gates}
+        refused = {door.lane.name: door.refused for door in doors}
         yield _counter("lane_refused", "Requests that were told to come back.", "lane", refused)
 
     def _streams(self) -> Iterator[Metric]:

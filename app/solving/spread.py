@@ -17,7 +17,9 @@ from app.solving.triangulate import Sight
 CLICK_DIAGONAL = float(np.hypot(1920, 1080))
 """The policy's click sigma holds for 1920 x 1080 and grows with the diagonal."""
 _BITS = 62
+"""Pairs of a group whose validity fits into one integer, a bit for each."""
 _ROUNDING = 1e-9
+"""Sums this close to a limit, relatively, are computed once more the exact way."""
 
 
 def click_variance(diagonal: FloatArray, ball_px: FloatArray, policy: Policy) -> FloatArray:
@@ -39,7 +41,7 @@ def click_variance(diagonal: FloatArray, ball_px: FloatArray, policy: Policy) ->
 def carried_spreads(
     parameters: FloatArray, covariances: FloatArray, points: FloatArray, diagonals: FloatArray
 ) -> FloatArray:
-    """Covariance that calibrations bring to the pixels of points, square pixels, (N, 2, 2).
+    """Covariance of the projected points due to that of the calibrations, square pixels, (N, 2, 2).
 
     Args:
         parameters: Of the cameras, shape (N, 8).
@@ -53,7 +55,7 @@ def carried_spreads(
 
 
 def calibration_spread(calibration: Calibration, size: ImageSize, point: FloatArray) -> FloatArray:
-    """Covariance that the calibration brings to the pixel of a point, square pixels, (2, 2).
+    """Covariance of the projected point due to that of the calibration, square pixels, (2, 2).
 
     Args:
         calibration: With a camera; nothing is known of the uncertainty of a given one: zeros.
@@ -123,7 +125,8 @@ class MeanSpread:
         self._facts, self._lock = facts, Lock()
         starts = np.searchsorted(facts.pair_group, np.arange(facts.groups))
         place = np.arange(len(facts.pair_group)) - starts[facts.pair_group]
-        # A group of twelve views has more pairs than a number has bits: it is computed anew.
+        # Which pairs of a group were valid last is kept as the bits of an integer. A group of twelve
+        # views has more pairs than that has bits: it is computed anew each time.
         self._bit = np.where(place < _BITS, np.int64(1) << np.minimum(place, _BITS), 0)
         self._long = np.isin(np.arange(facts.groups), facts.pair_group[place >= _BITS])
         self._pairs = np.zeros(facts.groups, np.int64)

@@ -17,7 +17,7 @@ SIDES = (3, 5, 7)
 SECTORS = 8
 """Parts of the ring around a disc; all of them must be darker."""
 STEEPNESS, MIDDLE = 14.0, 0.25
-"""Of the sigmoid that makes a score of contrast."""
+"""Of the sigmoid that turns contrast into a score."""
 
 
 def write_tiny_detector(
@@ -58,13 +58,13 @@ def _branch(
     cells = width * height
     across, down = np.meshgrid(np.arange(width), np.arange(height))
     places = np.stack([across.ravel(), down.ravel(), np.full(cells, side), np.full(cells, side)])
-    quiet = np.zeros((1, classes - 1, cells), np.float32)
+    silent_classes = np.zeros((1, classes - 1, cells), np.float32)
     constants = {
         f"filter{index}": _filter(side),
         f"shift{index}": np.float32(STEEPNESS * MIDDLE).reshape(1),
         f"steep{index}": np.float32(STEEPNESS).reshape(1),
         f"places{index}": places[None].astype(np.float32),
-        f"quiet{index}": quiet,
+        f"silent_classes{index}": silent_classes,
         f"flat{index}": np.array([1, 1, cells], np.int64),
     }
 
@@ -86,7 +86,7 @@ def _branch(
         node("Sigmoid", ["moved"], "sure"),
         node("Mul", ["sure", "kept"], "score"),
         node("Reshape", ["score", "flat"], "scores"),
-        node("Concat", ["places", "quiet", "scores"], "boxes", axis=1),
+        node("Concat", ["places", "silent_classes", "scores"], "boxes", axis=1),
     ]
     return nodes, [numpy_helper.from_array(array, name) for name, array in constants.items()]
 

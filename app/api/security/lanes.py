@@ -64,7 +64,7 @@ def lane_of(method: str, path: str) -> Lane | None:
     return UPLOADS if method == "POST" and _UPLOAD.search(path) else CHANGES
 
 
-class Gate:
+class Door:
     """The door of one lane: who is at work, who waits, and how many were turned away."""
 
     def __init__(self, lane: Lane):
@@ -100,14 +100,14 @@ class Gate:
         self._free.release()
 
 
-class Gates:
+class Doors:
     """The doors of all lanes of one server."""
 
     def __init__(self) -> None:
-        self.all = tuple(Gate(lane) for lane in LANES)
-        self._of = {gate.lane: gate for gate in self.all}
+        self.all = tuple(Door(lane) for lane in LANES)
+        self._of = {door.lane: door for door in self.all}
 
-    def of(self, scope: Scope) -> Gate | None:
+    def of(self, scope: Scope) -> Door | None:
         """The door that a request goes through, if any."""
         if scope["type"] != "http":
             return None
@@ -121,41 +121,41 @@ class Lanes:
     The turn ends when the answer begins: sending it to a slow client takes nobody's place.
     """
 
-    def __init__(self, app: ASGIApp, gates: Gates):
-        self.app, self._gates = app, gates
+    def __init__(self, app: ASGIApp, doors: Doors):
+        self.app, self._doors = app, doors
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        gate = self._gates.of(scope)
-        if gate is None:
+        door = self._doors.of(scope)
+        if door is None:
             await self.app(scope, receive, send)
             return
-        if not await gate.enter():
+        if not await door.enter():
             problem = make_problem(
                 503,
-                f"the server is busy with other {gate.lane.name}",
+                f"the server is busy with other {door.lane.name}",
                 hint="Nothing was done. Send it again in a moment.",
             )
             await problem_response(problem, {"Retry-After": RETRY_SECONDS})(scope, receive, send)
             return
-        turn = _Turn(gate)
+        place = _Place(door)
 
         async def watch(message: Message) -> None:
-            turn.end()
+            place.end()
             await send(message)
 
         try:
             await self.app(scope, receive, watch)
         finally:
-            turn.end()
+            place.end()
 
 
-class _Turn:
-    """One request's turn; it ends once."""
+class _Place:
+    """One request's place in its lane; it is given back once."""
 
-    def __init__(self, gate: Gate):
-        self._gate: Gate | None = gate
+    def __init__(self, door: Door):
+        self._door: Door | None = door
 
     def end(self) -> None:
-        if self._gate is not None:
-            self._gate.leave()
-            self._gate = None
+        if self._door is not None:
+            self._door.leave()
+            self._door = None

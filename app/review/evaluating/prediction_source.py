@@ -80,7 +80,7 @@ def evaluate_sources(
         dataset: Name or id.
         request: What to evaluate; its sets and its version are filled in.
         predictions: Predicted boxes and cameras, or empty.
-        careful: Careful boxes, or empty.
+        careful: Boxes drawn with care, by which the truth itself is measured; or empty.
         version: Name, id or hash of a frozen version; None: the dataset as it is now.
         actor: Who asks.
         progress: Called as the evaluation goes on.

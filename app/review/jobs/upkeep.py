@@ -25,7 +25,7 @@ log = structlog.get_logger("touchline.upkeep")
 
 FIRST_SECONDS, BETWEEN_SECONDS, BUSY_SECONDS = 60.0, 3600.0, 60.0
 """After the start, between two rounds, and until the next look while jobs are under way."""
-ROUNDS_A_LOOK = 24
+ROUNDS_BETWEEN_CHECKS = 24
 """SQLite looks at every page of the database once in so many rounds."""
 CALIBRATIONS = 2000
 """Calibrations a transaction: nobody who saves waits long for it."""
@@ -112,7 +112,7 @@ class Upkeep:
             tidied = tidy(self._store)
             if tidied != Tidied():
                 log.info("tidied", **vars(tidied))
-            if self._rounds % ROUNDS_A_LOOK == 1:
+            if self._rounds % ROUNDS_BETWEEN_CHECKS == 1:
                 self._store.require_whole()
         except (ReviewError, OSError) as error:
             log.error("upkeep failed", error=str(error))

@@ -86,7 +86,7 @@ class TestReadRows:
         Table(file, ("a",)).add([text])
         ((_, row),) = read_rows(file.getvalue().encode(), "f", ("a",), DEFAULT_LIMITS)
         expected = text.replace("\r\n", "\n").replace("\r", "\n")
-        # An apostrophe of its own before a formula cannot be told from ours.
+        # An apostrophe that the text itself has before a formula cannot be told from the escape.
         assert row["a"] in (expected, expected.removeprefix("'"))
 
 

@@ -12,7 +12,7 @@ from starlette.types import Receive, Scope, Send
 
 from app.api.application import PREFIX
 from app.api.security import lanes
-from app.api.security.lanes import CHANGES, IMAGES, PREVIEWS, READS, UPLOADS, Gates, Lanes, lane_of
+from app.api.security.lanes import CHANGES, IMAGES, PREVIEWS, READS, UPLOADS, Doors, Lanes, lane_of
 
 
 class TestLaneOf:
@@ -69,8 +69,8 @@ class Service:
     """Requests against ``Lanes`` without a socket."""
 
     def __init__(self) -> None:
-        self.work, self.gates = Work(), Gates()
-        self.lanes = Lanes(self.work, self.gates)
+        self.work, self.doors = Work(), Doors()
+        self.lanes = Lanes(self.work, self.doors)
         self.statuses: list[int] = []
         self.tasks: list[asyncio.Task[None]] = []
 
@@ -117,11 +117,11 @@ class TestLanes:
             await service.settle()
             assert len(service.work.begun) == CHANGES.width + 1
             assert service.work.begun[-1].endswith("/groups/1")
-            gate = service.gates.of({"type": "http", "method": "PUT", "path": PREFIX + "/x"})
-            assert gate is not None and (gate.busy, gate.waiting) == (CHANGES.width, 5)
+            door = service.doors.of({"type": "http", "method": "PUT", "path": PREFIX + "/x"})
+            assert door is not None and (door.busy, door.waiting) == (CHANGES.width, 5)
             await service.end()
             assert service.statuses == [200] * (CHANGES.width + 6)
-            assert (gate.busy, gate.waiting, gate.refused) == (0, 0, 0)
+            assert (door.busy, door.waiting, door.refused) == (0, 0, 0)
 
         run(test)
 
@@ -171,6 +171,6 @@ class TestLanes:
             service.ask("GET", "/groups/1")
             with pytest.raises(KeyError):
                 await service.end()
-            assert [gate.busy for gate in service.gates.all] == [0] * 5
+            assert [door.busy for door in service.doors.all] == [0] * 5
 
         run(test)
