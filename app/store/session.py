@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 
+import structlog
 from sqlalchemy import Engine, text
 from sqlalchemy.orm import Session as Session
 
@@ -31,6 +32,8 @@ from app.store.migrate import (
     newer_schema,
     schema_revision,
 )
+
+log = structlog.get_logger("touchline.store")
 
 TURN_SECONDS = 10.0
 """How long a thread waits for the writes of others in its process; SQLite waits for other
@@ -81,6 +84,7 @@ class Store:
         self.turn = turn
         self._listeners: list[Callable[[], None]] = []
         self._anchor = read_anchor(settings.database_file)
+        self._anchor_refused = False
         self._damage: str | None = None
 
     @staticmethod
@@ -133,7 +137,10 @@ class Store:
             session.commit()
             self._anchored(session)
         for listener in self._listeners:
-            listener()
+            try:
+                listener()
+            except Exception:
+                log.exception("a change was saved, and somebody could not be told")
 
     def require_undamaged(self) -> None:
         """Raise DamagedError once the database was seen to be damaged.
@@ -165,11 +172,19 @@ class Store:
         self._damage = self._damage or error.message
 
     def _anchored(self, session: Session) -> None:
-        """Tell the home how long the log is by now."""
+        """Tell the home how long the log is by now; an anchor that stays behind is right, too."""
         end = session.info.get(LOG_END)
-        if end is not None and self._anchor is not None:
-            self._anchor = replace(self._anchor, entries=end[0], hash=end[1])
+        if end is None or self._anchor is None:
+            return
+        self._anchor = replace(self._anchor, entries=end[0], hash=end[1])
+        try:
             move_anchor(self.settings.database_file, self._anchor)
+        except OSError as error:
+            if not self._anchor_refused:
+                log.warning("home.json cannot be written", error=str(error))
+            self._anchor_refused = True
+        else:
+            self._anchor_refused = False
 
     def listen(self, listener: Callable[[], None]) -> None:
         """Call a function after each commit of this process; it must be quick."""
@@ -178,8 +193,10 @@ class Store:
     def close(self) -> None:
         """Close all connections."""
         self._engine.dispose()
-        sync_anchor(self.settings.database_file)
-        self._lock.release()
+        try:
+            sync_anchor(self.settings.database_file)
+        finally:
+            self._lock.release()
 
 
 def _open(settings: Settings, alone: bool) -> Engine:

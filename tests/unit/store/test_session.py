@@ -9,12 +9,15 @@ from pathlib import Path
 import pysqlite3.dbapi2 as sqlite
 import pytest
 from sqlalchemy import text
+from structlog.testing import capture_logs
 
 from app.config import Settings
 from app.errors import InputError, StorageError
+from app.store.anchor import read_anchor
 from app.store.engine import PRAGMAS
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
 from app.store.session import Store
+from tests.unit.store.homes import say
 
 INSERT = "INSERT INTO dataset (name, created, policy, policy_hash) VALUES ('{}', '', '', '')"
 
@@ -171,6 +174,41 @@ class TestWrite:
         )
         assert (done.stdout, done.returncode) == ("saved\n", -9)
         assert names(store) == ["acknowledged"]
+
+
+class TestAfterTheCommit:
+    @pytest.mark.parametrize("error", [PermissionError, OSError])
+    def test_a_home_that_takes_no_anchor_costs_no_change_and_is_logged_once(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch, error: type[OSError]
+    ) -> None:
+        def refuse(*_: object) -> None:
+            raise error("refused")
+
+        told: list[int] = []
+        store.listen(lambda: told.append(1))
+        with capture_logs() as logs:
+            for _round in range(2):
+                with monkeypatch.context() as broken:
+                    broken.setattr("app.store.session.move_anchor", refuse)
+                    say(store)
+                    say(store)
+                say(store)
+        assert [line["event"] for line in logs] == ["home.json cannot be written"] * 2
+        assert len(told) == 6
+        anchor = read_anchor(store.settings.database_file)
+        assert anchor is not None
+        assert anchor.entries == 6
+
+    def test_a_listener_that_fails_costs_neither_the_change_nor_the_others(
+        self, store: Store
+    ) -> None:
+        told: list[int] = []
+        store.listen(lambda: told.append(1 // 0))
+        store.listen(lambda: told.append(1))
+        with capture_logs() as logs:
+            add(store, "kept")
+        assert (names(store), told) == (["kept"], [1])
+        assert [line["log_level"] for line in logs] == ["error"]
 
 
 ROWS = (
