@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from sqlalchemy import Connection, Engine, inspect, text
@@ -25,6 +26,8 @@ from app.errors import DamagedError
 from app.finite import json_text
 
 ANCHOR_BYTES = 512
+AGAIN_SECONDS = 0.01
+"""A reader beside a writer may see half of an anchor: after so long it is read once more."""
 RESTORE = (
     "Run touchline restore BACKUP; touchline restore {file} goes on with what that file holds."
 )
@@ -64,6 +67,13 @@ def read_anchor(database: Path) -> Anchor | None:
     Raises:
         DamagedError: The file is not one of ours.
     """
+    with suppress(DamagedError):
+        return _read(database)
+    time.sleep(AGAIN_SECONDS)
+    return _read(database)
+
+
+def _read(database: Path) -> Anchor | None:
     path = anchor_file(database)
     try:
         return Anchor(**json.loads(path.read_bytes()))
@@ -116,18 +126,36 @@ def anchor_of(connection: Connection) -> Anchor | None:
 
 def require_own_database(engine: Engine, settings: Settings) -> None:
     """Raise DamagedError where a database is not the one that its home had."""
+    with suppress(DamagedError):
+        _require_own(engine, settings)
+        return
+    time.sleep(AGAIN_SECONDS)
+    _require_own(engine, settings)
+
+
+def _require_own(engine: Engine, settings: Settings) -> None:
     anchor = read_anchor(settings.database_file)
     if anchor is not None:
         with engine.connect() as connection:
             _require_anchored(connection, anchor, settings.database_file)
 
 
-def renew_anchor(engine: Engine, settings: Settings) -> None:
-    """Write the anchor of a database that is in order, where it says anything else."""
+def renew_anchor(engine: Engine, settings: Settings, *, alone: bool) -> None:
+    """Write the anchor of a database that is in order, where it says anything else.
+
+    Beside others (not ``alone``) the length of the log is left to whoever writes it.
+    """
     with engine.connect() as connection:
         anchor = anchor_of(connection)
-    if anchor is not None and anchor != read_anchor(settings.database_file):
+    said = read_anchor(settings.database_file)
+    if anchor is None or anchor == said:
+        return
+    if alone or said is None or _without_end(said) != _without_end(anchor):
         make_anchor(settings.database_file, anchor)
+
+
+def _without_end(anchor: Anchor) -> Anchor:
+    return replace(anchor, entries=0, hash="")
 
 
 def _require_anchored(connection: Connection, anchor: Anchor, database: Path) -> None:

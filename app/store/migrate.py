@@ -96,7 +96,7 @@ def bring_up_to_date(settings: Settings, *, alone: bool) -> Migrated:
                 write_backup(settings, copy, replace=True)
             if revision != SCHEMA_REVISION:
                 _run(engine)
-            renew_anchor(engine, settings)
+            renew_anchor(engine, settings, alone=alone)
     finally:
         engine.dispose()
     if copy is not None:

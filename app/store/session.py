@@ -211,7 +211,7 @@ def _open(settings: Settings, alone: bool) -> Engine:
                 bring_up_to_date(settings, alone=alone)
             _require_schema(engine, settings)
             require_own_database(engine, settings)
-            renew_anchor(engine, settings)
+            renew_anchor(engine, settings, alone=alone)
     except BaseException:
         engine.dispose()
         raise
