@@ -156,7 +156,8 @@ class Store:
             fault = session.execute(text("PRAGMA quick_check(1)")).scalar_one()
             if fault != "ok":
                 file = self.settings.database_file
-                raise DamagedError(f"{file} is damaged: {' '.join(fault.split())}", hint=EXAMINE)
+                log.error("the database is damaged", file=str(file), fault=" ".join(fault.split()))
+                raise DamagedError(f"{file.name} is damaged", hint=EXAMINE)
 
     @contextmanager
     def _watched(self) -> Iterator[None]:

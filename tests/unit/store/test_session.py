@@ -12,7 +12,7 @@ from sqlalchemy import text
 from structlog.testing import capture_logs
 
 from app.config import Settings
-from app.errors import InputError, StorageError
+from app.errors import DamagedError, InputError, StorageError
 from app.store.anchor import read_anchor
 from app.store.engine import PRAGMAS
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
@@ -271,6 +271,29 @@ class TestErrors:
             add(store, "demo")
         assert "INSERT" not in f"{caught.value} {caught.value.hint}"
         assert names(store) == ["demo"]
+
+
+class TestRequireWhole:
+    def test_clients_read_the_files_name_and_the_log_its_place_and_fault(
+        self, store: Store, settings: Settings
+    ) -> None:
+        add(store, "demo")
+        with store.write() as session:
+            session.execute(text("PRAGMA writable_schema = ON"))
+            session.execute(
+                text(
+                    "UPDATE sqlite_master SET sql = replace(sql, 'created VARCHAR NOT NULL',"
+                    " 'created VARCHAR NOT NULL CHECK (created)') WHERE name = 'dataset'"
+                )
+            )
+        store.close()
+        opened = Store.open(settings)
+        with capture_logs() as logs, pytest.raises(DamagedError) as caught:
+            opened.require_whole()
+        opened.close()
+        assert caught.value.message == "touchline.db is damaged"
+        assert logs[-1]["file"] == str(settings.database_file)
+        assert "dataset" in logs[-1]["fault"]
 
 
 def test_every_migration_is_known() -> None:
