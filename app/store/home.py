@@ -18,6 +18,7 @@ NETWORK_FILE_SYSTEMS = frozenset(
 """Where file locks and shared memory do not hold, SQLite's WAL loses data."""
 FOLDERS = ("uploads", "exports", "cache", "sample", "practice", "backups")
 """What we make in a home beside the database and its side files."""
+LOCKS = SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK = "server.lock", "database.lock", "opening.lock"
 FOLDER_MODE, FILE_MODE = 0o700, 0o600
 
 _HALF_WRITTEN = (".*.partial", "*/.*.partial", "uploads/*.part", "uploads/*/upload.json.new")
@@ -91,7 +92,7 @@ def private_files(settings: Settings) -> Iterator[Path]:
     """The home, and all in it that is ours; whatever else somebody keeps there is theirs."""
     home, database = settings.home, settings.database_file
     yield home
-    yield from (home / name for name in ("server.lock", "database.lock") if (home / name).exists())
+    yield from (home / name for name in LOCKS if (home / name).exists())
     yield from database.parent.glob(f"{database.name}*")
     yield from database.parent.glob("home.json")
     for name in FOLDERS:

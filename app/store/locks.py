@@ -10,37 +10,38 @@ from pathlib import Path
 
 from app.config import Settings
 from app.errors import StorageError
-from app.store.home import make_home, refused
-
-SERVER_LOCK, DATABASE_LOCK = "server.lock", "database.lock"
+from app.store.home import DATABASE_LOCK, OPENING_LOCK, SERVER_LOCK, make_home, refused
 
 
 class DatabaseLock:
     """Says that a process has the database open.
+
+    ``database.lock`` is shared by all who have. Who opens it holds ``opening.lock`` meanwhile:
+    a lock that is changed from exclusive to shared is nobody's for a moment.
 
     Attributes:
         alone: Whether nobody else has; others wait until ``share`` before they open it.
     """
 
     def __init__(self, settings: Settings):
-        self._handle = _open(make_home(settings) / DATABASE_LOCK)
+        home = make_home(settings)
+        self._handle, self._opening = _open(home / DATABASE_LOCK), _open(home / OPENING_LOCK)
+        fcntl.flock(self._opening, fcntl.LOCK_EX)
         try:
             fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self.alone = True
         except BlockingIOError:
-            fcntl.flock(self._handle, fcntl.LOCK_SH)
-            self.alone = False
+            self.share()
 
     def share(self) -> None:
         """Let others open it, too."""
         fcntl.flock(self._handle, fcntl.LOCK_SH)
         self.alone = False
+        self._opening = _closed(self._opening)
 
     def release(self) -> None:
         """It is closed."""
-        if self._handle >= 0:
-            os.close(self._handle)
-        self._handle = -1
+        self._handle, self._opening = _closed(self._handle), _closed(self._opening)
 
 
 @contextmanager
@@ -85,6 +86,12 @@ def server_lock(settings: Settings) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def _closed(handle: int) -> int:
+    if handle >= 0:
+        os.close(handle)
+    return -1
 
 
 def _open(path: Path) -> int:

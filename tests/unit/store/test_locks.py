@@ -1,9 +1,68 @@
 from __future__ import annotations
 
+import fcntl
+
 import pytest
 
+from app.config import Settings
 from app.errors import StorageError
-from app.store.locks import server_lock
+from app.store.locks import DatabaseLock, database_alone, server_lock
+
+FLOCK = fcntl.flock
+
+
+def flock_at_once(handle: int, operation: int) -> None:
+    """Refuses where the real one would wait."""
+    FLOCK(handle, operation | fcntl.LOCK_NB)
+
+
+class TestDatabaseLock:
+    def test_who_opens_first_is_alone_and_the_next_wait_until_it_is_shared(
+        self, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(fcntl, "flock", flock_at_once)
+        first = DatabaseLock(settings)
+        assert first.alone
+        with pytest.raises(BlockingIOError):
+            DatabaseLock(settings)
+        first.share()
+        second, third = DatabaseLock(settings), DatabaseLock(settings)
+        assert not (first.alone or second.alone or third.alone)
+        for lock in (first, second, third):
+            lock.release()
+
+    def test_nobody_is_alone_while_a_lock_is_changed_to_a_shared_one(
+        self, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        first, waited = DatabaseLock(settings), []
+
+        def with_a_gap(handle: int, operation: int) -> None:
+            """Lets go before it shares, as the system may, and somebody opens just then."""
+            FLOCK(handle, fcntl.LOCK_UN)
+            monkeypatch.setattr(fcntl, "flock", flock_at_once)
+            try:
+                DatabaseLock(settings).release()
+            except BlockingIOError:
+                waited.append(True)
+            FLOCK(handle, operation)
+
+        monkeypatch.setattr(fcntl, "flock", with_a_gap)
+        first.share()
+        assert waited
+        first.release()
+
+    def test_what_must_be_alone_is_refused_beside_others_and_runs_after_them(
+        self, settings: Settings
+    ) -> None:
+        first = DatabaseLock(settings)
+        first.share()
+        refused = pytest.raises(StorageError, match="has the database open: not now")
+        with refused, database_alone(settings, "not now"):
+            pass
+        first.release()
+        first.release()
+        with database_alone(settings, "not now"):
+            pass
 
 
 class TestServerLock:
