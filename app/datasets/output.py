@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.datasets.manifest import MANIFEST, SOFTWARE
-from app.durable import sync
+from app.durable import PARTIAL, sync
 from app.errors import InputError, StorageError
 
 _DATE = (1980, 1, 1, 0, 0, 0)
@@ -37,7 +37,7 @@ def output_tree(out: Path) -> Iterator[Path]:
     _check_free(out)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent))
+        staging = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=PARTIAL, dir=out.parent))
     except OSError as error:
         raise StorageError(
             f"the folder of {out.name} cannot be written ({error.strerror})"
@@ -81,7 +81,7 @@ def _is_earlier_export(out: Path) -> bool:
 
 
 def _publish_zip(staging: Path, out: Path) -> None:
-    handle, name = tempfile.mkstemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent)
+    handle, name = tempfile.mkstemp(prefix=f".{out.name}.", suffix=PARTIAL, dir=out.parent)
     partial = Path(name)
     try:
         with os.fdopen(handle, "wb") as file:

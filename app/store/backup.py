@@ -22,7 +22,7 @@ from typing import IO, Any
 import pysqlite3.dbapi2
 
 from app.config import Settings
-from app.durable import sync
+from app.durable import PARTIAL, sync
 from app.errors import EXAMINE, InputError, StorageError
 from app.finite import json_text
 from app.store.anchor import require_own_database
@@ -30,7 +30,8 @@ from app.store.clock import now
 from app.store.engine import make_engine, reported
 from app.store.examination import examine_database
 from app.store.first_look import require_sound, signs_of_use
-from app.store.home import half_written, refused
+from app.store.home import refused
+from app.store.leftovers import is_half_written
 from app.store.locks import DatabaseLock
 
 FORMAT, FORMAT_VERSION = "touchline-backup", 1
@@ -175,7 +176,7 @@ def _require_place(out: Path, replace: bool) -> None:
 @contextmanager
 def _workshop(out: Path) -> Iterator[Path]:
     """A folder beside the backup, gone at the end; what a killed run left in it goes first."""
-    folder = out.with_name(f".{out.name}.partial")
+    folder = out.with_name(f".{out.name}{PARTIAL}")
     folder.mkdir(mode=0o700, exist_ok=True)
     handle = os.open(folder, os.O_RDONLY)
     try:
@@ -253,11 +254,9 @@ def _frames_elsewhere(connection: Any, folders: Sequence[Path]) -> int:
 
 def _files(home: Path, folders: Sequence[str]) -> Iterator[Path]:
     """Files of folders, in order; half-written ones are nobody's yet."""
-    half = set(half_written(home))
     for name in folders:
         for path in sorted((home / name).rglob("*")):
-            complete = half.isdisjoint((path, *path.parents))
-            if complete and path.is_file() and not path.is_symlink():
+            if not is_half_written(path, home) and path.is_file() and not path.is_symlink():
                 yield path
 
 

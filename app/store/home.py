@@ -21,9 +21,6 @@ FOLDERS = ("uploads", "exports", "cache", "sample", "practice", "backups")
 LOCKS = SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK = "server.lock", "database.lock", "opening.lock"
 FOLDER_MODE, FILE_MODE = 0o700, 0o600
 
-_HALF_WRITTEN = (".*.partial", "*/.*.partial", "uploads/*.part", "uploads/*/upload.json.new")
-"""Names that we give to what is not complete yet, in the places where we do; anywhere else a file
-of such a name is somebody's."""
 _MOUNTS = Path("/proc/mounts")
 
 
@@ -99,12 +96,6 @@ def private_files(settings: Settings) -> Iterator[Path]:
         for folder, _folders, names in os.walk(home / name):
             yield Path(folder)
             yield from (Path(folder, file) for file in names)
-
-
-def half_written(home: Path) -> Iterator[Path]:
-    """What something is writing in a home, or was when it was killed."""
-    for pattern in _HALF_WRITTEN:
-        yield from home.glob(pattern)
 
 
 def refused(path: Path, error: OSError) -> StorageError:

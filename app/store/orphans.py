@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import shutil
+import os
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.config import Settings
-from app.store.home import half_written
+from app.store.leftovers import DAY, last_written
 from app.store.models import QueueModel, ViewModel
 from app.store.uploads import list_uploads
 
-DAY = 86_400.0
-"""Seconds."""
 _UNUSED = (
     "SELECT key FROM calibration WHERE key NOT IN"
     " (SELECT json_each.value FROM solution, json_each(solution.calibrations)) LIMIT :limit"
@@ -53,31 +50,14 @@ def unread_uploads(session: Session, settings: Settings) -> list[str]:
     ]
 
 
-def leftovers(settings: Settings, seconds: float = DAY) -> Iterator[Path]:
-    """Files and folders of a home that something killed was writing, and has not for some time."""
-    oldest = time.time() - seconds
-    for path in half_written(settings.home):
-        if path.lstat().st_mtime < oldest:
-            yield path
-
-
-def delete_leftovers(settings: Settings) -> int:
-    """Delete them; returns how many there were."""
-    found = list(leftovers(settings))
-    for path in found:
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink(missing_ok=True)
-    return len(found)
-
-
 def expire_cache(settings: Settings) -> int:
     """Delete derived files that were made longer ago than the settings allow; returns how many."""
     oldest = time.time() - settings.cache_days * DAY
     gone = 0
-    for path in settings.cache.rglob("*"):
-        if path.is_file() and path.lstat().st_mtime < oldest:
-            path.unlink(missing_ok=True)
-            gone += 1
+    for folder, _, names in os.walk(settings.cache):
+        for path in (Path(folder, name) for name in names):
+            written = last_written(path)
+            if written is not None and written < oldest:
+                path.unlink(missing_ok=True)
+                gone += 1
     return gone

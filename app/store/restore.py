@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 
 from app.config import Settings
-from app.durable import sync
+from app.durable import PARTIAL, sync
 from app.errors import DamagedError, InputError
 from app.store.anchor import Anchor, anchor_file, make_anchor
 from app.store.backup import (
@@ -28,7 +28,7 @@ from app.store.locks import database_alone, server_lock
 from app.store.migrate import KNOWN_REVISIONS, newer_schema
 from app.store.wal import MAGIC, read_header, read_log
 
-_PARTIAL = ".restore.partial"
+_WORKSHOP = f".restore{PARTIAL}"
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def _restore(settings: Settings, source: Path, folder: Path) -> Restored:
 
 @contextmanager
 def _workshop(settings: Settings) -> Iterator[Path]:
-    folder = settings.database_file.with_name(_PARTIAL)
+    folder = settings.database_file.with_name(_WORKSHOP)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(mode=FOLDER_MODE)
     try:

@@ -27,14 +27,14 @@ from app.errors import InputError, NotFoundError, StorageError, TooLargeError
 from app.finite import json_text
 from app.store.clock import now
 
+PART = ".part"
+"""How the name of a half-sent upload's folder ends."""
+
 _ID = re.compile(r"[0-9a-f]{32}")
 _UNSAFE = re.compile(r"[^A-Za-z0-9._ -]")
 _MAX_NAME = 120
 _RECORD = "upload.json"
 _CONTENT = "content"
-_PART = ".part"
-_PART_HOURS = 24
-"""After so many hours a half-sent file is nobody's any more."""
 
 
 @dataclass(frozen=True)
@@ -107,17 +107,13 @@ def delete_upload(settings: Settings, upload_id: str) -> None:
 
 
 def expire_uploads(settings: Settings) -> int:
-    """Delete what is older than the settings allow and half-sent files; returns how many."""
+    """Delete what is older than the settings allow; returns how many."""
     day = datetime.now(UTC)
     gone = 0
     for upload in list(_all(settings)):
         age = day - datetime.fromisoformat(upload.created)
         if not upload.kept and age > timedelta(days=settings.upload_days):
             _remove(settings.uploads / upload.id)
-            gone += 1
-    for path in settings.uploads.glob(f"*{_PART}"):
-        if day.timestamp() - path.stat().st_mtime > _PART_HOURS * 3600:
-            _clear(path)
             gone += 1
     return gone
 
@@ -163,7 +159,7 @@ class UploadWriter:
 
     def __init__(self, settings: Settings, name: str):
         self._settings, self._name = settings, safe_name(name)
-        self._folder = settings.uploads / f"{uuid.uuid4().hex}{_PART}"
+        self._folder = settings.uploads / f"{uuid.uuid4().hex}{PART}"
         self._digest = hashlib.sha256(self._name.encode() + b"\0")
         self.bytes = 0
         with _reported():
@@ -236,7 +232,7 @@ class UploadWriter:
         """Leave nothing behind."""
         with suppress(OSError):
             self._file.close()
-        _clear(self._folder)
+        clear(self._folder)
 
 
 def require_size(settings: Settings, size: int) -> None:
@@ -254,14 +250,15 @@ def _write_record(folder: Path, upload: Upload) -> None:
 
 def _remove(folder: Path) -> None:
     """Delete an upload: it is gone at once, and what is left of it is half-sent."""
-    aside = folder.with_name(f"{uuid.uuid4().hex}{_PART}")
+    aside = folder.with_name(f"{uuid.uuid4().hex}{PART}")
     with suppress(FileNotFoundError):
         folder.rename(aside)
-    _clear(aside)
+    clear(aside)
 
 
-def _clear(path: Path) -> None:
-    if path.is_dir():
+def clear(path: Path) -> None:
+    """Delete a file, or a folder with all in it; it may be gone already."""
+    if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)

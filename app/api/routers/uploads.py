@@ -18,7 +18,6 @@ from app.store.uploads import (
     Upload,
     UploadWriter,
     delete_upload,
-    expire_uploads,
     get_upload,
     list_uploads,
     require_size,
@@ -63,7 +62,6 @@ async def upload_file(
     declared = request.headers.get("content-length", "")
     if declared.isascii() and declared.isdigit() and len(declared) < 19:
         require_size(services.settings, int(declared))
-    await to_thread.run_sync(expire_uploads, services.settings)
     upload = await _receive(request, services, name)
     response.headers["Location"] = f"/api/v1/uploads/{upload.id}"
     return UploadDocument.of(upload)

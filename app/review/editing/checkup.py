@@ -15,8 +15,9 @@ from app.review.editing.check import Check
 from app.store.anchor import read_anchor
 from app.store.engine import MIN_SQLITE
 from app.store.home import open_to_others
+from app.store.leftovers import leftovers
 from app.store.log import last_time
-from app.store.orphans import leftovers, spare_calibrations, unread_uploads
+from app.store.orphans import spare_calibrations, unread_uploads
 from app.store.session import Session, Store
 
 ROOM_BYTES = 2**30

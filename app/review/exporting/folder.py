@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from app.durable import replace_file
+from app.durable import PARTIAL, replace_file
 from app.errors import NotFoundError
 from app.finite import json_text
 from app.review.exporting.export import ExportReport
@@ -42,7 +42,7 @@ class ExportFolder:
     def prepare(self) -> None:
         """Make the folder, and clear what a killed server left half written."""
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        for path in self.folder.glob(".*.partial"):
+        for path in self.folder.glob(f".*{PARTIAL}"):
             if path.is_dir():
                 shutil.rmtree(path, ignore_errors=True)
             else:

@@ -12,9 +12,9 @@ from app.review.jobs.jobs import Jobs
 from app.store.anchor import sync_anchor
 from app.store.answers import forget_answers, shorten_answers
 from app.store.jobs import forget_jobs
+from app.store.leftovers import delete_leftovers
 from app.store.orphans import (
     delete_calibrations,
-    delete_leftovers,
     expire_cache,
     spare_calibrations,
 )

@@ -114,17 +114,20 @@ class TestFiles:
             place(home / "cache" / "frames" / "ab" / "c.jpg", OLD),
             place(home / "uploads" / "1.part", OLD),
             place(home / "exports" / ".7.zip.partial", OLD),
+            place(home / "uploads" / "a" / ".upload.json.x1.partial", OLD),
+            place(home / ".home.json.x1.partial", OLD),
         ]
         stay = [
             place(home / "cache" / "frames" / "ab" / "d.jpg", time.time()),
             place(home / "uploads" / "2.part", time.time()),
             place(home / "uploads" / "f" / "content" / "photos.part", OLD),
+            place(home / "uploads" / "f" / "content" / ".photos.partial", OLD),
             place(home / "exports" / "8.zip", OLD),
         ]
         tidied = tidy(store)
-        assert (tidied.cached, tidied.uploads + tidied.leftovers) == (1, 2)
-        assert [path.exists() for path in gone] == [False] * 3
-        assert [path.exists() for path in stay] == [True] * 4
+        assert (tidied.cached, tidied.uploads, tidied.leftovers) == (1, 0, 4)
+        assert not any(path.exists() for path in gone)
+        assert all(path.exists() for path in stay)
 
 
 class TestUpkeep:
