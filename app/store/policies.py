@@ -22,15 +22,29 @@ class PolicyVersion:
     policy: Policy
 
 
+# Word for word the condition of the index, which holds a few of a million entries.
+_JUDGED = text("kind IN ('dataset', 'policy')")
+
+
 def policy_history(session: Session, dataset_id: int) -> tuple[PolicyVersion, ...]:
     """The policies of a dataset, oldest first."""
     statement = (
         select(LogModel.at, LogModel.actor, LogModel.body)
-        # Word for word the condition of the index, which holds a few of a million entries.
-        .where(LogModel.dataset_id == dataset_id, text("kind IN ('dataset', 'policy')"))
+        .where(LogModel.dataset_id == dataset_id, _JUDGED)
         .order_by(LogModel.id)
     )
     return tuple(
         PolicyVersion(number, row.at, row.actor, policy_from_json(unpack(row.body)["policy"]))
         for number, row in enumerate(session.execute(statement), 1)
     )
+
+
+def judged_since(session: Session, dataset_id: int) -> str | None:
+    """When the policy of a dataset became what it is; None where the log does not say."""
+    statement = (
+        select(LogModel.at)
+        .where(LogModel.dataset_id == dataset_id, _JUDGED)
+        .order_by(LogModel.id.desc())
+        .limit(1)
+    )
+    return session.scalar(statement)

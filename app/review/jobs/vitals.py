@@ -35,10 +35,9 @@ def read_home(store: Store) -> Home:
     """
     with store.read() as session:
         vitals = read_vitals(session)
-    home = store.settings.home
-    return Home(
-        vitals, _age(vitals.oldest_unsolved), file_sizes(home), shutil.disk_usage(home).free
-    )
+    settings = store.settings
+    free = shutil.disk_usage(settings.home).free
+    return Home(vitals, _age(vitals.oldest_unsolved), file_sizes(settings), free)
 
 
 def _age(at: str | None) -> float:

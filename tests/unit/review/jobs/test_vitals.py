@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from datetime import datetime, timedelta
+from pathlib import Path
 
 import pytest
+from sqlalchemy import update
 
+from app.config import Settings
 from app.review.datasets.dataset import get_dataset
 from app.review.jobs import vitals
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import request_solve
 from app.review.jobs.vitals import read_home
+from app.review.policies.policy import change_policy
+from app.soccer.policy import STRICT
+from app.store.clock import now
+from app.store.models import GroupModel, QueueModel
 from app.store.session import Store
+from app.store.vitals import file_sizes
 
 
 def test_groups_that_wait_are_counted_and_the_oldest_is_timed(
@@ -28,6 +36,29 @@ def test_groups_that_wait_are_counted_and_the_oldest_is_timed(
 
     monkeypatch.setattr(vitals, "datetime", Later)
     assert 3600 <= read_home(store).oldest_unsolved_seconds < 7200
+
+
+def test_groups_that_wait_for_a_new_policy_wait_since_it_came(
+    store: Store, fill, make_group
+) -> None:
+    fill(make_group(7))
+    with store.write() as session:
+        long_ago = "2020-01-01T00:00:00.000000+00:00"
+        session.execute(update(GroupModel).values(changed=long_ago))
+        session.execute(update(QueueModel).values(changed=long_ago))
+    before = now()
+    change_policy(store, "demo", STRICT, if_match=None, actor="ann")
+    found = read_home(store).vitals
+    assert found.unsolved == 1
+    assert found.oldest_unsolved is not None
+    assert before <= found.oldest_unsolved <= now()
+
+
+def test_files_are_those_of_the_database_wherever_it_lies(tmp_path: Path) -> None:
+    settings = Settings(home=tmp_path, database_url=f"sqlite:///{tmp_path}/elsewhere.db")
+    assert file_sizes(settings) == {}
+    settings.database_file.write_bytes(b"123")
+    assert file_sizes(settings) == {"database": 3}
 
 
 def test_nothing_waits_once_all_is_solved(store: Store, fill, make_group) -> None:
