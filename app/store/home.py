@@ -10,6 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from app.config import Settings
+from app.durable import PARTIAL
 from app.errors import StorageError
 
 NETWORK_FILE_SYSTEMS = frozenset(
@@ -18,6 +19,8 @@ NETWORK_FILE_SYSTEMS = frozenset(
 """Where file locks and shared memory do not hold, SQLite's WAL loses data."""
 FOLDERS = ("uploads", "exports", "cache", "sample", "practice", "backups")
 """What we make in a home beside the database and its side files."""
+ASIDE, RESTORING = "before-restore-", f".restore{PARTIAL}"
+"""Folders of a restore: how those with what was there before begin, and where it works."""
 LOCKS = SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK = "server.lock", "database.lock", "opening.lock"
 FOLDER_MODE, FILE_MODE = 0o700, 0o600
 
@@ -92,8 +95,9 @@ def private_files(settings: Settings) -> Iterator[Path]:
     yield from (home / name for name in LOCKS if (home / name).exists())
     yield from database.parent.glob(f"{database.name}*")
     yield from database.parent.glob("home.json")
-    for name in FOLDERS:
-        for folder, _folders, names in os.walk(home / name):
+    ours = (home / name for name in FOLDERS)
+    for top in (*ours, *home.glob(f"{ASIDE}*"), database.with_name(RESTORING)):
+        for folder, _folders, names in os.walk(top):
             yield Path(folder)
             yield from (Path(folder, file) for file in names)
 

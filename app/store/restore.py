@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 
 from app.config import Settings
-from app.durable import PARTIAL, sync
+from app.durable import sync
 from app.errors import DamagedError, InputError
 from app.store.anchor import Anchor, anchor_file, make_anchor
 from app.store.backup import (
@@ -23,12 +23,10 @@ from app.store.backup import (
 )
 from app.store.examination import examine_database
 from app.store.first_look import log_file
-from app.store.home import FOLDER_MODE, make_private, refused
+from app.store.home import ASIDE, FOLDER_MODE, RESTORING, make_private, refused
 from app.store.locks import database_alone, server_lock
 from app.store.migrate import KNOWN_REVISIONS, newer_schema
 from app.store.wal import MAGIC, read_header, read_log
-
-_WORKSHOP = f".restore{PARTIAL}"
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ def _restore(settings: Settings, source: Path, folder: Path) -> Restored:
 
 @contextmanager
 def _workshop(settings: Settings) -> Iterator[Path]:
-    folder = settings.database_file.with_name(_WORKSHOP)
+    folder = settings.database_file.with_name(RESTORING)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(mode=FOLDER_MODE)
     try:
@@ -171,7 +169,7 @@ def _move_aside(settings: Settings, folders: list[str]) -> Path | None:
 
 
 def _new_folder(home: Path) -> Path:
-    name = f"before-restore-{datetime.now(UTC):%Y%m%dT%H%M%S}"
+    name = f"{ASIDE}{datetime.now(UTC):%Y%m%dT%H%M%S}"
     number = 1
     while (folder := home / (name if number == 1 else f"{name}-{number}")).exists():
         number += 1

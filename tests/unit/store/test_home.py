@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import StorageError
-from app.store.home import file_system, make_home, make_private
+from app.store.home import file_system, make_home, make_private, open_to_others
 from app.store.session import Store
 from tests.unit.store.homes import say
 
@@ -71,6 +71,18 @@ class TestMakePrivate:
         assert settings.home.stat().st_mode & 0o777 == 0o700
         assert (upload / "frames.zip").stat().st_mode & 0o777 == 0o600
         assert (settings.home / "letter.txt").stat().st_mode & 0o777 == 0o644
+
+    @pytest.mark.parametrize("name", ["before-restore-20260101T000000", ".restore.partial"])
+    def test_what_a_restore_moved_aside_or_works_on_is_its_owners_too(self, settings, name) -> None:
+        make_home(settings)
+        old = settings.home / name / "exports" / "1.zip"
+        old.parent.mkdir(parents=True)
+        old.touch()
+        settings.home.chmod(0o755)
+        assert old in open_to_others(settings)
+        make_private(settings)
+        assert old.stat().st_mode & 0o777 == 0o600
+        assert old.parent.stat().st_mode & 0o777 == 0o700
 
     def test_from_then_on_new_files_are_private(self, settings) -> None:
         make_home(settings)
