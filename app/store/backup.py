@@ -13,8 +13,8 @@ import os
 import shutil
 import zipfile
 import zlib
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -157,7 +157,7 @@ def verify_backup(path: Path) -> Manifest:
                 raise InputError(f"{path} does not hold the files that its manifest names")
             for name in names:
                 with backup.open(name) as member:
-                    if _digest(member) != manifest.files[name]:
+                    if _digest(iter(lambda: member.read(_CHUNK), b"")) != manifest.files[name]:
                         raise InputError(f"{path}, {name}: not what was written")
     except (zipfile.BadZipFile, EOFError, OSError, zlib.error) as error:
         raise InputError(
@@ -228,7 +228,9 @@ def _write_zip(settings: Settings, copy: Path, partial: Path, folders: Sequence[
             files[DATABASE] = _add(backup, DATABASE, copy, zipfile.ZIP_DEFLATED)
             for path in _files(settings.home, folders):
                 name = path.relative_to(settings.home).as_posix()
-                files[name] = _add(backup, name, path, zipfile.ZIP_STORED)
+                # Uploads expire, and exports are deleted, meanwhile.
+                with suppress(FileNotFoundError):
+                    files[name] = _add(backup, name, path, zipfile.ZIP_STORED)
             manifest = Manifest(
                 made=now(),
                 home=str(settings.home.resolve()),
@@ -255,21 +257,48 @@ def _frames_elsewhere(connection: Any, folders: Sequence[Path]) -> int:
 def _files(home: Path, folders: Sequence[str]) -> Iterator[Path]:
     """Files of folders, in order; half-written ones are nobody's yet."""
     for name in folders:
-        for path in sorted((home / name).rglob("*")):
+        walk = os.walk(home / name)
+        for path in sorted(Path(folder, file) for folder, _, files in walk for file in files):
             if not is_half_written(path, home) and path.is_file() and not path.is_symlink():
                 yield path
 
 
 def _add(backup: zipfile.ZipFile, name: str, path: Path, packed: int) -> dict[str, int | str]:
-    info = zipfile.ZipInfo.from_file(path, name)
+    """Put a file into a backup; FileNotFoundError, and nothing is in it, where there is none."""
+    with _reading(path):
+        info = zipfile.ZipInfo.from_file(path, name)
+        source = path.open("rb")
     info.compress_type = packed
-    with path.open("rb") as source, backup.open(info, "w", force_zip64=True) as target:
-        return _digest(source, target)
+    with source, backup.open(info, "w", force_zip64=True) as target:
+        return _digest(_chunks(source, path), target)
 
 
-def _digest(source: IO[bytes], target: IO[bytes] | None = None) -> dict[str, int | str]:
+def _chunks(source: IO[bytes], path: Path) -> Iterator[bytes]:
+    while True:
+        with _reading(path):
+            chunk = source.read(_CHUNK)
+        if not chunk:
+            return
+        yield chunk
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise StorageError(
+            f"{path} cannot be read: {error.strerror or error}",
+            hint="Make the file readable for this user, or look after the disk; no backup was"
+            " written.",
+        ) from error
+
+
+def _digest(chunks: Iterable[bytes], target: IO[bytes] | None = None) -> dict[str, int | str]:
     digest, size = hashlib.sha256(), 0
-    while chunk := source.read(_CHUNK):
+    for chunk in chunks:
         digest.update(chunk)
         size += len(chunk)
         if target is not None:

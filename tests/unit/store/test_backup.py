@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import zipfile
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sqlalchemy import text
 
 from app.config import Settings
 from app.errors import DamagedError, InputError, StorageError
-from app.store.backup import FRAMES, back_up, verify_backup
+from app.store import backup as backup_module
+from app.store.backup import EXPORTS, FRAMES, back_up, verify_backup
 from app.store.session import Store
 from tests.unit.store.homes import killed, say
+
+
+def place(store: Store, name: str) -> Path:
+    path = store.settings.exports / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(b"x")
+    return path
 
 
 class TestBackUp:
@@ -57,6 +67,56 @@ class TestBackUp:
             assert backup.testzip() is None
             assert backup.read("uploads/1/frames.zip") == b"frames"
             assert "uploads/2.part" not in backup.namelist()
+
+    def test_a_file_that_goes_meanwhile_is_left_out_and_the_backup_is_good(
+        self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        stays, goes = place(store, "b.zip"), place(store, "a.zip")
+        make = zipfile.ZipInfo.from_file
+
+        def meanwhile(path: Path, *arguments: str) -> zipfile.ZipInfo:
+            if path == goes:
+                goes.unlink()
+            return make(path, *arguments)
+
+        monkeypatch.setattr(zipfile.ZipInfo, "from_file", meanwhile)
+        # Found while the folder was listed, and there when it was looked at.
+        monkeypatch.setattr(Path, "is_file", lambda _path: True)
+        manifest = back_up(store.settings, tmp_path / "b.zip", EXPORTS)
+        assert list(manifest.files) == ["touchline.db", f"exports/{stays.name}"]
+        assert verify_backup(tmp_path / "b.zip") == manifest
+
+    def test_a_file_that_cannot_be_read_is_named_and_no_backup_is_written(
+        self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        unread, opened = place(store, "a.zip"), Path.open
+
+        def refuse(path: Path, *arguments: Any, **named: Any) -> Any:
+            if path == unread:
+                raise PermissionError(errno.EACCES, "Permission denied", str(path))
+            return opened(path, *arguments, **named)
+
+        monkeypatch.setattr(Path, "open", refuse)
+        with pytest.raises(StorageError, match=r"a\.zip cannot be read: Permission denied"):
+            back_up(store.settings, tmp_path / "b.zip", EXPORTS)
+        assert not (tmp_path / "b.zip").exists()
+
+    def test_what_began_to_be_written_after_the_backup_began_is_left_out(
+        self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        place(store, "a.zip")
+        sample = store.settings.home / "sample"
+        sample.mkdir()
+        (sample / "1.png").touch()
+        look = backup_module.is_half_written
+
+        def meanwhile(path: Path, home: Path) -> bool:
+            place(store, ".7.zip.x1.partial")
+            return look(path, home)
+
+        monkeypatch.setattr(backup_module, "is_half_written", meanwhile)
+        manifest = back_up(store.settings, tmp_path / "b.zip", ("sample", *EXPORTS))
+        assert list(manifest.files) == ["touchline.db", "sample/1.png", "exports/a.zip"]
 
     def test_is_for_its_owner_alone(self, store: Store, tmp_path: Path) -> None:
         back_up(store.settings, tmp_path / "b.zip")
