@@ -108,13 +108,14 @@ class TestBackUp:
         sample = store.settings.home / "sample"
         sample.mkdir()
         (sample / "1.png").touch()
-        look = backup_module.is_half_written
+        add = backup_module._add
 
-        def meanwhile(path: Path, home: Path) -> bool:
-            place(store, ".7.zip.x1.partial")
-            return look(path, home)
+        def meanwhile(backup: zipfile.ZipFile, name: str, *arguments: Any) -> Any:
+            if name.startswith("sample"):
+                place(store, ".7.zip.x1.partial")
+            return add(backup, name, *arguments)
 
-        monkeypatch.setattr(backup_module, "is_half_written", meanwhile)
+        monkeypatch.setattr(backup_module, "_add", meanwhile)
         manifest = back_up(store.settings, tmp_path / "b.zip", ("sample", *EXPORTS))
         assert list(manifest.files) == ["touchline.db", "sample/1.png", "exports/a.zip"]
 
