@@ -6,7 +6,6 @@ import contextlib
 import hashlib
 import os
 import stat
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import cv2
 import numpy as np
 
 from app.config import Settings
+from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.soccer.group import Media
 from app.store.archives import Archives
@@ -232,13 +232,4 @@ def _keep(place: Path, data: bytes) -> None:
     """Write into the cache, whole or not at all; a full disk costs the cache and no picture."""
     with contextlib.suppress(OSError):
         place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=".", dir=place.parent)
-        partial = Path(name)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            partial.replace(place)
-        finally:
-            partial.unlink(missing_ok=True)
+        replace_file(place, data)
