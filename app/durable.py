@@ -19,17 +19,26 @@ def sync(path: Path) -> None:
         os.close(handle)
 
 
-def replace_file(path: Path, content: bytes) -> None:
-    """Write a file for its owner alone: a reader sees all of it or what was there before, after a
-    power cut too. Of several writers the last one stays."""
+def replace_file(path: Path, content: bytes | memoryview, *, durable: bool = True) -> None:
+    """Write a file for its owner alone: a reader sees all of it or what was there before.
+
+    Of several writers the last one stays.
+
+    Args:
+        path: The file.
+        content: All of it.
+        durable: Whether that holds after a power cut, too; it costs a wait for the disk.
+    """
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=PARTIAL, dir=path.parent)
     partial = Path(name)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
             file.flush()
-            os.fsync(file.fileno())
+            if durable:
+                os.fsync(file.fileno())
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
-    sync(path.parent)
+    if durable:
+        sync(path.parent)

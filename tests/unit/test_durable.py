@@ -51,3 +51,13 @@ class TestReplaceFile:
             replace_file(path, b"after")
         assert path.read_bytes() == b"before"
         assert list(tmp_path.iterdir()) == [path]
+
+    def test_what_need_not_survive_a_power_cut_does_not_wait_for_the_disk(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        waited: list[int] = []
+        monkeypatch.setattr(os, "fsync", waited.append)
+        replace_file(tmp_path / "a", b"one", durable=False)
+        assert waited == []
+        replace_file(tmp_path / "a", b"two")
+        assert len(waited) == 2

@@ -5,15 +5,16 @@ A cache like the thumbnails: it can be deleted at any time, and what cannot be r
 
 from __future__ import annotations
 
-import os
 import zipfile
 from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import structlog
 
+from app.durable import replace_file
 from app.review.yields.table import EMPTY, YieldTable
 from app.solving.facts import COLUMNS, Facts
 
@@ -31,19 +32,17 @@ def keep_table(path: Path, calibration: str, table: YieldTable) -> None:
         calibration: What the calibrations of the table were made by.
         table: Every array of it.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     made_by = np.array([FORMAT, calibration])
     arrays: dict[str, Any] = {name: getattr(table.facts, name) for name in COLUMNS}
     arrays |= {"group_id": table.group_id, "inputs": table.inputs}
+    file = BytesIO()
+    np.savez(file, allow_pickle=False, made_by=made_by, **arrays)
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        with partial.open("wb") as file:
-            np.savez(file, allow_pickle=False, made_by=made_by, **arrays)
-        partial.replace(path)
+        # What a power cut leaves of it cannot be read, and is made again.
+        replace_file(path, file.getbuffer(), durable=False)
     except OSError as error:
         log.warning("a yield table could not be kept", error=str(error))
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
 
 
 def kept_table(path: Path, calibration: str) -> YieldTable:
