@@ -91,14 +91,15 @@ class Frames:
         made: Picture = self._submit(media, width, flipped, bounded=False).future.result()
         return made
 
-    def neighbours(self, media: Media, group: str, static: bool) -> dict[int, Media]:
-        """``neighbours``, which opens videos and archives."""
-        task = self._pool.submit(neighbours, media, group, static)
-        try:
-            found: dict[int, Media] = task.future.result()
-        except ChildEnded:
-            return {}
-        return found
+    def ask_neighbours(self, media: Media, group: str, static: bool) -> PoolTask:
+        """Have ``neighbours`` called, which opens videos and archives.
+
+        Its future may have ``ChildEnded``.
+
+        Raises:
+            OverloadedError: Too many wait.
+        """
+        return self._pool.submit(neighbours, media, group, static)
 
     def close(self) -> None:
         """End the processes."""

@@ -117,8 +117,8 @@ class TestFrames:
         folder.mkdir()
         for number in (1, 2, 3):
             (folder / f"00000{number}.png").write_bytes(PNG)
-        found = frames.neighbours(Media(str(folder / "000002.png")), "2", False)
-        assert sorted(found) == [-1, 1]
+        task = frames.ask_neighbours(Media(str(folder / "000002.png")), "2", False)
+        assert sorted(task.future.result()) == [-1, 1]
 
 
 def crash(*_: object) -> None:
