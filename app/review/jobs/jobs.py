@@ -130,6 +130,8 @@ class _Run:
     work: Work
     progress: JobProgress
     over: threading.Event = field(default_factory=threading.Event)
+    counted: bool = False
+    """Whether its record says that it was begun here."""
 
 
 @dataclass(frozen=True)
@@ -322,16 +324,19 @@ class Jobs:
         return not self._queue.runs
 
     def close(self) -> None:
-        """Stop after the running job's next step; its record says where it was."""
+        """Stop after the running job's next step; its record says where it was.
+
+        A job that takes no step for long is left to itself.
+        """
         with self._changed:
             self._closing.set()
             self._changed.notify_all()
         if self._worker is not None:
             self._worker.join(CLOSE_SECONDS)
-            if self._worker.is_alive():
-                log.warning(
-                    "a job did not end in time", job=self._queue.running and self._queue.running.id
-                )
+            running = self._queue.running
+            if self._worker.is_alive() and running is not None:
+                log.warning("a job did not end in time", job=running.id)
+                self._take_back(running)
 
     def _waiting_for(self, kind: str, dataset_id: int | None) -> _Run | None:
         """The waiting job of a kind and dataset."""
@@ -421,6 +426,7 @@ class Jobs:
 
     def _carry_out(self, run: _Run) -> None:
         self._save(run.id, state=RUNNING, started=now(), begun=1)
+        run.counted = True
         ended = threading.Event()
         ticker = threading.Thread(target=self._tick, args=(run, ended), daemon=True)
         ticker.start()
@@ -431,10 +437,16 @@ class Jobs:
             ticker.join()
         if values is not None:
             self._finish(run, **values)
-            return
-        with suppress(StorageError):
-            # The server stops in good order; that is none of this job's doing.
-            self._save(run.id, begun=-1)
+        else:
+            self._take_back(run)
+
+    def _take_back(self, run: _Run) -> None:
+        """Let a server that stops in good order count for no death: it is none of this job's doing."""
+        with self._changed:
+            counted, run.counted = run.counted, False
+        if counted:
+            with suppress(StorageError):
+                self._save(run.id, begun=-1)
 
     def _outcome(self, run: _Run) -> dict[str, Any] | None:
         """How a job ended, as columns; None where the server stops and the next one decides."""

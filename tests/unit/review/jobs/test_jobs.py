@@ -374,6 +374,29 @@ class TestRestart:
         assert first.wait(job.id, SECONDS).result == 9
         first.close()
 
+    def test_a_stop_in_good_order_does_not_count_where_the_job_takes_no_step(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "CLOSE_SECONDS", 0.05)
+        started, finish = threading.Event(), threading.Event()
+
+        def stuck(progress: JobProgress) -> Json:
+            started.set()
+            assert finish.wait(SECONDS)
+            progress(1)
+            return None
+
+        jobs = Jobs(store)
+        job = submit(jobs, stuck, kind="import")
+        assert started.wait(SECONDS)
+        with capture_logs() as logs:
+            jobs.close()
+        assert [entry["event"] for entry in logs] == ["a job did not end in time"]
+        assert jobs.get(job.id).tries == 0
+        finish.set()
+        until(jobs.are_idle)
+        assert jobs.get(job.id).tries == 0
+
     def test_finished_jobs_stay_as_they_were_after_a_restart(
         self, jobs: Jobs, store: Store
     ) -> None:
