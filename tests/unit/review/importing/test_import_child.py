@@ -148,12 +148,12 @@ class TestImportApart:
             pass
 
     def test_damage_that_the_child_meets_ends_changes_here(
-        self, store: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
+        self, there: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(import_child, "import_here", meet_damage)
         with pytest.raises(DamagedError, match=r"^touchline\.db is damaged$"):
-            apart(store, tree)
-        with pytest.raises(DamagedError, match="no change is taken"), store.write():
+            apart(there, tree)
+        with pytest.raises(DamagedError, match="no change is taken"), there.write():
             pass
 
     def test_what_needs_too_much_memory_is_a_sentence(

@@ -157,17 +157,15 @@ class TestUpkeep:
         assert not old.exists()
 
     def test_a_look_at_the_whole_database_ends_when_the_server_stops(
-        self, store: Store, monkeypatch: pytest.MonkeyPatch
+        self, there: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         # Instead of a look that takes minutes: its number would be taken for a fault.
         count = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 2000000)"
-        with monkeypatch.context() as patch:
-            slow = text(f"{count} SELECT CAST(count(*) AS TEXT) FROM n")
-            patch.setattr("app.store.session.text", lambda _: slow)
-            store.require_whole(lambda: False)
-            with pytest.raises(DamagedError):
-                store.require_whole()
-        store.require_whole()
+        slow = text(f"{count} SELECT CAST(count(*) AS TEXT) FROM n")
+        monkeypatch.setattr("app.store.session.text", lambda _: slow)
+        there.require_whole(lambda: False)
+        with pytest.raises(DamagedError):
+            there.require_whole()
 
     def test_ends_at_once(self, store: Store) -> None:
         upkeep = Upkeep(store, Jobs(store))
