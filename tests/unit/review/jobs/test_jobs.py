@@ -181,7 +181,9 @@ class TestSubmitting:
 
     def test_a_job_whose_record_cannot_be_kept_is_not_begun(self, jobs: Jobs) -> None:
         def full() -> None:
-            # The worker is idle and would begin it by now.
+            # Another one that entered wakes the worker, which would begin it by now.
+            with jobs._changed:
+                jobs._changed.notify_all()
             time.sleep(0.1)
             raise StorageError("the disk is full")
 
