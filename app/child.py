@@ -15,7 +15,7 @@ import select
 import signal
 import traceback
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -23,7 +23,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Literal
 
-from app.errors import ReviewError
+from app.errors import OverloadedError, ReviewError
 
 TICK = 0.1
 """Seconds between two looks whether the work is still wanted."""
@@ -32,7 +32,8 @@ START_SECONDS = 120.0
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 """Each thread of these libraries reserves memory before it does anything."""
 
-Reason = Literal["memory", "processor", "silence", "crash"]
+Reason = Literal["memory", "processor", "silence", "killed", "crash"]
+"""``memory`` and ``processor`` are limits of ours; who is killed, is so from outside."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,7 @@ def _sentence(reason: Reason, allowance: Allowance) -> str:
         "memory": f"needs more than {allowance.memory / 2**20:,.0f} MiB of memory",
         "processor": f"takes more than {allowance.processor:,.0f} seconds to work out",
         "silence": f"was at work for {allowance.silence:,.0f} seconds without a result",
+        "killed": "was not finished: its process was killed, most likely for want of memory",
         "crash": "made the process crash that read it",
     }[reason]
 
@@ -94,6 +96,7 @@ class Child:
 
         Raises:
             ReviewError: As the work raised it.
+            OverloadedError: No process could be started.
             ChildEnded: The work went beyond a limit, or crashed.
             RuntimeError: The work has a fault; the text is its traceback.
         """
@@ -133,12 +136,14 @@ class Child:
         if self._process is not None and not self._process.is_alive():
             self.close()
         if self._line is None:
-            context = multiprocessing.get_context("spawn")
-            self._line, far = context.Pipe()
-            self._process = context.Process(target=_serve, args=(far, self.allowance), daemon=True)
-            self._process.start()
-            far.close()
-            self._word(self._line, START_SECONDS, stop)
+            try:
+                self._process, self._line = _launch(self.allowance)
+                self._word(self._line, START_SECONDS, stop)
+            except (OSError, EOFError, ChildEnded) as error:
+                raise OverloadedError(
+                    "no process could be started for this",
+                    hint="The machine is busy or short of memory. Try again in a moment.",
+                ) from error
         return self._line
 
     def _word(
@@ -170,12 +175,26 @@ class Child:
             process.join(1.0)
             code = process.exitcode
         self.close()
-        # Without a word of ours, SIGKILL is the kernel's when it runs out of memory.
         causes: dict[int | None, Reason] = {
             -signal.SIGXCPU: "processor",
-            -signal.SIGKILL: "memory",
+            # Without a word of ours, this is the kernel's when the machine runs out of memory.
+            -signal.SIGKILL: "killed",
         }
         return causes.get(code, "crash")
+
+
+def _launch(allowance: Allowance) -> tuple[BaseProcess, Connection]:
+    """A process that has been started, and the line to it."""
+    context = multiprocessing.get_context("spawn")
+    line, far = context.Pipe()
+    with closing(far):
+        process = context.Process(target=_serve, args=(far, allowance), daemon=True)
+        try:
+            process.start()
+        except BaseException:
+            line.close()
+            raise
+    return process, line
 
 
 def end_with_parent() -> None:

@@ -121,8 +121,9 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None =
 def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
     """The first one added is the innermost."""
     doors = Doors()
-    app.add_middleware(Idempotency, actor=LOCAL_USER)
     app.add_middleware(Lanes, doors=doors)
+    # Outside of the lanes: a repetition that waits for the first answer takes nobody's place.
+    app.add_middleware(Idempotency, actor=LOCAL_USER)
     app.add_middleware(OneRange)
     app.add_middleware(HeadAsGet)
     app.add_middleware(

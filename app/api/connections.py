@@ -15,7 +15,9 @@ from http import HTTPStatus
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from app.api.errors import RETRY_SECONDS
 from app.api.problem import make_problem, problem_response
+from app.api.request_log import HEADER, new_request_id
 from app.api.security.headers import FIXED, content_security_policy
 
 HEAD_SECONDS = 15.0
@@ -158,8 +160,10 @@ class Connection(H11Protocol):
 
 def _answer(status: int, detail: str) -> bytes:
     """A whole answer that says what is wrong, for a connection that ends with it."""
-    problem = problem_response(make_problem(status, detail))
+    busy = {"Retry-After": RETRY_SECONDS} if status == 503 else {}
+    problem = problem_response(make_problem(status, detail), busy)
     headers = {
+        HEADER: new_request_id(),
         **FIXED,
         "Content-Security-Policy": content_security_policy(),
         "Connection": "close",

@@ -85,8 +85,9 @@ class Services:
     def close(self) -> None:
         """Let the running work end, and close processes and database."""
         self.events.close()
-        self.upkeep.close()
+        self.upkeep.stop()
         self.jobs.close()
+        self.upkeep.close()
         self.frames.close()
         self.store.close()
 

@@ -100,11 +100,9 @@ async def _review_error(request: Request, error: Exception) -> Response:
         station=error.station if isinstance(error, SharedStationError) else None,
         current=error.current if isinstance(error, StaleStateError) else None,
     )
-    headers = {"Retry-After": RETRY_SECONDS} if status in (429, 503) else {}
+    headers = {"Retry-After": RETRY_SECONDS} if status in (503, 507) else {}
     if isinstance(error, StaleStateError):
         headers["ETag"] = error.etag
-    if isinstance(error, StorageError):
-        headers["Retry-After"] = RETRY_SECONDS
     if isinstance(error, DamagedError):
         request.app.state.services.store.note_damage(error)
     if status >= 500:

@@ -12,6 +12,7 @@ import hashlib
 import re
 
 import structlog
+from anyio import CapacityLimiter
 from anyio.to_thread import run_sync
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -37,6 +38,8 @@ MAX_ANSWER_BYTES = 8 * 1024 * 1024
 """Larger answers are not kept; no route that changes something gives one."""
 PATIENCE = 60.0
 """Seconds that a repetition waits for the first one to be answered."""
+THREADS = 4
+"""So many answers are looked up at a time, and as many are kept."""
 
 
 class Idempotency:
@@ -50,6 +53,7 @@ class Idempotency:
     def __init__(self, app: ASGIApp, actor: str):
         self.app, self._actor = app, actor
         self._under_way: dict[str, asyncio.Event] = {}
+        self._finding, self._keeping = CapacityLimiter(THREADS), CapacityLimiter(THREADS)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One request."""
@@ -82,7 +86,9 @@ class Idempotency:
 
     async def _answer(self, key: str, request: _Request, send: Send) -> None:
         try:
-            known = await run_sync(find_first, request.store, key, self._actor)
+            known = await run_sync(
+                find_first, request.store, key, self._actor, limiter=self._finding
+            )
         except StorageError as error:
             await _refuse(error, request.scope, request.receive, send)
             return
@@ -104,7 +110,9 @@ class Idempotency:
         if recorded.is_kept and not (asked and asked.kept):
             try:
                 answer = recorded.answer(request.digest())
-                await run_sync(keep_first, request.store, key, self._actor, answer)
+                await run_sync(
+                    keep_first, request.store, key, self._actor, answer, limiter=self._keeping
+                )
             except StorageError as error:
                 # It is sent already; a repetition is answered with the state as it is then.
                 log.warning("an answer could not be kept", error=str(error))

@@ -23,7 +23,6 @@ TITLES: Mapping[int, tuple[str, str]] = {
     416: ("range", "That part of the file does not exist"),
     422: ("invalid", "The request is not valid"),
     428: ("precondition-required", "If-Match is required"),
-    429: ("busy", "The server is busy with another request of this kind"),
     500: ("internal", "The server made a mistake"),
     503: ("unavailable", "The service is not ready"),
     507: ("storage", "The server cannot store it"),

@@ -17,6 +17,11 @@ HEADER = "X-Request-ID"
 """Tells the caller under which id the log speaks of its request."""
 
 
+def new_request_id() -> str:
+    """An id that no other request has."""
+    return uuid.uuid4().hex[:16]
+
+
 class RequestLog:
     """Names each request; logs those that change something, and those that the server failed.
 
@@ -31,7 +36,7 @@ class RequestLog:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        name, start = uuid.uuid4().hex[:16], time.perf_counter()
+        name, start = new_request_id(), time.perf_counter()
         status, etag = 0, None
 
         async def watch(message: Message) -> None:

@@ -26,6 +26,8 @@ WAITING = 64
 """Pictures that may wait; one more is told to come back."""
 REMEMBERED = 256
 """Frames that went beyond the allowance and are not tried again."""
+LIMITS = frozenset({"memory", "processor"})
+"""How a frame goes beyond the allowance; whatever else ends a process may be the machine's doing."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ class Frames:
 
         Raises:
             NotFoundError: The file is not there.
-            TooLargeError, ImageError: It was tried before, and went beyond the allowance.
+            TooLargeError: It was tried before, and went beyond the allowance.
         """
         with self._lock:
             error = self._refused.get(frame_stamp(media))
@@ -91,14 +93,15 @@ class Frames:
         made: Picture = self._submit(media, width, flipped, bounded=False).future.result()
         return made
 
-    def neighbours(self, media: Media, group: str, static: bool) -> dict[int, Media]:
-        """``neighbours``, which opens videos and archives."""
-        task = self._pool.submit(neighbours, media, group, static)
-        try:
-            found: dict[int, Media] = task.future.result()
-        except ChildEnded:
-            return {}
-        return found
+    def ask_neighbours(self, media: Media, group: str, static: bool) -> PoolTask:
+        """Have ``neighbours`` called, which opens videos and archives.
+
+        Its future may have ``ChildEnded``.
+
+        Raises:
+            OverloadedError: Too many wait.
+        """
+        return self._pool.submit(neighbours, media, group, static)
 
     def close(self) -> None:
         """End the processes."""
@@ -108,7 +111,8 @@ class Frames:
         def explain(error: ChildEnded) -> ReviewError:
             kind = ImageError if error.reason == "crash" else TooLargeError
             refusal = kind(f"{frame_name(media)} {error}")
-            self._remember(media, refusal)
+            if error.reason in LIMITS:
+                self._remember(media, refusal)
             return refusal
 
         return self._pool.submit(

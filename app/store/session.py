@@ -6,9 +6,11 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
+from typing import Any
 
 import structlog
 from sqlalchemy import Engine, text
+from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session as Session
 
 from app.config import Settings
@@ -38,6 +40,9 @@ log = structlog.get_logger("touchline.store")
 TURN_SECONDS = 10.0
 """How long a thread waits for the writes of others in its process; SQLite waits for other
 processes (``busy_timeout``)."""
+
+STEPS = 10_000
+"""Of SQLite's machine between two looks whether to go on: some microseconds each."""
 
 
 class Turn:
@@ -150,9 +155,12 @@ class Store:
         if self._damage is not None:
             raise DamagedError(f"no change is taken: {self._damage}", hint=EXAMINE)
 
-    def require_whole(self) -> None:
-        """Let SQLite look at every page and index; raise DamagedError where it finds a fault."""
-        with self.read() as session:
+    def require_whole(self, wanted: Callable[[], bool] = lambda: True) -> None:
+        """Let SQLite look at every page and index; raise DamagedError where it finds a fault.
+
+        It ends early, without a word, once it is no longer ``wanted``.
+        """
+        with self.read() as session, _interrupted(session, lambda: not wanted()):
             fault = session.execute(text("PRAGMA quick_check(1)")).scalar_one()
             if fault != "ok":
                 file = self.settings.database_file
@@ -198,6 +206,20 @@ class Store:
             sync_anchor(self.settings.database_file)
         finally:
             self._lock.release()
+
+
+@contextmanager
+def _interrupted(session: Session, ends: Callable[[], bool]) -> Iterator[None]:
+    """End what SQLite is at, and what is done here, once a function says so."""
+    driver: Any = session.connection().connection.driver_connection
+    driver.set_progress_handler(ends, STEPS)
+    try:
+        yield
+    except OperationalError:
+        if not ends():
+            raise
+    finally:
+        driver.set_progress_handler(None, 0)
 
 
 def _open(settings: Settings, alone: bool) -> Engine:

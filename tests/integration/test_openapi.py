@@ -43,7 +43,7 @@ EVALUATION, DELETED_EVALUATION = "1", "2"
 """Ids of sets of predictions and of evaluations, both."""
 EXPORT, DELETED_EXPORT = "1", "2"
 """Exports are the first jobs of the home; what is deleted must not be asked for later."""
-REFUSALS = ["2xx", "400", "404", "409", "412", "422", "428", "429", "503"]
+REFUSALS = ["2xx", "400", "404", "409", "412", "422", "428", "503"]
 """What data that fits the schema may still meet: a state that is older, a query that is none."""
 
 

@@ -16,7 +16,13 @@ from pathlib import Path
 import pytest
 
 from app.child import Allowance, Child, ChildEnded
-from app.errors import DatasetFormatError, JobCancelled, StaleRevisionError, StorageError
+from app.errors import (
+    DatasetFormatError,
+    JobCancelled,
+    OverloadedError,
+    StaleRevisionError,
+    StorageError,
+)
 
 MEBI = 2**20
 ENDLESS = re.compile(r"(a+)+$"), "a" * 60 + "b"
@@ -37,6 +43,10 @@ def never_end(*_: object) -> None:
 
 def be_killed() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def be_killed_at_start(*_: object) -> None:
+    be_killed()
 
 
 def crash() -> None:
@@ -156,7 +166,7 @@ class TestRun:
         assert wait_for_end(pid)
 
     def test_a_crash_is_the_childs_alone(self, child: Child) -> None:
-        for work, reason in ((crash, "crash"), (be_killed, "memory")):
+        for work, reason in ((crash, "crash"), (be_killed, "killed")):
             with pytest.raises(ChildEnded) as caught:
                 child.run(work)
             assert caught.value.reason == reason
@@ -167,6 +177,30 @@ class TestRun:
         os.kill(pid, signal.SIGKILL)
         assert wait_for_end(pid)
         assert child.run(child_pid) != pid
+
+    def test_one_that_cannot_be_started_is_tried_again_later(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def refuse(_process: object) -> None:
+            raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+
+        child = Child(Allowance(300 * MEBI, 10.0, 60.0))
+        before = len(list(Path("/proc/self/fd").iterdir()))
+        with monkeypatch.context() as patch:
+            patch.setattr("multiprocessing.context.SpawnProcess.start", refuse)
+            with pytest.raises(OverloadedError, match="no process could be started"):
+                child.run(child_pid)
+        assert len(list(Path("/proc/self/fd").iterdir())) == before
+        child.kill()
+        assert child.run(child_pid) != os.getpid()
+        child.close()
+
+    def test_one_that_dies_before_it_is_ready_says_nothing_of_its_task(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.child._serve", be_killed_at_start)
+        with pytest.raises(OverloadedError, match="no process could be started"):
+            Child(Allowance(300 * MEBI, 10.0, 60.0)).run(child_pid)
 
     def test_what_is_not_wanted_any_more_is_killed(self, child: Child) -> None:
         pid = child.run(child_pid)

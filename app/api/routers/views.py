@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Any
 
 from anyio import to_thread
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -17,7 +17,6 @@ from app.api.deps import (
     AppStore,
     Id,
     IfMatch,
-    Services,
     etag_matches,
 )
 from app.api.problem import Responses, responses
@@ -26,6 +25,7 @@ from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_docume
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
+from app.child import ChildEnded
 from app.child_pool import PoolTask
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.editing.edit import Edit, IncludeView, SetBall, SetCalibrationSource, SetLines
@@ -162,7 +162,12 @@ async def get_image(
     ] = 0,
 ) -> Response:
     """The frame of a view, or one just before or after it, scaled down when a width is given."""
-    found = await to_thread.run_sync(_asked, services, view, offset)
+    found = await to_thread.run_sync(find_view, services.store, view)
+    if offset:
+        around = await _neighbours(request, services.frames, found)
+        if around is None:
+            return Response(status_code=CLIENT_GONE)
+        found = replace(found, media=_so_far_away(found, around, offset))
     picture = await _picture(request, services.frames, found, clamp_width(width))
     if picture is None:
         return Response(status_code=CLIENT_GONE)
@@ -173,33 +178,49 @@ async def get_image(
     return Response(picture.data, media_type=picture.kind, headers=headers)
 
 
-@router.get("/{view}/neighbours", operation_id="getFramesAround", responses=responses(404, 503))
-def get_neighbours(view: Id, services: AppServices) -> NeighbourList:
+@router.get(
+    "/{view}/neighbours",
+    operation_id="getFramesAround",
+    response_model=NeighbourList,
+    responses=responses(404, 503),
+)
+async def get_neighbours(
+    view: Id, services: AppServices, request: Request
+) -> NeighbourList | Response:
     """The frames of the same camera just before and after a view's, where they are on disk.
 
     Only videos and folders of frames that are numbered by time have them: the files of most
     datasets are numbered by action.
     """
-    found = _neighbours(services.frames, find_view(services.store, view))
-    return NeighbourList.of(view, sorted(found), NO_NEIGHBOURS)
+    found = await to_thread.run_sync(find_view, services.store, view)
+    around = await _neighbours(request, services.frames, found)
+    if around is None:
+        return Response(status_code=CLIENT_GONE)
+    return NeighbourList.of(view, sorted(around), NO_NEIGHBOURS)
 
 
-def _neighbours(frames: Frames, view: FoundView) -> dict[int, Media]:
-    """Where the frames before and after a view's lie, by how many frames later."""
-    return {} if view.media is None else frames.neighbours(view.media, view.group_key, view.static)
+async def _neighbours(request: Request, frames: Frames, view: FoundView) -> dict[int, Media] | None:
+    """Where the frames before and after a view's lie, by how many frames later.
+
+    None where nobody waits for it any more.
+    """
+    if view.media is None:
+        return {}
+    task = frames.ask_neighbours(view.media, view.group_key, view.static)
+    try:
+        found: dict[int, Media] | None = await while_wanted(request, task)
+    except ChildEnded:
+        return {}
+    return found
 
 
-def _asked(services: Services, view: int, offset: int) -> FoundView:
-    """The view, its frame so many frames later."""
-    found = find_view(services.store, view)
-    if offset == 0:
-        return found
-    around = _neighbours(services.frames, found)
+def _so_far_away(view: FoundView, around: dict[int, Media], offset: int) -> Media:
+    """The frame so many frames later."""
     if not around:
-        raise NotFoundError(f"view {found.key}: {NO_NEIGHBOURS}")
+        raise NotFoundError(f"view {view.key}: {NO_NEIGHBOURS}")
     if offset not in around:
-        raise NotFoundError(f"view {found.key}: there is no frame {frames_away(offset)}")
-    return replace(found, media=around[offset])
+        raise NotFoundError(f"view {view.key}: there is no frame {frames_away(offset)}")
+    return around[offset]
 
 
 async def _picture(
@@ -215,16 +236,19 @@ async def _picture(
         found = await to_thread.run_sync(frames.cached, view.media, width, view.flipped)
         if found is not None:
             return found
-        return await while_wanted(request, frames.ask(view.media, width, view.flipped))
+        made: Picture | None = await while_wanted(
+            request, frames.ask(view.media, width, view.flipped)
+        )
+        return made
     except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
         # The cause decides between a full disk and one that fails.
         cause = error.__cause__ or error
         raise type(error)(f"view {view.key}: {error.message}", hint=error.hint) from cause
 
 
-async def while_wanted(request: Request, task: PoolTask) -> Picture | None:
-    """The result of a task, which is given up when the client has left."""
-    result: asyncio.Future[Picture] = asyncio.wrap_future(task.future)
+async def while_wanted(request: Request, task: PoolTask) -> Any:
+    """The result of a task; None where it is given up because the client has left."""
+    result: asyncio.Future[Any] = asyncio.wrap_future(task.future)
     try:
         while not result.done():
             await asyncio.wait({result}, timeout=LOOK_SECONDS)

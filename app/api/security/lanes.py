@@ -42,13 +42,16 @@ PREVIEWS = Lane("previews", 4, 100)
 """Questions that are answered by solving and change nothing."""
 IMAGES = Lane("images", 6, 200)
 UPLOADS = Lane("uploads", 8, 8)
-LANES = (READS, CHANGES, PREVIEWS, IMAGES, UPLOADS)
+ZIPS = Lane("zips", 16, 100)
+"""Those of exports, which a request may find still being written."""
+LANES = (READS, CHANGES, PREVIEWS, IMAGES, UPLOADS, ZIPS)
 THREADS = sum(lane.width for lane in LANES) + 6
 """A thread for each request at work, and some for files of the browser application."""
 
 _API = re.compile(r"/api/v\d+/")
 _STREAM = re.compile(r"/events$")
-_IMAGE = re.compile(r"/(?:image|figures/[^/]+)$")
+_IMAGE = re.compile(r"/(?:image|figures/[^/]+|views/[^/]+/neighbours)$")
+_ZIP = re.compile(r"/exports/[^/]+/content$")
 _SOLVING = re.compile(r"/(?:preview|influence|remedies|yield)$")
 _UPLOAD = re.compile(r"/uploads$")
 
@@ -60,6 +63,8 @@ def lane_of(method: str, path: str) -> Lane | None:
     if _SOLVING.search(path):
         return PREVIEWS
     if method in SAFE_METHODS:
+        if _ZIP.search(path):
+            return ZIPS
         return IMAGES if _IMAGE.search(path) else READS
     return UPLOADS if method == "POST" and _UPLOAD.search(path) else CHANGES
 

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from app.child import Allowance, Child, ChildEnded
 from app.config import Settings
-from app.errors import TooLargeError
+from app.errors import DamagedError, TooLargeError
 from app.progress import Progress
 from app.review.importing.sources import Source, import_source
 from app.store.session import Store
@@ -68,6 +68,7 @@ def import_apart(
         stop: Called every now and then; what it raises ends the import.
 
     Raises:
+        DamagedError: The child met damage; no change is taken from then on, here either.
         TooLargeError: It went beyond the limits of the settings, or made the process crash.
     """
     settings = store.settings
@@ -86,6 +87,9 @@ def import_apart(
             outcome: Outcome = child.run(
                 import_here, settings, dataset, source, actor, dry_run, heard=hear, stop=stop
             )
+        except DamagedError as error:
+            store.note_damage(error)
+            raise
         except ChildEnded as error:
             raise TooLargeError(f"{source.label} {error}", hint=LIMITS_HINT) from error
     return outcome

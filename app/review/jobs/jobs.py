@@ -8,10 +8,10 @@ knows how (``Jobs.resumes``) and marks the others failed.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, suppress
-from dataclasses import dataclass, field
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import structlog
@@ -130,6 +130,29 @@ class _Run:
     work: Work
     progress: JobProgress
     over: threading.Event = field(default_factory=threading.Event)
+    counted: bool = False
+    """Whether its record says that it was begun here."""
+
+
+@dataclass(frozen=True)
+class _Queue:
+    """Which jobs of this process wait, and which one runs."""
+
+    waiting: tuple[_Run, ...] = ()
+    running: _Run | None = None
+
+    @property
+    def runs(self) -> tuple[_Run, ...]:
+        """Those that wait and the one that runs."""
+        return self.waiting if self.running is None else (*self.waiting, self.running)
+
+    def joined_by(self, *runs: _Run) -> _Queue:
+        """With more that wait."""
+        return replace(self, waiting=(*self.waiting, *runs))
+
+    def left_by(self, run: _Run) -> _Queue:
+        """Without one that waits."""
+        return replace(self, waiting=tuple(item for item in self.waiting if item is not run))
 
 
 class Jobs:
@@ -140,8 +163,10 @@ class Jobs:
 
     def __init__(self, store: Store, *, capacity: int = CAPACITY, pool: Pool | None = None):
         self._store, self._capacity, self.pool = store, capacity, pool
-        self._waiting: list[_Run] = []
-        self._running: _Run | None = None
+        # Replaced as a whole and only under ``_changed``, so that it is read without.
+        self._queue = _Queue()
+        self._entering = 0
+        # Never held while the database is asked: requests and the event loop wait for it.
         self._changed = threading.Condition()
         self._closing = threading.Event()
         self._worker: threading.Thread | None = None
@@ -170,7 +195,8 @@ class Jobs:
             for job in left:
                 update_job(session, job.id, **self._settled(job))
         with self._changed:
-            self._waiting += [self._run(job) for job in left if self._is_resumed(job)]
+            resumed = [self._run(job) for job in left if self._is_resumed(job)]
+            self._queue = self._queue.joined_by(*resumed)
             self._wake()
 
     def submit(
@@ -200,21 +226,20 @@ class Jobs:
         Raises:
             OverloadedError: Too many jobs wait.
         """
-        with self._changed:
+        new = NewJob(kind, title, actor, dataset_id, request)
+        with ExitStack() as entry, self._store.write() as session:
+            # Others that enter wait for the write lock, so that none of them is counted twice.
+            enter = entry.enter_context(self._entry())
             known = self._waiting_for(kind, dataset_id) if once else None
-            if not once and len(self._waiting) >= self._capacity:
-                raise OverloadedError(
-                    f"{len(self._waiting)} jobs wait already", hint="Send it again in a while."
-                )
-            new = NewJob(kind, title, actor, dataset_id, request)
-            with self._store.write() as session:
-                job = _need(session, insert_job(session, new) if known is None else known.id)
-                keep(job)(session)
-            if known is not None:
-                return job
-            run = _Run(job.id, kind, dataset_id, work, JobProgress(job.id, self._closing))
-            self._waiting.append(run)
-            self._wake()
+            if not once:
+                self._require_room()
+            job = _need(session, insert_job(session, new) if known is None else known.id)
+            keep(job)(session)
+            if known is None:
+                progress = JobProgress(job.id, self._closing)
+                enter(_Run(job.id, kind, dataset_id, work, progress))
+        if known is not None:
+            return job
         self._announce(job)
         return job
 
@@ -258,11 +283,12 @@ class Jobs:
         if job.state in (DONE, FAILED):
             raise ConflictError(f"job {job_id} is over already")
         with self._changed:
-            run = next((item for item in self._waiting if item.id == job_id), None)
+            run = next((item for item in self._queue.waiting if item.id == job_id), None)
+            running = self._queue.running
             if run is not None:
-                self._waiting.remove(run)
-            elif self._running is not None and self._running.id == job_id:
-                self._running.progress.cancelled.set()
+                self._queue = self._queue.left_by(run)
+            elif running is not None and running.id == job_id:
+                running.progress.cancelled.set()
         if run is not None:
             self._finish(run, state=CANCELLED, sentence="Cancelled before it began.")
         return self.get(job_id)
@@ -276,7 +302,7 @@ class Jobs:
         for job in self.find(dataset_id=dataset_id, states=OPEN, limit=1000):
             with suppress(ConflictError):
                 self.cancel(job.id)
-        running = self._running
+        running = self._queue.running
         if running is None or running.dataset_id != dataset_id:
             return
         if not running.over.wait(seconds):
@@ -284,38 +310,71 @@ class Jobs:
 
     def wait(self, job_id: int, seconds: float) -> Job:
         """A job once it is over, or as it stands after some seconds."""
-        with self._changed:
-            runs = [*self._waiting, *([self._running] if self._running else [])]
-        run = next((item for item in runs if item.id == job_id), None)
+        run = next((item for item in self._queue.runs if item.id == job_id), None)
         if run is not None:
             run.over.wait(seconds)
         return self.get(job_id)
 
     def is_open(self, job_id: int, kind: str) -> bool:
-        """Whether a job of a kind waits or runs here; asks no database."""
-        with self._changed:
-            runs = [*self._waiting, *([self._running] if self._running else [])]
-        return any((run.id, run.kind) == (job_id, kind) for run in runs)
+        """Whether a job of a kind waits or runs here; waits for nothing."""
+        return any((run.id, run.kind) == (job_id, kind) for run in self._queue.runs)
 
     def are_idle(self) -> bool:
         """Whether none waits or runs."""
-        with self._changed:
-            return not self._waiting and self._running is None
+        return not self._queue.runs
 
     def close(self) -> None:
-        """Stop after the running job's next step; its record says where it was."""
+        """Stop after the running job's next step; its record says where it was.
+
+        A job that takes no step for long is left to itself.
+        """
         with self._changed:
             self._closing.set()
             self._changed.notify_all()
         if self._worker is not None:
             self._worker.join(CLOSE_SECONDS)
-            if self._worker.is_alive():
-                log.warning("a job did not end in time", job=self._running and self._running.id)
+            running = self._queue.running
+            if self._worker.is_alive() and running is not None:
+                log.warning("a job did not end in time", job=running.id)
+                self._take_back(running)
 
     def _waiting_for(self, kind: str, dataset_id: int | None) -> _Run | None:
         """The waiting job of a kind and dataset."""
         place = (kind, dataset_id)
-        return next((run for run in self._waiting if (run.kind, run.dataset_id) == place), None)
+        runs = self._queue.waiting
+        return next((run for run in runs if (run.kind, run.dataset_id) == place), None)
+
+    def _require_room(self) -> None:
+        waiting = len(self._queue.waiting)
+        if waiting >= self._capacity:
+            raise OverloadedError(f"{waiting} jobs wait already", hint="Send it again in a while.")
+
+    @contextmanager
+    def _entry(self) -> Iterator[Callable[[_Run], None]]:
+        """Lets a job in while its record is written; none begins before that is kept.
+
+        What is let in is out again where the record could not be written.
+        """
+        entered: list[_Run] = []
+
+        def enter(run: _Run) -> None:
+            with self._changed:
+                entered.append(run)
+                self._queue = self._queue.joined_by(run)
+
+        with self._changed:
+            self._entering += 1
+        try:
+            yield enter
+        except BaseException:
+            with self._changed:
+                for run in entered:
+                    self._queue = self._queue.left_by(run)
+            raise
+        finally:
+            with self._changed:
+                self._entering -= 1
+                self._wake()
 
     def _settled(self, job: Job) -> dict[str, Any]:
         """What an earlier server's job becomes."""
@@ -335,7 +394,7 @@ class Jobs:
         return _Run(job.id, job.kind, job.dataset_id, work, JobProgress(job.id, self._closing))
 
     def _wake(self) -> None:
-        if self._worker is None and self._waiting:
+        if self._worker is None and self._queue.waiting:
             # A daemon: a job that does not come to its next step must not hold the process.
             self._worker = threading.Thread(target=self._work, name="jobs", daemon=True)
             self._worker.start()
@@ -349,22 +408,25 @@ class Jobs:
                 log.exception("the record of a job could not be written", job=run.id)
             finally:
                 with self._changed:
-                    self._running = None
+                    self._queue = replace(self._queue, running=None)
                 run.over.set()
 
     def _next(self) -> _Run | None:
         """The next job to run; None when the server stops."""
         with self._changed:
-            self._changed.wait_for(lambda: self._waiting or self._closing.is_set())
+            self._changed.wait_for(self._is_somebodys_turn)
             if self._closing.is_set():
                 return None
-            run = min(self._waiting, key=lambda item: (item.kind not in PROMPT, item.id))
-            self._waiting.remove(run)
-            self._running = run
+            run = min(self._queue.waiting, key=lambda item: (item.kind not in PROMPT, item.id))
+            self._queue = replace(self._queue.left_by(run), running=run)
             return run
+
+    def _is_somebodys_turn(self) -> bool:
+        return self._closing.is_set() or bool(self._queue.waiting and not self._entering)
 
     def _carry_out(self, run: _Run) -> None:
         self._save(run.id, state=RUNNING, started=now(), begun=1)
+        run.counted = True
         ended = threading.Event()
         ticker = threading.Thread(target=self._tick, args=(run, ended), daemon=True)
         ticker.start()
@@ -375,10 +437,16 @@ class Jobs:
             ticker.join()
         if values is not None:
             self._finish(run, **values)
-            return
-        with suppress(StorageError):
-            # The server stops in good order; that is none of this job's doing.
-            self._save(run.id, begun=-1)
+        else:
+            self._take_back(run)
+
+    def _take_back(self, run: _Run) -> None:
+        """Let a server that stops in good order count for no death: it is none of this job's doing."""
+        with self._changed:
+            counted, run.counted = run.counted, False
+        if counted:
+            with suppress(StorageError):
+                self._save(run.id, begun=-1)
 
     def _outcome(self, run: _Run) -> dict[str, Any] | None:
         """How a job ended, as columns; None where the server stops and the next one decides."""

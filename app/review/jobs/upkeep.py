@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import structlog
 
@@ -22,6 +24,8 @@ from app.store.session import Store
 from app.store.uploads import expire_uploads
 
 log = structlog.get_logger("touchline.upkeep")
+
+T = TypeVar("T")
 
 FIRST_SECONDS, BETWEEN_SECONDS, BUSY_SECONDS = 60.0, 3600.0, 60.0
 """After the start, between two rounds, and until the next look while jobs are under way."""
@@ -43,38 +47,62 @@ class Tidied:
     calibrations: int = 0
 
 
-def tidy(store: Store) -> Tidied:
+def tidy(store: Store, wanted: Callable[[], bool] = lambda: True) -> Tidied:
     """Take away what is older or larger than the settings allow, and what nothing uses.
 
-    Every step is a short transaction of its own, safe to be killed in.
+    Every step is a short transaction of its own, safe to be killed in. One that fails is logged,
+    and the others are done all the same.
+
+    Args:
+        store: Of the home.
+        wanted: Asked before each step; where it says no, the rest is left.
     """
     settings = store.settings
-    with store.write() as session:
-        answers = forget_answers(session) + shorten_answers(session, settings.answer_bytes)
-    with store.write() as session:
-        jobs = forget_jobs(session, settings.job_days)
-    tidied = Tidied(
-        answers=answers,
-        jobs=jobs,
-        uploads=expire_uploads(settings),
-        cached=expire_cache(settings),
-        leftovers=delete_leftovers(settings),
-        calibrations=_delete_spare_calibrations(store),
-    )
-    sync_anchor(settings.database_file)
-    return tidied
+    steps: dict[str, Callable[[], int]] = {
+        "answers": lambda: _shorten_answers(store),
+        "jobs": lambda: _forget_jobs(store),
+        "uploads": lambda: expire_uploads(settings),
+        "cached": lambda: expire_cache(settings),
+        "leftovers": lambda: delete_leftovers(settings),
+        "calibrations": lambda: _delete_spare_calibrations(store, wanted),
+    }
+    gone = {name: _attempt(name, step) or 0 for name, step in steps.items() if wanted()}
+    _attempt("anchor", lambda: sync_anchor(settings.database_file))
+    return Tidied(**gone)
 
 
-def _delete_spare_calibrations(store: Store) -> int:
+def _attempt(name: str, step: Callable[[], T]) -> T | None:
+    """What a step returns; None where it fails, which the log tells."""
+    try:
+        return step()
+    except (ReviewError, OSError) as error:
+        log.error("upkeep failed", step=name, error=str(error))
+    except Exception:
+        log.exception("upkeep failed", step=name)
+    return None
+
+
+def _shorten_answers(store: Store) -> int:
+    with store.write() as session:
+        return forget_answers(session) + shorten_answers(session, store.settings.answer_bytes)
+
+
+def _forget_jobs(store: Store) -> int:
+    with store.write() as session:
+        return forget_jobs(session, store.settings.job_days)
+
+
+def _delete_spare_calibrations(store: Store, wanted: Callable[[], bool]) -> int:
     gone = 0
-    while True:
+    while wanted():
         with store.read() as session:
             if not spare_calibrations(session, 1):
-                return gone
+                break
         with store.write() as session:
             keys = spare_calibrations(session, CALIBRATIONS)
             delete_calibrations(session, keys)
         gone += len(keys)
+    return gone
 
 
 class Upkeep:
@@ -91,9 +119,13 @@ class Upkeep:
         self._thread = threading.Thread(target=self._work, name="upkeep", daemon=True)
         self._thread.start()
 
-    def close(self) -> None:
-        """End after the step that is under way."""
+    def stop(self) -> None:
+        """Tell it to end after the step that is under way; a look at the whole database ends there."""
         self._closing.set()
+
+    def close(self) -> None:
+        """Stop, and wait for the end of the step that is under way."""
+        self.stop()
         if self._thread is not None:
             self._thread.join(BUSY_SECONDS)
 
@@ -108,11 +140,11 @@ class Upkeep:
     def round(self) -> None:
         """Tidy once, and look at the whole database once in a while."""
         self._rounds += 1
-        try:
-            tidied = tidy(self._store)
-            if tidied != Tidied():
-                log.info("tidied", **vars(tidied))
-            if self._rounds % ROUNDS_BETWEEN_CHECKS == 1:
-                self._store.require_whole()
-        except (ReviewError, OSError) as error:
-            log.error("upkeep failed", error=str(error))
+        tidied = tidy(self._store, self._is_wanted)
+        if tidied != Tidied():
+            log.info("tidied", **vars(tidied))
+        if self._rounds % ROUNDS_BETWEEN_CHECKS == 1:
+            _attempt("check", lambda: self._store.require_whole(self._is_wanted))
+
+    def _is_wanted(self) -> bool:
+        return not self._closing.is_set()

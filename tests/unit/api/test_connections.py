@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import socket
 import threading
 import time
@@ -107,6 +108,8 @@ def assert_problem(answer: bytes, status: int) -> None:
     assert "x-content-type-options: nosniff" in lines
     assert "connection: close" in lines
     assert any(line.startswith("content-security-policy: default-src 'self'") for line in lines)
+    assert any(re.fullmatch("x-request-id: [0-9a-f]{16}", line) for line in lines)
+    assert ("retry-after: 5" in lines) == (status == 503)
     assert json.loads(body)["status"] == status
 
 

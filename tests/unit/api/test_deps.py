@@ -2,11 +2,36 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from threading import Event
+
 import pytest
 
-from app.api.deps import require_if_match
+from app.api.deps import Services, require_if_match
 from app.api.errors import PreconditionRequiredError
+from app.config import Settings
 from app.errors import InputError
+from app.review.jobs import upkeep
+
+
+class TestServices:
+    def test_when_they_close_the_jobs_are_told_before_upkeep_is_waited_for(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        tidying, told = Event(), []
+
+        def tidy(*_: object) -> upkeep.Tidied:
+            tidying.set()
+            told.append(services.jobs._closing.wait(20))
+            return upkeep.Tidied()
+
+        monkeypatch.setattr(upkeep, "FIRST_SECONDS", 0.0)
+        monkeypatch.setattr(upkeep, "tidy", tidy)
+        services = Services.open(Settings(home=tmp_path / "home"))
+        services.upkeep.start()
+        assert tidying.wait(20)
+        services.close()
+        assert told == [True]
 
 
 class TestRequireIfMatch:

@@ -15,9 +15,12 @@ from sqlalchemy import update
 from structlog.testing import capture_logs
 
 from app.api.idempotency import Idempotency
+from app.api.routers import groups
+from app.api.security.lanes import CHANGES
 from app.api.server import Server, listen
 from app.errors import StorageError
 from app.review.answers import answers
+from app.review.verdicts.verdict import set_verdict
 from app.store.answers import shorten_answers
 from app.store.job_models import AnswerModel
 
@@ -207,6 +210,38 @@ class TestTwins:
         assert len({answer.content for answer in answers}) == 1
         assert sum("idempotency-replayed" in answer.headers for answer in answers) == 5
         assert len(api.get(f"{API}/groups/1/history").json()["items"]) == 2
+
+
+class TestRepetitionsThatWait:
+    def test_leave_room_for_other_changes(self, app, api, monkeypatch: pytest.MonkeyPatch) -> None:
+        etag = api.get(f"{API}/groups/1").headers["etag"]
+        other = api.get(f"{API}/groups/2").headers["etag"]
+        finish = threading.Event()
+
+        def slow(store: Any, group: int, *said: Any, **options: Any) -> Any:
+            assert group != 1 or finish.wait(20)
+            return set_verdict(store, group, *said, **options)
+
+        monkeypatch.setattr(groups, "set_verdict", slow)
+
+        async def ask() -> tuple[int, list[int]]:
+            transport = httpx.ASGITransport(app)
+            async with httpx.AsyncClient(transport=transport, base_url=str(api.base_url)) as client:
+
+                def put(group: int, headers: dict[str, str]) -> asyncio.Task[httpx.Response]:
+                    path, body = f"{API}/groups/{group}/verdict", {"state": "deferred"}
+                    return asyncio.create_task(client.put(path, json=body, headers=headers))
+
+                same = [put(1, {"If-Match": etag, **KEY}) for _ in range(CHANGES.width + 1)]
+                await asyncio.sleep(0.1)
+                try:
+                    change = await put(2, {"If-Match": other})
+                    assert not any(task.done() for task in same)
+                finally:
+                    finish.set()
+                return change.status_code, [(await task).status_code for task in same]
+
+        assert asyncio.run(ask()) == (200, [200] * (CHANGES.width + 1))
 
 
 class TestStreamed:

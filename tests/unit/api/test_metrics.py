@@ -43,7 +43,7 @@ def test_says_how_long_the_log_and_the_files_are(read) -> None:
     assert read("touchline_disk_free_bytes") > 0
 
 
-@pytest.mark.parametrize("lane", ["reads", "changes", "previews", "images", "uploads"])
+@pytest.mark.parametrize("lane", ["reads", "changes", "previews", "images", "uploads", "zips"])
 def test_says_who_is_at_work_and_who_waits(read, lane: str) -> None:
     for name in ("lane_busy", "lane_waiting", "lane_refused_total"):
         assert read(f"touchline_{name}", lane=lane) == 0

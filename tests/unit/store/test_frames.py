@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import struct
 import zlib
 from collections.abc import Iterator
@@ -91,15 +92,34 @@ class TestFrames:
         finally:
             frames.close()
 
-    def test_what_ended_its_process_is_not_tried_again(
-        self, tmp_path: Path, frames: Frames, media: Media, monkeypatch: pytest.MonkeyPatch
+    @pytest.mark.parametrize(
+        ("end", "error", "reason"),
+        [("crash", ImageError, "made the process crash"), ("be_killed", TooLargeError, "killed")],
+    )
+    def test_what_may_be_the_machines_doing_is_tried_again(
+        self,
+        frames: Frames,
+        media: Media,
+        monkeypatch: pytest.MonkeyPatch,
+        end: str,
+        error: type[Exception],
+        reason: str,
     ) -> None:
-        monkeypatch.setattr(module, "make_picture", crash)
-        with pytest.raises(ImageError, match=r"frame 7\.png made the process crash"):
-            frames.read(media, None, False)
-        monkeypatch.undo()
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "make_picture", globals()[end])
+            with pytest.raises(error, match=rf"frame 7\.png .*{reason}"):
+                frames.read(media, None, False)
+        assert frames.read(media, None, False).kind == "image/png"
+
+    def test_what_takes_too_long_is_not_tried_again_before_it_changes(
+        self, frames: Frames, media: Media, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "make_picture", run_out_of_time)
+            with pytest.raises(TooLargeError, match=r"frame 7\.png takes more than 10 seconds"):
+                frames.read(media, None, False)
         for width in (None, 40):
-            with pytest.raises(ImageError, match="crash"):
+            with pytest.raises(TooLargeError, match="takes more than"):
                 frames.read(media, width, False)
         Path(media.path).write_bytes(PNG + b"\0")
         assert frames.read(media, None, False).kind == "image/png"
@@ -117,9 +137,17 @@ class TestFrames:
         folder.mkdir()
         for number in (1, 2, 3):
             (folder / f"00000{number}.png").write_bytes(PNG)
-        found = frames.neighbours(Media(str(folder / "000002.png")), "2", False)
-        assert sorted(found) == [-1, 1]
+        task = frames.ask_neighbours(Media(str(folder / "000002.png")), "2", False)
+        assert sorted(task.future.result()) == [-1, 1]
 
 
 def crash(*_: object) -> None:
     os.abort()
+
+
+def be_killed(*_: object) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def run_out_of_time(*_: object) -> None:
+    os.kill(os.getpid(), signal.SIGXCPU)

@@ -13,7 +13,14 @@ import cv2
 import numpy as np
 import pytest
 
-from app.api.routers.views import MAX_WIDTH, MIN_WIDTH, clamp_width, while_wanted
+from app.api.routers.views import (
+    CLIENT_GONE,
+    MAX_WIDTH,
+    MIN_WIDTH,
+    clamp_width,
+    get_neighbours,
+    while_wanted,
+)
 from app.child_pool import PoolTask
 from app.errors import OverloadedError
 from app.review.importing.ingest import ingest
@@ -255,6 +262,25 @@ class TestImage:
 
         task = PoolTask(lambda error: error)
         assert asyncio.run(while_wanted(Gone(), task)) is None
+        assert task.future.cancelled()
+
+    def test_frames_around_that_nobody_waits_for_are_given_up(
+        self, app, api, frames, monkeypatch
+    ) -> None:
+        task = PoolTask(lambda error: error)
+        monkeypatch.setattr(app.state.services.frames, "ask_neighbours", lambda *_: task)
+        row = api.get(f"{API}/groups", params={"dataset": "framed"}).json()["items"][0]
+        view = api.get(f"{API}/groups/{row['id']}").json()["views"][0]["id"]
+
+        class Gone:
+            async def is_disconnected(self) -> bool:
+                return True
+
+        async def ask() -> int:
+            answer = await get_neighbours(view, app.state.services, Gone())
+            return answer.status_code
+
+        assert asyncio.run(asyncio.wait_for(ask(), 20)) == CLIENT_GONE
         assert task.future.cancelled()
 
 

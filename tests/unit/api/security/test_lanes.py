@@ -12,7 +12,18 @@ from starlette.types import Receive, Scope, Send
 
 from app.api.application import PREFIX
 from app.api.security import lanes
-from app.api.security.lanes import CHANGES, IMAGES, PREVIEWS, READS, UPLOADS, Doors, Lanes, lane_of
+from app.api.security.lanes import (
+    CHANGES,
+    IMAGES,
+    LANES,
+    PREVIEWS,
+    READS,
+    UPLOADS,
+    ZIPS,
+    Doors,
+    Lanes,
+    lane_of,
+)
 
 
 class TestLaneOf:
@@ -29,6 +40,9 @@ class TestLaneOf:
             ("POST", "/datasets/a/yield", PREVIEWS),
             ("GET", "/views/1/image", IMAGES),
             ("GET", "/evaluations/1/figures/precision.svg", IMAGES),
+            ("GET", "/views/1/neighbours", IMAGES),
+            ("GET", "/groups/1/neighbours", READS),
+            ("GET", "/exports/1/content", ZIPS),
             ("POST", "/uploads", UPLOADS),
             ("GET", "/uploads", READS),
             ("GET", "/events", None),
@@ -125,6 +139,17 @@ class TestLanes:
 
         run(test)
 
+    def test_zips_that_are_not_written_yet_leave_reads_alone(self) -> None:
+        async def test(service: Service) -> None:
+            for _ in range(READS.width + ZIPS.width):
+                service.ask("GET", "/exports/1/content")
+            service.ask("GET", "/groups/1")
+            await service.settle()
+            assert service.work.begun[-1].endswith("/groups/1")
+            await service.end()
+
+        run(test)
+
     def test_one_more_than_may_wait_is_told_to_come_back(self) -> None:
         async def test(service: Service) -> None:
             for _ in range(UPLOADS.width + UPLOADS.queue + 1):
@@ -171,6 +196,6 @@ class TestLanes:
             service.ask("GET", "/groups/1")
             with pytest.raises(KeyError):
                 await service.end()
-            assert [door.busy for door in service.doors.all] == [0] * 5
+            assert [door.busy for door in service.doors.all] == [0] * len(LANES)
 
         run(test)

@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
-from app.errors import JobCancelled, TooLargeError
+from app.errors import DamagedError, JobCancelled, TooLargeError
 from app.progress import Progress
 from app.review.datasets.dataset import list_datasets
+from app.review.importing import import_child
 from app.review.importing.import_child import Outcome, import_apart
 from app.review.importing.sources import Source, import_source
 from app.soccer.group import Group
@@ -46,6 +47,10 @@ def tree(tmp_path: Path, make_group: Callable[..., Group]) -> Path:
     root.mkdir()
     write_soccernet_v3(root, [make_group()])
     return root
+
+
+def meet_damage(*_: object) -> None:
+    raise DamagedError("touchline.db is damaged", hint="Restore it.")
 
 
 def heavy(root: Path, objects: int) -> Path:
@@ -140,6 +145,15 @@ class TestImportApart:
         with pytest.raises(JobCancelled):
             apart(store, tree, stop=stop)
         with store.write():
+            pass
+
+    def test_damage_that_the_child_meets_ends_changes_here(
+        self, there: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(import_child, "import_here", meet_damage)
+        with pytest.raises(DamagedError, match=r"^touchline\.db is damaged$"):
+            apart(there, tree)
+        with pytest.raises(DamagedError, match="no change is taken"), there.write():
             pass
 
     def test_what_needs_too_much_memory_is_a_sentence(

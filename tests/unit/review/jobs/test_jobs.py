@@ -5,18 +5,26 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 from structlog.testing import capture_logs
 
-from app.errors import ConflictError, InputError, JobCancelled, NotFoundError, OverloadedError
+from app.errors import (
+    ConflictError,
+    InputError,
+    JobCancelled,
+    NotFoundError,
+    OverloadedError,
+    StorageError,
+)
 from app.review.importing.ingest import ensure_dataset
 from app.review.jobs import jobs as module
 from app.review.jobs.jobs import JobProgress, Jobs
 from app.store.codecs import Json
 from app.store.jobs import Job, NewJob, insert_job
-from app.store.session import Store
+from app.store.session import Session, Store
 
 SECONDS = 20
 
@@ -118,6 +126,76 @@ class TestSubmit:
         assert second.id == third.id
         assert len({running.id, second.id, fourth.id}) == 3
         first.finish.set()
+
+
+class Slow:
+    """What belongs to a job and is written slowly."""
+
+    def __init__(self) -> None:
+        self.started, self.finish = threading.Event(), threading.Event()
+
+    def __call__(self, job: Job) -> Callable[[Session], None]:
+        def keep(_session: Session) -> None:
+            self.started.set()
+            assert self.finish.wait(SECONDS)
+
+        return keep
+
+
+class TestSubmitting:
+    """A request whose record is being written."""
+
+    def test_keeps_nobody_waiting_who_only_looks(self, jobs: Jobs) -> None:
+        gate, slow = Gate(), Slow()
+        running = submit(jobs, gate, kind="export")
+        assert gate.started.wait(SECONDS)
+        with ThreadPoolExecutor(2) as threads:
+            writes = threads.submit(submit, jobs, lambda _: 7, keep=slow)
+            assert slow.started.wait(SECONDS)
+            looks = threads.submit(
+                lambda: (
+                    jobs.is_open(running.id, "export"),
+                    jobs.are_idle(),
+                    jobs.cancel(running.id).id,
+                )
+            )
+            try:
+                assert looks.result(SECONDS) == (True, False, running.id)
+                assert not writes.done()
+            finally:
+                slow.finish.set()
+            assert jobs.wait(writes.result(SECONDS).id, SECONDS).result == 7
+
+    def test_of_two_that_are_wanted_once_one_is_queued(self, jobs: Jobs, store: Store) -> None:
+        dataset, gate = ensure_dataset(store, "one", "ann"), Gate()
+        submit(jobs, gate)
+        assert gate.started.wait(SECONDS)
+        with ThreadPoolExecutor(4) as threads:
+            both = threads.map(
+                lambda n: submit(jobs, lambda _: n, kind="solve", dataset_id=dataset, once=True),
+                range(4),
+            )
+            assert len({job.id for job in both}) == 1
+        assert len(jobs.find(kinds=["solve"])) == 1
+        gate.finish.set()
+
+    def test_a_job_whose_record_cannot_be_kept_is_not_begun(self, jobs: Jobs) -> None:
+        def full() -> None:
+            # Another one that entered wakes the worker, which would begin it by now.
+            with jobs._changed:
+                jobs._changed.notify_all()
+            time.sleep(0.1)
+            raise StorageError("the disk is full")
+
+        def keep(_job: Job) -> Callable[[Session], None]:
+            return lambda session: setattr(session, "commit", full)
+
+        began: list[int] = []
+        jobs.wait(submit(jobs, lambda _: None).id, SECONDS)
+        with pytest.raises(StorageError):
+            submit(jobs, lambda _: began.append(1), keep=keep)
+        assert jobs.wait(submit(jobs, lambda _: 7).id, SECONDS).result == 7
+        assert (began, len(jobs.find())) == ([], 2)
 
 
 class TestProgress:
@@ -297,6 +375,29 @@ class TestRestart:
         gate.finish.set()
         assert first.wait(job.id, SECONDS).result == 9
         first.close()
+
+    def test_a_stop_in_good_order_does_not_count_where_the_job_takes_no_step(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "CLOSE_SECONDS", 0.05)
+        started, finish = threading.Event(), threading.Event()
+
+        def stuck(progress: JobProgress) -> Json:
+            started.set()
+            assert finish.wait(SECONDS)
+            progress(1)
+            return None
+
+        jobs = Jobs(store)
+        job = submit(jobs, stuck, kind="import")
+        assert started.wait(SECONDS)
+        with capture_logs() as logs:
+            jobs.close()
+        assert [entry["event"] for entry in logs] == ["a job did not end in time"]
+        assert jobs.get(job.id).tries == 0
+        finish.set()
+        until(jobs.are_idle)
+        assert jobs.get(job.id).tries == 0
 
     def test_finished_jobs_stay_as_they_were_after_a_restart(
         self, jobs: Jobs, store: Store

@@ -11,8 +11,10 @@ import pytest
 from sqlalchemy import text, update
 from structlog.testing import capture_logs
 
+from app.errors import DamagedError
 from app.review.datasets.dataset import list_datasets
 from app.review.datasets.delete import delete_dataset
+from app.review.jobs import upkeep as module
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.upkeep import Tidied, Upkeep, tidy
 from app.store.answers import Answer, find_answer, keep_answer
@@ -134,7 +136,7 @@ class TestUpkeep:
     def test_a_fault_is_logged_and_ends_changes(
         self, store: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        def damaged() -> None:
+        def damaged(_wanted: object) -> None:
             raise OSError("the disk is gone")
 
         upkeep = Upkeep(store, Jobs(store))
@@ -142,6 +144,31 @@ class TestUpkeep:
         with capture_logs() as logs:
             upkeep.round()
         assert logs[-1]["error"] == "the disk is gone"
+
+    @pytest.mark.parametrize("error", [OSError("gone"), ZeroDivisionError("a bug")])
+    def test_a_step_that_fails_leaves_the_others_to_be_done(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch, error: Exception
+    ) -> None:
+        def fail(*_: object) -> int:
+            raise error
+
+        old = place(store.settings.home / "cache" / "frames" / "ab" / "c.jpg", OLD)
+        monkeypatch.setattr(module, "forget_answers", fail)
+        with capture_logs() as logs:
+            assert tidy(store).cached == 1
+        assert [(entry["event"], entry["step"]) for entry in logs] == [("upkeep failed", "answers")]
+        assert not old.exists()
+
+    def test_a_look_at_the_whole_database_ends_when_the_server_stops(
+        self, there: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        # Instead of a look that takes minutes: its number would be taken for a fault.
+        count = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 2000000)"
+        slow = text(f"{count} SELECT CAST(count(*) AS TEXT) FROM n")
+        monkeypatch.setattr("app.store.session.text", lambda _: slow)
+        there.require_whole(lambda: False)
+        with pytest.raises(DamagedError):
+            there.require_whole()
 
     def test_ends_at_once(self, store: Store) -> None:
         upkeep = Upkeep(store, Jobs(store))
