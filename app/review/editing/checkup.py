@@ -22,7 +22,6 @@ from app.store.session import Session, Store
 ROOM_BYTES = 2**30
 """Room on the disk below which the next import may not fit."""
 _PREFIX = "TOUCHLINE_"
-_MANY = 1_000_000
 _FORMATS = (".jpg", ".png", ".webp")
 
 
@@ -124,7 +123,7 @@ def _leftovers(settings: Settings) -> Check:
 
 
 def _calibrations(session: Session) -> Check:
-    count = len(spare_calibrations(session, _MANY))
+    count = len(spare_calibrations(session))
     mend = "The server deletes them when it has nothing to do." if count else None
     return Check("spare calibrations", True, f"{count:,} that no solution rests on", mend)
 

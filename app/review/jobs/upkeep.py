@@ -8,16 +8,12 @@ from dataclasses import dataclass
 import structlog
 
 from app.errors import ReviewError
+from app.review.datasets.spare_calibrations import delete_spare_calibrations
 from app.review.jobs.jobs import Jobs
 from app.store.anchor import sync_anchor
 from app.store.answers import forget_answers, shorten_answers
 from app.store.jobs import forget_jobs
-from app.store.orphans import (
-    delete_calibrations,
-    delete_leftovers,
-    expire_cache,
-    spare_calibrations,
-)
+from app.store.orphans import delete_leftovers, expire_cache
 from app.store.session import Store
 from app.store.uploads import expire_uploads
 
@@ -27,8 +23,6 @@ FIRST_SECONDS, BETWEEN_SECONDS, BUSY_SECONDS = 60.0, 3600.0, 60.0
 """After the start, between two rounds, and until the next look while jobs are under way."""
 ROUNDS_BETWEEN_CHECKS = 24
 """SQLite looks at every page of the database once in so many rounds."""
-CALIBRATIONS = 2000
-"""Calibrations a transaction: nobody who saves waits long for it."""
 
 
 @dataclass(frozen=True)
@@ -59,22 +53,10 @@ def tidy(store: Store) -> Tidied:
         uploads=expire_uploads(settings),
         cached=expire_cache(settings),
         leftovers=delete_leftovers(settings),
-        calibrations=_delete_spare_calibrations(store),
+        calibrations=delete_spare_calibrations(store),
     )
     sync_anchor(settings.database_file)
     return tidied
-
-
-def _delete_spare_calibrations(store: Store) -> int:
-    gone = 0
-    while True:
-        with store.read() as session:
-            if not spare_calibrations(session, 1):
-                return gone
-        with store.write() as session:
-            keys = spare_calibrations(session, CALIBRATIONS)
-            delete_calibrations(session, keys)
-        gone += len(keys)
 
 
 class Upkeep:

@@ -44,7 +44,7 @@ def killed_deletion(store: Store, fill, make_group, monkeypatch: pytest.MonkeyPa
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("app.review.datasets.delete._delete_calibrations", kill)
+        patch.setattr("app.review.datasets.delete.delete_spare_calibrations", kill)
         with suppress(KeyboardInterrupt):
             delete_dataset(store, "demo", confirm="demo", actor="a")
     return store
