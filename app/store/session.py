@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 
-from sqlalchemy import Engine, text
+from sqlalchemy import Engine
 from sqlalchemy.orm import Session as Session
 
 from app.config import Settings
@@ -31,6 +31,7 @@ from app.store.migrate import (
     newer_schema,
     schema_revision,
 )
+from app.store.soundness import file_faults
 
 TURN_SECONDS = 10.0
 """How long a thread waits for the writes of others in its process; SQLite waits for other
@@ -146,10 +147,10 @@ class Store:
     def require_whole(self) -> None:
         """Let SQLite look at every page and index; raise DamagedError where it finds a fault."""
         with self.read() as session:
-            fault = session.execute(text("PRAGMA quick_check(1)")).scalar_one()
-            if fault != "ok":
+            faults = file_faults(session, 1)
+            if faults:
                 file = self.settings.database_file
-                raise DamagedError(f"{file} is damaged: {' '.join(fault.split())}", hint=EXAMINE)
+                raise DamagedError(f"{file} is damaged: {faults[0]}", hint=EXAMINE)
 
     @contextmanager
     def _watched(self) -> Iterator[None]:

@@ -11,7 +11,7 @@ import pytest
 from sqlalchemy import text
 
 from app.config import Settings
-from app.errors import InputError, StorageError
+from app.errors import DamagedError, InputError, StorageError
 from app.store.engine import PRAGMAS
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
 from app.store.session import Store
@@ -76,6 +76,18 @@ class TestOpen:
         other = settings.model_copy(update={"database_url": "postgresql://localhost/x"})
         with pytest.raises(InputError, match="SQLite"):
             Store.open(other)
+
+
+class TestRequireWhole:
+    def test_names_the_fault_and_no_change_is_taken_after_it(
+        self, store: Store, monkeypatch
+    ) -> None:
+        store.require_whole()
+        monkeypatch.setattr("app.store.session.file_faults", lambda *_: ["Tree 5 is torn"])
+        with pytest.raises(DamagedError, match=r"touchline\.db is damaged: Tree 5 is torn"):
+            store.require_whole()
+        with pytest.raises(DamagedError, match="no change is taken"):
+            add(store, "late")
 
 
 class TestWrite:
