@@ -13,6 +13,7 @@ from app.api.errors import PreconditionRequiredError
 from app.api.events import Events
 from app.config import Settings
 from app.errors import InputError
+from app.review.evaluating.prediction_reader import PredictionReader
 from app.review.exporting.folder import ExportFolder
 from app.review.jobs.evaluations import resume_evaluations
 from app.review.jobs.exports import resume_exports
@@ -44,6 +45,7 @@ class Services:
     settings: Settings
     store: Store
     frames: Frames
+    predictions: PredictionReader
     exports: ExportFolder
     jobs: Jobs
     events: Events
@@ -61,6 +63,7 @@ class Services:
             settings,
             store,
             Frames(settings),
+            PredictionReader(settings),
             exports,
             jobs,
             Events(store, jobs),
@@ -89,6 +92,7 @@ class Services:
         self.jobs.close()
         self.upkeep.close()
         self.frames.close()
+        self.predictions.close()
         self.store.close()
 
 

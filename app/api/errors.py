@@ -106,8 +106,8 @@ async def _review_error(request: Request, error: Exception) -> Response:
     if isinstance(error, DamagedError):
         request.app.state.services.store.note_damage(error)
     if status >= 500:
-        cause = error.__cause__
-        log.error("request refused", instance=problem.instance, error=str(error), exc_info=cause)
+        cause = str(error.__cause__ or "").partition("\n")[0]
+        log.error("request refused", instance=problem.instance, error=str(error), cause=cause)
     return problem_response(problem, headers)
 
 

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from app.errors import EXAMINE, DamagedError
+from app.geometry.arrays import FloatArray
 from app.solving.facts import COLUMNS, Facts
 
 _NUMBERS = "<f8"
@@ -21,8 +23,19 @@ def facts_to_bytes(facts: Facts) -> bytes:
 
 
 def facts_from_bytes(content: bytes) -> Facts:
-    """Back from ``facts_to_bytes`` of one group."""
-    numbers = np.frombuffer(zlib.decompress(content), _NUMBERS)
+    """Back from ``facts_to_bytes`` of one group.
+
+    Raises:
+        DamagedError: The bytes are not what was written.
+    """
+    try:
+        return _facts(np.frombuffer(zlib.decompress(content), _NUMBERS))
+    except (ValueError, zlib.error) as error:
+        sentence = "the facts beside a solution are not what was written"
+        raise DamagedError(sentence, hint=EXAMINE) from error
+
+
+def _facts(numbers: FloatArray) -> Facts:
     counts = dict(zip(_ROWS, numbers[: len(_ROWS)].astype(int).tolist(), strict=True))
     arrays: dict[str, Any] = {}
     at = len(_ROWS)

@@ -12,6 +12,7 @@ from app.errors import EXAMINE, DamagedError
 from app.store.anchor import Anchor, anchor_of
 from app.store.engine import make_engine, reported
 from app.store.log import verify_chain
+from app.store.soundness import count_lost_references, file_faults
 
 _COUNTED = ("dataset", "groups", "view", "station", "verdict", "version", "solution", "log")
 
@@ -47,11 +48,10 @@ def _examine(engine: Engine, file: Path) -> tuple[Anchor, dict[str, int]]:
         tables = set(inspect(connection).get_table_names())
         if "alembic_version" not in tables or "log" not in tables:
             raise DamagedError(f"{file} is no database of Touchline", hint=EXAMINE)
-        faults = connection.execute(text("PRAGMA integrity_check(3)")).scalars().all()
-        if faults != ["ok"]:
-            sentence = " ".join("; ".join(faults).split())
-            raise DamagedError(f"{file} is damaged: {sentence}", hint=EXAMINE)
-        if connection.execute(text("PRAGMA foreign_key_check")).first() is not None:
+        faults = file_faults(session, 3, thorough=True)
+        if faults:
+            raise DamagedError(f"{file} is damaged: {'; '.join(faults)}", hint=EXAMINE)
+        if count_lost_references(session):
             raise DamagedError(f"{file} has rows that refer to rows that are gone", hint=EXAMINE)
         verify_chain(session)
         counts = {

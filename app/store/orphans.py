@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from sqlalchemy import select, text
@@ -14,28 +16,37 @@ from app.store.leftovers import DAY, last_written
 from app.store.models import QueueModel, ViewModel
 from app.store.uploads import list_uploads
 
-_UNUSED = (
-    "SELECT key FROM calibration WHERE key NOT IN"
-    " (SELECT json_each.value FROM solution, json_each(solution.calibrations)) LIMIT :limit"
+_NAMED = "SELECT json_each.value FROM solution, json_each(solution.calibrations)"
+_SPARE = text(f"SELECT key FROM calibration WHERE key NOT IN ({_NAMED})")
+_ASKED = "SELECT value FROM json_each(:keys)"
+_DELETE = text(
+    f"DELETE FROM calibration WHERE key IN ({_ASKED})"
+    f" AND key NOT IN ({_NAMED} WHERE json_each.value IN ({_ASKED})) RETURNING key"
 )
 
 
-def spare_calibrations(session: Session, limit: int) -> list[str]:
+def spare_calibrations(session: Session) -> list[str]:
     """Keys of calibrations that no solution rests on; none while groups wait to be solved.
 
     A solver may have read them already for the solution that it is about to save.
     """
+    return [] if _has_unsolved(session) else list(session.scalars(_SPARE))
+
+
+def delete_calibrations(session: Session, keys: Sequence[str]) -> int:
+    """Delete those of some calibrations that are spare still; returns how many.
+
+    Those that a version needs go on in it (a trigger sees to that).
+    """
+    if _has_unsolved(session):
+        return 0
+    return len(session.scalars(_DELETE, {"keys": json.dumps(keys)}).all())
+
+
+def _has_unsolved(session: Session) -> bool:
+    """Whether a group of any dataset waits to be solved."""
     waiting = select(QueueModel.group_id).where(QueueModel.solved.is_(False)).limit(1)
-    if session.scalar(waiting) is not None:
-        return []
-    return list(session.scalars(text(_UNUSED), {"limit": limit}))
-
-
-def delete_calibrations(session: Session, keys: list[str]) -> None:
-    """Delete calibrations; those that a version needs go on in it (a trigger sees to that)."""
-    if keys:
-        statement = text("DELETE FROM calibration WHERE key = :key")
-        session.execute(statement, [{"key": key} for key in keys])
+    return session.scalar(waiting) is not None
 
 
 def unread_uploads(session: Session, settings: Settings) -> list[str]:

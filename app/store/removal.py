@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Sequence
 
 from sqlalchemy import (
     ColumnElement,
@@ -14,14 +14,12 @@ from sqlalchemy import (
     or_,
     select,
     text,
-    true,
 )
 from sqlalchemy.orm import Session
 
 from app.store.models import (
     DatasetModel,
     GroupModel,
-    QueueModel,
     SolutionModel,
     StationModel,
     VerdictModel,
@@ -40,7 +38,6 @@ _COUNTED = {
     "evaluations": "evaluation",
 }
 """What a person is told of, by the name of its table."""
-_DELETE_CALIBRATION = text("DELETE FROM calibration WHERE key = :unused")
 
 
 def count_contents(session: Session, dataset_id: int) -> dict[str, int]:
@@ -59,26 +56,9 @@ def solutions_of(session: Session, dataset_id: int) -> list[int]:
     return list(session.scalars(select(SolutionModel.id).where(mine)))
 
 
-def delete_solutions(session: Session, ids: Sequence[int]) -> set[str]:
-    """Delete solutions; returns the keys of the calibrations that they rested on."""
-    chosen = SolutionModel.id.in_(ids)
-    keys = set(_calibration_keys(session, select(SolutionModel.id).where(chosen)))
-    session.execute(delete(SolutionModel).where(chosen))
-    return keys
-
-
-def has_unsolved(session: Session) -> bool:
-    """Whether a group of any dataset waits to be solved."""
-    statement = select(QueueModel.group_id).where(QueueModel.solved.is_(False)).limit(1)
-    return session.scalar(statement) is not None
-
-
-def delete_unused_calibrations(session: Session, keys: Collection[str]) -> None:
-    """Delete those of some calibrations that no solution names any more."""
-    used = set(_calibration_keys(session, select(SolutionModel.id)))
-    rows = [{"unused": key} for key in keys if key not in used]
-    if rows:
-        session.execute(_DELETE_CALIBRATION, rows)
+def delete_solutions(session: Session, ids: Sequence[int]) -> None:
+    """Delete solutions; the calibrations that they rested on may be spare then."""
+    session.execute(delete(SolutionModel).where(SolutionModel.id.in_(ids)))
 
 
 def keep_used_ids(session: Session) -> None:
@@ -129,10 +109,3 @@ def _hangs_on(table: Table) -> bool:
         and key.ondelete is None
         for key in table.foreign_keys
     )
-
-
-def _calibration_keys(session: Session, solutions: Select[int]) -> Iterator[str]:
-    """Keys of the calibrations that solutions rest on, each once."""
-    names = func.json_each(SolutionModel.calibrations).table_valued("value")
-    statement = select(names.c.value).distinct().select_from(SolutionModel).join(names, true())
-    return iter(session.scalars(statement.where(SolutionModel.id.in_(solutions))))

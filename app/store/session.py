@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import structlog
-from sqlalchemy import Engine, text
+from sqlalchemy import Engine
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session as Session
 
@@ -34,6 +34,7 @@ from app.store.migrate import (
     newer_schema,
     schema_revision,
 )
+from app.store.soundness import file_faults
 
 log = structlog.get_logger("touchline.store")
 
@@ -161,10 +162,10 @@ class Store:
         It ends early, without a word, once it is no longer ``wanted``.
         """
         with self.read() as session, _interrupted(session, lambda: not wanted()):
-            fault = session.execute(text("PRAGMA quick_check(1)")).scalar_one()
-            if fault != "ok":
+            faults = file_faults(session, 1)
+            if faults:
                 file = self.settings.database_file
-                log.error("the database is damaged", file=str(file), fault=" ".join(fault.split()))
+                log.error("the database is damaged", file=str(file), fault=faults[0])
                 raise DamagedError(f"{file.name} is damaged", hint=EXAMINE)
 
     @contextmanager

@@ -40,16 +40,18 @@ function Dots({ lessons, current }) {
 	`;
 }
 
+/** The group on screen and the one before it; the card itself may be away between the two. */
+let seen = { now: /** @type {number | null} */ (null), before: /** @type {number | null} */ (null) };
+
 /** The group that was on screen before this one; null for the first. @param {number} id @returns {number | null} */
-function useBefore(id) {
-	const seen = useRef({ now: id, before: /** @type {number | null} */ (null) });
-	if (seen.current.now !== id) seen.current = { now: id, before: seen.current.now };
-	return seen.current.before;
+function groupBefore(id) {
+	if (seen.now !== id) seen = { now: id, before: seen.now };
+	return seen.before;
 }
 
 /** @param {{group: GroupDocument}} props */
 export function LessonCard({ group }) {
-	const before = useBefore(group.id);
+	const before = groupBefore(group.id);
 	// An answer counts once the server has it.
 	const busy = waiting.value.some((item) => item.group === before || item.group === group.id);
 	const { value } = useResource(async (signal) => (busy ? null : (await getPractice(signal)).lessons), [group.id, group.etag, busy]);

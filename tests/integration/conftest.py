@@ -118,21 +118,24 @@ def address(touchline, tree: Path, spoiled_tree: Path) -> Iterator[str]:
         f"import soccernet-v3 {spoiled_tree} --dataset spoiled",
         "solve --dataset small --workers 1",
     )
-    server = subprocess.Popen(
-        [sys.executable, "-c", COMMAND, "serve", "--port", "0"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment(touchline.home),
-    )
+    log = Path(touchline.home) / "server.log"
+    with log.open("w") as file:
+        server = subprocess.Popen(
+            [sys.executable, "-c", COMMAND, "serve", "--port", "0"],
+            stdout=subprocess.PIPE,
+            # A pipe that nobody reads would fill, and the server wait for ever.
+            stderr=file,
+            text=True,
+            env=environment(touchline.home),
+        )
     try:
         line = server.stdout.readline()
-        assert line.startswith("Touchline is at http://127.0.0.1:"), server.stderr.read()
+        assert line.startswith("Touchline is at http://127.0.0.1:"), log.read_text()
         yield line.split()[-1]
     finally:
         server.terminate()
-        _, errors = server.communicate(timeout=20)
-    assert "Traceback" not in errors, errors
+        server.communicate(timeout=20)
+    assert "Traceback" not in (errors := log.read_text()), errors
 
 
 @pytest.fixture(scope="session")

@@ -30,7 +30,8 @@ from app.review.editing.recompute import solve_dataset
 from app.review.editing.stations import load_station
 from app.review.editing.submit import load
 from app.review.evaluating.evaluation import EvaluationRequest, run_evaluation
-from app.review.evaluating.predictions import PredictionFiles, add_predictions
+from app.review.evaluating.prediction_reader import PredictionFiles
+from app.review.evaluating.predictions import add_predictions
 from app.review.importing.ingest import ingest
 from app.review.jobs.exports import request_export
 from app.review.policies.policy import read_policy

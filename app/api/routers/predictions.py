@@ -30,6 +30,7 @@ from app.review.editing.places import find_view
 from app.review.evaluating import predictions as review
 from app.review.evaluating.accept import accept, accept_box, plan_accept
 from app.review.evaluating.group_predictions import group_predictions
+from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.jobs.evaluations import request_accept
 from app.store.predictions import PredictionSet
 from app.store.uploads import upload_path
@@ -68,7 +69,8 @@ def add_predictions(
     """Read uploaded files into a new set of predictions.
 
     What is wrong is left out and listed with file, record and field; frames that the dataset does
-    not have are counted and listed. 400 where nothing can be used. No solve reads predictions.
+    not have are counted and listed. 400 where nothing can be used, 413 where reading takes too
+    much memory or time, 503 while too many others are read. No solve reads predictions.
     """
     found = review.add_predictions(
         services.store,
@@ -76,6 +78,7 @@ def add_predictions(
         request.name,
         _files(services.settings, request),
         actor=actor,
+        read=services.predictions.read,
     )
     response.headers["Location"] = f"/api/v1/predictions/{found.id}"
     return found
@@ -194,7 +197,7 @@ def accept_prediction(
     return reply.of(state)
 
 
-def _files(settings: Settings, request: PredictionRequest) -> review.PredictionFiles:
+def _files(settings: Settings, request: PredictionRequest) -> PredictionFiles:
     paths = {
         name: None if upload is None else upload_path(settings, upload)
         for name, upload in (
@@ -203,7 +206,7 @@ def _files(settings: Settings, request: PredictionRequest) -> review.PredictionF
             ("cameras", request.cameras_upload),
         )
     }
-    return review.PredictionFiles(
+    return PredictionFiles(
         **paths,
         format=request.format,
         category=request.category,

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from app.errors import ConflictError
 from app.review.datasets.dataset import dataset_id, read_dataset
+from app.review.datasets.spare_calibrations import delete_spare_calibrations
 from app.store import removal
 from app.store.clock import now
 from app.store.log import Entry, append
@@ -17,8 +18,6 @@ from app.store.session import Session, Store
 KIND = "dataset_deleted"
 CHUNK = 500
 """Solutions a transaction."""
-CALIBRATIONS = 5000
-"""Calibrations a transaction; each looks through all solutions that are left."""
 
 
 @dataclass(frozen=True)
@@ -66,14 +65,14 @@ def delete_dataset(
             pointer="/confirm",
         )
     identity = dataset_id(store, found.id)
-    calibrations = _delete_solutions(store, identity)
+    _delete_solutions(store, identity)
     with store.write() as session:
         contents = _contents(session, identity)
         removal.keep_used_ids(session)
         body = {"name": contents.name, "counts": contents.counts}
         append(session, [Entry(KIND, actor, now(), body, identity)])
         removal.delete_rows(session, identity)
-    _delete_calibrations(store, calibrations)
+    delete_spare_calibrations(store)
     return contents
 
 
@@ -82,25 +81,10 @@ def _contents(session: Session, identity: int) -> DatasetContents:
     return DatasetContents(identity, name, removal.count_contents(session, identity))
 
 
-def _delete_solutions(store: Store, identity: int) -> set[str]:
-    """Delete what was computed; returns the keys of the calibrations that it rested on."""
-    keys: set[str] = set()
+def _delete_solutions(store: Store, identity: int) -> None:
+    """Delete what was computed."""
     with store.read() as session:
         solutions = removal.solutions_of(session, identity)
     for start in range(0, len(solutions), CHUNK):
         with store.write() as session:
-            keys |= removal.delete_solutions(session, solutions[start : start + CHUNK])
-    return keys
-
-
-def _delete_calibrations(store: Store, keys: set[str]) -> None:
-    """Delete calibrations that no solution names any more, some thousand a transaction.
-
-    While another dataset is being solved they stay: its solver may have read them already.
-    """
-    names = sorted(keys)
-    for start in range(0, len(names), CALIBRATIONS):
-        with store.write() as session:
-            if removal.has_unsolved(session):
-                return
-            removal.delete_unused_calibrations(session, names[start : start + CALIBRATIONS])
+            removal.delete_solutions(session, solutions[start : start + CHUNK])

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -18,14 +17,11 @@ from app.datasets.report import Report
 from app.errors import ConflictError, InputError, NotFoundError
 from app.evaluation.frame import Detection
 from app.evaluation.frame_names import FrameNames, NamedFrame
-from app.evaluation.prediction_files import (
-    ReadPredictedCameras,
-    read_predicted_cameras,
-    read_predictions,
-)
+from app.evaluation.prediction_files import ReadPredictedCameras
 from app.evaluation.prediction_run import ReadPredictions, listed
 from app.geometry.camera import Camera
 from app.review.datasets.dataset import read_dataset
+from app.review.evaluating.prediction_reader import PredictionFiles, Read, read_files
 from app.soccer.frames import ImageSize
 from app.store.clock import now
 from app.store.codecs import Json, canonical
@@ -48,29 +44,6 @@ LISTED = 100
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
 
 
-@dataclass(frozen=True)
-class PredictionFiles:
-    """Files of predictions, and how to read them.
-
-    Attributes:
-        path: File, folder or zip of ball boxes, or None.
-        format: ``coco``, ``yolo`` or ``csv``.
-        images: The COCO document that numbers in ``coco`` results refer to, or None.
-        cameras: Folder or zip of SoccerNet camera JSON, or None.
-        category: The class that is the ball, where the file has several.
-        size: Size of the images that boxes in pixels refer to, where that is not the annotated.
-        cameras_size: The same for the cameras.
-    """
-
-    path: Path | None
-    format: str = "coco"
-    images: Path | None = None
-    cameras: Path | None = None
-    category: int | None = None
-    size: ImageSize | None = None
-    cameras_size: ImageSize | None = None
-
-
 def add_predictions(
     store: Store,
     dataset: str | int,
@@ -80,6 +53,7 @@ def add_predictions(
     actor: str,
     source: str | None = None,
     reuse: bool = False,
+    read: Read = read_files,
 ) -> PredictionSet:
     """Read files into a new set.
 
@@ -92,6 +66,7 @@ def add_predictions(
         source: What people call the file; its own name by default.
         reuse: Answer the set that came of the very same reading, where there is one, and find
             another name where the name is taken.
+        read: Reads the files, here or in another process.
 
     Raises:
         InputError: A file cannot be used, no box or camera belongs to a frame of the dataset, or
@@ -102,8 +77,7 @@ def add_predictions(
     if files.path is None and files.cameras is None:
         raise InputError("there is nothing to read: neither boxes nor cameras", pointer="/upload")
     names = frame_names(store, dataset)
-    limits = Limits.of(store.settings)
-    boxes, cameras = _read(files, names, limits)
+    boxes, cameras = read(files, names, Limits.of(store.settings))
     if not boxes.detections and not cameras.cameras and _is_for_another(boxes, cameras):
         raise _nothing_known(boxes, cameras)
     first = files.path or files.cameras
@@ -293,27 +267,6 @@ def _free_name(name: str, taken: set[str]) -> str:
         for number in count(1)
         if (found := name if number == 1 else f"{name}-{number}") not in taken
     )
-
-
-def _read(
-    files: PredictionFiles, names: FrameNames, limits: Limits
-) -> tuple[ReadPredictions, ReadPredictedCameras]:
-    boxes, cameras = ReadPredictions(), ReadPredictedCameras()
-    if files.path is not None:
-        boxes = read_predictions(
-            files.path,
-            files.format,
-            names,
-            category=files.category,
-            size=files.size,
-            images=files.images,
-            limits=limits,
-        )
-    if files.cameras is not None:
-        cameras = read_predicted_cameras(
-            files.cameras, names, size=files.cameras_size, limits=limits
-        )
-    return boxes, cameras
 
 
 def _is_for_another(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> bool:

@@ -10,16 +10,13 @@ from typing import TypeVar
 import structlog
 
 from app.errors import ReviewError
+from app.review.datasets.spare_calibrations import delete_spare_calibrations
 from app.review.jobs.jobs import Jobs
 from app.store.anchor import sync_anchor
 from app.store.answers import forget_answers, shorten_answers
 from app.store.jobs import forget_jobs
 from app.store.leftovers import delete_leftovers
-from app.store.orphans import (
-    delete_calibrations,
-    expire_cache,
-    spare_calibrations,
-)
+from app.store.orphans import expire_cache
 from app.store.session import Store
 from app.store.uploads import expire_uploads
 
@@ -31,8 +28,6 @@ FIRST_SECONDS, BETWEEN_SECONDS, BUSY_SECONDS = 60.0, 3600.0, 60.0
 """After the start, between two rounds, and until the next look while jobs are under way."""
 ROUNDS_BETWEEN_CHECKS = 24
 """SQLite looks at every page of the database once in so many rounds."""
-CALIBRATIONS = 2000
-"""Calibrations a transaction: nobody who saves waits long for it."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +59,7 @@ def tidy(store: Store, wanted: Callable[[], bool] = lambda: True) -> Tidied:
         "uploads": lambda: expire_uploads(settings),
         "cached": lambda: expire_cache(settings),
         "leftovers": lambda: delete_leftovers(settings),
-        "calibrations": lambda: _delete_spare_calibrations(store, wanted),
+        "calibrations": lambda: delete_spare_calibrations(store, wanted),
     }
     gone = {name: _attempt(name, step) or 0 for name, step in steps.items() if wanted()}
     _attempt("anchor", lambda: sync_anchor(settings.database_file))
@@ -90,19 +85,6 @@ def _shorten_answers(store: Store) -> int:
 def _forget_jobs(store: Store) -> int:
     with store.write() as session:
         return forget_jobs(session, store.settings.job_days)
-
-
-def _delete_spare_calibrations(store: Store, wanted: Callable[[], bool]) -> int:
-    gone = 0
-    while wanted():
-        with store.read() as session:
-            if not spare_calibrations(session, 1):
-                break
-        with store.write() as session:
-            keys = spare_calibrations(session, CALIBRATIONS)
-            delete_calibrations(session, keys)
-        gone += len(keys)
-    return gone
 
 
 class Upkeep:

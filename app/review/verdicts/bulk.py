@@ -1,8 +1,9 @@
 """Bulk: one verdict for every group that a query matches, tried first.
 
 A batch is many short write transactions, so that others go on working; killed in between it
-leaves whole verdicts, and given again it does the rest (under the same key as the same batch). ``bulk_undo`` takes it back, and
-``bulk_redo`` gives it once more after that.
+leaves whole verdicts, and given again it does the rest (under the same key as the same batch).
+``bulk_undo`` takes it back, which ends a run that is still giving it, and ``bulk_redo`` gives it
+once more after that.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from app.errors import ConflictError
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdicts.verdict import Verdict, check_verdict
 from app.store.answers import Keep, Progress, keep_nothing
-from app.store.batches import Batch, find_batch, insert_batch, read_batches, update_batch
+from app.store.batches import Batch, Spans, find_batch, insert_batch, read_batches, update_batch
 from app.store.clock import now
 from app.store.listing import Listing, read_columns
 from app.store.log import Entry, append
@@ -242,7 +243,6 @@ class BatchRun:
         self.changed = 0
         self._dataset_id, self._query = dataset_id, query
         self._verdict, self._actor = verdict, actor
-        self._spans: list[tuple[int, int]] = []
 
     def resume(self, session: Session) -> Any:
         """Go on where a run was killed; returns what it said was left, None where none was.
@@ -253,14 +253,8 @@ class BatchRun:
         self._left = None if self._progress is None else self._progress.read(session)
         if self._left is None:
             return None
-        self.batch, self.changed = self._left["batch"], self._left["changed"]
-        self._spans = [(first, last) for first, last in self._left["spans"]]
-        given = None if self.batch is None else find_batch(session, self.batch)
-        if self.batch is not None and (given is None or given.is_taken_back):
-            raise ConflictError(
-                "the verdicts that were given before the server stopped have been taken back",
-                hint="Give the verdict under another Idempotency-Key.",
-            )
+        self.batch = self._left["batch"]
+        self._standing(session)
         return self._left
 
     def interrupt(self, session: Session, left: dict[str, Any]) -> None:
@@ -269,20 +263,25 @@ class BatchRun:
             return
         if self._progress.read(session) != self._left:
             raise ConflictError("this very request is being carried out", hint="Send it again.")
-        spans = [list(span) for span in self._spans]
-        self._left = {"batch": self.batch, "changed": self.changed, "spans": spans, **left}
+        self._left = {"batch": self.batch, **left}
         self._progress.save(session, self._left)
 
     def save(self, session: Session, rows: Sequence[Any]) -> None:
-        """Save the verdicts of one chunk with its log entries, in one transaction."""
+        """Save the verdicts of one chunk with its log entries, in one transaction.
+
+        Raises:
+            ConflictError: What was given before has been taken back meanwhile.
+        """
+        given = self._standing(session)
+        self.changed = 0 if given is None else given.changed
         if not rows:
             return
         at = now()
         verdicts = _verdicts(session, rows, self._verdict, self._actor, at)
         save_verdicts(session, self._dataset_id, verdicts, actor=self._actor, at=at)
         self.changed += len(verdicts)
-        self._spans.append((verdicts[0].id, verdicts[-1].id))
-        self._save_batch(session, at)
+        spans = [] if given is None else given.spans
+        self._save_batch(session, at, [*spans, (verdicts[0].id, verdicts[-1].id)])
 
     def close(self, session: Session) -> None:
         """Say in the log that the batch is complete."""
@@ -295,8 +294,24 @@ class BatchRun:
         (log_id,) = append(session, [entry])
         update_batch(session, self.batch, log_id=log_id)
 
-    def _save_batch(self, session: Session, at: str) -> None:
-        values: dict[str, Any] = {"changed": self.changed, "spans": self._spans}
+    def _standing(self, session: Session) -> Batch | None:
+        """The batch as it is stored, which others may go on with or take back; None before it is.
+
+        Raises:
+            ConflictError: It has been taken back.
+        """
+        if self.batch is None:
+            return None
+        given = find_batch(session, self.batch)
+        if given is None or given.is_taken_back:
+            raise ConflictError(
+                "the verdicts that were given so far have been taken back",
+                hint="Give the verdict again, under another Idempotency-Key.",
+            )
+        return given
+
+    def _save_batch(self, session: Session, at: str, spans: Spans) -> None:
+        values: dict[str, Any] = {"changed": self.changed, "spans": spans}
         if self.batch is not None:
             update_batch(session, self.batch, **values)
             return

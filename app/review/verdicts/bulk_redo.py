@@ -45,11 +45,13 @@ def redo_batch(
     """Give the verdicts of a batch again after they were taken back.
 
     A group keeps what it has when somebody judged it after the batch was taken back, or edited
-    it since the batch judged it: nobody has seen what the verdict would speak of.
+    it since the batch judged it: nobody has seen what the verdict would speak of. What a run that
+    was stopped has left over is given as the same batch, also under another key.
 
     Raises:
         NotFoundError: There is no such batch.
-        ConflictError: It was not taken back, or it was given again already.
+        ConflictError: It was not taken back, or it was given again already, or somebody else has
+            begun to.
     """
     with store.read() as session:
         batch = read_batch(session, batch_id)
@@ -62,6 +64,7 @@ def redo_batch(
         return _report(batch, run, refused)
     for number, (first, last) in enumerate(spans, 1):
         with store.write() as session:
+            run.batch = _begun(session, batch_id, actor)
             ids = _unchanged(session, batch.spans, first, last)
             found = sort_out(read_columns(session, ids, (), ASKED), verdict)
             run.save(session, found.change)
@@ -88,8 +91,6 @@ def _spans(batch: Batch) -> Spans:
     """First and last id of the verdicts that took a batch back, chunk by chunk."""
     if batch.undone is None:
         raise ConflictError("this batch was not taken back, so there is nothing to give again")
-    if batch.redone is not None:
-        raise ConflictError("the verdicts of this batch were given again already")
     if batch.undo_spans is None:
         raise ConflictError(
             "this batch was taken back by an older version of Touchline, which kept no record "
@@ -97,6 +98,22 @@ def _spans(batch: Batch) -> Spans:
             hint="Give the verdict once more in the queue.",
         )
     return batch.undo_spans
+
+
+def _begun(session: Session, batch_id: int, actor: str) -> int | None:
+    """The batch that gives a batch again and is not complete; None where nobody has begun."""
+    redone = read_batch(session, batch_id).redone
+    if redone is None:
+        return None
+    again = read_batch(session, redone)
+    if again.done or again.is_taken_back:
+        raise ConflictError("the verdicts of this batch were given again already")
+    if again.actor != actor:
+        raise ConflictError(
+            f"{again.actor} has begun to give this batch again",
+            hint=f"Let {again.actor} finish it, or take back what was given.",
+        )
+    return again.id
 
 
 def _unchanged(session: Session, given: Spans, first: int, last: int) -> list[int]:

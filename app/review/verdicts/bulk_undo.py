@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from app.errors import ConflictError, NotFoundError
 from app.review.verdicts.bulk import save_verdicts
 from app.store.answers import Keep, keep_nothing
-from app.store.batches import Batch, find_batch, update_batch
+from app.store.batches import Batch, Spans, find_batch, update_batch
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session, Store
@@ -35,23 +35,39 @@ def undo_batch(
         NotFoundError: There is no such batch.
         ConflictError: It was taken back before.
     """
-    with store.read() as session:
-        batch = read_batch(session, batch_id)
-    if batch.undone is not None:
-        raise ConflictError(f"{batch.undone_by} has taken this batch back already")
-    # What a run that was killed has taken back is not taken back again: it is not the newest.
-    spans = [(first, last) for first, last in batch.undo_spans or ()]
-    for number, (first, last) in enumerate(batch.spans, 1):
+    number = 0
+    while True:
         with store.write() as session:
-            verdicts = _restore(session, batch, first, last, actor)
-            spans += [(verdicts[0].id, verdicts[-1].id)] if verdicts else []
+            batch = _standing(session, batch_id)
+            verdicts = _restore(session, batch, *batch.spans[number], actor)
+            # What another run has taken back is not taken back again: it is not the newest.
+            spans = [*(batch.undo_spans or ()), *_span(verdicts)]
             update_batch(session, batch_id, undo_spans=spans)
+            number += 1
             if number == len(batch.spans):
                 restored = {group for span in spans for group in judged_between(session, *span)}
                 report = UndoReport(batch_id, len(restored), batch.changed - len(restored))
                 _close(session, batch, report, actor)
                 keep(report)(session)
-    return report
+                return report
+
+
+def _standing(session: Session, batch_id: int) -> Batch:
+    """A batch that was not taken back, or not wholly.
+
+    Raises:
+        NotFoundError: There is no such batch.
+        ConflictError: It was taken back before.
+    """
+    batch = read_batch(session, batch_id)
+    if batch.undone is not None:
+        raise ConflictError(f"{batch.undone_by} has taken this batch back already")
+    return batch
+
+
+def _span(verdicts: Sequence[StoredVerdict]) -> Spans:
+    """First and last id of the verdicts of a chunk; nothing where there are none."""
+    return [(verdicts[0].id, verdicts[-1].id)] if verdicts else []
 
 
 def _close(session: Session, batch: Batch, report: UndoReport, actor: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field
@@ -339,7 +338,7 @@ def _solution_differences(
 def _parsed(body: bytes) -> Json:
     try:
         return json.loads(text_of(body))
-    except (ValueError, zlib.error) as error:
+    except ValueError as error:
         raise StorageError("a frozen part is damaged") from error
 
 

@@ -120,7 +120,7 @@ class TestReviewErrors:
         with capture_logs() as logs:
             answer = client.get(f"/raise/{index}")
         assert "INSERT" not in answer.text
-        assert isinstance(logs[0]["exc_info"], OperationalError)
+        assert "RefusalError" in logs[0]["cause"]
 
 
 class TestValidationErrors:

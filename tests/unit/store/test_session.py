@@ -81,6 +81,44 @@ class TestOpen:
             Store.open(other)
 
 
+class TestRequireWhole:
+    def test_names_the_fault_and_no_change_is_taken_after_it(
+        self, store: Store, monkeypatch
+    ) -> None:
+        store.require_whole()
+        monkeypatch.setattr("app.store.session.file_faults", lambda *_: ["Tree 5 is torn"])
+        with pytest.raises(DamagedError, match=r"touchline\.db is damaged$"):
+            store.require_whole()
+        with pytest.raises(DamagedError, match="no change is taken"):
+            add(store, "late")
+
+    def test_clients_read_the_files_name_and_the_log_its_place_and_fault(
+        self, store: Store, settings: Settings
+    ) -> None:
+        add(store, "demo")
+        with store.write() as session:
+            session.execute(text("PRAGMA writable_schema = ON"))
+            session.execute(
+                text(
+                    "UPDATE sqlite_master SET sql = replace(sql, 'created VARCHAR NOT NULL',"
+                    " 'created VARCHAR NOT NULL CHECK (created)') WHERE name = 'dataset'"
+                )
+            )
+        store.close()
+        opened = Store.open(settings)
+        with capture_logs() as logs, pytest.raises(DamagedError) as caught:
+            opened.require_whole()
+        opened.close()
+        assert caught.value.message == "touchline.db is damaged"
+        assert logs[-1]["file"] == str(settings.database_file)
+        assert "dataset" in logs[-1]["fault"]
+
+
+def test_every_migration_is_known() -> None:
+    scripts = (migrations_folder() / "versions").glob("*.py")
+    assert tuple(sorted(script.name[:4] for script in scripts)) == KNOWN_REVISIONS
+
+
 class TestWrite:
     def test_is_kept_when_the_block_ends_and_not_otherwise(self, store: Store) -> None:
         add(store, "kept")
@@ -271,31 +309,3 @@ class TestErrors:
             add(store, "demo")
         assert "INSERT" not in f"{caught.value} {caught.value.hint}"
         assert names(store) == ["demo"]
-
-
-class TestRequireWhole:
-    def test_clients_read_the_files_name_and_the_log_its_place_and_fault(
-        self, store: Store, settings: Settings
-    ) -> None:
-        add(store, "demo")
-        with store.write() as session:
-            session.execute(text("PRAGMA writable_schema = ON"))
-            session.execute(
-                text(
-                    "UPDATE sqlite_master SET sql = replace(sql, 'created VARCHAR NOT NULL',"
-                    " 'created VARCHAR NOT NULL CHECK (created)') WHERE name = 'dataset'"
-                )
-            )
-        store.close()
-        opened = Store.open(settings)
-        with capture_logs() as logs, pytest.raises(DamagedError) as caught:
-            opened.require_whole()
-        opened.close()
-        assert caught.value.message == "touchline.db is damaged"
-        assert logs[-1]["file"] == str(settings.database_file)
-        assert "dataset" in logs[-1]["fault"]
-
-
-def test_every_migration_is_known() -> None:
-    scripts = (migrations_folder() / "versions").glob("*.py")
-    assert tuple(sorted(script.name[:4] for script in scripts)) == KNOWN_REVISIONS

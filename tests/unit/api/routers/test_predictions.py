@@ -6,6 +6,8 @@ from typing import Any
 import pytest
 
 from app.datasets.frame_names import flat_frame
+from app.errors import TooLargeError
+from app.review.evaluating.prediction_reader import LIMITS_HINT, PredictionReader
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 
@@ -33,17 +35,21 @@ def predicted(api, emptied, tmp_path) -> list[dict[str, Any]]:
     rows = [(first, 100, 0.4), (first, 600, 0.9), (second, 200, 0.7)]
     lines = [f"{name_of(emptied, view)},{x},300,14,14,{score}" for view, x, score in rows]
     content = "\n".join(["image,x,y,w,h,score", *lines]).encode()
+    made = api.post(f"{API}/datasets/broadcast/predictions", json=uploaded(api, content))
+    assert made.status_code == 201, made.text
+    items: list[dict[str, Any]] = asked(api, emptied)["items"]
+    return items
+
+
+def uploaded(api, content: bytes) -> dict[str, Any]:
+    """A request for what is uploaded now."""
     answer = api.post(
         f"{API}/uploads",
         params={"name": "p.csv"},
         content=content,
         headers={"Content-Type": "application/octet-stream"},
     )
-    body = {"name": "yolo", "format": "csv", "upload": answer.json()["id"]}
-    made = api.post(f"{API}/datasets/broadcast/predictions", json=body)
-    assert made.status_code == 201, made.text
-    items: list[dict[str, Any]] = asked(api, emptied)["items"]
-    return items
+    return {"name": "yolo", "format": "csv", "upload": answer.json()["id"]}
 
 
 def name_of(emptied: dict[str, Any], view: dict[str, Any]) -> str:
@@ -65,6 +71,19 @@ def accept(api, emptied: dict[str, Any], item: dict[str, Any], **query: Any):
         params=query,
         headers={"If-Match": emptied["etag"]},
     )
+
+
+class TestAddPredictions:
+    def test_what_goes_beyond_the_limits_of_reading_is_413_and_leaves_nothing(
+        self, api, emptied, monkeypatch
+    ) -> None:
+        def beyond(*_: object) -> None:
+            raise TooLargeError("p.csv needs more than 300 MiB of memory", hint=LIMITS_HINT)
+
+        monkeypatch.setattr(PredictionReader, "read", beyond)
+        answer = api.post(f"{API}/datasets/broadcast/predictions", json=uploaded(api, b"image"))
+        assert (answer.status_code, answer.json()["hint"]) == (413, LIMITS_HINT)
+        assert api.get(f"{API}/datasets/broadcast/predictions").json()["items"] == []
 
 
 class TestGroupPredictions:

@@ -65,6 +65,10 @@ class TestExamineHome:
         monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage)
         assert "at least 1.1 GB" in str(faults(settings)["room"].mend)
 
+    def test_an_unreadable_anchor_is_named(self, settings: Settings) -> None:
+        settings.database_file.with_name("home.json").write_text("{")
+        assert "home.json" in faults(settings)["anchor"].sentence
+
     def test_an_old_sqlite_is_named(
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -73,14 +77,8 @@ class TestExamineHome:
 
 
 class TestExamineSurroundings:
-    def test_a_healthy_store_has_no_fault(self, store: Store, fill, make_group) -> None:
-        fill(make_group(7))
-        fresh = Store.open(store.settings)
-        assert [check.name for check in examine_surroundings(fresh) if not check.ok] == []
-        fresh.close()
-
-    def test_a_missing_anchor_is_named(self, store: Store) -> None:
-        assert not around(store)["anchor"].ok
+    def test_a_healthy_store_has_no_fault(self, there: Store) -> None:
+        assert [check.name for check in examine_surroundings(there) if not check.ok] == []
 
     def test_a_clock_behind_the_log_is_named(self, store: Store, fill, make_group) -> None:
         fill(make_group(7))

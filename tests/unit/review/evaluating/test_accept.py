@@ -12,12 +12,8 @@ from app.review.editing.replay import replay
 from app.review.editing.submit import history, load, submit, undo
 from app.review.evaluating.accept import AcceptRequest, accept, accept_box, plan_accept
 from app.review.evaluating.group_predictions import group_predictions
-from app.review.evaluating.predictions import (
-    PredictionFiles,
-    add_predictions,
-    frame_names,
-    save_predictions,
-)
+from app.review.evaluating.prediction_reader import PredictionFiles
+from app.review.evaluating.predictions import add_predictions, frame_names, save_predictions
 from app.soccer.frames import Box
 
 

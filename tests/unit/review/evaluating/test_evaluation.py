@@ -23,7 +23,8 @@ from app.review.evaluating.evaluation import (
     run_evaluation,
     tables_of,
 )
-from app.review.evaluating.predictions import PredictionFiles, add_predictions
+from app.review.evaluating.prediction_reader import PredictionFiles
+from app.review.evaluating.predictions import add_predictions
 from app.review.verdicts.verdict import set_verdict
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.store.prediction_models import (

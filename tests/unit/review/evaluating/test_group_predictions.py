@@ -9,7 +9,8 @@ from app.review.editing.edit import SetBall
 from app.review.editing.submit import load, redo, submit, undo
 from app.review.evaluating.accept import accept_box
 from app.review.evaluating.group_predictions import AcceptedBall, group_predictions
-from app.review.evaluating.predictions import PredictionFiles, add_predictions, delete_predictions
+from app.review.evaluating.prediction_reader import PredictionFiles
+from app.review.evaluating.predictions import add_predictions, delete_predictions
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 

@@ -10,8 +10,8 @@ from app.datasets.camera_json import camera_to_json
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.editing.state import read_record
 from app.review.editing.submit import load
+from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.evaluating.predictions import (
-    PredictionFiles,
     add_predictions,
     delete_predictions,
     get_predictions,

@@ -46,7 +46,7 @@ def killed_deletion(store: Store, fill, make_group, monkeypatch: pytest.MonkeyPa
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("app.review.datasets.delete._delete_calibrations", kill)
+        patch.setattr("app.review.datasets.delete.delete_spare_calibrations", kill)
         with suppress(KeyboardInterrupt):
             delete_dataset(store, "demo", confirm="demo", actor="a")
     return store
@@ -165,7 +165,7 @@ class TestUpkeep:
         # Instead of a look that takes minutes: its number would be taken for a fault.
         count = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 2000000)"
         slow = text(f"{count} SELECT CAST(count(*) AS TEXT) FROM n")
-        monkeypatch.setattr("app.store.session.text", lambda _: slow)
+        monkeypatch.setattr("app.store.soundness.text", lambda _: slow)
         there.require_whole(lambda: False)
         with pytest.raises(DamagedError):
             there.require_whole()

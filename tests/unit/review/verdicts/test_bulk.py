@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -39,6 +39,21 @@ def statuses(store: Store) -> list[str]:
 
 def verdict_of(store: Store, group: int) -> VerdictState:
     return load(store, group).verdict
+
+
+def before_write(
+    store: Store, monkeypatch: pytest.MonkeyPatch, number: int, act: Callable[[], object]
+) -> None:
+    """Let somebody else do something just before the transaction of some number begins."""
+    write, left = store.write, [number]
+
+    def somebody_else_first() -> Any:
+        left[0] -= 1
+        if left[0] == 0:
+            act()
+        return write()
+
+    monkeypatch.setattr(store, "write", somebody_else_first)
 
 
 @pytest.fixture
@@ -182,15 +197,7 @@ class TestGiveVerdicts:
     def test_others_write_between_the_chunks(self, store, ids, monkeypatch) -> None:
         """A group that somebody judges meanwhile and that matches no more is left alone."""
         monkeypatch.setattr(bulk, "CHUNK", 1)
-        write, turns = store.write, []
-
-        def somebody_else_first() -> Any:
-            turns.append(len(turns))
-            if len(turns) == 2:
-                judge(store, ids[1], "accepted", actor="ann")
-            return write()
-
-        monkeypatch.setattr(store, "write", somebody_else_first)
+        before_write(store, monkeypatch, 2, lambda: judge(store, ids[1], "accepted", actor="ann"))
         report = give_verdicts(store, 1, "status:unreviewed", "deferred", actor="ben")
         assert report.changed == 3
         assert statuses(store) == ["deferred", "accepted", "deferred", "deferred"]
@@ -231,6 +238,29 @@ class TestUndoBatch:
         assert (batch.undone_by, batch.done) == ("ben", True)
         with pytest.raises(ConflictError, match="ben has taken this batch back"):
             undo_batch(store, report.batch, actor="ann")
+
+    def test_two_who_take_it_back_at_once_do_it_once(self, store, ids, monkeypatch) -> None:
+        monkeypatch.setattr(bulk, "CHUNK", 2)
+        batch = give_verdicts(store, 1, "", "deferred", actor="ben").batch
+        before_write(store, monkeypatch, 2, lambda: undo_batch(store, batch, actor="eve"))
+        with pytest.raises(ConflictError, match="eve has taken this batch back"):
+            undo_batch(store, batch, actor="ann")
+        (found,) = list_batches(store, 1)
+        assert (found.undone_by, len(found.undo_spans)) == ("eve", 2)
+        with store.read() as session:
+            kinds = session.scalars(text("SELECT kind FROM log WHERE kind LIKE '%undo'")).all()
+            assert kinds == ["verdict_batch_undo"]
+
+    def test_a_batch_that_is_taken_back_while_it_is_given_ends_there(
+        self, store, ids, monkeypatch
+    ) -> None:
+        monkeypatch.setattr(bulk, "CHUNK", 1)
+        before_write(store, monkeypatch, 3, lambda: undo_batch(store, 1, actor="eve"))
+        with pytest.raises(ConflictError, match="have been taken back"):
+            give_verdicts(store, 1, "", "deferred", actor="ben")
+        assert set(statuses(store)) == {"unreviewed"}
+        (found,) = list_batches(store, 1)
+        assert (found.changed, found.done, found.undone_by) == (2, False, "eve")
 
     def test_an_unknown_batch_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):

@@ -40,6 +40,27 @@ def undone(store, ids) -> int:
     return batch
 
 
+def stopped_redo(store, monkeypatch) -> int:
+    """A batch of two chunks that ben was giving again when something stopped him after one."""
+    with monkeypatch.context() as patch:
+        patch.setattr(bulk, "CHUNK", 2)
+        batch = give_verdicts(store, 1, "", "rejected", "other", "blurred", actor="ben").batch
+    undo_batch(store, batch, actor="ben")
+    write, turns = store.write, []
+
+    def once() -> Any:
+        turns.append(None)
+        if len(turns) > 1:
+            raise RuntimeError("killed")
+        return write()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "write", once)
+        with pytest.raises(RuntimeError, match="killed"):
+            redo_batch(store, batch, actor="ben")
+    return batch
+
+
 class TestRedoBatch:
     def test_every_group_has_the_verdict_again_and_it_can_be_taken_back_again(
         self, store, ids, undone, monkeypatch
@@ -101,6 +122,40 @@ class TestRedoBatch:
             redo_batch(store, done.batch, actor="ben")
         with pytest.raises(NotFoundError):
             redo_batch(store, 99, actor="ben")
+
+    def test_one_that_was_stopped_is_finished_under_another_key_as_the_same_batch(
+        self, store, ids, monkeypatch
+    ) -> None:
+        batch = stopped_redo(store, monkeypatch)
+        done = redo_batch(store, batch, actor="ben")
+        assert (done.batch, done.changed, done.kept) == (batch + 1, 4, 0)
+        newest, _ = list_batches(store, 1)
+        assert (newest.changed, len(newest.spans), newest.done) == (4, 2, True)
+        assert undo_batch(store, done.batch, actor="ben").restored == 4
+
+    def test_one_that_somebody_else_has_begun_is_theirs_to_finish(
+        self, store, ids, monkeypatch
+    ) -> None:
+        batch = stopped_redo(store, monkeypatch)
+        with pytest.raises(ConflictError, match="ben has begun") as refused:
+            redo_batch(store, batch, actor="eve")
+        assert "ben" in refused.value.hint
+
+    def test_two_who_give_it_again_at_once_make_one_batch(
+        self, store, ids, undone, monkeypatch
+    ) -> None:
+        write = store.write
+
+        def somebody_else_first() -> Any:
+            monkeypatch.setattr(store, "write", write)
+            redo_batch(store, undone, actor="eve")
+            return write()
+
+        monkeypatch.setattr(store, "write", somebody_else_first)
+        with pytest.raises(ConflictError, match="given again already"):
+            redo_batch(store, undone, actor="ben")
+        newest, old = list_batches(store, 1)
+        assert (newest.actor, old.redone) == ("eve", newest.id)
 
     def test_a_batch_that_an_older_version_took_back_says_what_to_do(self, store, undone) -> None:
         with store.write() as session:

@@ -1,0 +1,106 @@
+"""Prediction reader: files of predictions, read here or in a process with limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.child import Allowance, ChildEnded
+from app.child_pool import ChildPool
+from app.config import Settings
+from app.datasets.archive import Limits
+from app.errors import TooLargeError
+from app.evaluation.frame_names import FrameNames
+from app.evaluation.prediction_files import (
+    ReadPredictedCameras,
+    read_predicted_cameras,
+    read_predictions,
+)
+from app.evaluation.prediction_run import ReadPredictions
+from app.soccer.frames import ImageSize
+
+SECONDS, SILENCE = 120.0, 300.0
+"""Of processor time, and by the clock, for one set: five million boxes take less."""
+WAITING = 2
+"""Sets that may wait while one is read; one more is told to come back."""
+LIMITS_HINT = (
+    "Bring the predictions in parts, have the operator raise TOUCHLINE_IMPORT_MEMORY, or use the "
+    "command line (touchline evaluate), which has no limits. Nothing was kept."
+)
+
+
+@dataclass(frozen=True)
+class PredictionFiles:
+    """Files of predictions, and how to read them.
+
+    Attributes:
+        path: File, folder or zip of ball boxes, or None.
+        format: ``coco``, ``yolo`` or ``csv``.
+        images: The COCO document that numbers in ``coco`` results refer to, or None.
+        cameras: Folder or zip of SoccerNet camera JSON, or None.
+        category: The class that is the ball, where the file has several.
+        size: Size of the images that boxes in pixels refer to, where that is not the annotated.
+        cameras_size: The same for the cameras.
+    """
+
+    path: Path | None
+    format: str = "coco"
+    images: Path | None = None
+    cameras: Path | None = None
+    category: int | None = None
+    size: ImageSize | None = None
+    cameras_size: ImageSize | None = None
+
+
+Found = tuple[ReadPredictions, ReadPredictedCameras]
+Read = Callable[[PredictionFiles, FrameNames, Limits], Found]
+"""Reads files, wherever that happens."""
+
+
+def read_files(files: PredictionFiles, names: FrameNames, limits: Limits) -> Found:
+    """Boxes and cameras of files, by the frames of a dataset."""
+    boxes, cameras = ReadPredictions(), ReadPredictedCameras()
+    if files.path is not None:
+        boxes = read_predictions(
+            files.path,
+            files.format,
+            names,
+            category=files.category,
+            size=files.size,
+            images=files.images,
+            limits=limits,
+        )
+    if files.cameras is not None:
+        cameras = read_predicted_cameras(
+            files.cameras, names, size=files.cameras_size, limits=limits
+        )
+    return boxes, cameras
+
+
+class PredictionReader:
+    """Reads files of somebody else in a process of its own, one set at a time."""
+
+    def __init__(self, settings: Settings):
+        allowance = Allowance(settings.import_memory, SECONDS, SILENCE)
+        self._pool = ChildPool(allowance, 1, WAITING, "sets of predictions")
+
+    def read(self, files: PredictionFiles, names: FrameNames, limits: Limits) -> Found:
+        """``read_files``, within limits.
+
+        Raises:
+            TooLargeError: It went beyond the limits, or made the process crash.
+            OverloadedError: Too many wait.
+        """
+        first = files.path or files.cameras
+
+        def explain(error: ChildEnded) -> TooLargeError:
+            return TooLargeError(f"{first.name if first else ''} {error}", hint=LIMITS_HINT)
+
+        task = self._pool.submit(read_files, files, names, limits, explain=explain)
+        found: Found = task.future.result()
+        return found
+
+    def close(self) -> None:
+        """End the process."""
+        self._pool.close()

@@ -1,0 +1,69 @@
+"""Predictions of somebody else are read as here, and within limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.config import Settings
+from app.datasets.archive import Limits
+from app.errors import DatasetFormatError, OverloadedError, TooLargeError
+from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.review.evaluating import prediction_reader
+from app.review.evaluating.prediction_reader import PredictionFiles, PredictionReader, read_files
+from app.soccer.frames import ImageSize
+
+NAMES = FrameNames.of([NamedFrame(1, "demo/7", "7.png", "demo", ImageSize(1280, 720))])
+
+
+@pytest.fixture
+def reader_of() -> Iterator[Callable[..., PredictionReader]]:
+    made: list[PredictionReader] = []
+
+    def make(**values: Any) -> PredictionReader:
+        made.append(PredictionReader(Settings(**values)))
+        return made[-1]
+
+    yield make
+    for reader in made:
+        reader.close()
+
+
+def written(path: Path, content: bytes) -> PredictionFiles:
+    path.write_bytes(content)
+    return PredictionFiles(path)
+
+
+class TestPredictionReader:
+    def test_reads_and_refuses_what_is_read_and_refused_here(self, reader_of, tmp_path) -> None:
+        reader, limits = reader_of(), Limits.of(Settings())
+        box = b'{"category_id": 1, "bbox": [600, 300, 14, 14], "score": 0.5, "image_id": "%s"}'
+        files = written(tmp_path / "a.json", b"[%s, %s]" % (box % b"7.png", box % b"9.png"))
+        assert reader.read(files, NAMES, limits) == read_files(files, NAMES, limits)
+        broken = written(tmp_path / "b.json", b'[{"image_id"')
+        with pytest.raises(DatasetFormatError) as there:
+            reader.read(broken, NAMES, limits)
+        with pytest.raises(DatasetFormatError) as here:
+            read_files(broken, NAMES, limits)
+        assert (there.value.message, there.value.hint) == (here.value.message, here.value.hint)
+
+    def test_what_needs_too_much_memory_is_refused_and_the_next_is_read(
+        self, reader_of, tmp_path
+    ) -> None:
+        reader, limits = reader_of(import_memory=300 * 2**20), Limits.of(Settings())
+        heavy = written(tmp_path / "heavy.json", b"[%s{}]" % (b"{}," * 8_000_000))
+        with pytest.raises(TooLargeError, match=r"heavy\.json needs more than 300 MiB") as refused:
+            reader.read(heavy, NAMES, limits)
+        assert "in parts" in refused.value.hint
+        empty = written(tmp_path / "empty.json", b"[]")
+        assert reader.read(empty, NAMES, limits)[0].boxes == 0
+
+    def test_one_more_than_may_wait_is_told_to_come_back(
+        self, reader_of, tmp_path, monkeypatch
+    ) -> None:
+        monkeypatch.setattr(prediction_reader, "WAITING", -1)
+        with pytest.raises(OverloadedError, match="sets of predictions"):
+            reader_of().read(written(tmp_path / "a.json", b"[]"), NAMES, Limits.of(Settings()))

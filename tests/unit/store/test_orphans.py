@@ -1,0 +1,48 @@
+from __future__ import annotations
+
+import pytest
+from sqlalchemy import insert, text
+
+from app.store.models import CalibrationModel, SolutionModel
+from app.store.orphans import delete_calibrations, spare_calibrations
+from app.store.removal import delete_solutions, solutions_of
+from app.store.session import Store
+from app.store.solutions import known_calibrations
+
+KEYS = ("a", "b", "c")
+
+
+@pytest.fixture
+def solved(filled: Store) -> Store:
+    """The group 1 with two solutions that share the calibration "b"."""
+    with filled.write() as session:
+        session.execute(insert(CalibrationModel), [{"key": key, "body": b""} for key in KEYS])
+        for place, names in enumerate(('["a", "b"]', '["b", "c"]'), 1):
+            values = {"id": place, "group_id": 1, "inputs_hash": str(place), "policy_hash": "p"}
+            values |= {"solver_version": "s", "calibrations": names, "summary": "{}", "body": b""}
+            session.execute(insert(SolutionModel), [values])
+        session.execute(text("UPDATE queue SET solved = 1"))
+    return filled
+
+
+class TestSpareCalibrations:
+    def test_a_calibration_stays_while_a_solution_names_it(self, solved: Store) -> None:
+        with solved.write() as session:
+            assert spare_calibrations(session) == []
+            assert (solutions_of(session, 1), solutions_of(session, 2)) == ([1, 2], [])
+            delete_solutions(session, [1])
+            assert spare_calibrations(session) == ["a"]
+            assert delete_calibrations(session, KEYS[:2]) == 1
+            assert known_calibrations(session, KEYS) == {"b", "c"}
+
+    def test_only_those_that_were_found_go(self, solved: Store) -> None:
+        with solved.write() as session:
+            delete_solutions(session, [1, 2])
+            assert delete_calibrations(session, KEYS[:2]) == 2
+            assert known_calibrations(session, KEYS) == {"c"}
+
+    def test_they_stay_while_a_group_waits_to_be_solved(self, solved: Store) -> None:
+        with solved.write() as session:
+            delete_solutions(session, [1, 2])
+            session.execute(text("UPDATE queue SET solved = 0"))
+            assert (spare_calibrations(session), delete_calibrations(session, KEYS)) == ([], 0)
