@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections.abc import Sequence
@@ -12,6 +11,7 @@ from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.config import Settings
+from app.finite import json_text
 from app.store.leftovers import DAY, last_written
 from app.store.models import QueueModel, ViewModel
 from app.store.uploads import list_uploads
@@ -40,7 +40,7 @@ def delete_calibrations(session: Session, keys: Sequence[str]) -> int:
     """
     if _has_unsolved(session):
         return 0
-    return len(session.scalars(_DELETE, {"keys": json.dumps(keys)}).all())
+    return len(session.scalars(_DELETE, {"keys": json_text(keys)}).all())
 
 
 def _has_unsolved(session: Session) -> bool:

@@ -80,7 +80,7 @@ def count(last: int, tell: Callable[[int], None]) -> str:
 
 @pytest.fixture(scope="module")
 def child() -> Iterator[Child]:
-    made = Child(Allowance(memory=300 * MEBI, processor=1.0, silence=5.0))
+    made = Child(Allowance(memory=300 * MEBI, processor=1.0, silence=60.0))
     yield made
     made.close()
 

@@ -30,14 +30,14 @@ PLAIN_WORDS = """
     folder folders form format formats frozen gestures glossary grid guess guide header headers
     heads health heat help histograms history hit home hooks idempotency identity if image images
     import imports in info init insight items jaccard json key keys known konva last latest lazy
-    least legend lesson lessons letter licence limits list listing live locks look loupe main map
-    markdown marks match matrix meant membership menu merge metrics migrate mini missing model
-    models modules name names navigation neighbours nested notice nudge numbers object observability
-    onnx open openapi opened options order origin orphans output overlap page pages paint palette
-    panel parquet parse parts patch pen pins pitch pixel place places png pointer policies pool
-    popover pose preview problem progress projection props query rail reader reasons recompute
-    record remedies removal render reply report requests resect resource restore result revert
-    reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
+    least leftovers legend lesson lessons letter licence limits list listing live locks look loupe
+    main map markdown marks match matrix meant membership menu merge metrics migrate mini missing
+    model models modules name names navigation neighbours nested notice nudge numbers object
+    observability onnx open openapi opened options order origin orphans output overlap page pages
+    paint palette panel parquet parse parts patch pen pins pitch pixel place places png pointer
+    policies pool popover pose preview problem progress projection props query rail reader reasons
+    recompute record remedies removal render reply report requests resect resource restore result
+    revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows shared sheet singular site smallest solve
     solving soundness source sources sphere spill spread squares stage staging standpoints starts
     state statistics steps storage store stream submit summary surface swap tab table tables term

@@ -133,6 +133,8 @@ def empty(only_store: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def store(only_store: Store, empty: Path) -> Store:
     """An empty database: a real file, put back before each test."""
     _copy(empty, only_store.settings.home / "touchline.db")
+    # What an earlier test saw is not true of this database.
+    only_store._damage = None
     return only_store
 
 

@@ -49,6 +49,12 @@ def tree(tmp_path: Path, make_group: Callable[..., Group]) -> Path:
     return root
 
 
+@pytest.fixture
+def store(there: Store) -> Store:
+    """An installation of its own: the child opens it, and looks at its files first."""
+    return there
+
+
 def meet_damage(*_: object) -> None:
     raise DamagedError("touchline.db is damaged", hint="Restore it.")
 
