@@ -7,8 +7,13 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
+from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.pitch import Pitch
+from app.solving.jaccard import camera_jaccard, project_markings
 from app.store.session import Store
+from tests.cameras import looking
 from tests.paper.page import page
+from tests.paper.printed_jac import printed_jaccard
 from tests.paper.study import Study, run_study
 
 
@@ -64,3 +69,25 @@ class TestPage:
         heads = [line for line in page(study).splitlines() if line.startswith("#")]
         written = committed.read_text(encoding="utf-8").splitlines()
         assert [line for line in written if line.startswith("#")] == heads
+
+    def test_says_where_real_files_were_missing(self, study) -> None:
+        assert "ISSIA's files were not there" in page(study)
+        assert "The paper's text asks the other way" in page(study)
+
+
+class TestPrintedJac:
+    """A camera that fits, and a marking of which one half alone was clicked."""
+
+    def test_asks_for_what_nobody_clicked(self) -> None:
+        size, pitch = ImageSize(1280, 720), Pitch()
+        camera = looking((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), 900.0)
+        whole = {
+            marking: tuple(ImagePoint(*point) for point in polyline.tolist())
+            for marking, polyline in project_markings(camera, pitch, size).items()
+        }
+        half = whole["Middle line"]
+        clicked = {**whole, "Middle line": half[: len(half) // 2]}
+        assert printed_jaccard(camera, whole, pitch, size, 5.0) == 1.0
+        public = camera_jaccard(camera, clicked, pitch, size, (5.0,))[0]
+        assert public == 1.0
+        assert printed_jaccard(camera, clicked, pitch, size, 5.0) < 1.0

@@ -13,8 +13,10 @@ from app.config import Settings
 from app.evaluation.evaluate import Evaluation
 from app.evaluation.figure_png import figure_png
 from app.store.session import Store
+from tests.paper.issia import run_issia
 from tests.paper.page import page
-from tests.paper.study import run_study
+from tests.paper.printed_jac import both_directions
+from tests.paper.study import SEED, run_study
 
 DOCS = Path(__file__).parents[2] / "docs"
 FIGURES = {
@@ -29,9 +31,10 @@ def main() -> None:
         store = Store.open(Settings(home=Path(folder)))
         try:
             study = run_study(store)
+            issia = run_issia(store, SEED)
         finally:
             store.close()
-    (DOCS / "reproduction.md").write_text(page(study), encoding="utf-8")
+    (DOCS / "reproduction.md").write_text(page(study, issia, both_directions()), encoding="utf-8")
     for name, file in FIGURES.items():
         (DOCS / "images" / file).write_bytes(_drawn(study.opt, name))
     sys.stdout.write(f"{DOCS / 'reproduction.md'} is written\n")
