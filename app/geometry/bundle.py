@@ -122,12 +122,12 @@ def nearest_points(parameters: FloatArray, rays: Rays) -> FloatArray:
         mine = rays.camera == row
         camera = camera_from_parameters(parameters[row], (0.0, 0.0), rays.half_diagonals[row])
         towards = camera.rays(rays.pixels[mine])
-        towards = towards / np.sqrt((towards**2).sum(axis=1, keepdims=True))
+        towards /= np.linalg.norm(towards, axis=1, keepdims=True)
         across = np.eye(3) - towards[:, :, None] * towards[:, None, :]
         np.add.at(normal, rays.point[mine], across)
         np.add.at(pull, rays.point[mine], across @ camera.position)
-    points: FloatArray = np.linalg.solve(normal + _TINY * np.eye(3), pull[..., None])[..., 0]
-    return points
+    points = np.linalg.solve(normal + _TINY * np.eye(3), pull[..., None])[..., 0]
+    return np.asarray(points, dtype=np.float64)
 
 
 def best_points(parameters: FloatArray, rays: Rays, scale: float) -> FloatArray:
@@ -185,7 +185,9 @@ def bundle_equations(
     mixed = coupling.reshape(rays.points, 3, size)
     carried = np.linalg.solve(of_points, mixed)
     reduced = information.reshape(size, size) - np.tensordot(mixed, carried, ((0, 1), (0, 1)))
-    cost = float((scale**2 * (1 / weights - 1)).sum())
+    squares = (at.residuals**2).sum(axis=1)
+    # scale^2 (sqrt(1 + squares / scale^2) - 1), which is squares / 2 where scale is infinite.
+    cost = float((squares * weights / (1 + weights)).sum())
     return cost, gradient.ravel(), (reduced + reduced.T) / 2
 
 

@@ -1,0 +1,262 @@
+"""Rig proposal: adjusted cameras beside those in use, with what judges them.
+
+The judge is held out: cameras are adjusted to every other block of time and measured on the
+blocks between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+from app.geometry.bundle import best_points, ray_gaps
+from app.geometry.camera import Camera
+from app.geometry.resection import X, Z, projection_jacobians
+from app.soccer.pitch import Pitch
+from app.soccer.policy import Policy
+from app.solving.rig import (
+    Rig,
+    RigCamera,
+    RigFit,
+    RigFrame,
+    adjust,
+    grass_in_view,
+    line_distances,
+    make_rig,
+)
+
+BLOCK = 50
+"""Frames in a block of time: two seconds at 25 frames a second."""
+MIN_OFFSET_FRAMES = 50
+"""Instants with a moving ball that a time offset of two cameras needs."""
+MAX_SIGMAS = 4.0
+"""A ball farther off is another ball; it says nothing about time."""
+
+
+@dataclass(frozen=True)
+class CameraChange:
+    """A camera of a rig before and after.
+
+    Attributes:
+        key: Of its station.
+        before: The camera in use.
+        after: The adjusted camera.
+        covariance: Of the adjusted camera's parameters, 8 x 8, row by row.
+        covariance_before: The same for the camera in use: what is unknown of the adjusted one,
+            and how far that one lies from it.
+        moved_m: How far its position moves.
+        turned_degrees: How far it turns.
+        focal_percent: How much longer its focal length becomes.
+        picture_px: How far the grass moves in its picture, in the median.
+        position_sigma_m: Of the adjusted position, all axes together.
+        picture_sigma_px: How well the grass is known in the adjusted picture, in the median.
+        lines_before_px: Median distance of the annotated lines; None without any.
+        lines_after_px: The same with the adjusted camera.
+    """
+
+    key: str
+    before: Camera
+    after: Camera
+    covariance: tuple[float, ...]
+    covariance_before: tuple[float, ...]
+    moved_m: float
+    turned_degrees: float
+    focal_percent: float
+    picture_px: float
+    position_sigma_m: float
+    picture_sigma_px: float
+    lines_before_px: float | None
+    lines_after_px: float | None
+
+
+@dataclass(frozen=True)
+class PairChange:
+    """Two cameras of a rig: how far their rays to one ball pass each other, before and after.
+
+    Attributes:
+        a: Key of the one; ``b`` of the other.
+        frames: Instants in which both show the ball.
+        before_px: Median gap of the rays, both reprojection errors added.
+        after_px: The same with the adjusted cameras.
+        held_out: Instants in blocks of time that the judged cameras were not adjusted to.
+        held_out_before_px: Median gap there; None without any.
+        held_out_after_px: The same with cameras that never saw those instants.
+        offset_frames: How much later camera b shows the same instant; None where too few balls
+            move.
+        offset_sigma_frames: Standard deviation of that.
+    """
+
+    a: str
+    b: str
+    frames: int
+    before_px: float
+    after_px: float
+    held_out: int
+    held_out_before_px: float | None
+    held_out_after_px: float | None
+    offset_frames: float | None
+    offset_sigma_frames: float | None
+
+
+@dataclass(frozen=True)
+class RigProposal:
+    """Adjusted cameras, for a person to accept or not.
+
+    Attributes:
+        cameras: Those that share enough balls.
+        pairs: Every two of them that show one ball together.
+        left_alone: Keys of cameras that share too few balls, or have no calibration.
+        frames: Instants that the cameras were adjusted to.
+        gross: Instants that were left out, because their rays pass each other by more than tau.
+        ball_sigma_px: Noise of a ball's click at 1920 x 1080, never below the policy's.
+        line_points: Annotated points of lines that hold the rig in its place.
+        ball_moved_m: How far balls move, in the median; ``ball_moved_p95_m`` 95 % of them less.
+    """
+
+    cameras: tuple[CameraChange, ...]
+    pairs: tuple[PairChange, ...]
+    left_alone: tuple[str, ...]
+    frames: int
+    gross: int
+    ball_sigma_px: float
+    line_points: int
+    ball_moved_m: float
+    ball_moved_p95_m: float
+
+
+def propose_rig(
+    cameras: Sequence[RigCamera], frames: Sequence[RigFrame], pitch: Pitch, policy: Policy
+) -> RigProposal:
+    """Adjust a rig to all its instants, and judge it by an adjustment to half of them.
+
+    Raises:
+        InputError: Too few cameras share balls, or one has a lens that cannot be adjusted.
+    """
+    rig, gross = make_rig(cameras, frames, pitch, policy)
+    odd = rig.times // BLOCK % 2 == 1
+    fit = adjust(rig)
+    halved = adjust(rig.only(~odd)) if odd.any() and not odd.all() else None
+    moved = np.linalg.norm(
+        best_points(fit.parameters, rig.rays, np.inf) - best_points(rig.start, rig.rays, np.inf),
+        axis=1,
+    )
+    used = {camera.key for camera in rig.cameras}
+    return RigProposal(
+        cameras=tuple(_camera_change(rig, fit, row) for row in range(len(rig.cameras))),
+        pairs=tuple(_pair_changes(rig, fit, halved, odd)),
+        left_alone=tuple(camera.key for camera in cameras if camera.key not in used),
+        frames=rig.rays.points,
+        gross=gross,
+        ball_sigma_px=fit.ball_sigma * policy.click_sigma_px,
+        line_points=sum(len(item) for camera in rig.cameras for item in camera.lines.values()),
+        ball_moved_m=float(np.median(moved)),
+        ball_moved_p95_m=float(np.percentile(moved, 95)),
+    )
+
+
+def _camera_change(rig: Rig, fit: RigFit, row: int) -> CameraChange:
+    camera, parameters, spread = rig.cameras[row], fit.parameters[row], fit.covariance_of(row)
+    after, step = camera.with_parameters(parameters), rig.start[row] - parameters
+    turn = after.rotation @ camera.camera.rotation.T
+    grass = grass_in_view(camera)
+    moved = after.project(grass) - camera.camera.project(grass)
+    rows = np.repeat(parameters[None], len(grass), axis=0)
+    slopes = projection_jacobians(rows, grass, np.full(len(grass), camera.half_diagonal))
+    variances = np.trace(slopes @ spread @ slopes.transpose(0, 2, 1), axis1=1, axis2=2)
+    lines = any(camera.lines.values())
+    return CameraChange(
+        key=camera.key,
+        before=camera.camera,
+        after=after,
+        covariance=tuple(spread.ravel().tolist()),
+        covariance_before=tuple((spread + np.outer(step, step)).ravel().tolist()),
+        moved_m=float(np.linalg.norm(after.position - camera.camera.position)),
+        turned_degrees=float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))),
+        focal_percent=100 * (after.focal_length[0] / camera.camera.focal_length[0] - 1),
+        picture_px=_median(np.hypot(*moved.T)) or 0.0,
+        position_sigma_m=float(np.sqrt(np.trace(spread[X : Z + 1, X : Z + 1]))),
+        picture_sigma_px=_median(np.sqrt(variances)) or 0.0,
+        lines_before_px=_median(line_distances(camera, rig.start[row], rig.pitch))
+        if lines
+        else None,
+        lines_after_px=_median(line_distances(camera, parameters, rig.pitch)) if lines else None,
+    )
+
+
+def _pair_changes(
+    rig: Rig, fit: RigFit, halved: RigFit | None, odd: FloatArray
+) -> list[PairChange]:
+    pairs = []
+    for a, b in combinations(range(len(rig.cameras)), 2):
+        rays, rows = rig.rays.of_cameras(a, b)
+        if len(rows) == 0:
+            continue
+        before, after = ray_gaps(rig.start, rays)[0], ray_gaps(fit.parameters, rays)[0]
+        out = odd[rows] if halved is not None else np.zeros(len(rows), bool)
+        unseen = None if halved is None else ray_gaps(halved.parameters, rays)[0]
+        offset = time_offset(rig, fit, a, b)
+        pairs.append(
+            PairChange(
+                a=rig.cameras[a].key,
+                b=rig.cameras[b].key,
+                frames=len(rows),
+                before_px=float(np.median(before)),
+                after_px=float(np.median(after)),
+                held_out=int(out.sum()),
+                held_out_before_px=_median(before[out]),
+                held_out_after_px=None if unseen is None else _median(unseen[out]),
+                offset_frames=None if offset is None else offset[0],
+                offset_sigma_frames=None if offset is None else offset[1],
+            )
+        )
+    return pairs
+
+
+def time_offset(rig: Rig, fit: RigFit, a: int, b: int) -> tuple[float, float] | None:
+    """How many frames later camera b shows the same instant than camera a, and its sigma.
+
+    A ball that moves is then seen in b where it is a little later, so that the rays pass each
+    other in proportion to its speed. The sigma is that of blocks of time, because the gaps of
+    neighbouring frames are alike.
+
+    Returns:
+        None where too few instants show a ball before and after.
+    """
+    rays, rows = rig.rays.of_cameras(a, b)
+    times = rig.times[rows]
+    order = {time: place for place, time in enumerate(times.tolist())}
+    around = [
+        (place, order[time - 1], order[time + 1])
+        for time, place in order.items()
+        if time - 1 in order and time + 1 in order
+    ]
+    if len(around) < MIN_OFFSET_FRAMES:
+        return None
+    here, earlier, later = np.array(around).T
+    _, gaps, free = ray_gaps(fit.parameters, rays)
+    in_b = np.argsort(rays.point, kind="stable").reshape(-1, 2)
+    second = np.where(rays.camera[in_b] == b, 1, 0).argmax(axis=1)
+    row = in_b[np.arange(len(in_b)), second]
+    pixels = rays.pixels[row]
+    speed = (pixels[later] - pixels[earlier]) / 2 / rays.sigma[row][here, None]
+    along = free.reshape(-1, 2, 2)[here, second[here]]
+    # Residuals are projected less measured: a later picture lowers them.
+    slope, gap = -(along * speed).sum(axis=1), gaps[here]
+    sound = np.abs(gap - np.median(gap)) < MAX_SIGMAS
+    slope, gap, block = slope[sound], gap[sound], times[here][sound] // BLOCK
+    slope, gap = slope - slope.mean(), gap - gap.mean()
+    power = float((slope**2).sum())
+    if not power > 0:
+        return None
+    offset = float((slope * gap).sum()) / power
+    _, blocks = np.unique(block, return_inverse=True)
+    pulls = np.bincount(blocks, slope * (gap - offset * slope))
+    return offset, float(np.sqrt((pulls**2).sum())) / power
+
+
+def _median(values: FloatArray) -> float | None:
+    return float(np.median(values)) if len(values) else None

@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from app.soccer.frames import ImagePoint
+from app.soccer.pitch import Pitch
+from app.soccer.policy import PAPER
+from app.solving.rig import RigFrame
+from app.solving.rig_proposal import BLOCK, propose_rig
+from tests.rigs import GIVEN, TRUTH, cameras, frames
+
+
+@pytest.fixture(scope="module")
+def proposal():
+    return propose_rig(cameras(), frames(), Pitch(), PAPER)
+
+
+def pair(proposal, a="cam1", b="cam2"):
+    return next(item for item in proposal.pairs if (item.a, item.b) == (a, b))
+
+
+class TestProposeRig:
+    def test_cameras_that_never_saw_an_instant_agree_in_it(self, proposal):
+        found = pair(proposal)
+        assert found.held_out > 25
+        assert found.held_out_before_px > 3.0
+        assert found.held_out_after_px < 1.0
+
+    def test_what_is_held_out_was_not_adjusted_to(self):
+        seen = frames()
+        for place, frame in enumerate(seen):
+            if frame.time // BLOCK % 2 and "cam2" in frame.balls:
+                x, y = frame.balls["cam2"]
+                bumped = {**frame.balls, "cam2": ImagePoint(x + 6.0, y)}
+                seen[place] = RigFrame(frame.time, bumped)
+        found = pair(propose_rig(cameras(), seen, Pitch(), PAPER))
+        assert found.held_out_after_px > found.after_px + 1.0
+
+    def test_says_how_far_each_camera_moves(self, proposal):
+        for change in proposal.cameras:
+            true, given = TRUTH[change.key], GIVEN[change.key]
+            assert change.before == given
+            assert change.moved_m == pytest.approx(
+                np.linalg.norm(change.after.position - given.position)
+            )
+            assert change.picture_px > 2.0
+            assert change.lines_after_px < change.lines_before_px
+            apart = np.linalg.norm(change.after.position - true.position)
+            assert apart < 4 * change.position_sigma_m
+
+    def test_how_far_the_camera_in_use_may_be_off_covers_the_truth(self, proposal):
+        for change in proposal.cameras:
+            sure = np.reshape(change.covariance, (8, 8))
+            wide = np.reshape(change.covariance_before, (8, 8))
+            assert np.linalg.eigvalsh(wide - sure)[0] > -1e-9
+            off = GIVEN[change.key].position - TRUTH[change.key].position
+            assert (np.abs(off) < 3 * np.sqrt(np.diag(wide)[3:6])).all()
+
+    def test_cameras_of_one_time_are_not_late(self, proposal):
+        found = pair(proposal)
+        assert abs(found.offset_frames) < 4 * max(found.offset_sigma_frames, 0.005)
+        assert found.offset_sigma_frames < 0.05
+
+    def test_a_camera_that_is_ahead_is_seen(self):
+        found = pair(propose_rig(cameras(), frames(late={"cam2": 0.4}), Pitch(), PAPER))
+        assert found.offset_frames == pytest.approx(0.4, abs=0.12)
+        assert found.offset_frames > 4 * found.offset_sigma_frames
+
+    def test_nothing_can_be_held_out_of_one_block(self):
+        found = pair(propose_rig(cameras(), frames(45), Pitch(), PAPER))
+        assert (found.held_out, found.held_out_after_px) == (0, None)
