@@ -36,7 +36,7 @@ def camera_sigma(calibration: Calibration) -> CameraSigma | None:
     together: both follow to first order.
 
     Returns:
-        None for a given camera, and where the lines leave a combination open.
+        None for a given camera of which nothing more is known, and where the lines leave a combination open.
 
     Example:
         Of a parameter log f with sigma 0.01, a focal length of 2000 px has a sigma of 20 px.

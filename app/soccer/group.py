@@ -21,6 +21,8 @@ class Station:
         key: Unique in the dataset, ``cam3`` or the key of its only view.
         given: Calibration that came with the data, or None.
         calibration: Which one counts when both exist: ``given`` or ``lines``.
+        given_covariance: Of the given camera's parameters (``geometry.resection``), 8 x 8, row by
+            row; None where nothing is known of it.
     """
 
     key: str
@@ -31,6 +33,23 @@ class Station:
     calibration: str = "given"
     flipped: bool = False
     """The frames of this camera are mirrored; annotations and calibration are not."""
+    given_covariance: tuple[float, ...] | None = None
+
+    def with_said(self, other: Station) -> Station:
+        """This station with the lines and the camera that people or datasets gave another."""
+        return replace(
+            self,
+            lines=other.lines,
+            given=other.given,
+            given_covariance=other.given_covariance,
+            calibration=other.calibration,
+        )
+
+    def with_given(
+        self, given: Camera | None, covariance: tuple[float, ...] | None = None
+    ) -> Station:
+        """This station with another given camera; what was known of the old one is not of it."""
+        return replace(self, given=given, given_covariance=covariance)
 
 
 @dataclass(frozen=True)

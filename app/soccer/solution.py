@@ -103,8 +103,8 @@ class Calibration:
         jac: JaC for each of ``GAMMAS_PERCENT``; None when there are no lines to measure it.
         error_px: Median distance of the annotated points, pixels.
         covariance: Of pan, tilt, roll, position, log focal length and kappa (see
-            ``geometry.resection``), 8 x 8, row by row; None for a given camera, or where the
-            lines leave a combination open.
+            ``geometry.resection``), 8 x 8, row by row; None for a given camera of which
+            nothing more is known, or where the lines leave a combination open.
         unobservable: Parameters that the lines do not determine, in words.
     """
 

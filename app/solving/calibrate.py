@@ -72,7 +72,8 @@ def calibrate(
 def calibrate_station(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> Calibration:
     """Calibration of a station: the given camera where that counts, else from its lines."""
     if station.given is not None and station.calibration == "given":
-        return measure(Calibration("given", station.given), station.lines, pitch, station.size)
+        given = Calibration("given", station.given, covariance=station.given_covariance)
+        return measure(given, station.lines, pitch, station.size)
     return calibrate(station.lines, pitch, station.size, policy)
 
 
@@ -114,6 +115,8 @@ def calibration_key(station: Station, pitch: Pitch, policy: CalibrationPolicy) -
     parts.append([(marking, station.lines[marking]) for marking in sorted(station.lines)])
     if station.given is not None and station.calibration == "given":
         parts.append(station.given.parameters.tolist())
+        if station.given_covariance is not None:
+            parts.append(station.given_covariance)
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 
 

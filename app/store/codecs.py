@@ -6,8 +6,9 @@ Floats go through ``repr`` and come back the same bits. Nothing here knows the d
 from __future__ import annotations
 
 import json
+import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -140,8 +141,39 @@ def camera_from_json(value: Mapping[str, Any]) -> Camera:
     )
 
 
+def covariance_to_json(covariance: Sequence[float] | None) -> Json:
+    """64 numbers, or None."""
+    return None if covariance is None else [*map(float, covariance)]
+
+
+def covariance_from_json(value: Sequence[float] | None) -> tuple[float, ...] | None:
+    """Back from ``covariance_to_json``."""
+    if value is None:
+        return None
+    covariance = tuple(map(float, value))
+    if len(covariance) != 64 or not all(map(math.isfinite, covariance)):
+        raise ValueError("the covariance of a camera is 64 numbers")
+    return covariance
+
+
+def given_to_json(station: Station) -> Json:
+    """The given camera of a station, with its covariance where there is one; or None."""
+    if station.given is None:
+        return None
+    return {**camera_to_json(station.given), **_known_covariance(station, "covariance")}
+
+
+def _known_covariance(station: Station, name: str) -> dict[str, Json]:
+    covariance = covariance_to_json(station.given_covariance)
+    return {} if covariance is None else {name: covariance}
+
+
 def station_to_json(station: Station) -> Json:
-    """A station with everything that was said about it."""
+    """A station with everything that was said about it.
+
+    ``given_covariance`` stands there only where it is known, so that digests of all other
+    stations are what they always were.
+    """
     return {
         "key": station.key,
         "size": [station.size.width, station.size.height],
@@ -150,6 +182,7 @@ def station_to_json(station: Station) -> Json:
         "given": None if station.given is None else camera_to_json(station.given),
         "calibration": station.calibration,
         "flipped": station.flipped,
+        **_known_covariance(station, "given_covariance"),
     }
 
 
@@ -164,6 +197,7 @@ def station_from_json(value: Mapping[str, Any]) -> Station:
         given=None if given is None else camera_from_json(given),
         calibration=value["calibration"],
         flipped=value["flipped"],
+        given_covariance=covariance_from_json(value.get("given_covariance")),
     )
 
 

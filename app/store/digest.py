@@ -25,7 +25,10 @@ def digest(value: Json) -> str:
 def station_digest(station: Station) -> str:
     """Digest of size, lines, given camera and which of the two counts."""
     value = station_to_json(station)
-    return digest([value["size"], value["lines"], value["given"], value["calibration"]])
+    parts = [value["size"], value["lines"], value["given"], value["calibration"]]
+    if station.given_covariance is not None:
+        parts.append(value["given_covariance"])
+    return digest(parts)
 
 
 def view_digest(view: View) -> str:

@@ -19,7 +19,7 @@ from app.store.view_models import UsedIdModel
 
 def station_values(station: Station) -> dict[str, Any]:
     """Columns of a station that follow from its value."""
-    given = station.given
+    given = codecs.given_to_json(station)
     return {
         "key": station.key,
         "shared": station.shared,
@@ -28,7 +28,7 @@ def station_values(station: Station) -> dict[str, Any]:
         "flipped": station.flipped,
         "calibration": station.calibration,
         "lines": codecs.canonical(codecs.lines_to_json(station.lines)),
-        "given": None if given is None else codecs.canonical(codecs.camera_to_json(given)),
+        "given": None if given is None else codecs.canonical(given),
         "digest": station_digest(station),
     }
 

@@ -220,6 +220,7 @@ def stored_station(row: Any) -> StoredStation:
         given=None if row.given is None else _camera(row.given),
         calibration=row.calibration,
         flipped=row.flipped,
+        given_covariance=None if row.given is None else _covariance(row.given),
     )
     return StoredStation(
         row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
@@ -245,6 +246,11 @@ def _lines(text: str) -> Lines:
 @lru_cache(maxsize=1024)
 def _camera(text: str) -> Camera:
     return codecs.camera_from_json(codecs.parse(text))
+
+
+@lru_cache(maxsize=1024)
+def _covariance(text: str) -> tuple[float, ...] | None:
+    return codecs.covariance_from_json(codecs.parse(text).get("covariance"))
 
 
 def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:

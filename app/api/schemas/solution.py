@@ -107,7 +107,7 @@ class CalibrationDocument(Document):
     source: str = Field(description="`given` or `lines`.")
     camera: Annotated[CameraDocument, BeforeValidator(_camera)] | None
     sigma: CameraSigmaDocument | None = Field(
-        description="How well the lines determine the camera; null for a given one."
+        description="How well the camera is known; null for a given one of which nothing more is known."
     )
     reason: str | None = Field(description="Why there is no camera.")
     jac: Jac | None = Field(

@@ -14,11 +14,20 @@ from app.review.editing.edit import (
     SetCalibrationSource,
     SetLines,
     SetStationCalibration,
+    SetStationCamera,
     SetStationLines,
     StationEdit,
 )
 from app.soccer.frames import ImagePoint
-from app.store.codecs import Json, ball_from_json, ball_to_json
+from app.store.codecs import (
+    Json,
+    ball_from_json,
+    ball_to_json,
+    camera_from_json,
+    camera_to_json,
+    covariance_from_json,
+    covariance_to_json,
+)
 
 
 def edit_to_json(edit: Edit | StationEdit) -> Json:
@@ -40,6 +49,13 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
             return {"edit": "set_station_lines", "lines": _lines_to_json(lines)}
         case SetStationCalibration(calibration):
             return {"edit": "set_station_calibration", "calibration": calibration}
+        case SetStationCamera(given, covariance, calibration):
+            return {
+                "edit": "set_station_camera",
+                "given": None if given is None else camera_to_json(given),
+                "covariance": covariance_to_json(covariance),
+                "calibration": calibration,
+            }
     raise TypeError(f"no codec for {type(edit).__name__}")
 
 
@@ -65,6 +81,13 @@ def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
             return SetStationLines(_lines_from_json(value["lines"]))
         case "set_station_calibration":
             return SetStationCalibration(value["calibration"])
+        case "set_station_camera":
+            given = value["given"]
+            return SetStationCamera(
+                None if given is None else camera_from_json(given),
+                covariance_from_json(value["covariance"]),
+                value["calibration"],
+            )
     raise ValueError(f"the log holds an unknown edit: {value['edit']}")
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from app.errors import InputError, NotFoundError
+from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
@@ -92,6 +93,31 @@ class SetStationCalibration:
     def inverse(self, station: Station) -> SetStationCalibration:
         """The choice as it was."""
         return SetStationCalibration(station.calibration)
+
+
+@dataclass(frozen=True)
+class SetStationCamera:
+    """Give a station another camera, with what is known of its uncertainty; it counts then.
+
+    ``covariance`` is that of the camera's parameters, 8 x 8, row by row, or None.
+    """
+
+    given: Camera | None
+    covariance: tuple[float, ...] | None = None
+    calibration: str = "given"
+
+    def apply(self, station: Station) -> Station:
+        """The station with that camera."""
+        return replace(
+            station,
+            given=self.given,
+            given_covariance=self.covariance,
+            calibration=self.calibration,
+        )
+
+    def inverse(self, station: Station) -> SetStationCamera:
+        """The camera as it was."""
+        return SetStationCamera(station.given, station.given_covariance, station.calibration)
 
 
 @dataclass(frozen=True)

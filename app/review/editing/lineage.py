@@ -99,7 +99,7 @@ class _Walk:
             view = self.base.view(item.view.key)
             if view is not None:
                 given = camera_from_json(entry.body["given"])
-                station = replace(view.station, given=given)
+                station = view.station.with_given(given)
                 self.base = self.base.with_view(replace(view, station=station))
 
     def _note(self, group: Group) -> None:

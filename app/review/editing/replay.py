@@ -182,7 +182,7 @@ def _camera(ledger: Ledger, entry: LogEntry) -> None:
     assert entry.station_id is not None
     record = ledger.stations[entry.station_id]
     edited = station_digest(record.station) != record.source_digest
-    station = replace(record.station, given=camera_from_json(entry.body["given"]))
+    station = record.station.with_given(camera_from_json(entry.body["given"]))
     base = None if edited else station
     _save_station(ledger, record.dataset_id, entry.station_id, station, base)
     if entry.group_id is not None:

@@ -84,16 +84,15 @@ def follow_station(
     if incoming.shared and not incoming.lines and source is not None and source.lines:
         incoming = replace(incoming, lines=source.lines, calibration=source.calibration)
     if incoming.given is None and stored.station.given is not None:
-        incoming = replace(incoming, given=stored.station.given)
+        incoming = incoming.with_given(stored.station.given, stored.station.given_covariance)
     if not stored.edited:
         return FollowedStation(incoming, incoming, None)
     kept = None
     if station_digest(incoming) not in (stored.digest, stored.source_digest):
         sentence = f"the dataset has new lines or a new camera for {incoming.key}; edits stay"
         kept = Kept(None, sentence)
-    said = stored.station
     # What no edit can touch follows all the same.
-    station = replace(incoming, lines=said.lines, given=said.given, calibration=said.calibration)
+    station = incoming.with_said(stored.station)
     return FollowedStation(station, incoming, kept)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import PurePosixPath
 
 from app.geometry.camera import Camera
@@ -110,7 +110,7 @@ def _attach_batch(
         if stored.station.given == camera:
             report.unchanged += 1
             continue
-        station = replace(stored.station, given=camera)
+        station = stored.station.with_given(camera)
         save_station(session, stored, station, source=None if stored.edited else station)
         body = {"source": source, "given": camera_to_json(camera)}
         entries.append(Entry("camera", actor, at, body, dataset_id, place.group, place.station))

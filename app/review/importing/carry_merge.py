@@ -108,11 +108,7 @@ def _merged(
             here, there = _station_side(stored, lineage, view), _other_station(carried, other, base)
             lines = decide(here, there)
             if lines in (FOLLOW, UPSTREAM):
-                said = other.station
-                station = replace(
-                    view.station, lines=said.lines, given=said.given, calibration=said.calibration
-                )
-                view = replace(view, station=station)
+                view = replace(view, station=view.station.with_said(other.station))
             kept += _kept(view, lines, "lines or the camera")
         group = group.with_view(view)
     return group, kept

@@ -91,10 +91,7 @@ def _follow(
     lineage: StationLineage,
     sentence: str | None,
 ) -> None:
-    said = item.station
-    station = replace(
-        stored.station, lines=said.lines, given=said.given, calibration=said.calibration
-    )
+    station = stored.station.with_said(item.station)
     save_station(session, stored, station)
     replace_station_finding(session, stored.id, KIND, sentence)
     _log(session, origin, replace(stored, station=station), lineage, sentence, list(item.log))

@@ -123,6 +123,11 @@ class TestCalibrateStation:
         assert found.jac is None
         assert found.markings  # the projection is shown all the same
 
+    def test_what_is_known_of_a_given_camera_is_known_of_its_calibration(self):
+        station = Station("cam1", SIZE, given=MAIN, given_covariance=(0.25,) * 64)
+        found = calibrate_station(station, PITCH, POLICY)
+        assert (found.source, found.covariance) == ("given", (0.25,) * 64)
+
 
 class TestCalibrationKey:
     def test_names_all_that_is_read(self):
@@ -132,10 +137,11 @@ class TestCalibrationKey:
             calibration_key(replace(station, lines=click(MAIN, 0.1)), PITCH, POLICY),
             calibration_key(replace(station, given=OPPOSITE), PITCH, POLICY),
             calibration_key(replace(station, calibration="lines"), PITCH, POLICY),
+            calibration_key(replace(station, given_covariance=(0.25,) * 64), PITCH, POLICY),
             calibration_key(station, Pitch(104.0), POLICY),
             calibration_key(station, PITCH, replace(POLICY, robust_scale_px=3.0)),
         ]
-        assert len({key, *others}) == 6
+        assert len({key, *others}) == 7
 
     def test_does_not_depend_on_the_name_or_the_order_of_lines(self):
         lines = click(MAIN)

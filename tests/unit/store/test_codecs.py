@@ -27,6 +27,19 @@ class TestGroup:
         assert value["station"] == "cam1"
         assert codecs.view_from_json(value, view.station) == view
 
+    def test_the_covariance_of_a_given_camera_comes_back(self, group) -> None:
+        station = group.views[0].station
+        bare = codecs.station_to_json(station)
+        assert "given_covariance" not in bare  # digests of stations without one stay
+        known = replace(station, given_covariance=tuple(float(n) / 7 for n in range(64)))
+        value = json.loads(codecs.canonical(codecs.station_to_json(known)))
+        assert codecs.station_from_json(value) == known
+
+    @pytest.mark.parametrize("wrong", [[1.0] * 63, [float("inf")] * 64])
+    def test_a_covariance_that_is_none_is_refused(self, wrong) -> None:
+        with pytest.raises(ValueError, match="64 numbers"):
+            codecs.covariance_from_json(wrong)
+
     def test_integers_and_floats_are_one_text(self) -> None:
         whole = BallAnnotation(box=Box(1, 2, 3, 4))
         assert codecs.canonical(codecs.ball_to_json(whole)) == codecs.canonical(

@@ -36,6 +36,7 @@ class TestInputsHash:
             lambda g, c: with_station(g, size=ImageSize(1280, 721)),
             lambda g, c: with_station(g, given=c),
             lambda g, c: with_station(g, calibration="given"),
+            lambda g, c: with_station(g, given_covariance=(0.5,) * 64),
         ],
     )
     def test_changes_with_everything_that_solving_reads(self, group, camera, change) -> None:

@@ -13,10 +13,12 @@ from app.review.editing.edit import (
     SetCalibrationSource,
     SetLines,
     SetStationCalibration,
+    SetStationCamera,
     SetStationLines,
 )
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
+from tests.cameras import EVERY_COEFFICIENT
 
 HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))
 BALL = BallAnnotation(box=Box(500.0, 300.25, 14.0, 15.0), occluded=True)
@@ -34,6 +36,9 @@ EDITS = [
 STATION_EDITS = [
     SetStationLines({"Middle line": HERE, "Circle central": None}),
     SetStationCalibration("lines"),
+    SetStationCamera(EVERY_COEFFICIENT, tuple(float(n) for n in range(64))),
+    SetStationCamera(EVERY_COEFFICIENT, None, "lines"),
+    SetStationCamera(None),
 ]
 
 

@@ -6,8 +6,10 @@ import pytest
 
 from app.errors import NotFoundError
 from app.review.datasets.dataset import get_dataset
-from app.review.editing.edit import SetLines
+from app.review.editing.edit import SetLines, SetStationCamera
 from app.review.editing.recompute import stale_groups
+from app.review.editing.replay import replay
+from app.review.editing.stations import load_station, submit_station
 from app.review.editing.submit import load, submit
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import ingest
@@ -42,6 +44,20 @@ class TestIngestCameras:
         assert attach(store, {"cam1": opposite}).changed == 1
         assert load(store, ids[1]).group.view("cam1").station.given == opposite
         assert stale_groups(store, "demo") == ids
+
+    def test_what_was_known_of_the_camera_before_is_not_known_of_the_new_one(
+        self, store, fill, make_static, opposite
+    ) -> None:
+        (group_id,) = fill(make_static(10))
+        station = load_station(store, load(store, group_id).station_ids["cam1"])
+        known = SetStationCamera(station.station.given, (0.5,) * 64)
+        submit_station(store, station.id, known, if_match=station.etag, actor="ann")
+        assert load_station(store, station.id).station.given_covariance == (0.5,) * 64
+        attach(store, {"cam1": opposite})
+        after = load_station(store, station.id).station
+        assert (after.given, after.given_covariance) == (opposite, None)
+        with store.read() as session:
+            assert replay(session).stations[station.id].station == after
 
     def test_names_that_match_no_view_or_several_are_reported(
         self, store, fill, make_group, opposite
