@@ -21,6 +21,7 @@ from app.commands import (
     lines,
     policy,
     predictions,
+    rig,
     sample,
     service,
     solving,
@@ -36,7 +37,19 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-PARTS = (service, sample, files, solving, lines, versions, evaluation, predictions, doctor, backup)
+PARTS = (
+    service,
+    sample,
+    files,
+    solving,
+    rig,
+    lines,
+    versions,
+    evaluation,
+    predictions,
+    doctor,
+    backup,
+)
 for part in PARTS:
     app.add_typer(part.commands)
 app.add_typer(datasets.commands, name="datasets")

@@ -21,6 +21,7 @@ AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
     3d accept action actions address adjust adjustments advice ahead anchor annotate answers app
     application archive archives arrays arrival ask axis backup bar bars batches best binned bodies
+    bundle proposal
     body boxes bulk button buttons cache calibrate canvas caption card cards cell changes chart
     child chip choice chooser class cli client clock codec codecs colours comparison completion
     conditions config confirm connections contact cross csv cursor curve damped delete deps details

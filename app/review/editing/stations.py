@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.errors import ConflictError, NotFoundError
@@ -118,6 +118,52 @@ def submit_station(
         return _Change("station_edit", body, edit.apply(station))
 
     return _change(store, station_id, plan, if_match, actor, shown, keep)
+
+
+def submit_stations(
+    store: Store, edits: Sequence[tuple[StationState, StationEdit]], *, actor: str
+) -> None:
+    """Save edits of several static cameras that belong together: all of them, or none.
+
+    Args:
+        store: The database.
+        edits: What each camera was when its edit was thought of, and the edit.
+        actor: Who says so.
+
+    Raises:
+        StaleRevisionError: One of the cameras has changed since.
+    """
+
+    def plan(edit: StationEdit) -> _Plan:
+        def change(_session: Session, state: StationState) -> _Change:
+            body = {
+                "edit": edit_to_json(edit),
+                "inverse": edit_to_json(edit.inverse(state.station)),
+            }
+            return _Change("station_edit", body, edit.apply(state.station))
+
+        return change
+
+    steps = [(state.id, plan(edit), state.etag) for state, edit in edits]
+    with store.write() as session:
+        _save_all(session, steps, actor)
+
+
+def undo_stations(store: Store, states: Sequence[StationState], *, actor: str) -> None:
+    """Take the last edit of several static cameras back: of all of them, or of none."""
+    steps = [(state.id, _plan_step("undo"), state.etag) for state in states]
+    with store.write() as session:
+        _save_all(session, steps, actor)
+
+
+def _save_all(session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: str) -> None:
+    groups: set[int] = set()
+    for station_id, plan, etag in steps:
+        state, change = _planned(session, station_id, plan, etag)
+        if change.station != state.station:
+            _save(session, state, change, actor)
+            groups.update(state.groups)
+    refresh_queue(session, sorted(groups))
 
 
 def undo_station(

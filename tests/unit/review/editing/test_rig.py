@@ -1,0 +1,156 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from app.errors import ConflictError, InputError, StaleRevisionError
+from app.review.editing.edit import SetStationCalibration
+from app.review.editing.recompute import stale_groups
+from app.review.editing.replay import replay
+from app.review.editing.rig import (
+    CAMERAS,
+    SIGMA,
+    ProposedRig,
+    accept,
+    anchor_sentence,
+    proposal_values,
+    propose,
+    take_back,
+    time_sentence,
+)
+from app.review.editing.stations import load_station, submit_station
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import ImagePoint
+from app.soccer.group import Group, Station, View
+from tests.cameras import SIZE
+from tests.rigs import GIVEN, cameras, frames
+
+
+def groups() -> list[Group]:
+    stations = {
+        item.key: Station(item.key, SIZE, shared=True, lines=item.lines, given=item.camera)
+        for item in cameras()
+    }
+    return [
+        Group(
+            str(frame.time),
+            tuple(
+                View(key, stations[key], (BallAnnotation(point=center),))
+                for key, center in frame.balls.items()
+            ),
+            match="rig",
+        )
+        for frame in frames(60)
+        if frame.balls
+    ]
+
+
+@pytest.fixture
+def ids(fill) -> list[int]:
+    return fill(*groups(), solved=False)
+
+
+@pytest.fixture(scope="module")
+def known() -> dict[str, ProposedRig]:
+    """What was proposed once holds for every copy of the same database."""
+    return {}
+
+
+@pytest.fixture
+def proposed(store, ids, known) -> ProposedRig:
+    if not known:
+        known["demo"] = propose(store, "demo")
+    return known["demo"]
+
+
+def stations(store, proposed) -> dict[str, Station]:
+    return {key: load_station(store, state.id).station for key, state in proposed.stations.items()}
+
+
+class TestPropose:
+    def test_saves_nothing(self, store, ids, proposed) -> None:
+        assert [change.key for change in proposed.proposal.cameras] == sorted(GIVEN)
+        assert all(item.given == GIVEN[key] for key, item in stations(store, proposed).items())
+        assert all(load_station(store, s.id).revision == 1 for s in proposed.stations.values())
+
+    def test_says_what_holds_the_rig_and_that_no_camera_is_late(self, proposed) -> None:
+        assert "points of field lines" in anchor_sentence(proposed.proposal)
+        assert time_sentence(proposed.proposal).startswith("no camera is late")
+        values = proposal_values(proposed.proposal)
+        assert json.loads(json.dumps(values)) == values
+
+    def test_a_ball_that_was_put_where_others_see_it_says_nothing(self, store, fill) -> None:
+        inferred = BallAnnotation(point=ImagePoint(10, 10), inferred=True)
+        fill(
+            *(
+                Group(g.key, tuple(View(v.key, v.station, (inferred,)) for v in g.views), "rig")
+                for g in groups()
+            ),
+            solved=False,
+        )
+        with pytest.raises(InputError, match="show the ball together"):
+            propose(store, "demo")
+
+    def test_line_files_count_instead_of_the_lines_of_the_dataset(
+        self, store, ids, proposed, tmp_path
+    ) -> None:
+        lines = {"Middle line": [{"x": 640.0, "y": y} for y in (100.0, 300.0, 500.0)]}
+        (tmp_path / "cam1.json").write_text(json.dumps(lines))
+        assert propose(store, "demo", tmp_path).proposal.line_points == 3
+        (tmp_path / "cam1.json").rename(tmp_path / "left.json")
+        with pytest.raises(InputError, match="no line file"):
+            propose(store, "demo", tmp_path)
+
+
+class TestAccept:
+    def test_gives_every_camera_its_place_and_its_covariance(self, store, ids, proposed) -> None:
+        accept(store, proposed, CAMERAS, actor="ann")
+        for change in proposed.proposal.cameras:
+            station = stations(store, proposed)[change.key]
+            assert (station.given, station.given_covariance) == (change.after, change.covariance)
+        assert set(stale_groups(store, "demo")) == set(ids)
+
+    def test_or_leaves_the_cameras_and_says_how_far_they_may_be_off(self, store, proposed) -> None:
+        accept(store, proposed, SIGMA, actor="ann")
+        for change in proposed.proposal.cameras:
+            station = stations(store, proposed)[change.key]
+            assert station.given == GIVEN[change.key]
+            assert station.given_covariance == change.covariance_before
+
+    def test_the_log_alone_leads_to_the_same_cameras(self, store, proposed) -> None:
+        accept(store, proposed, CAMERAS, actor="ann")
+        with store.read() as session:
+            ledger = replay(session)
+        for key, state in proposed.stations.items():
+            assert ledger.stations[state.id].station == stations(store, proposed)[key]
+
+    def test_a_camera_that_has_changed_since_is_not_overwritten(self, store, proposed) -> None:
+        state = proposed.stations["cam3"]
+        other = SetStationCalibration("lines")
+        submit_station(store, state.id, other, if_match=state.etag, actor="bob")
+        with pytest.raises(StaleRevisionError):
+            accept(store, proposed, CAMERAS, actor="ann")
+        # All of them or none.
+        assert stations(store, proposed)["cam1"].given_covariance is None
+
+    def test_balls_do_not_count_twice(self, store, proposed) -> None:
+        accept(store, proposed, SIGMA, actor="ann")
+        with pytest.raises(ConflictError, match="adjusted already"):
+            propose(store, "demo")
+
+    def test_anything_else_is_refused(self, store, proposed) -> None:
+        with pytest.raises(InputError, match='"sigma"'):
+            accept(store, proposed, "all", actor="ann")
+
+
+class TestTakeBack:
+    def test_every_camera_is_what_it_was(self, store, proposed) -> None:
+        accept(store, proposed, CAMERAS, actor="ann")
+        assert take_back(store, "demo", actor="ann") == len(GIVEN)
+        for key, state in proposed.stations.items():
+            assert stations(store, proposed)[key] == state.station
+
+    def test_there_must_be_something_to_take_back(self, store, ids) -> None:
+        with pytest.raises(ConflictError, match="nothing to take back"):
+            take_back(store, "demo", actor="ann")
