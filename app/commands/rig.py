@@ -57,7 +57,7 @@ def rig(
         proposed = propose(store, dataset, lines)
         if accept is not None:
             accept_rig(store, proposed, accept.value, actor="local")
-    values = {**proposal_values(proposed.proposal), "accepted": accept and accept.value}
+    values = {**proposal_values(proposed), "accepted": accept and accept.value}
     if json_:
         print_json(values)
     else:

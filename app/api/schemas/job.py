@@ -10,7 +10,7 @@ from pydantic import Field
 from app.api.schemas.document import Document
 
 JobKind = Literal[
-    "solve", "import", "export", "freeze", "verify", "evaluate", "detect", "bulk", "practice"
+    "solve", "import", "export", "freeze", "verify", "evaluate", "detect", "bulk", "practice", "rig"
 ]
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -22,9 +23,13 @@ from app.review.editing.undo import read_station_stacks
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint
 from app.soccer.group import View
+from app.soccer.pitch import Pitch
+from app.soccer.policy import Policy
 from app.solving.calibrate import calibrate_station
 from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import RigProposal, propose_rig
+from app.store.codecs import lines_to_json
+from app.store.digest import digest
 from app.store.groups import read_groups, station_pitches
 from app.store.imports import known_groups, shared_stations
 from app.store.log import read_entry
@@ -40,13 +45,23 @@ MIN_OFFSET_FRAMES, MIN_OFFSET_SIGMAS = 0.1, 3.0
 
 @dataclass(frozen=True)
 class ProposedRig:
-    """A proposal, and the cameras as they were when it was made, by key."""
+    """A proposal, what it rests on, and the cameras as they were when it was made, by key.
+
+    ``inputs`` is a digest: the same one, the same proposal.
+    """
 
     proposal: RigProposal
     stations: Mapping[str, StationState]
+    inputs: str
 
 
-def propose(store: Store, dataset: str | int, lines: Path | None = None) -> ProposedRig:
+def propose(
+    store: Store,
+    dataset: str | int,
+    lines: Path | None = None,
+    *,
+    executor: Executor | None = None,
+) -> ProposedRig:
     """Adjust the static cameras of a dataset to their lines and balls; nothing is saved.
 
     Args:
@@ -54,17 +69,59 @@ def propose(store: Store, dataset: str | int, lines: Path | None = None) -> Prop
         dataset: Name or id.
         lines: Folder or zip of line files named like the cameras (``cam1.json``), which count
             instead of those of the dataset; None: those of the dataset.
+        executor: Where it is computed; None: here.
 
     Raises:
         InputError: Too few cameras share balls, or their pitches differ.
         ConflictError: The cameras were adjusted already.
     """
+    states, pitch, policy = adjustable(store, dataset)
+    with store.read() as session:
+        frames = _frames(session, states[0].dataset_id)
+    own = None if lines is None else _read_lines(lines, states)
+    cameras = [
+        RigCamera(
+            state.station.key,
+            state.station.size,
+            state.station.lines if own is None else own.get(state.station.key, {}),
+            camera,
+        )
+        for state in states
+        if (camera := calibrate_station(state.station, pitch, policy.calibration).camera)
+    ]
+    asked = cameras, frames, pitch, policy
+    if executor is None:
+        proposal = propose_rig(*asked)
+    else:
+        proposal = executor.submit(propose_rig, *asked).result()
+    inputs = digest(
+        [
+            policy.hash,
+            [state.etag for state in states],
+            [lines_to_json(camera.lines) for camera in cameras],
+            [[frame.time, {key: [*at] for key, at in frame.balls.items()}] for frame in frames],
+        ]
+    )
+    return ProposedRig(proposal, {state.station.key: state for state in states}, inputs)
+
+
+def adjustable(store: Store, dataset: str | int) -> tuple[list[StationState], Pitch, Policy]:
+    """The static cameras of a dataset, their pitch, and the dataset's policy.
+
+    Raises:
+        InputError: There are fewer than two, or their pitches differ.
+        ConflictError: They were adjusted already.
+    """
     with store.read() as session:
         found = read_dataset(session, need_dataset(session, dataset))
         stations = [item.id for item in shared_stations(session, found.id)]
         pitches = {pitch for _, pitch in station_pitches(session, found.id)}
-        frames = _frames(session, found.id)
     states = [load_station(store, station) for station in stations]
+    if len(states) < 2:
+        raise InputError(
+            f"{found.name} has {len(states)} static cameras, a rig has two at least",
+            hint="Only cameras that stand still can be adjusted to each other.",
+        )
     if any(state.station.given_covariance is not None for state in states):
         raise ConflictError(
             f"the cameras of {found.name} were adjusted already",
@@ -75,20 +132,7 @@ def propose(store: Store, dataset: str | int, lines: Path | None = None) -> Prop
             f"the static cameras of {found.name} look at {len(pitches)} sizes of pitch",
             hint="Cameras are adjusted together where they look at one pitch.",
         )
-    (pitch,) = pitches
-    own = None if lines is None else _read_lines(lines, states)
-    cameras = [
-        RigCamera(
-            state.station.key,
-            state.station.size,
-            state.station.lines if own is None else own.get(state.station.key, {}),
-            camera,
-        )
-        for state in states
-        if (camera := calibrate_station(state.station, pitch, found.policy.calibration).camera)
-    ]
-    proposal = propose_rig(cameras, frames, pitch, found.policy)
-    return ProposedRig(proposal, {state.station.key: state for state in states})
+    return states, pitches.pop(), found.policy
 
 
 def accept(store: Store, proposed: ProposedRig, what: str, *, actor: str) -> None:
@@ -141,8 +185,9 @@ def take_back(store: Store, dataset: str | int, *, actor: str) -> int:
     return len(adjusted)
 
 
-def proposal_values(proposal: RigProposal) -> dict[str, Any]:
+def proposal_values(proposed: ProposedRig) -> dict[str, Any]:
     """A proposal for people and scripts: numbers by name, without the cameras themselves."""
+    proposal = proposed.proposal
     hidden = {"before", "after", "covariance", "covariance_before"}
     values = {item.name: getattr(proposal, item.name) for item in fields(proposal)}
     values["cameras"] = [
@@ -153,6 +198,7 @@ def proposal_values(proposal: RigProposal) -> dict[str, Any]:
     values["left_alone"] = list(proposal.left_alone)
     values["anchor"] = anchor_sentence(proposal)
     values["time"] = time_sentence(proposal)
+    values["inputs"] = proposed.inputs
     return values
 
 

@@ -77,7 +77,7 @@ class TestPropose:
     def test_says_what_holds_the_rig_and_that_no_camera_is_late(self, proposed) -> None:
         assert "points of field lines" in anchor_sentence(proposed.proposal)
         assert time_sentence(proposed.proposal).startswith("no camera is late")
-        values = proposal_values(proposed.proposal)
+        values = proposal_values(proposed)
         assert json.loads(json.dumps(values)) == values
 
     def test_a_ball_that_was_put_where_others_see_it_says_nothing(self, store, fill) -> None:

@@ -1,0 +1,54 @@
+"""Rig: the static cameras of a dataset adjusted together, proposed, accepted, taken back."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+
+from app.api.deps import Actor, AppServices, DatasetPath
+from app.api.jobs import ACCEPTED, job_answer
+from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply
+from app.api.schemas.job import JobDocument
+from app.api.schemas.rig import RigRequest, RigTakenBack
+from app.review.jobs.rig import request_rig, take_rig_back
+
+router = APIRouter(tags=["stations"])
+
+
+@router.post(
+    "/datasets/{dataset}/rig",
+    operation_id="adjustRig",
+    status_code=202,
+    response_model=JobDocument,
+    responses={**responses(404, 409, 413, 415), **ACCEPTED},
+)
+def adjust_rig(
+    dataset: DatasetPath,
+    request: RigRequest,
+    services: AppServices,
+    actor: Actor,
+    asked: AskedUnder,
+) -> Response:
+    """Adjust the static cameras of a dataset to lines and balls over time.
+
+    The job's result is the proposal: each camera and each pair before and after, on instants that
+    were used and on instants that were held out. With `accept` it is saved as an edit of each camera.
+    """
+    reply = Reply(asked, job_answer)
+    job = request_rig(
+        services.jobs,
+        services.store,
+        dataset,
+        what=request.accept,
+        inputs=request.inputs,
+        actor=actor,
+        keep=reply.keep,
+    )
+    return reply.of(job)
+
+
+@router.delete("/datasets/{dataset}/rig", operation_id="takeRigBack", responses=responses(404, 409))
+def delete_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> RigTakenBack:
+    """Take an accepted rig back, all its cameras at once; 409 when there is none."""
+    count = take_rig_back(services.jobs, services.store, dataset, actor=actor)
+    return RigTakenBack(taken_back=count)

@@ -1,0 +1,88 @@
+"""The job that adjusts the static cameras of a dataset: it proposes, and saves what is accepted."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+from app.errors import ConflictError
+from app.review.datasets.dataset import get_dataset
+from app.review.editing.rig import accept, adjustable, proposal_values, propose, take_back
+from app.review.jobs.jobs import JobProgress, Jobs, Work
+from app.review.jobs.solve import request_solve
+from app.store.answers import Keep, keep_nothing
+from app.store.codecs import Json
+from app.store.jobs import Job
+from app.store.session import Store
+
+KIND = "rig"
+
+
+def request_rig(
+    jobs: Jobs,
+    store: Store,
+    dataset: str,
+    *,
+    what: str | None,
+    inputs: str | None,
+    actor: str,
+    keep: Keep[Job] = keep_nothing,
+) -> Job:
+    """Adjust the static cameras of a dataset, soon; what can be refused is refused at once.
+
+    Args:
+        jobs: Where it is queued.
+        store: The database.
+        dataset: Name or id.
+        what: What of the proposal is saved, as ``editing.rig.accept`` takes it; None: nothing.
+        inputs: Of the proposal that a person saw; another one is not saved.
+        actor: Who wants it.
+        keep: Keeps the answer with the job.
+
+    Raises:
+        InputError, ConflictError: As ``editing.rig.adjustable`` does.
+    """
+    found = get_dataset(store, dataset)
+    adjustable(store, found.id)
+    return jobs.submit(
+        KIND,
+        f"Adjust the cameras of {found.name}",
+        rig_work(jobs, store, found.id, what, inputs, actor),
+        dataset_id=found.id,
+        actor=actor,
+        keep=keep,
+    )
+
+
+def take_rig_back(jobs: Jobs, store: Store, dataset: str, *, actor: str) -> int:
+    """Take an accepted rig back, and solve its dataset, soon; returns the number of cameras.
+
+    Raises:
+        ConflictError: There is nothing to take back.
+    """
+    found = get_dataset(store, dataset)
+    count = take_back(store, found.id, actor=actor)
+    request_solve(jobs, store, found.id, actor=actor)
+    return count
+
+
+def rig_work(
+    jobs: Jobs, store: Store, dataset_id: int, what: str | None, inputs: str | None, actor: str
+) -> Work:
+    """The work itself; its result is the proposal and what of it was saved."""
+
+    def work(progress: JobProgress) -> Json:
+        progress(0, None, "Adjusting cameras to lines and balls.")
+        with jobs.pool() if jobs.pool is not None else nullcontext() as executor:
+            proposed = propose(store, dataset_id, executor=executor)
+        progress.check()
+        if what is not None:
+            if inputs is not None and inputs != proposed.inputs:
+                raise ConflictError(
+                    "balls, lines or cameras have changed since that proposal",
+                    hint="Look at a new one, and accept that.",
+                )
+            accept(store, proposed, what, actor=actor)
+            request_solve(jobs, store, dataset_id, actor=actor)
+        return {**proposal_values(proposed), "accepted": what}
+
+    return work

@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from app.api.deps import Services
+from app.review.importing.ingest import ingest
+from app.soccer.annotation import BallAnnotation
+from app.soccer.group import Group, Station, View
+from tests.cameras import SIZE
+from tests.rigs import cameras, frames
+
+ADDRESS = "/api/v1/datasets/rig/rig"
+
+
+@pytest.fixture
+def services(app) -> Services:
+    """The application's, with a dataset of four static cameras."""
+    services: Services = app.state.services
+    stations = {c.key: Station(c.key, SIZE, shared=True, given=c.camera) for c in cameras()}
+    groups = [
+        Group(
+            str(frame.time),
+            tuple(
+                View(key, stations[key], (BallAnnotation(point=center),))
+                for key, center in frame.balls.items()
+            ),
+        )
+        for frame in frames(45)
+        if frame.balls
+    ]
+    ingest(services.store, "rig", groups, source="test", actor="ann")
+    return services
+
+
+def result(services: Services, answer) -> dict[str, Any]:
+    """What came of the job that an answer started."""
+    assert answer.status_code == 202, answer.text
+    services.jobs.wait(answer.json()["id"], 60)
+    return vars(services.jobs.get(answer.json()["id"]))
+
+
+class TestRig:
+    def test_is_proposed_accepted_as_it_was_seen_and_taken_back(self, api, services) -> None:
+        proposed = result(services, api.post(ADDRESS, json={}))
+        assert (proposed["state"], proposed["kind"]) == ("done", "rig")
+        assert proposed["result"]["accepted"] is None
+        assert len(proposed["result"]["cameras"]) == 4
+
+        other = {"accept": "sigma", "inputs": "0" * 32}
+        refused = result(services, api.post(ADDRESS, json=other))
+        assert (refused["state"], refused["problem"]["detail"]) == (
+            "failed",
+            "balls, lines or cameras have changed since that proposal",
+        )
+        seen = {"accept": "sigma", "inputs": proposed["result"]["inputs"]}
+        accepted = result(services, api.post(ADDRESS, json=seen))
+        assert accepted["result"]["accepted"] == "sigma"
+        solving = services.jobs.find(kinds=["solve"])
+        assert [job.dataset for job in solving] == ["rig"]
+
+        again = api.post(ADDRESS, json={})
+        assert (again.status_code, "adjusted already" in again.json()["detail"]) == (409, True)
+        assert api.delete(ADDRESS).json() == {"taken_back": 4}
+        assert api.delete(ADDRESS).status_code == 409
+
+    def test_a_dataset_without_static_cameras_is_refused(self, api) -> None:
+        answer = api.post("/api/v1/datasets/broadcast/rig", json={})
+        assert (answer.status_code, "0 static cameras" in answer.json()["detail"]) == (400, True)
+
+    def test_anything_else_is_refused(self, api) -> None:
+        answer = api.post(ADDRESS, json={"accept": "everything"})
+        assert (answer.status_code, answer.json()["pointer"]) == (422, "/accept")
