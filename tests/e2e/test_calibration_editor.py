@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.soccer.pitch import MARKINGS
+from tests.e2e.conftest import Console
 from tests.e2e.film import FRAMES
 from tests.e2e.screen import passing, submitted
 from tests.e2e.test_access import CUT_OFF, NESTED_SCROLLERS, SIZES, serious
@@ -284,6 +285,33 @@ class TestStation:
             "aria-pressed", "true"
         )
         assert FRAMES[0] == timeline["frame"][0]
+
+    def test_all_static_cameras_are_adjusted_and_that_is_taken_back(
+        self, open_page: OpenPage, film: str, console: Console
+    ) -> None:
+        console.expect("409 (Conflict)")
+        page = open_page(None)
+        timeline = page.request.get(f"{film}/api/v1/datasets/film/timeline").json()
+        editor = Editor(page, film, timeline["id"][0], 2)
+        dialog = page.get_by_role("dialog", name="Adjust static cameras together")
+
+        page.get_by_role("button", name="Adjust all static cameras").click()
+        dialog.get_by_role("button", name="Propose").click()
+        row = dialog.locator(f'tr[data-camera="{editor.key}"]')
+        expect(row).to_be_visible(timeout=30_000)
+        expect(dialog).to_contain_text("Rays pass each other")
+        assert serious(page) == []
+        dialog.get_by_role("button", name="Save").click()
+        expect(dialog).to_be_hidden(timeout=30_000)
+        station = page.request.get(f"{film}/api/v1/stations/{editor.view['station']['id']}").json()
+        assert station["can_undo"]
+
+        page.get_by_role("button", name="Adjust all static cameras").click()
+        dialog.get_by_role("button", name="Propose").click()
+        expect(dialog.get_by_role("alert")).to_contain_text("adjusted already")
+        dialog.get_by_role("button", name="Take it back").click()
+        expect(dialog).to_be_hidden()
+        expect(page.locator(".station-card__work")).to_be_visible()
 
 
 class TestAccess:

@@ -111,7 +111,7 @@ function Workspace({ group, at }) {
 		</main>
 		<aside class="editor__rail" aria-label="Markings and staged changes">
 			<${PitchDiagram} pitch=${group.pitch} fits=${picture.markings} />
-			<${StationCard} view=${at} station=${station.value} dataset=${group.dataset.name} />
+			<${StationCard} view=${at} station=${station.value} dataset=${group.dataset} />
 			<${MarkingCard} picture=${picture} />
 			${tall ? comparison : null}
 			<${CommitBar} shared=${at.station.shared} />

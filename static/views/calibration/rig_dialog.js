@@ -1,0 +1,119 @@
+// @ts-check
+/** All static cameras adjusted together: what that would change, then saved or taken back. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { ApiError } from '../../api/problem.js';
+import { deleteRig, postRig } from '../../api/rig.js';
+import { capital, count, fixed } from '../../lib/format.js';
+import { sentenceOf } from '../../lib/resource.js';
+import { follow, isOver } from '../../state/jobs.js';
+import { announce } from '../../state/notice.js';
+import { watchSolving } from '../../state/solving.js';
+import { FormDialog } from '../dialog.js';
+import { JobProgress } from '../job_progress.js';
+
+/** @import {JobJson} from '../../api/jobs.js' */
+/** @import {Accepted, RigProposal} from '../../api/rig.js' */
+
+const CHOICES = /** @type {{name: Accepted, label: string, note: string}[]} */ ([
+	{ name: 'cameras', label: 'The adjusted cameras', note: 'balls move; undo takes it back' },
+	{ name: 'sigma', label: 'Only how far the cameras in use may be off', note: 'no ball moves, its sigma is honest' },
+]);
+
+/** @param {number | null} before @param {number | null} after */
+function change(before, after) {
+	return before === null || after === null ? '–' : `${fixed(before, 1)} → ${fixed(after, 1, ' px')}`;
+}
+
+/** @param {{proposal: RigProposal}} props */
+function Proposal({ proposal }) {
+	return html`
+		<div class="table__scroll" tabindex="0" role="region" aria-label="Cameras and pairs, before and after">
+			<table class="table">
+				<thead><tr><th>Camera</th><th data-numeric="true">Moves</th><th data-numeric="true">Grass moves</th><th data-numeric="true">Field lines</th></tr></thead>
+				<tbody>${proposal.cameras.map((camera) => html`
+					<tr key=${camera.key} data-camera=${camera.key}>
+						<th scope="row">${camera.key}</th>
+						<td data-numeric="true">${fixed(camera.moved_m, 2, ' m')} <small>±${fixed(camera.position_sigma_m, 2)}</small></td>
+						<td data-numeric="true">${fixed(camera.picture_px, 1, ' px')}</td>
+						<td data-numeric="true">${change(camera.lines_before_px, camera.lines_after_px)}</td>
+					</tr>`)}</tbody>
+			</table>
+			<table class="table">
+				<thead><tr><th>Rays pass each other</th><th data-numeric="true">Instants</th><th data-numeric="true">Gap</th><th data-numeric="true">Held out</th></tr></thead>
+				<tbody>${proposal.pairs.map((pair) => html`
+					<tr key=${`${pair.a} ${pair.b}`}>
+						<th scope="row">${pair.a} and ${pair.b}</th>
+						<td data-numeric="true">${count(pair.frames)}</td>
+						<td data-numeric="true">${change(pair.before_px, pair.after_px)}</td>
+						<td data-numeric="true">${change(pair.held_out_before_px, pair.held_out_after_px)}</td>
+					</tr>`)}</tbody>
+			</table>
+		</div>
+		<p>${count(proposal.frames)} instants were used, ${count(proposal.gross)} contradict themselves and were left out. Balls move by ${fixed(proposal.ball_moved_m, 2, ' m')} in the median. The cameras are ${proposal.anchor}. ${capital(proposal.time)}.</p>
+		${proposal.left_alone.length ? html`<p data-grade="warn">Too few common balls: ${proposal.left_alone.join(', ')}</p>` : null}
+	`;
+}
+
+/** @param {{dataset: {id: number, name: string}, onClose: () => void}} props */
+export function RigDialog({ dataset, onClose }) {
+	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const [proposal, setProposal] = useState(/** @type {RigProposal | null} */ (null));
+	const [what, setWhat] = useState(/** @type {Accepted} */ ('sigma'));
+	const [problem, setProblem] = useState(/** @type {{text: string, adjusted: boolean} | null} */ (null));
+	const busy = job !== null && !isOver(job);
+	/** @param {() => Promise<void>} act */
+	async function attempt(act) {
+		setProblem(null);
+		try {
+			await act();
+		} catch (error) {
+			setJob(null);
+			setProblem({ text: sentenceOf(error), adjusted: error instanceof ApiError && error.status === 409 });
+		}
+	}
+	async function send() {
+		if (busy) return;
+		await attempt(async () => {
+			const body = proposal ? { accept: what, inputs: proposal.inputs } : {};
+			const over = await follow(await postRig(dataset.id, body), setJob);
+			if (over.state !== 'done') return;
+			if (!over.result.accepted) { setProposal(over.result); return; }
+			announce(what === 'cameras' ? 'The adjusted cameras count.' : 'The cameras stay, their uncertainty is known.');
+			watchSolving(dataset.name);
+			onClose();
+		});
+	}
+	async function takeBack() {
+		await attempt(async () => {
+			const { taken_back: cameras } = await deleteRig(dataset.id);
+			announce(`${count(cameras)} cameras are what they were.`);
+			watchSolving(dataset.name);
+			onClose();
+		});
+	}
+	return html`
+		<${FormDialog}
+			wide=${true} title="Adjust static cameras together" onClose=${onClose} onSubmit=${send}
+			buttons=${html`
+				${problem?.adjusted ? html`<button class="button" type="button" onClick=${takeBack}>Take it back</button>` : null}
+				<button class="button button--primary" type="submit" aria-disabled=${busy} title=${busy ? 'Under way' : ''}>${proposal ? 'Save' : 'Propose'}</button>`}
+		>
+			<p>Balls that several cameras show at once tell how the cameras stand to each other; field lines and the cameras in use hold them in their place. Nothing is saved before you have seen what changes.</p>
+			${proposal ? html`
+				<${Proposal} proposal=${proposal} />
+				<fieldset class="choice choice--row">
+					<legend>Save</legend>
+					${CHOICES.map(({ name, label, note }) => html`
+						<label key=${name}>
+							<input type="radio" name="accept" checked=${what === name} onChange=${() => setWhat(name)} />
+							<span>${label}<small>${note}</small></span>
+						</label>`)}
+				</fieldset>` : null}
+			${job && (busy || job.state !== 'done') ? html`<${JobProgress} job=${job} />` : null}
+			${problem ? html`<p class="form__error" role="alert">${problem.text}</p>` : null}
+		<//>
+	`;
+}
