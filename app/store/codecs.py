@@ -26,6 +26,9 @@ from app.soccer.reasons import LeftOut
 Json = Any
 """What ``json`` makes: dict, list, str, int, float, bool or None."""
 
+_ROUNDING = 1e-6
+"""How far correlations of a covariance may be from what they have to be."""
+
 
 def canonical(value: Json) -> str:
     """The one JSON text of a value: sorted keys, no spaces, no NaN."""
@@ -147,12 +150,24 @@ def covariance_to_json(covariance: Sequence[float] | None) -> Json:
 
 
 def covariance_from_json(value: Sequence[float] | None) -> tuple[float, ...] | None:
-    """Back from ``covariance_to_json``."""
+    """Back from ``covariance_to_json``.
+
+    Raises:
+        ValueError: It is not symmetric with no negative variance in any direction.
+    """
     if value is None:
         return None
     covariance = tuple(map(float, value))
     if len(covariance) != 64 or not all(map(math.isfinite, covariance)):
         raise ValueError("the covariance of a camera is 64 numbers")
+    matrix = np.array(covariance).reshape(8, 8)
+    scale = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
+    scale[scale == 0] = 1.0
+    shares = matrix / np.outer(scale, scale)
+    if not (np.abs(shares - shares.T) < _ROUNDING).all():
+        raise ValueError("the covariance of a camera is symmetric")
+    if np.linalg.eigvalsh(shares)[0] < -_ROUNDING:
+        raise ValueError("no variance of a camera is negative")
     return covariance
 
 

@@ -13,6 +13,7 @@ from app.soccer.frames import Box
 from app.soccer.policy import PAPER, STRICT, CalibrationPolicy, Policy
 from app.store import codecs
 
+COVARIANCE = tuple(np.outer(*2 * [np.arange(1, 9) / 7]).ravel().tolist())
 FLOATS = st.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -31,13 +32,22 @@ class TestGroup:
         station = group.views[0].station
         bare = codecs.station_to_json(station)
         assert "given_covariance" not in bare  # digests of stations without one stay
-        known = replace(station, given_covariance=tuple(float(n) / 7 for n in range(64)))
+        known = replace(station, given_covariance=COVARIANCE)
         value = json.loads(codecs.canonical(codecs.station_to_json(known)))
         assert codecs.station_from_json(value) == known
 
-    @pytest.mark.parametrize("wrong", [[1.0] * 63, [float("inf")] * 64])
-    def test_a_covariance_that_is_none_is_refused(self, wrong) -> None:
-        with pytest.raises(ValueError, match="64 numbers"):
+    @pytest.mark.parametrize(
+        ("wrong", "why"),
+        [
+            ([1.0] * 63, "64 numbers"),
+            ([float("inf")] * 64, "64 numbers"),
+            ([float(n) for n in range(64)], "symmetric"),
+            ((-np.eye(8)).ravel().tolist(), "negative"),
+            ((2 * np.ones((8, 8)) - np.eye(8)).ravel().tolist(), "negative"),
+        ],
+    )
+    def test_a_covariance_that_is_none_is_refused(self, wrong, why) -> None:
+        with pytest.raises(ValueError, match=why):
             codecs.covariance_from_json(wrong)
 
     def test_integers_and_floats_are_one_text(self) -> None:

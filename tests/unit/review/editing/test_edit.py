@@ -36,7 +36,7 @@ EDITS = [
 STATION_EDITS = [
     SetStationLines({"Middle line": HERE, "Circle central": None}),
     SetStationCalibration("lines"),
-    SetStationCamera(EVERY_COEFFICIENT, tuple(float(n) for n in range(64))),
+    SetStationCamera(EVERY_COEFFICIENT, (0.25,) * 64),
     SetStationCamera(EVERY_COEFFICIENT, None, "lines"),
     SetStationCamera(None),
 ]

@@ -20,9 +20,12 @@ from app.review.editing.rig import (
     time_sentence,
 )
 from app.review.editing.stations import load_station, submit_station
+from app.review.editing.submit import load
+from app.review.importing.ingest import ingest
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
+from app.store.frozen import freeze_said, thaw_group
 from tests.cameras import SIZE
 from tests.rigs import GIVEN, cameras, frames
 
@@ -117,6 +120,21 @@ class TestAccept:
             station = stations(store, proposed)[change.key]
             assert station.given == GIVEN[change.key]
             assert station.given_covariance == change.covariance_before
+
+    def test_importing_the_dataset_again_changes_nothing_of_it(self, store, proposed) -> None:
+        accept(store, proposed, CAMERAS, actor="ann")
+        before = stations(store, proposed)
+        report = ingest(store, "demo", groups(), source="test", actor="ann")
+        assert (report.changed, report.findings) == (0, 0)
+        assert stations(store, proposed) == before
+
+    def test_a_frozen_group_has_the_covariance_of_its_cameras(self, store, ids, proposed) -> None:
+        accept(store, proposed, SIGMA, actor="ann")
+        group = load(store, ids[0]).group
+        said = freeze_said(group)
+        texts = {key: json.loads(text) for key, text in said.texts.items()}
+        assert group.views[0].station.given_covariance is not None
+        assert thaw_group(texts[said.key], texts) == group
 
     def test_the_log_alone_leads_to_the_same_cameras(self, store, proposed) -> None:
         accept(store, proposed, CAMERAS, actor="ann")

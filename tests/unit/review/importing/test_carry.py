@@ -12,7 +12,13 @@ from app.datasets.archive import DEFAULT_LIMITS
 from app.datasets.report import Report
 from app.errors import InputError
 from app.review.datasets.dataset import get_dataset
-from app.review.editing.edit import IncludeView, SetBall, SetLines, SetStationLines
+from app.review.editing.edit import (
+    IncludeView,
+    SetBall,
+    SetLines,
+    SetStationCamera,
+    SetStationLines,
+)
 from app.review.editing.ledger import read_ledger
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import replay
@@ -264,6 +270,14 @@ class TestMerge:
         undo_station(here, station(here).id, if_match=station(here).etag, actor="ann")
         assert_replays(here)
 
+    def test_what_is_known_of_a_static_camera_comes_along(self, both, bring) -> None:
+        here, there = both
+        given = station(there).station.given
+        edit_station(there, SetStationCamera(given, (0.25,) * 64))
+        bring(there, here)
+        assert station(here).station.given_covariance == (0.25,) * 64
+        assert_replays(here)
+
     def test_a_newer_state_of_the_source_comes_along(self, both, bring, make_group) -> None:
         here, there = both
         edit(here, 1, SetBall("7.png", BALL))
@@ -339,6 +353,7 @@ class TestBrokenFiles:
             (("group", "views", 0, "station", "lines"), {"Middle line": [[1, "x"]]}),
             (("group", "views", 0, "station", "given"), {"rotation": [1]}),
             (("group", "views", 0, "station", "calibration"), "guess"),
+            (("group", "views", 0, "station", "given_covariance"), [1.0]),
             (("group", "views", 0, "station"), "cam9"),
             (("group", "views", 0, "balls"), [{"box": [1, 2, 3]}]),
             (("group", "views", 0, "extras"), {"boxes": 1, "lines": [], "metadata": {}}),
