@@ -9,9 +9,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import pytest
+import structlog
 from sqlalchemy import event
 
 from app.store.session import Store
+
+# As the server logs. The default draws a traceback with all its variables, half a second each.
+structlog.configure(
+    processors=[
+        structlog.contextvars.merge_contextvars,
+        structlog.processors.add_log_level,
+        structlog.processors.format_exc_info,
+        structlog.processors.KeyValueRenderer(key_order=["level", "event"]),
+    ]
+)
 
 
 @dataclass
