@@ -22,6 +22,7 @@ from app.api.site import Site
 from app.config import Settings
 from app.geometry.camera import Camera
 from app.review.editing.recompute import solve_dataset
+from app.review.evaluating.prediction_reader import PredictionReader
 from app.review.importing.ingest import ingest
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import Group, Media, Station, View
@@ -155,11 +156,33 @@ def only_app(prepared_home: Path, tmp_path_factory: pytest.TempPathFactory) -> F
     return app
 
 
+class KeptReader(PredictionReader):
+    """Reads predictions for one test after the other: its process is started once."""
+
+    def close(self) -> None:
+        """Stay; see ``end``."""
+
+    def end(self) -> None:
+        """End the process."""
+        super().close()
+
+
+@pytest.fixture(scope="session")
+def reader(prepared_home: Path) -> Iterator[KeptReader]:
+    """Reads predictions for every application of this session."""
+    kept = KeptReader(Settings(home=prepared_home))
+    yield kept
+    kept.end()
+
+
 @pytest.fixture
-def app(only_app: FastAPI, prepared_home: Path, tmp_path: Path) -> Iterator[FastAPI]:
+def app(
+    only_app: FastAPI, prepared_home: Path, tmp_path: Path, reader: KeptReader
+) -> Iterator[FastAPI]:
     """The whole application over a home of its own."""
     shutil.copytree(prepared_home, tmp_path / "home")
-    only_app.state.services = Services.open(Settings(home=tmp_path / "home"))
+    opened = Services.open(Settings(home=tmp_path / "home"))
+    only_app.state.services = replace(opened, predictions=reader)
     yield only_app
     only_app.state.services.close()
 
