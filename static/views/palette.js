@@ -51,8 +51,11 @@ function useGroups(text) {
 		const found = one && asked ? await groupItems(one, asked, signal) : [];
 		if (!signal.aborted) setGroups({ groups: found, to: asked });
 	}), []);
-	useEffect(() => { asking.run(text.trim()); }, [text]);
-	useEffect(() => () => asking.cancel(), []);
+	useEffect(() => {
+		asking.run(text.trim());
+		// A search that the server never answers must not keep the next one waiting.
+		return asking.cancel;
+	}, [text]);
 	return { groups, answered: to === text.trim() };
 }
 
