@@ -25,7 +25,6 @@ from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
 from app.progress import Progress
 from app.review.importing.cameras import ingest_cameras
-from app.review.importing.carry_in import carry_in
 from app.review.importing.ingest import IngestReport, ingest
 from app.review.importing.spare import SpareFrame, ingest_spare
 from app.soccer.annotation import Extras
@@ -174,6 +173,9 @@ def import_source(
         )
         return Imported(source, report, result)
     if source.format == "touchline":
+        # It solves what it brings; who imports anything else need not load a solver.
+        from app.review.importing.carry_in import carry_in
+
         result = carry_in(
             store,
             dataset,
