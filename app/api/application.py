@@ -43,7 +43,6 @@ from app.api.routers import (
     yields,
 )
 from app.api.security.bodies import MAX_JSON_BYTES, JsonBodies
-from app.api.security.failures import Failures
 from app.api.security.headers import SecurityHeaders
 from app.api.security.lanes import THREADS, Doors, Lanes
 from app.api.security.origin import KnownHosts, SameOrigin
@@ -137,7 +136,6 @@ def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
     app.add_middleware(SameOrigin)
     app.add_middleware(KnownHosts, allowed=settings.allowed_hosts)
     install_metrics(app, doors)
-    app.add_middleware(Failures)
     app.add_middleware(RequestLog)
     app.add_middleware(SecurityHeaders, policy=site.policy)
 

@@ -66,21 +66,20 @@ class ServerCollector(Collector):
 
 
 def _home(home: Home) -> Iterator[Metric]:
-    vitals = home.vitals
-    yield _gauge("groups", "Groups of all datasets.", vitals.groups)
-    yield _gauge("unsolved_groups", "Groups that wait to be solved.", vitals.unsolved)
+    yield _gauge("groups", "Groups of all datasets.", home.groups)
+    yield _gauge("unsolved_groups", "Groups that wait to be solved.", home.unsolved)
     yield _gauge(
         "oldest_unsolved_seconds",
         "How long the oldest group waits to be solved.",
         home.oldest_unsolved_seconds,
     )
-    yield _gauge("log_entries", "Entries of the log of changes.", vitals.entries)
+    yield _gauge("log_entries", "Entries of the log of changes.", home.entries)
     yield _gauges("file_bytes", "Size of the database's files.", "file", home.file_bytes)
     yield _gauge("disk_free_bytes", "Room on the disk of the home.", home.free_bytes)
     jobs = GaugeMetricFamily(
         "touchline_jobs", "Jobs on record, by kind and state.", labels=["kind", "state"]
     )
-    for (kind, state), number in sorted(vitals.jobs.items()):
+    for (kind, state), number in sorted(home.jobs.items()):
         jobs.add_metric([kind, state], number)
     yield jobs
 

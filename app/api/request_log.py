@@ -1,4 +1,8 @@
-"""The request log: one line for each change, under an id that its other lines carry as well."""
+"""The request log: one line for each change, under an id that its other lines carry as well.
+
+It has the last word on mistakes of ours, too: they become a problem with an id, and a line with
+the rest.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.api.problem import make_problem, problem_response
 from app.api.security.origin import SAFE_METHODS
 
 log = structlog.get_logger("touchline.requests")
@@ -27,6 +32,10 @@ class RequestLog:
 
     With the Idempotency-Key of the browser's click and the ETag of what was committed, an edit can
     be followed from one to the other.
+
+    Answers 500 for whatever nobody caught, and says nothing of stack, path or SQL to the caller.
+    Starlette's own handler of that kind stands outside of every middleware, where the answer
+    would go out without the security headers.
     """
 
     def __init__(self, app: ASGIApp):
@@ -48,7 +57,18 @@ class RequestLog:
             await send(message)
 
         with structlog.contextvars.bound_contextvars(request=name):
-            await self.app(scope, receive, watch)
+            try:
+                await self.app(scope, receive, watch)
+            except Exception:
+                problem = make_problem(
+                    500,
+                    "something went wrong inside the server",
+                    hint="Nothing was saved. The server's log has the details under this instance.",
+                )
+                log.exception("request failed", instance=problem.instance, path=scope["path"])
+                if status:
+                    raise
+                await problem_response(problem)(scope, receive, watch)
             if scope["method"] in SAFE_METHODS and status < 500:
                 return
             log.info(

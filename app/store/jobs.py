@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from sqlalchemy import delete, insert, select, update
+from sqlalchemy import delete, func, insert, select, update
 from sqlalchemy.orm import Session
 
 from app.finite import finite
@@ -134,6 +134,13 @@ def read_jobs(
     if before is not None:
         statement = statement.where(JobModel.id < before)
     return [_job(row) for row in session.execute(statement)]
+
+
+def count_jobs(session: Session) -> dict[tuple[str, str], int]:
+    """How many jobs there are, by kind and state."""
+    kinds = select(JobModel.kind, JobModel.state, func.count())
+    rows = session.execute(kinds.group_by(JobModel.kind, JobModel.state))
+    return {(kind, state): number for kind, state, number in rows}
 
 
 def trim_jobs(session: Session, kind: str, keep: int) -> None:

@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from app.store.conditions import Condition
 from app.store.models import QueueModel
 from app.store.order import Key, Order
+from app.store.policies import judged_since
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,21 @@ def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[Any]:
         .group_by(QueueModel.dataset_id, QueueModel.status)
     )
     return session.execute(statement).all()
+
+
+def count_unsolved(session: Session) -> tuple[int, int, str | None]:
+    """How many groups there are, how many wait to be solved, and since when (UTC) the one that
+    waits longest does: from its last change, or from that of its dataset's policy where that came
+    later; None: none waits."""
+    total = session.scalar(select(func.count()).select_from(QueueModel)) or 0
+    statement = (
+        select(QueueModel.dataset_id, func.count(), func.min(QueueModel.changed))
+        .where(QueueModel.solved.is_(False))
+        .group_by(QueueModel.dataset_id)
+    )
+    rows = session.execute(statement).all()
+    since = [max(changed, judged_since(session, dataset) or "") for dataset, _, changed in rows]
+    return total, sum(count for _, count, _ in rows), min(since, default=None)
 
 
 def count_reviewed(session: Session, dataset_id: int) -> dict[tuple[str | None, str], int]:

@@ -7,7 +7,7 @@ from fastapi import FastAPI, Response
 from structlog.testing import capture_logs
 
 from app.api.errors import install_handlers
-from app.api.security.failures import Failures
+from app.api.request_log import RequestLog
 from app.api.security.headers import FIXED, SecurityHeaders, content_security_policy
 from app.errors import InputError
 
@@ -31,7 +31,7 @@ def client(plain_app: FastAPI, client_of):
         raise InputError("no")
 
     install_handlers(plain_app)
-    plain_app.add_middleware(Failures)
+    plain_app.add_middleware(RequestLog)
     plain_app.add_middleware(SecurityHeaders, policy=content_security_policy)
     return client_of(plain_app)
 
@@ -65,7 +65,7 @@ class TestSecurityHeaders:
         assert client.get("/cached").headers["cache-control"] == "private, max-age=60"
 
 
-class TestFailures:
+class TestMistakes:
     def test_a_crash_tells_its_id_and_nothing_else(self, client) -> None:
         with capture_logs() as logs:
             answer = client.get("/crash")
@@ -73,4 +73,6 @@ class TestFailures:
         assert answer.headers["content-type"] == "application/problem+json"
         for secret in ("SELECT", "home", "RuntimeError", "Traceback"):
             assert secret not in answer.text
-        assert [entry["instance"] for entry in logs] == [answer.json()["instance"]]
+        failed, answered = logs
+        assert failed["instance"] == answer.json()["instance"]
+        assert (answered["path"], answered["status"]) == ("/crash", 500)

@@ -13,13 +13,12 @@ from app.review.datasets.dataset import get_dataset
 from app.review.jobs import vitals
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import request_solve
-from app.review.jobs.vitals import read_home
+from app.review.jobs.vitals import file_sizes, read_home
 from app.review.policies.policy import change_policy
 from app.soccer.policy import STRICT
 from app.store.clock import now
 from app.store.models import GroupModel, QueueModel
 from app.store.session import Store
-from app.store.vitals import file_sizes
 
 
 def test_groups_that_wait_are_counted_and_the_oldest_is_timed(
@@ -27,7 +26,7 @@ def test_groups_that_wait_are_counted_and_the_oldest_is_timed(
 ) -> None:
     fill(make_group(7), make_group(8, shift=300.0), solved=False)
     found = read_home(store)
-    assert (found.vitals.groups, found.vitals.unsolved) == (2, 2)
+    assert (found.groups, found.unsolved) == (2, 2)
 
     class Later(datetime):
         @classmethod
@@ -48,7 +47,7 @@ def test_groups_that_wait_for_a_new_policy_wait_since_it_came(
         session.execute(update(QueueModel).values(changed=long_ago))
     before = now()
     change_policy(store, "demo", STRICT, if_match=None, actor="ann")
-    found = read_home(store).vitals
+    found = read_home(store)
     assert found.unsolved == 1
     assert found.oldest_unsolved is not None
     assert before <= found.oldest_unsolved <= now()
@@ -64,17 +63,17 @@ def test_files_are_those_of_the_database_wherever_it_lies(tmp_path: Path) -> Non
 def test_nothing_waits_once_all_is_solved(store: Store, fill, make_group) -> None:
     fill(make_group(7))
     found = read_home(store)
-    assert (found.vitals.unsolved, found.oldest_unsolved_seconds) == (0, 0.0)
-    assert found.vitals.entries >= 2
+    assert (found.unsolved, found.oldest_unsolved_seconds) == (0, 0.0)
+    assert found.entries >= 2
     assert found.file_bytes["database"] > 0
     assert found.free_bytes > 0
 
 
 def test_jobs_are_counted_by_kind_and_state(store: Store, fill, make_group) -> None:
     fill(make_group(7))
-    assert read_home(store).vitals.jobs == {}
+    assert read_home(store).jobs == {}
     jobs = Jobs(store)
     job = request_solve(jobs, store, get_dataset(store, "demo").id, actor="ann")
     jobs.wait(job.id, 30)
     jobs.close()
-    assert read_home(store).vitals.jobs == {("solve", "done"): 1}
+    assert read_home(store).jobs == {("solve", "done"): 1}
