@@ -13,7 +13,8 @@ from app.review.evaluating.evaluation import (
     list_evaluations,
     run_evaluation,
 )
-from app.review.jobs.jobs import JobProgress, Jobs, Work
+from app.review.jobs.job_run import JobProgress, Work
+from app.review.jobs.jobs import Jobs
 from app.store.codecs import Json
 from app.store.evaluations import StoredEvaluation
 from app.store.jobs import Job

@@ -10,7 +10,8 @@ from app.review.exporting.export import export
 from app.review.exporting.folder import ExportFolder
 from app.review.exporting.source import LiveSource
 from app.review.importing.carry import FORMAT as CARRY
-from app.review.jobs.jobs import JobProgress, Jobs, Work, counting
+from app.review.jobs.job_run import JobProgress, Work, counting
+from app.review.jobs.jobs import Jobs
 from app.review.versions.version import find_version
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json

@@ -14,7 +14,8 @@ from app.review.datasets.dataset import dataset_id, require_name
 from app.review.importing.folders import resolve_folder
 from app.review.importing.import_child import Outcome, import_apart
 from app.review.importing.sources import FORMATS, Source
-from app.review.jobs.jobs import FailedWithReportError, JobProgress, Jobs, Work
+from app.review.jobs.job_run import FailedWithReportError, JobProgress, Work
+from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
 from app.store.codecs import Json

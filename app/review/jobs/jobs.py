@@ -11,20 +11,18 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import structlog
 
 from app.errors import (
     ConflictError,
-    JobCancelled,
     NotFoundError,
     OverloadedError,
-    ReviewError,
     StorageError,
 )
-from app.progress import Progress
+from app.review.jobs.job_run import JobProgress, JobRun, RunQueue, Work
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
@@ -61,98 +59,9 @@ KEPT = {"solve": 200, "bulk": 200, "verify": 200}
 MOST_TRIES = 2
 """So many times a server may die at a job before it is left alone."""
 
-Work = Callable[["JobProgress"], Json]
-"""What a job does; returns its result. It must be safe to start again from the beginning."""
 Listener = Callable[[Job], None]
 Pool = Callable[[], AbstractContextManager[Executor]]
 """Makes an executor for the length of one large job, so that requests keep their processor."""
-
-
-class FailedWithReportError(ReviewError):
-    """A job that failed, and what it has to tell all the same.
-
-    Args:
-        message: One sentence that says what is wrong.
-        hint: What to do about it.
-        result: The job's result.
-    """
-
-    def __init__(self, message: str, hint: str | None, result: Json):
-        super().__init__(message, hint=hint)
-        self.result = result
-
-
-def counting(progress: JobProgress, what: str) -> Progress:
-    """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``."""
-
-    def count(done: int, total: int | None = None, _sentence: str = "") -> None:
-        of = "" if total is None else f" of {total:,}"
-        progress(done, total, f"{done:,}{of} {what}")
-
-    return count
-
-
-class JobProgress:
-    """How far a job is; its work calls it often, and it costs next to nothing.
-
-    ``job_id`` is the job's, for what its work writes under that name.
-    """
-
-    def __init__(self, job_id: int, closing: threading.Event):
-        self.job_id = job_id
-        self.place: tuple[int, int | None, str] = (0, None, "")
-        self.cancelled = threading.Event()
-        self._closing = closing
-
-    def __call__(self, done: int, total: int | None = None, sentence: str = "") -> None:
-        """Note how much is done; what is not said stays as it was.
-
-        Raises:
-            JobCancelled: The work shall end here.
-        """
-        _, last_total, last_sentence = self.place
-        self.place = (done, last_total if total is None else total, sentence or last_sentence)
-        self.check()
-
-    def check(self) -> None:
-        """Raise ``JobCancelled`` where the work shall end here."""
-        if self.cancelled.is_set() or self._closing.is_set():
-            raise JobCancelled
-
-
-@dataclass(eq=False)
-class _Run:
-    """A job of this process that waits or runs."""
-
-    id: int
-    kind: str
-    dataset_id: int | None
-    work: Work
-    progress: JobProgress
-    over: threading.Event = field(default_factory=threading.Event)
-    counted: bool = False
-    """Whether its record says that it was begun here."""
-
-
-@dataclass(frozen=True)
-class _Queue:
-    """Which jobs of this process wait, and which one runs."""
-
-    waiting: tuple[_Run, ...] = ()
-    running: _Run | None = None
-
-    @property
-    def runs(self) -> tuple[_Run, ...]:
-        """Those that wait and the one that runs."""
-        return self.waiting if self.running is None else (*self.waiting, self.running)
-
-    def joined_by(self, *runs: _Run) -> _Queue:
-        """With more that wait."""
-        return replace(self, waiting=(*self.waiting, *runs))
-
-    def left_by(self, run: _Run) -> _Queue:
-        """Without one that waits."""
-        return replace(self, waiting=tuple(item for item in self.waiting if item is not run))
 
 
 class Jobs:
@@ -164,7 +73,7 @@ class Jobs:
     def __init__(self, store: Store, *, capacity: int = CAPACITY, pool: Pool | None = None):
         self._store, self._capacity, self.pool = store, capacity, pool
         # Replaced as a whole and only under ``_changed``, so that it is read without.
-        self._queue = _Queue()
+        self._queue = RunQueue()
         self._entering = 0
         # Never held while the database is asked: requests and the event loop wait for it.
         self._changed = threading.Condition()
@@ -237,7 +146,7 @@ class Jobs:
             keep(job)(session)
             if known is None:
                 progress = JobProgress(job.id, self._closing)
-                enter(_Run(job.id, kind, dataset_id, work, progress))
+                enter(JobRun(job.id, kind, dataset_id, work, progress))
         if known is not None:
             return job
         self._announce(job)
@@ -338,7 +247,7 @@ class Jobs:
                 log.warning("a job did not end in time", job=running.id)
                 self._take_back(running)
 
-    def _waiting_for(self, kind: str, dataset_id: int | None) -> _Run | None:
+    def _waiting_for(self, kind: str, dataset_id: int | None) -> JobRun | None:
         """The waiting job of a kind and dataset."""
         place = (kind, dataset_id)
         runs = self._queue.waiting
@@ -350,14 +259,14 @@ class Jobs:
             raise OverloadedError(f"{waiting} jobs wait already", hint="Send it again in a while.")
 
     @contextmanager
-    def _entry(self) -> Iterator[Callable[[_Run], None]]:
+    def _entry(self) -> Iterator[Callable[[JobRun], None]]:
         """Lets a job in while its record is written; none begins before that is kept.
 
         What is let in is out again where the record could not be written.
         """
-        entered: list[_Run] = []
+        entered: list[JobRun] = []
 
-        def enter(run: _Run) -> None:
+        def enter(run: JobRun) -> None:
             with self._changed:
                 entered.append(run)
                 self._queue = self._queue.joined_by(run)
@@ -389,9 +298,9 @@ class Jobs:
     def _is_resumed(self, job: Job) -> bool:
         return job.kind in self._resumers and job.tries < MOST_TRIES
 
-    def _run(self, job: Job) -> _Run:
+    def _run(self, job: Job) -> JobRun:
         work = self._resumers[job.kind](job)
-        return _Run(job.id, job.kind, job.dataset_id, work, JobProgress(job.id, self._closing))
+        return JobRun(job.id, job.kind, job.dataset_id, work, JobProgress(job.id, self._closing))
 
     def _wake(self) -> None:
         if self._worker is None and self._queue.waiting:
@@ -411,7 +320,7 @@ class Jobs:
                     self._queue = replace(self._queue, running=None)
                 run.over.set()
 
-    def _next(self) -> _Run | None:
+    def _next(self) -> JobRun | None:
         """The next job to run; None when the server stops."""
         with self._changed:
             self._changed.wait_for(self._is_somebodys_turn)
@@ -424,14 +333,14 @@ class Jobs:
     def _is_somebodys_turn(self) -> bool:
         return self._closing.is_set() or bool(self._queue.waiting and not self._entering)
 
-    def _carry_out(self, run: _Run) -> None:
+    def _carry_out(self, run: JobRun) -> None:
         self._save(run.id, state=RUNNING, started=now(), begun=1)
         run.counted = True
         ended = threading.Event()
         ticker = threading.Thread(target=self._tick, args=(run, ended), daemon=True)
         ticker.start()
         try:
-            values = self._outcome(run)
+            values = run.outcome()
         finally:
             ended.set()
             ticker.join()
@@ -440,7 +349,7 @@ class Jobs:
         else:
             self._take_back(run)
 
-    def _take_back(self, run: _Run) -> None:
+    def _take_back(self, run: JobRun) -> None:
         """Let a server that stops in good order count for no death: it is none of this job's doing."""
         with self._changed:
             counted, run.counted = run.counted, False
@@ -448,25 +357,7 @@ class Jobs:
             with suppress(StorageError):
                 self._save(run.id, begun=-1)
 
-    def _outcome(self, run: _Run) -> dict[str, Any] | None:
-        """How a job ended, as columns; None where the server stops and the next one decides."""
-        try:
-            return {"state": DONE, "result": run.work(run.progress)}
-        except JobCancelled:
-            if not run.progress.cancelled.is_set():
-                return None
-            return {"state": CANCELLED, "sentence": "Cancelled."}
-        except FailedWithReportError as error:
-            return {**_failure(error.message, error.hint), "result": error.result}
-        except ReviewError as error:
-            return _failure(error.message, error.hint, error.pointer)
-        except Exception:
-            log.exception("job failed", job=run.id, kind=run.kind)
-            return _failure(
-                "something went wrong inside the server", f"The server's log names job {run.id}."
-            )
-
-    def _tick(self, run: _Run, ended: threading.Event) -> None:
+    def _tick(self, run: JobRun, ended: threading.Event) -> None:
         """Keep the record in step with the progress, off the work's own thread: the work may hold
         the write lock when it tells how far it is."""
         shown = run.progress.place
@@ -474,10 +365,10 @@ class Jobs:
             if run.progress.place != shown:
                 shown = run.progress.place
                 with suppress(StorageError):
-                    self._save(run.id, **_columns(shown))
+                    self._save(run.id, **run.columns)
 
-    def _finish(self, run: _Run, **values: Any) -> None:
-        place = _columns(run.progress.place)
+    def _finish(self, run: JobRun, **values: Any) -> None:
+        place = run.columns
         # Where the disk is full for a moment, the record waits for it.
         for _ in range(5):
             try:
@@ -506,12 +397,3 @@ def _need(session: Session, job_id: int) -> Job:
     if job is None:
         raise NotFoundError(f"there is no job {job_id}")
     return job
-
-
-def _columns(place: tuple[int, int | None, str]) -> dict[str, Any]:
-    return dict(zip(("done", "total", "sentence"), place, strict=True))
-
-
-def _failure(detail: str, hint: str | None, pointer: str | None = None) -> dict[str, Any]:
-    problem = {"detail": detail, "hint": hint, "pointer": pointer}
-    return {"state": FAILED, "sentence": detail, "problem": problem}

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from app.review.datasets.dataset import get_dataset, list_datasets
 from app.review.editing.recompute import SolveReport, solve_dataset, stale_groups
-from app.review.jobs.jobs import JobProgress, Jobs, Pool, Work, counting
+from app.review.jobs.job_run import JobProgress, Work, counting
+from app.review.jobs.jobs import Jobs, Pool
 from app.review.policies.policy import PolicyState, apply_policy
 from app.soccer.policy import Policy
 from app.store.answers import Keep, Kept, keep_nothing

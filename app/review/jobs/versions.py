@@ -6,7 +6,8 @@ from typing import Any
 
 from app.errors import NotFoundError
 from app.review.datasets.dataset import get_dataset
-from app.review.jobs.jobs import JobProgress, Jobs, Work
+from app.review.jobs.job_run import JobProgress, Work
+from app.review.jobs.jobs import Jobs
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.review.versions.verify import verify_and_keep
 from app.review.versions.version import Version, find_version, get_version

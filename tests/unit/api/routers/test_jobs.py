@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from app.review.jobs.jobs import JobProgress
+from app.review.jobs.job_run import JobProgress
 
 SECONDS = 20
 API = "/api/v1/jobs"

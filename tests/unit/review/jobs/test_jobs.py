@@ -21,7 +21,8 @@ from app.errors import (
 )
 from app.review.importing.ingest import ensure_dataset
 from app.review.jobs import jobs as module
-from app.review.jobs.jobs import JobProgress, Jobs
+from app.review.jobs.job_run import JobProgress
+from app.review.jobs.jobs import Jobs
 from app.store.codecs import Json
 from app.store.jobs import Job, NewJob, insert_job
 from app.store.session import Session, Store

@@ -12,7 +12,8 @@ from app.review.datasets.dataset import get_dataset
 from app.review.editing.recompute import SolveReport, stale_groups
 from app.review.importing.ingest import ensure_dataset
 from app.review.jobs import solve as solve_job
-from app.review.jobs.jobs import JobProgress, Jobs
+from app.review.jobs.job_run import JobProgress
+from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import request_solve, resume_solving, solve_leftovers
 from app.store.session import Store
 

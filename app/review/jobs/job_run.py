@@ -1,0 +1,136 @@
+"""Job run: the work of one job in this process, how far it is, and how it ended."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import structlog
+
+from app.errors import JobCancelled, ReviewError
+from app.progress import Progress
+from app.store.codecs import Json
+from app.store.jobs import CANCELLED, DONE, FAILED
+
+log = structlog.get_logger("touchline.jobs")
+
+Work = Callable[["JobProgress"], Json]
+"""What a job does; returns its result. It must be safe to start again from the beginning."""
+
+
+class FailedWithReportError(ReviewError):
+    """A job that failed, and what it has to tell all the same.
+
+    Args:
+        message: One sentence that says what is wrong.
+        hint: What to do about it.
+        result: The job's result.
+    """
+
+    def __init__(self, message: str, hint: str | None, result: Json):
+        super().__init__(message, hint=hint)
+        self.result = result
+
+
+def counting(progress: JobProgress, what: str) -> Progress:
+    """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``."""
+
+    def count(done: int, total: int | None = None, _sentence: str = "") -> None:
+        of = "" if total is None else f" of {total:,}"
+        progress(done, total, f"{done:,}{of} {what}")
+
+    return count
+
+
+class JobProgress:
+    """How far a job is; its work calls it often, and it costs next to nothing.
+
+    ``job_id`` is the job's, for what its work writes under that name.
+    """
+
+    def __init__(self, job_id: int, closing: threading.Event):
+        self.job_id = job_id
+        self.place: tuple[int, int | None, str] = (0, None, "")
+        self.cancelled = threading.Event()
+        self._closing = closing
+
+    def __call__(self, done: int, total: int | None = None, sentence: str = "") -> None:
+        """Note how much is done; what is not said stays as it was.
+
+        Raises:
+            JobCancelled: The work shall end here.
+        """
+        _, last_total, last_sentence = self.place
+        self.place = (done, last_total if total is None else total, sentence or last_sentence)
+        self.check()
+
+    def check(self) -> None:
+        """Raise ``JobCancelled`` where the work shall end here."""
+        if self.cancelled.is_set() or self._closing.is_set():
+            raise JobCancelled
+
+
+@dataclass(eq=False)
+class JobRun:
+    """A job of this process that waits or runs."""
+
+    id: int
+    kind: str
+    dataset_id: int | None
+    work: Work
+    progress: JobProgress
+    over: threading.Event = field(default_factory=threading.Event)
+    counted: bool = False
+    """Whether its record says that it was begun here."""
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """How far it is, as columns of its record."""
+        return dict(zip(("done", "total", "sentence"), self.progress.place, strict=True))
+
+    def outcome(self) -> dict[str, Any] | None:
+        """Do the work; how it ended, as columns. None where the server stops and the next one
+        decides."""
+        try:
+            return {"state": DONE, "result": self.work(self.progress)}
+        except JobCancelled:
+            if not self.progress.cancelled.is_set():
+                return None
+            return {"state": CANCELLED, "sentence": "Cancelled."}
+        except FailedWithReportError as error:
+            return {**_failure(error.message, error.hint), "result": error.result}
+        except ReviewError as error:
+            return _failure(error.message, error.hint, error.pointer)
+        except Exception:
+            log.exception("job failed", job=self.id, kind=self.kind)
+            return _failure(
+                "something went wrong inside the server", f"The server's log names job {self.id}."
+            )
+
+
+def _failure(detail: str, hint: str | None, pointer: str | None = None) -> dict[str, Any]:
+    problem = {"detail": detail, "hint": hint, "pointer": pointer}
+    return {"state": FAILED, "sentence": detail, "problem": problem}
+
+
+@dataclass(frozen=True)
+class RunQueue:
+    """Which jobs of this process wait, and which one runs."""
+
+    waiting: tuple[JobRun, ...] = ()
+    running: JobRun | None = None
+
+    @property
+    def runs(self) -> tuple[JobRun, ...]:
+        """Those that wait and the one that runs."""
+        return self.waiting if self.running is None else (*self.waiting, self.running)
+
+    def joined_by(self, *runs: JobRun) -> RunQueue:
+        """With more that wait."""
+        return replace(self, waiting=(*self.waiting, *runs))
+
+    def left_by(self, run: JobRun) -> RunQueue:
+        """Without one that waits."""
+        return replace(self, waiting=tuple(item for item in self.waiting if item is not run))
