@@ -43,7 +43,7 @@ def build_sample(folder: Path) -> None:
     run_touchline(
         folder / "home",
         "migrate",
-        f"sample --groups {GROUPS} {tree}",
+        f"sample --workers 1 --groups {GROUPS} {tree}",
         f"import soccernet-v3 {tree} --dataset sample",
         "solve --dataset sample --workers 1",
     )
