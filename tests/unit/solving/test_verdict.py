@@ -51,6 +51,21 @@ def facts(views: int = 2, **changes: object) -> Facts:
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
+def three(**changes: object) -> Facts:
+    """Three views with a pair of each two, in good order."""
+    pairs = {
+        "pair_group": np.zeros(3, np.int64),
+        "pair_view": np.array([[0, 1], [0, 2], [1, 2]]),
+        "pair_errors": np.full((3, 2), 3.0),
+        "pair_front": np.ones(3, bool),
+        "pair_baseline": np.array([14.0, 15.0, 11.0]),
+        "pair_parallax": np.full(3, 45.0),
+        "pair_point": np.zeros((3, 3)),
+        "pair_moved": np.zeros((3, 2, 2, 2, 3)),
+    }
+    return facts(3, **{**pairs, **changes})
+
+
 def failing(verdict: Verdict) -> list[str]:
     return [name for name, fails in zip(GATES, verdict.failed[:, 0], strict=True) if fails]
 
@@ -93,6 +108,39 @@ class TestJudge:
         assert (verdict.passes.tolist(), verdict.first.tolist()) == ([True], [PASSES])
         assert verdict.point.tolist() == [[0.0, 0.0, 0.0]]
         assert (verdict.parallax.tolist(), verdict.distance.tolist()) == ([90.0], [10.0])
+
+    def test_the_ball_is_the_mean_of_its_pairs_seen_from_the_first_view(self):
+        points = np.array([[1.0, 2.0, -1.0], [3.0, 2.0, -1.0], [2.0, 5.0, -4.0]])
+        verdict = judged(three(pair_point=points))
+        assert verdict.point.tolist() == [[2.0, 3.0, -2.0]]
+        assert verdict.distance.tolist() == pytest.approx([77**0.5])
+
+    def test_the_parallax_of_several_pairs_is_measured_at_their_mean(self):
+        point = np.tile([0.0, 0.0, -4.0], (3, 1))
+        rays = np.array([[10.0, 0.0, 4.0], [0.0, 10.0, 4.0], [-5.0, 0.0, 4.0]])
+        rays /= np.linalg.norm(rays, axis=1)[:, None]
+        widest = np.degrees(np.arccos(min(rays[a] @ rays[b] for a, b in ((0, 1), (0, 2), (1, 2)))))
+        assert judged(three(pair_point=point)).parallax.tolist() == pytest.approx([widest])
+
+    def test_the_parallax_of_one_pair_is_its_own(self):
+        assert judged(facts(pair_parallax=np.array([45.0]))).parallax.tolist() == [45.0]
+
+    def test_one_without_a_camera_is_not_to_blame_where_another_falls(self):
+        marks = np.repeat([1.0, 1.0, 9.0], 4)
+        verdict = judged(three(view_camera=np.array([True, False, True]), mark_px=marks))
+        assert failing(verdict)[:2] == ["jac", "two_views"]
+
+    def test_a_view_without_ball_is_no_second_view_of_it(self):
+        none = {name: getattr(facts(1), name) for name in dir(facts()) if name.startswith("pair_")}
+        assert np.isnan(judged(facts(view_ball=np.array([True, False]), **none)).baseline).all()
+
+    def test_the_baseline_is_the_widest_between_views_that_are_left(self):
+        marks = np.repeat([1.0, 1.0, 9.0], 4)
+        assert judged(three(mark_px=marks)).baseline.tolist() == [14.0]
+
+    def test_one_marking_that_is_found_is_all_of_them(self):
+        marked = {"mark_view": np.array([0, 1, 1]), "mark_px": np.array([1.0, 1.0, 9.0])}
+        assert judged(facts(**marked)).jac.tolist() == [1.0, 0.5]
 
     def test_two_without_a_camera_are_to_blame(self):
         verdict = judged(facts(3, view_camera=np.array([True, False, False])))
