@@ -50,6 +50,12 @@ class LiveGroups(StrEnum):
 BALLS, CAMERAS = "Predicted balls", "Predicted cameras"
 CAREFUL, TRUTH, RESULT = "Careful boxes", "The truth", "The result"
 
+
+def _size(panel: str, text: str, *names: str) -> Any:
+    """An option that is the size of images."""
+    return typer.Option(*names, parser=parse_size, metavar="WxH", rich_help_panel=panel, help=text)
+
+
 Predictions = Annotated[
     str | None, typer.Argument(help="File, folder or zip of ball boxes, or the name of a set.")
 ]
@@ -73,13 +79,7 @@ Category = Annotated[
 ]
 PixelSize = Annotated[
     ImageSize | None,
-    typer.Option(
-        "--size",
-        parser=parse_size,
-        metavar="WxH",
-        rich_help_panel=BALLS,
-        help="Size of the images that boxes in pixels refer to.",
-    ),
+    _size(BALLS, "Size of the images that boxes in pixels refer to.", "--size"),
 ]
 MinScore = Annotated[
     float,
@@ -98,12 +98,7 @@ Cameras = Annotated[
 ]
 CamerasSize = Annotated[
     ImageSize | None,
-    typer.Option(
-        parser=parse_size,
-        metavar="WxH",
-        rich_help_panel=CAMERAS,
-        help="Size of the images of these cameras.",
-    ),
+    _size(CAMERAS, "Size of the images of these cameras."),
 ]
 Careful = Annotated[
     str | None,
@@ -119,12 +114,7 @@ CarefulFormat = Annotated[
 ]
 CarefulSize = Annotated[
     ImageSize | None,
-    typer.Option(
-        parser=parse_size,
-        metavar="WxH",
-        rich_help_panel=CAREFUL,
-        help="As --size, of the careful boxes.",
-    ),
+    _size(CAREFUL, "As --size, of the careful boxes."),
 ]
 CarefulCategory = Annotated[
     int | None,
