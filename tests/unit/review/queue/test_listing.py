@@ -130,8 +130,8 @@ class TestListGroups:
     def test_pages_hold_each_group_once_and_in_order(self, store, dataset, query: str) -> None:
         whole = walk(store, dataset, query, 500)
         assert sorted(whole) == list(range(1, COUNT + 1))
-        assert walk(store, dataset, query, 7) == whole
-        assert walk(store, dataset, f"{query} status:unreviewed", 7) == [
+        assert walk(store, dataset, query, 13) == whole
+        assert walk(store, dataset, f"{query} status:unreviewed", 13) == [
             row.id
             for row in list_groups(store, dataset, query, 500).items
             if row.status == "unreviewed"
