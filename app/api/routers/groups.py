@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -20,7 +22,7 @@ from app.api.deps import (
 )
 from app.api.edits import preview_edits
 from app.api.problem import Responses, responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.reply import Asked, AskedUnder, Reply, document
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
 from app.api.schemas.queue import (
@@ -58,6 +60,24 @@ def group_answer(state: GroupState) -> Response:
 def load_document(store: Store, group_id: int) -> GroupDocument:
     """The document of a group as it is now."""
     return GroupDocument.of(submit.load_solved(store, group_id))
+
+
+def change_group(
+    asked: Asked | None,
+    present: Callable[[], GroupDocument],
+    change: Callable[..., GroupState],
+) -> Response:
+    """Change a group and answer with it.
+
+    Args:
+        asked: The key under which it was asked for.
+        present: Reads the group, to be shown to who comes too late.
+        change: Does it; told by ``keep`` how the answer is kept.
+    """
+    reply = Reply(asked, group_answer)
+    with current_state(present):
+        state = change(keep=reply.keep)
+    return reply.of(state)
 
 
 @router.get("", operation_id="listGroups", responses=responses(404))
@@ -175,10 +195,8 @@ def undo(
     group: Id, store: AppStore, actor: Actor, if_match: IfMatch, asked: AskedUnder
 ) -> Response:
     """Take the last edit back; 409 when there is none."""
-    reply = Reply(asked, group_answer)
-    with current_state(lambda: load_document(store, group)):
-        state = submit.undo(store, group, if_match=if_match, actor=actor, keep=reply.keep)
-    return reply.of(state)
+    change = partial(submit.undo, store, group, if_match=if_match, actor=actor)
+    return change_group(asked, lambda: load_document(store, group), change)
 
 
 @router.post(
@@ -191,10 +209,8 @@ def redo(
     group: Id, store: AppStore, actor: Actor, if_match: IfMatch, asked: AskedUnder
 ) -> Response:
     """Do again what was undone last; 409 when there is nothing."""
-    reply = Reply(asked, group_answer)
-    with current_state(lambda: load_document(store, group)):
-        state = submit.redo(store, group, if_match=if_match, actor=actor, keep=reply.keep)
-    return reply.of(state)
+    change = partial(submit.redo, store, group, if_match=if_match, actor=actor)
+    return change_group(asked, lambda: load_document(store, group), change)
 
 
 @router.put(
@@ -212,8 +228,6 @@ def put_verdict(
     asked: AskedUnder,
 ) -> Response:
     """Accept, reject with a reason, defer, or take a verdict back."""
-    reply = Reply(asked, group_answer)
     said = (verdict.state, verdict.reason, verdict.note)
-    with current_state(lambda: load_document(store, group)):
-        state = set_verdict(store, group, *said, if_match=if_match, actor=actor, keep=reply.keep)
-    return reply.of(state)
+    change = partial(set_verdict, store, group, *said, if_match=if_match, actor=actor)
+    return change_group(asked, lambda: load_document(store, group), change)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from app.api.conflicts import current_state
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, IfMatch
 from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply
-from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document
+from app.api.reply import AskedUnder
+from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.job import JobDocument
 from app.api.schemas.prediction import (
@@ -183,18 +183,12 @@ def accept_prediction(
     ] = False,
 ) -> Response:
     """Make this very prediction the ball of its view: an edit that can be undone."""
-    reply = Reply(asked, group_answer)
-    with current_state(lambda: load_document(store, find_view(store, view).group_id)):
-        state = accept_box(
-            store,
-            view,
-            prediction,
-            if_match=if_match,
-            actor=actor,
-            replace=replace,
-            keep=reply.keep,
-        )
-    return reply.of(state)
+    change = partial(
+        accept_box, store, view, prediction, if_match=if_match, actor=actor, replace=replace
+    )
+    return change_group(
+        asked, lambda: load_document(store, find_view(store, view).group_id), change
+    )
 
 
 def _files(settings: Settings, request: PredictionRequest) -> PredictionFiles:

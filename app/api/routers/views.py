@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, Any
 
 from anyio import to_thread
 from fastapi import APIRouter, Body, Query, Request, Response
 
-from app.api.conflicts import current_state
 from app.api.deps import (
     Actor,
     AppServices,
@@ -20,8 +20,8 @@ from app.api.deps import (
     etag_matches,
 )
 from app.api.problem import Responses, responses
-from app.api.reply import Asked, AskedUnder, Reply
-from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document
+from app.api.reply import Asked, AskedUnder
+from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
@@ -132,10 +132,10 @@ def _submit(
     actor: str,
     asked: Asked | None,
 ) -> Response:
-    reply = Reply(asked, group_answer)
-    with current_state(lambda: load_document(store, find_view(store, view).group_id)):
-        state = submit_view(store, view, edit_of, if_match=if_match, actor=actor, keep=reply.keep)
-    return reply.of(state)
+    change = partial(submit_view, store, view, edit_of, if_match=if_match, actor=actor)
+    return change_group(
+        asked, lambda: load_document(store, find_view(store, view).group_id), change
+    )
 
 
 @router.get(
