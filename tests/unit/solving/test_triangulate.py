@@ -113,6 +113,11 @@ class TestSightsOf:
 
 
 class TestMeet:
+    def test_the_baseline_lies_between_the_cameras_wherever_they_stand(self):
+        (found,) = meet([(looks_at("a", MAIN, BALL), looks_at("b", BEHIND_GOAL, BALL))])
+        apart = np.linalg.norm(MAIN.position - BEHIND_GOAL.position)
+        assert found.baseline_m == pytest.approx(float(apart))
+
     def test_a_meeting_by_hand(self):
         # Both look at the origin: 2 px across are 4 cm at 20 m, and 2 cm at 10 m.
         (found,) = meet(
