@@ -181,13 +181,12 @@ def app(
     prepared_home: Path,
     tmp_path: Path,
     reader: KeptReader,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[FastAPI]:
     """The whole application over a home of its own."""
     shutil.copytree(prepared_home, tmp_path / "home")
     opened = Services.open(Settings(home=tmp_path / "home"))
     # Most tests show no picture: the process that makes them starts with the first one.
-    monkeypatch.setattr(opened.frames, "warm", lambda: None)
+    opened.frames.warm = lambda: None  # type: ignore[method-assign]
     only_app.state.services = replace(opened, predictions=reader)
     yield only_app
     only_app.state.services.close()
