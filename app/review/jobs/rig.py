@@ -7,7 +7,8 @@ from contextlib import nullcontext
 from app.errors import ConflictError
 from app.review.datasets.dataset import get_dataset
 from app.review.editing.rig import accept, adjustable, proposal_values, propose, take_back
-from app.review.jobs.jobs import JobProgress, Jobs, Work
+from app.review.jobs.job_run import JobProgress, Work
+from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import request_solve
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
