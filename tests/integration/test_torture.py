@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.torture import commands, crowd, kills, power
+from tests.torture import commands, crowd, flood, kills, power
 from tests.torture.power import Acknowledge, Sync, Unlink, Write, cut_power, disk_at, parse
 
 
@@ -131,3 +131,18 @@ class TestCrowd:
         assert found.faults == []
         assert found.changes > 0
         assert found.lines()[0].startswith("4 people, 2 s: ")
+
+
+class TestFlood:
+    def test_too_many_clients_are_refused_and_a_reader_is_served(self, home: Path) -> None:
+        assert flood.flood(home, flood.SHORT, times=None) == []
+
+    def test_a_server_that_does_not_say_when_to_come_back_is_seen(self, home: Path) -> None:
+        plant = (
+            "from app.api.security import lanes\n"
+            "refuse = lanes.problem_response\n"
+            "lanes.problem_response = lambda problem, headers: refuse(problem)\n"
+        )
+        only = ("uploads",)
+        found = flood.flood(home, flood.SHORT, times=None, only=only, plant=plant)
+        assert found == ["uploads: 503 without Retry-After"]

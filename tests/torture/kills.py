@@ -58,16 +58,27 @@ def prepare(home: Path, folder: Path, *, clients: int, groups: int) -> None:
 
 
 class Server:
-    """A server that can be killed and started again on its port."""
+    """A server that can be killed and started again on its port.
 
-    def __init__(self, home: Path):
-        self._home, self.port = home, free_port()
+    Args:
+        home: What it serves.
+        plant: Python that its process runs first, to plant a fault.
+    """
+
+    def __init__(self, home: Path, plant: str = ""):
+        self._home, self._plant, self.port = home, plant, free_port()
         self._process: subprocess.Popen[bytes] | None = None
 
     @property
     def address(self) -> str:
         """Where it is."""
         return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def pid(self) -> int:
+        """Of its process."""
+        assert self._process is not None
+        return self._process.pid
 
     def start(self) -> None:
         """Start, and do not wait."""
@@ -78,7 +89,7 @@ class Server:
         }
         with (self._home / "server.log").open("ab") as log:
             self._process = subprocess.Popen(
-                [sys.executable, "-c", SERVE, "serve"],
+                [sys.executable, "-c", f"{self._plant}\n{SERVE}", "serve"],
                 cwd=ROOT,
                 env=environment,
                 stdout=log,

@@ -18,8 +18,9 @@ MAX_JSON_BYTES = 2 * 1024 * 1024
 BYTES = "application/octet-stream"
 """What upload routes take, and nothing else does."""
 MAX_DEPTH = 16
-MAX_CONTAINERS = 50_000
-"""Lists and objects of one body; a point of a line is an object."""
+MAX_CONTAINERS = 5_000
+"""Lists and objects of one body: a request may bring 2,000 points, and each is an object. Ten times as
+many were read for a second, in which nobody else was answered."""
 VALUE = "touchline.json"
 """Where a request's scope says what its JSON body is."""
 # Possessive, and the closing quote may be missing: linear on whatever comes.
