@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tests.torture import commands, crowd, flood, kills, power
+from tests.torture import commands, conditions, crowd, flood, kills, power, upgrades
 
 SEED = 20260101
 
@@ -101,12 +101,24 @@ def _flood(folder: Path, asked: argparse.Namespace) -> list[str]:
     return flood.flood(home, tell=print)
 
 
+def _conditions(folder: Path, asked: argparse.Namespace) -> list[str]:
+    home = folder / "conditions"
+    kills.prepare(home, folder / "conditions-files", clients=1, groups=4)
+    return conditions.torture(home, folder / "spoilt", tell=print)
+
+
+def _upgrades(folder: Path, asked: argparse.Namespace) -> list[str]:
+    return upgrades.torture(folder / "upgrades", kills=3, seed=asked.seed, tell=print)
+
+
 PARTS = {
     "kills": _kills,
     "cuts": _cuts,
     "commands": _commands,
     "crowd": _crowd,
     "flood": _flood,
+    "conditions": _conditions,
+    "upgrades": _upgrades,
 }
 
 

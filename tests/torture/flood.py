@@ -76,7 +76,7 @@ class Scale:
     """Seconds that an attacker rests between an answer and the next request."""
 
 
-SHORT = Scale(1.0, bodies=40, sockets=100, streams=110, uploads=60, others=12)
+SHORT = Scale(0.4, bodies=40, sockets=100, streams=110, uploads=60, others=12)
 
 
 @dataclass
@@ -152,15 +152,15 @@ def flood(
         for attack in target.attacks():
             if only and attack.name not in only:
                 continue
-            seen = _watched(server, target, attack.name, lambda a=attack: _run(a, scale))
-            faults += seen.faults + _judged(seen, quiet, attack, times)
+            seen = _watched(server, target, attack.name, lambda a=attack: run(a, scale))
+            faults += seen.faults + judged(seen, quiet, attack, times)
             tell(seen.line())
         return faults
     finally:
         server.kill()
 
 
-def _judged(seen: Seen, quiet: Seen, attack: Attack, times: float | None) -> list[str]:
+def judged(seen: Seen, quiet: Seen, attack: Attack, times: float | None) -> list[str]:
     """What an attack did that it should not have done."""
     faults = []
     wrong = {code: n for code, n in seen.statuses.items() if code not in {429, 503, *attack.may}}
@@ -224,7 +224,8 @@ def _memory(pid: int) -> Iterator[Callable[[], float]]:
         watcher.join()
 
 
-def _run(attack: Attack, scale: Scale) -> Seen:
+def run(attack: Attack, scale: Scale) -> Seen:
+    """Let all clients of an attack work for a while."""
     seen = Seen(attack.name, [], 0)
 
     async def client(number: int) -> None:
@@ -252,6 +253,11 @@ def _run(attack: Attack, scale: Scale) -> Seen:
     return seen
 
 
+async def nothing(_number: int) -> tuple[int, dict[str, str]]:
+    """Somebody who asks for nothing."""
+    return 200, {}
+
+
 class _Target:
     """A server and what there is to ask of it."""
 
@@ -266,7 +272,7 @@ class _Target:
         self._key, self._lines = group["views"][0]["key"], group["views"][0]["lines"]
         self._turn = itertools.count()
         # More than is read, and as much as a person sends; made once, for making them takes long.
-        self._edits = [_lines_body(self._lines, points) for points in (40_000, 30)]
+        self._edits = [_lines_body(self._lines, points) for points in (15_000, 30)]
 
     def attacks(self) -> list[Attack]:
         """All of them."""
