@@ -2,28 +2,58 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from typing import Any
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
 from prometheus_client import CollectorRegistry
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
-from prometheus_fastapi_instrumentator import Instrumentator
+from prometheus_fastapi_instrumentator.middleware import PrometheusInstrumentatorMiddleware
 
 from app.api.deps import Services
 from app.api.security.lanes import Doors
 from app.errors import StorageError
 from app.review.jobs.vitals import Home, read_home
 
+MAX_ADDRESSES = 2000
+"""Whose routes are remembered: addresses hold names of datasets, too."""
+_NUMBER = re.compile(r"/[0-9]+(?=/|$)")
+
 
 def install_metrics(app: FastAPI, doors: Doors) -> None:
     """Count requests by route, each application for itself, and watch its services."""
     registry = app.state.metrics = CollectorRegistry()
     registry.register(ServerCollector(app.state.services, doors))
-    instrumentator = Instrumentator(
-        registry=registry, excluded_handlers=["/metrics", "/healthz", "/readyz"]
-    )
-    instrumentator.instrument(app)
+    excluded = [re.compile(path) for path in ("/metrics", "/healthz", "/readyz")]
+    app.add_middleware(RequestMetrics, registry=registry, excluded_handlers=excluded)
+
+
+class RequestMetrics(PrometheusInstrumentatorMiddleware):
+    """Counts requests and their durations by route, and finds the route of an address once.
+
+    The library tries all routes for every request, after FastAPI has done so: a tenth of what it
+    costs to answer with a group.
+    """
+
+    def __init__(self, *arguments: Any, **options: Any):
+        super().__init__(*arguments, **options)
+        self._routes: dict[tuple[str, str], str] = {}
+
+    def _get_handler(self, request: Request) -> tuple[str, bool]:
+        """The route of a request, or its path where it has none; and whether it has one."""
+        # No route asks more of a number than that it is one.
+        address = request.method, _NUMBER.sub("/0", request.url.path)
+        known = self._routes.get(address)
+        if known is not None:
+            return known, True
+        route, found = super()._get_handler(request)
+        if found:
+            if len(self._routes) >= MAX_ADDRESSES:
+                self._routes.clear()
+            self._routes[address] = route
+        return route, found
 
 
 class ServerCollector(Collector):

@@ -91,7 +91,7 @@ def document(
     return Response(content.model_dump_json(), status, headers, "application/json")
 
 
-def get_asked(request: Request) -> Asked | None:
+async def get_asked(request: Request) -> Asked | None:
     """The key under which a request was sent, or None."""
     asked: Asked | None = request.scope.get(ASKED)
     return asked

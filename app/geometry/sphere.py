@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from app.errors import DegenerateGeometryError
-from app.geometry.arrays import FloatArray, require_shape
+from app.geometry.arrays import FloatArray, cross, require_shape
 from app.geometry.camera import Camera
 from app.geometry.distortion import distort
 
 _OUTLINE_POINTS = 64
+_ANGLES = np.linspace(0, 2 * np.pi, _OUTLINE_POINTS, endpoint=False)[:, None]
+_COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
+_DOWN = np.array([0.0, 1.0, 0.0])
 
 
 def position_from_diameter(
@@ -111,11 +114,10 @@ def _outline(center: FloatArray, radius: float) -> FloatArray:
     squared = float(center @ center)
     shrink = 1 - radius**2 / squared
     axis = center / np.sqrt(squared)
-    across = np.cross(axis, [0.0, 1.0, 0.0])
+    across = cross(axis, _DOWN)
     across /= np.linalg.norm(across)
-    up = np.cross(axis, across)
-    angles = np.linspace(0, 2 * np.pi, _OUTLINE_POINTS, endpoint=False)[:, None]
-    circle = np.cos(angles) * across + np.sin(angles) * up
+    up = cross(axis, across)
+    circle = _COSINES * across + _SINES * up
     outline: FloatArray = center * shrink + radius * np.sqrt(shrink) * circle
     return outline
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.errors import DegenerateGeometryError
-from app.geometry.arrays import FloatArray, require_shape
+from app.geometry.arrays import FloatArray, cross, require_shape
 from app.geometry.smallest_singular import smallest_singular_vectors
 
 _PARALLEL = 1e-12
@@ -103,7 +103,7 @@ def parallax_angle(
     points = require_shape(points, (None, 3), "points")
     to_a = require_shape(position_a, (len(points), 3), "position_a") - points
     to_b = require_shape(position_b, (len(points), 3), "position_b") - points
-    sine = np.linalg.norm(np.cross(to_a, to_b), axis=1)
+    sine = np.linalg.norm(cross(to_a, to_b), axis=1)
     cosine = (to_a * to_b).sum(axis=1)
     nowhere = (to_a == 0).all(axis=1) | (to_b == 0).all(axis=1)
     # atan2 of (sine, cosine): arccos loses half the digits near zero, which
@@ -112,7 +112,7 @@ def parallax_angle(
 
 
 def point_covariance(
-    jacobians: Sequence[FloatArray], pixel_covariances: Sequence[FloatArray]
+    jacobians: Sequence[FloatArray], pixel_covariances: Sequence[FloatArray] | FloatArray
 ) -> FloatArray:
     """Covariance of a point seen by several cameras, square metres, shape (3, 3).
 
@@ -126,8 +126,10 @@ def point_covariance(
     Source: Hartley & Zisserman, result 5.10.
     """
     information = np.zeros((3, 3))
-    for jacobian, spread in zip(jacobians, pixel_covariances, strict=True):
-        information += jacobian.T @ np.linalg.solve(spread, jacobian)
+    # One call for all cameras: each costs more than what it computes.
+    weighed = np.linalg.solve(np.asarray(pixel_covariances), np.asarray(jacobians))
+    for jacobian, weighted in zip(jacobians, weighed, strict=True):
+        information += jacobian.T @ weighted
     values = np.linalg.eigvalsh(information)
     if values[0] <= 1e-15 * values[-1]:
         raise DegenerateGeometryError("all rays to the point are parallel")

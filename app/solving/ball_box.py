@@ -15,7 +15,12 @@ from app.solving.spread import calibration_spread
 
 
 def fit_ball(
-    camera: Camera, size: ImageSize, ball: BallAnnotation, point: FloatArray, diameter_m: float
+    camera: Camera,
+    size: ImageSize,
+    ball: BallAnnotation,
+    point: FloatArray,
+    diameter_m: float,
+    expected: ExpectedBall | None = None,
 ) -> BallFit:
     """How the 3D ball and the annotation of one view agree.
 
@@ -25,6 +30,7 @@ def fit_ball(
         ball: The ball of the view, in view.
         point: The triangulated ball, pitch frame, metres, shape (3,).
         diameter_m: True diameter, metres.
+        expected: What ``expect_ball`` says of the same, so that its box is not fitted twice.
 
     Returns:
         The parts that do not exist are None: no box for a point behind the camera, no size
@@ -46,7 +52,7 @@ def fit_ball(
         optimized_diameter_px=diameter,
         optimized_box=Box.square(center, diameter) if diameter is not None else None,
         optimized_error_m=off_ray,
-        exact_box=_exact_box(camera, point, diameter_m),
+        exact_box=expected.box if expected else _exact_box(camera, point, diameter_m),
         size_ratio=annotated / diameter if annotated and diameter else None,
         depth_m=depth,
         monocular=(float(alone[0]), float(alone[1]), float(alone[2]))

@@ -104,14 +104,14 @@ def _estimate(
         return None
     point = np.mean(origins, axis=0)
     # The uncertainties hardly change on the way.
-    spreads = [pixel_spread(sight, point, policy) for sight in sights]
+    spreads = np.array([pixel_spread(sight, point, policy) for sight in sights])
     try:
         for _ in range(_STEPS):
             offsets, jacobians = _linearized(sights, point)
             covariance = point_covariance(jacobians, spreads)
             pull = sum(
-                jacobian.T @ np.linalg.solve(spread, offset)
-                for offset, jacobian, spread in zip(offsets, jacobians, spreads, strict=True)
+                jacobian.T @ weighted
+                for jacobian, weighted in zip(jacobians, _weighed(spreads, offsets), strict=True)
             )
             step = covariance @ pull
             point = point + step
@@ -124,10 +124,16 @@ def _estimate(
     except (DegenerateGeometryError, np.linalg.LinAlgError):
         return None
     distances = [
-        float(offset @ np.linalg.solve(spread, offset))
-        for offset, spread in zip(offsets, spreads, strict=True)
+        float(offset @ weighted)
+        for offset, weighted in zip(offsets, _weighed(spreads, offsets), strict=True)
     ]
     return _Estimate(sights, point, covariance, np.array(distances))
+
+
+def _weighed(spreads: FloatArray, offsets: Sequence[FloatArray]) -> FloatArray:
+    """Offsets over their covariances (V, 2, 2), in one call for all views, shape (V, 2)."""
+    weighed = np.linalg.solve(spreads, np.array(offsets)[..., None])[..., 0]
+    return np.asarray(weighed, dtype=np.float64)
 
 
 def _linearized(

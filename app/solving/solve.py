@@ -126,6 +126,7 @@ def _with_ball(
         view.ball,
         np.array(ball.point),
         policy.ball_diameter_m,
+        solved.expected,
     )
     return replace(solved, ball=fit)
 

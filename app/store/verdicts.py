@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -37,12 +37,34 @@ _OF_GROUPS = (
     .where(_VERDICT.c.group_id.in_(bindparam("ids", expanding=True)))
     .order_by(_VERDICT.c.id.desc())
 )
+_LAST_OF_EACH = (
+    select(*_VERDICT.columns)
+    .where(
+        _VERDICT.c.id.in_(
+            select(func.max(_VERDICT.c.id))
+            .where(_VERDICT.c.group_id.in_(bindparam("ids", expanding=True)))
+            .group_by(_VERDICT.c.group_id, _VERDICT.c.actor)
+        )
+    )
+    .order_by(_VERDICT.c.id.desc())
+)
 
 
 def read_verdicts(session: Session, group_ids: Sequence[int]) -> dict[int, list[StoredVerdict]]:
     """All verdicts of groups, the newest first; groups without one are left out."""
+    return _by_group(session.execute(_OF_GROUPS, {"ids": list(group_ids)}))
+
+
+def read_last_verdicts(
+    session: Session, group_ids: Sequence[int]
+) -> dict[int, list[StoredVerdict]]:
+    """Like ``read_verdicts``, but of each person the last alone."""
+    return _by_group(session.execute(_LAST_OF_EACH, {"ids": list(group_ids)}))
+
+
+def _by_group(rows: Iterable[Any]) -> dict[int, list[StoredVerdict]]:
     verdicts: dict[int, list[StoredVerdict]] = {}
-    for row in session.execute(_OF_GROUPS, {"ids": list(group_ids)}):
+    for row in rows:
         verdicts.setdefault(row.group_id, []).append(StoredVerdict(**row._mapping))
     return verdicts
 

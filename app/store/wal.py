@@ -25,6 +25,8 @@ _HEADER_BYTES = 100
 _LOG_HEADER = struct.Struct(">8I")
 _FRAME_HEADER = struct.Struct(">6I")
 _BIG_ENDIAN, _LITTLE_ENDIAN = 0x377F0683, 0x377F0682
+_NEWEST_LAYOUT = 4
+"""Schema format number; SQLite refuses a larger one as if a statement were wrong."""
 _CHUNK = 8
 """Bytes that one step of the checksum takes."""
 
@@ -56,7 +58,10 @@ class DatabaseHeader:
         (pages,) = struct.unpack_from(">I", raw, 28)
         (count,) = struct.unpack_from(">i", raw, 60)
         (tag,) = struct.unpack_from(">i", raw, 68)
+        (layout,) = struct.unpack_from(">I", raw, 44)
         page_bytes = 65536 if size == 1 else size
+        if layout > _NEWEST_LAYOUT or not _is_page_size(page_bytes):
+            return None
         return DatabaseHeader(raw[:_HEADER_BYTES], pages, page_bytes, count, tag)
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import random
 import shutil
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from tests.torture import commands, crowd, kills, power
+from tests.torture import commands, conditions, crowd, flood, kills, power, upgrades
 from tests.torture.power import Acknowledge, Sync, Unlink, Write, cut_power, disk_at, parse
 
 
@@ -131,3 +132,49 @@ class TestCrowd:
         assert found.faults == []
         assert found.changes > 0
         assert found.lines()[0].startswith("4 people, 2 s: ")
+
+
+class TestFlood:
+    def test_too_many_clients_are_refused_and_a_reader_is_served(self, home: Path) -> None:
+        assert flood.flood(home, flood.SHORT, times=None) == []
+
+    def test_a_refusal_that_does_not_say_when_to_come_back_is_seen(self) -> None:
+        async def refused(_number: int) -> tuple[int, dict[str, str]]:
+            return 503, {}
+
+        async def told(_number: int) -> tuple[int, dict[str, str]]:
+            return 503, {"retry-after": "2"}
+
+        seen = [
+            flood.run(flood.Attack("uploads", 3, once, frozenset()), flood.Scale(0.05)).faults
+            for once in (refused, told)
+        ]
+        assert seen == [["uploads: 503 without Retry-After"], []]
+
+    def test_a_failure_a_slow_reader_and_memory_that_grows_are_seen(self) -> None:
+        attack = flood.Attack("edits", 1, flood.nothing, frozenset({412}))
+        quiet = flood.Seen("nobody", [20.0] * 10, 200)
+        fine = flood.Seen("edits", [59.0] * 10, 480, Counter({412: 3, 503: 2}))
+        assert flood.judged(fine, quiet, attack, 3.0) == []
+        bad = flood.Seen("edits", [61.0] * 10, 501, Counter({500: 1}))
+        assert flood.judged(bad, quiet, attack, 3.0) == [
+            "edits: answers {500: 1}",
+            "edits: the server took 501 MB",
+            "edits: the reader waited 61 ms, 20 before",
+        ]
+
+
+class TestConditions:
+    def test_a_clock_that_is_set_back_disturbs_nothing(self, home: Path) -> None:
+        assert conditions.clock_set_back(home) == []
+
+    @pytest.mark.skipif(not conditions.can_mount(), reason="only root can mount a disk")
+    def test_a_disk_that_fills_stops_changes_alone(self, home: Path) -> None:
+        assert conditions.full_disk(home) == []
+
+
+class TestUpgrades:
+    def test_a_full_home_that_was_killed_midway_migrates_and_can_be_taken_back(
+        self, tmp_path: Path
+    ) -> None:
+        assert upgrades.torture(tmp_path, kills=1, seed=1, revisions=("0004",)) == []

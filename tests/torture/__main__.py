@@ -1,4 +1,4 @@
-"""``make torture``: kills, power cuts, killed commands and a crowd; 1 where anything was lost."""
+"""``make torture``: kills, power cuts, killed commands, a crowd and a flood; 1 where one finds fault."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tests.torture import commands, crowd, kills, power
+from tests.torture import commands, conditions, crowd, flood, kills, power, upgrades
 
 SEED = 20260101
 
 
 def main() -> int:
-    """Run what is asked for; 1 where anything was lost."""
+    """Run what is asked for; 1 where one finds fault."""
     parser = argparse.ArgumentParser(prog="python -m tests.torture", description=__doc__)
     parser.add_argument("--kills", type=int, default=60, help="of the server (60)")
     parser.add_argument("--edits", type=int, default=30_000, help="acknowledged changes (30000)")
@@ -25,11 +25,12 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=120, help="for how long (120)")
     parser.add_argument("--think", type=float, default=3, help="mean seconds between requests (3)")
     parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--only", choices=PARTS, action="append", help="a part; all without it")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="touchline-torture-") as name:
         folder = Path(name)
-        parts = (_kills, _cuts, _commands, _crowd)
-        faults = [fault for part in parts for fault in part(folder, asked)]
+        chosen = [PARTS[name] for name in asked.only or PARTS]
+        faults = [fault for part in chosen for fault in part(folder, asked)]
     for fault in faults:
         print(f"FAULT {fault}")
     return 1 if faults else 0
@@ -91,6 +92,34 @@ def _crowd(folder: Path, asked: argparse.Namespace) -> list[str]:
         print("\n".join(found.lines()))
         faults += found.faults
     return faults
+
+
+def _flood(folder: Path, asked: argparse.Namespace) -> list[str]:
+    home = folder / "flood"
+    kills.prepare(home, folder / "flood-files", clients=1, groups=12)
+    print("A reader of groups, alone and beside clients that ask for too much")
+    return flood.flood(home, tell=print)
+
+
+def _conditions(folder: Path, asked: argparse.Namespace) -> list[str]:
+    home = folder / "conditions"
+    kills.prepare(home, folder / "conditions-files", clients=1, groups=4)
+    return conditions.torture(home, folder / "spoilt", tell=print)
+
+
+def _upgrades(folder: Path, asked: argparse.Namespace) -> list[str]:
+    return upgrades.torture(folder / "upgrades", kills=3, seed=asked.seed, tell=print)
+
+
+PARTS = {
+    "kills": _kills,
+    "cuts": _cuts,
+    "commands": _commands,
+    "crowd": _crowd,
+    "flood": _flood,
+    "conditions": _conditions,
+    "upgrades": _upgrades,
+}
 
 
 if __name__ == "__main__":

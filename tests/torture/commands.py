@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import random
 import shutil
@@ -13,10 +14,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from sqlalchemy import text
 
 from app.config import Settings
+from app.datasets.manifest import MANIFEST
 from app.review.editing.doctor import examine
 from app.store.session import Store
 from tests.e2e.service import ROOT, SERVE, run_touchline
@@ -39,6 +42,9 @@ CONTENTS = {
     "log": "SELECT kind, count(*) FROM log GROUP BY kind ORDER BY kind",
 }
 """What must be the same; times and ids may differ."""
+
+TIMES = ("date", "created")
+"""What a manifest says of the time: each of the two homes froze its version at its own."""
 
 
 @dataclass
@@ -144,7 +150,19 @@ def _contents(home: Path) -> dict[str, str]:
         store.close()
     out = home / "out"
     files = sorted(path for path in out.rglob("*") if path.is_file()) if out.exists() else []
-    return {**found, **{str(path.relative_to(out)): _digest(path.read_bytes()) for path in files}}
+    return {**found, **{str(path.relative_to(out)): _digest(_timeless(path)) for path in files}}
+
+
+def _timeless(path: Path) -> bytes:
+    """Content of an exported file; a manifest without when its version was frozen."""
+    content = path.read_bytes()
+    if path.name != MANIFEST:
+        return content
+
+    def without_times(said: dict[str, Any]) -> dict[str, Any]:
+        return {key: value for key, value in said.items() if key not in TIMES}
+
+    return json.dumps(json.loads(content, object_hook=without_times)).encode()
 
 
 def _digest(content: bytes) -> str:

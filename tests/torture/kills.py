@@ -58,16 +58,34 @@ def prepare(home: Path, folder: Path, *, clients: int, groups: int) -> None:
 
 
 class Server:
-    """A server that can be killed and started again on its port."""
+    """A server that can be killed and started again on its port.
 
-    def __init__(self, home: Path):
-        self._home, self.port = home, free_port()
+    Args:
+        home: What it serves.
+        plant: Python that its process runs first, to plant a fault.
+        log: Where it says what it says; None: into the home.
+    """
+
+    def __init__(
+        self,
+        home: Path,
+        plant: str = "",
+        log: Path | None = None,
+    ):
+        self._home, self._plant, self.port = home, plant, free_port()
+        self._log = log or home / "server.log"
         self._process: subprocess.Popen[bytes] | None = None
 
     @property
     def address(self) -> str:
         """Where it is."""
         return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def pid(self) -> int:
+        """Of its process."""
+        assert self._process is not None
+        return self._process.pid
 
     def start(self) -> None:
         """Start, and do not wait."""
@@ -76,9 +94,9 @@ class Server:
             "TOUCHLINE_HOME": str(self._home),
             "TOUCHLINE_PORT": str(self.port),
         }
-        with (self._home / "server.log").open("ab") as log:
+        with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                [sys.executable, "-c", SERVE, "serve"],
+                [sys.executable, "-c", f"{self._plant}\n{SERVE}", "serve"],
                 cwd=ROOT,
                 env=environment,
                 stdout=log,
@@ -105,9 +123,17 @@ class Server:
             os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
 
+    def ended(self, seconds: float) -> int | None:
+        """Its exit code; None where it is still there after so many seconds."""
+        assert self._process is not None
+        try:
+            return self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return None
+
     def log(self) -> str:
         """What it said last."""
-        return (self._home / "server.log").read_text(errors="replace")[-2000:]
+        return self._log.read_text(errors="replace")[-2000:]
 
 
 class Client(threading.Thread):

@@ -13,13 +13,14 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.api.problem import make_problem, problem_response
 from app.api.security.origin import SAFE_METHODS
 
-MAX_JSON_BYTES = 2 * 1024 * 1024
-"""A group with every line of six views is below 50 kB."""
+MAX_JSON_BYTES = 512 * 1024
+"""A group with every line of six views is below 50 kB; what is longer is refused before it is read."""
 BYTES = "application/octet-stream"
 """What upload routes take, and nothing else does."""
 MAX_DEPTH = 16
-MAX_CONTAINERS = 50_000
-"""Lists and objects of one body; a point of a line is an object."""
+MAX_CONTAINERS = 5_000
+"""Lists and objects of one body: a request may bring 2,000 points, and each is an object. Ten times as
+many were read for a second, in which nobody else was answered."""
 VALUE = "touchline.json"
 """Where a request's scope says what its JSON body is."""
 # Possessive, and the closing quote may be missing: linear on whatever comes.

@@ -16,7 +16,7 @@ from app.store.groups import StoredGroup, StoredStation, read_groups
 from app.store.queue import import_findings, is_fixed
 from app.store.session import Session
 from app.store.solutions import SolutionKey, read_solutions
-from app.store.verdicts import StoredVerdict, read_verdicts
+from app.store.verdicts import StoredVerdict, read_last_verdicts
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Record:
 
     Attributes:
         noticed: What imports noticed.
-        verdicts: Everyone's, the newest first.
+        verdicts: The last of each person, the newest first.
         stacks: What can be undone and done again.
     """
 
@@ -157,7 +157,7 @@ def read_records(session: Session, group_ids: Sequence[int]) -> list[Record]:
     """Records of groups in the order asked for; at most a few hundred."""
     groups = read_groups(session, group_ids)
     noticed = import_findings(session, group_ids)
-    verdicts = read_verdicts(session, group_ids)
+    verdicts = read_last_verdicts(session, group_ids)
     stacks = read_stacks(session, group_ids)
     return [
         Record(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
+from inspect import iscoroutinefunction
 from pathlib import Path
 from threading import Event
 
 import pytest
 
-from app.api.deps import Services, require_if_match
+from app.api.deps import Services, get_actor, get_services, get_store, require_if_match
 from app.api.errors import PreconditionRequiredError
+from app.api.reply import get_asked
 from app.config import Settings
 from app.errors import InputError
 from app.review.jobs import upkeep
@@ -36,13 +39,19 @@ class TestServices:
 
 class TestRequireIfMatch:
     def test_a_strong_etag_is_taken_as_it_is(self) -> None:
-        assert require_if_match(' "9f2c-61d0" ') == '"9f2c-61d0"'
+        assert asyncio.run(require_if_match(' "9f2c-61d0" ')) == '"9f2c-61d0"'
 
     def test_a_change_without_if_match_is_refused(self) -> None:
         with pytest.raises(PreconditionRequiredError):
-            require_if_match(None)
+            asyncio.run(require_if_match(None))
 
     @pytest.mark.parametrize("tag", ["*", "", "abc", 'W/"a"', '"a", "b"', '"a', '"a"b"', '"ä"'])
     def test_a_weak_tag_a_list_or_a_star_is_refused(self, tag: str) -> None:
         with pytest.raises(InputError):
-            require_if_match(tag)
+            asyncio.run(require_if_match(tag))
+
+
+class TestDependencies:
+    def test_none_that_every_request_asks_takes_a_thread(self) -> None:
+        for given in (get_services, get_store, get_actor, require_if_match, get_asked):
+            assert iscoroutinefunction(given), given.__name__

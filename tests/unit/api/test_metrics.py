@@ -8,6 +8,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from starlette.testclient import TestClient
 
+from app.api import metrics
 from app.errors import StorageError
 
 API = "/api/v1"
@@ -52,6 +53,27 @@ def test_says_who_is_at_work_and_who_waits(read, lane: str) -> None:
 def test_counts_windows_that_listen(read) -> None:
     for what in ("opened", "resumed", "lost"):
         assert read("touchline_event_stream_total", what=what) == 0
+
+
+def test_requests_count_for_their_route_whatever_number_is_in_their_address(
+    api: TestClient, read, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(metrics, "MAX_ADDRESSES", 1)
+    for path in ("groups/1", "groups/2", "groups/1/history", "groups/ids?dataset=9", "nothing/1"):
+        api.get(f"{API}/{path}")
+    counted = {
+        route: read("http_requests_total", handler=handler, method="GET", status=status)
+        for route, handler, status in (
+            ("history", f"{API}/groups/{{group}}/history", "2xx"),
+            ("ids", f"{API}/groups/ids", "4xx"),
+            ("none", "none", "4xx"),
+        )
+    }
+    assert counted == {"history": 1, "ids": 1, "none": 1}
+    assert (
+        read("http_requests_total", handler=f"{API}/groups/{{group}}", method="GET", status="2xx")
+        >= 2
+    )
 
 
 def test_a_database_that_does_not_answer_is_a_number_and_no_error(

@@ -109,6 +109,18 @@ class TestRequireSound:
         settings.database_file.write_bytes(b"certainly not a database\n" * 100)
         refused(settings, r"touchline\.db is damaged or not a database")
 
+    @pytest.mark.parametrize("place", [16, 44])
+    def test_a_header_that_was_scribbled_on_is_named(
+        self, store: Store, tmp_path: Path, place: int
+    ) -> None:
+        say(store)
+        store.close()
+        settings = killed(store, tmp_path / "left", "touchline.db", "home.json")
+        with settings.database_file.open("r+b") as file:
+            file.seek(place)
+            file.write(b"\xff" * 4)
+        refused(settings, r"touchline\.db is damaged or not a database")
+
 
 class TestAnchor:
     def test_follows_every_commit(self, store: Store) -> None:

@@ -11,10 +11,21 @@ from app.store.verdicts import (
     insert_verdicts,
     judged_between,
     newest_between,
+    read_last_verdicts,
+    read_verdicts,
 )
 
 FIRST = StoredVerdict(1, 1, "ann", "2030-01-01", "accepted", None, None, "a", "p", False, None)
 LATER = replace(FIRST, id=2, actor="bob", at="2030-01-02", inputs_hash="b")
+
+
+class TestReadLastVerdicts:
+    def test_of_each_person_the_last_the_newest_first(self, filled: Store) -> None:
+        again = replace(FIRST, id=3, state="rejected", reason="other")
+        with filled.write() as session:
+            insert_verdicts(session, 1, [FIRST, LATER, again], actor="ann", at="t")
+            assert read_last_verdicts(session, [1, 9]) == {1: [again, LATER]}
+            assert read_verdicts(session, [1, 9]) == {1: [again, LATER, FIRST]}
 
 
 class TestRanges:

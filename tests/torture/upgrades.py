@@ -1,0 +1,168 @@
+"""Upgrades: homes of every released schema, with something in every table, killed while they migrate.
+
+A migration that was killed has not happened; done again it keeps every row that the new schema
+has room for.
+"""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from sqlalchemy import Connection, MetaData, func, select
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
+
+from app.config import Settings
+from app.store.clock import now
+from app.store.codecs import pack
+from app.store.engine import WRITE, make_engine
+from app.store.home import make_home
+from app.store.log import Entry, append
+from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
+from app.store.restore import restore
+from tests.e2e.service import ROOT
+
+MIGRATE = (
+    "import sys; from tests.torture.upgrades import migrate_slowly; migrate_slowly(sys.argv[1])"
+)
+STARTED = "migrating\n"
+SAYS = {
+    ("solution", "body"): pack({"ball": None}),
+    ("solution", "calibrations"): "[]",
+    ("calibration", "body"): pack({"camera": None}),
+    ("view", "balls"): "[]",
+}
+"""What a migration reads must be there."""
+
+
+def make_old(settings: Settings, revision: str) -> None:
+    """A home as an earlier version left it: its schema, and one row in each table."""
+    make_home(settings)
+    config = Config()
+    config.set_main_option("script_location", str(migrations_folder()))
+    engine = make_engine(settings).execution_options(**WRITE)
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, revision)
+        _fill(connection)
+    engine.dispose()
+
+
+def _fill(connection: Connection) -> None:
+    """One row in each table, whose references lead to each other's."""
+    schema = MetaData()
+    schema.reflect(connection)
+    with Session(bind=connection) as session:
+        append(session, [Entry("dataset", "ann", now(), {}, 1)])
+        session.commit()
+    for table in schema.sorted_tables:
+        if connection.execute(select(func.count()).select_from(table)).scalar():
+            continue
+        values = {}
+        for column in table.columns:
+            kind = str(column.type).split("(")[0]
+            # JSON that says nothing, wherever a migration reads what it finds.
+            texts = {
+                "VARCHAR": "{}",
+                "TEXT": "{}",
+                "BLOB": pack({}),
+                "FLOAT": 1.0,
+                "BOOLEAN": False,
+            }
+            known = SAYS.get((table.name, column.name))
+            values[column.name] = texts.get(kind, 1) if known is None else known
+        # What belongs to a version is filled while that is being frozen, and not later.
+        with suppress(IntegrityError), connection.begin_nested():
+            connection.execute(table.insert().values(values))
+
+
+def rows(settings: Settings) -> dict[str, int]:
+    """How many rows each table has."""
+    engine = make_engine(settings)
+    with engine.connect() as connection:
+        schema = MetaData()
+        schema.reflect(connection)
+        found = {
+            table.name: connection.execute(select(func.count()).select_from(table)).scalar_one()
+            for table in schema.sorted_tables
+        }
+    engine.dispose()
+    return found
+
+
+def revision_of(settings: Settings) -> str | None:
+    """The schema's revision of a home."""
+    engine = make_engine(settings)
+    found = schema_revision(engine)
+    engine.dispose()
+    return found
+
+
+def migrate_slowly(home: str) -> None:
+    """Migrate, with a pause after each operation, so that a kill meets it midway."""
+    from alembic.operations import Operations
+
+    execute = Operations.invoke
+
+    def slowly(self: Operations, operation: object) -> object:
+        sys.stdout.write(STARTED)
+        sys.stdout.flush()
+        time.sleep(0.02)
+        return execute(self, operation)  # type: ignore[arg-type]
+
+    Operations.invoke = slowly  # type: ignore[method-assign, assignment]
+    migrate(Settings(home=Path(home)))
+
+
+def torture(
+    folder: Path,
+    *,
+    kills: int,
+    seed: int,
+    revisions: tuple[str, ...] = KNOWN_REVISIONS[:-1],
+    tell: Callable[[str], None] = lambda _sentence: None,
+) -> list[str]:
+    """Migrate a home of each revision, killed that often before; what was not in order."""
+    chance, faults = random.Random(seed), []
+    for revision in revisions:
+        settings = Settings(home=folder / revision)
+        make_old(settings, revision)
+        before = rows(settings)
+        for _ in range(kills):
+            _kill_midway(settings, chance.uniform(0, 0.15))
+            if (revision_of(settings), rows(settings)) != (revision, before):
+                faults.append(f"schema {revision}: killed midway, something had happened")
+                break
+        migrated = migrate(settings)
+        after = rows(settings)
+        lost = [name for name, count in before.items() if after.get(name, count) < count]
+        if lost or revision_of(settings) != KNOWN_REVISIONS[-1]:
+            faults.append(f"schema {revision}: migrated, and rows are gone of {', '.join(lost)}")
+        assert migrated.copy is not None
+        restore(settings, migrated.copy)
+        if (revision_of(settings), rows(settings)) != (revision, before):
+            faults.append(f"schema {revision}: its backup is not what it was")
+        tell(f"schema {revision}: {len(before)} tables, {kills} kills, migrated and taken back")
+    return faults
+
+
+def _kill_midway(settings: Settings, seconds: float) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", MIGRATE, str(settings.home)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None and process.stdout.readline() == STARTED
+    time.sleep(seconds)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
