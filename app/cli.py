@@ -9,6 +9,7 @@ Progress and complaints go to stderr. Heavy modules are imported inside the comm
 from __future__ import annotations
 
 import sys
+from typing import Annotated
 
 import typer
 
@@ -32,10 +33,9 @@ from app.errors import ReviewError
 
 app = typer.Typer(
     name="touchline",
-    help="Turn multi-view soccer frames into a trusted 3D ball dataset.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 PARTS = (
     service,
@@ -54,6 +54,26 @@ for part in PARTS:
     app.add_typer(part.commands)
 app.add_typer(datasets.commands, name="datasets")
 app.add_typer(policy.commands, name="policy")
+
+
+def _tell_version(asked: bool) -> None:
+    if asked:
+        from app.datasets.manifest import SOFTWARE, software_version
+
+        typer.echo(f"{SOFTWARE} {software_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Tell the version and end.", callback=_tell_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    """Turn multi-view soccer frames into a trusted 3D ball dataset."""
 
 
 def main() -> None:
