@@ -18,7 +18,7 @@ from pathlib import Path
 from app.datasets.manifest import software_version
 from tests.release.advisories import ask_browser, ask_python
 from tests.release.bill import write_bill
-from tests.release.libraries import EXTRAS, ROOT, closure, pinned
+from tests.release.libraries import EXTRAS, ROOT, closure, pins
 from tests.release.licences import complaints
 
 SUMS = "SHA256SUMS"
@@ -59,9 +59,8 @@ def build(out: Path, tools: Path) -> int:
 
 def write_lock(out: Path, *extras: str) -> None:
     """Write the entries of requirements.lock that an installation with these extras needs."""
-    entries = pinned()
-    lines = [entries[name] for name in sorted(closure(extras))]
-    out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    needed = closure(extras)
+    out.write_text("".join(f"{pin.text}\n" for pin in pins() if pin.name in needed), "utf-8")
 
 
 def main(words: list[str]) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from importlib.metadata import requires
 from pathlib import Path
 
@@ -16,15 +17,35 @@ EXTRAS = ("export", "charts", "detect")
 """What a user may add; ``dev`` is for who works on the product."""
 
 
-def pinned(lock: Path = LOCK) -> dict[str, str]:
-    """The entries of a lock file that this machine installs: name to text, hashes included."""
+@dataclass(frozen=True)
+class Pin:
+    """An entry of a lock file; one library may have several, for other versions of Python.
+
+    Attributes:
+        name: Of the library, in its canonical form.
+        here: This machine installs it.
+        text: The entry with its hashes.
+    """
+
+    name: str
+    here: bool
+    text: str
+
+
+def pins(lock: Path = LOCK) -> list[Pin]:
+    """The entries of a lock file."""
     entries = re.split(r"\n(?=\S)", re.sub(r"^ *#.*\n", "", lock.read_text("utf-8"), flags=re.M))
-    found = {}
+    found = []
     for entry in filter(str.strip, entries):
         requirement = Requirement(entry.partition("--hash")[0].replace("\\", "").strip())
-        if requirement.marker is None or requirement.marker.evaluate():
-            found[canonicalize_name(requirement.name)] = entry.strip()
+        here = requirement.marker is None or requirement.marker.evaluate()
+        found.append(Pin(canonicalize_name(requirement.name), here, entry.strip()))
     return found
+
+
+def pinned() -> set[str]:
+    """Names of the libraries that the lock file puts onto this machine."""
+    return {pin.name for pin in pins() if pin.here}
 
 
 def closure(extras: Iterable[str] = (), project: str = "touchline") -> set[str]:

@@ -10,7 +10,7 @@ import pytest
 
 from tests.release.advisories import UNANSWERED, read_browser, read_python
 from tests.release.bill import merged
-from tests.release.libraries import EXTRAS, closure, pinned
+from tests.release.libraries import EXTRAS, closure, pinned, pins
 from tests.release.licences import allowed, complaints, licence_of, python_licence
 
 
@@ -70,12 +70,12 @@ class TestLicences:
 class TestLibraries:
     def test_what_a_user_installs_is_pinned_and_holds_no_tools(self) -> None:
         base, everything = closure(), closure(EXTRAS)
-        assert base < everything < set(pinned())
+        assert base < everything < pinned()
         assert {"uvicorn", "starlette", "numba", "llvmlite"} <= base
         assert {"pyarrow", "matplotlib", "onnxruntime"} <= everything - base
         assert not everything & {"pytest", "ruff", "mypy", "playwright", "hatchling"}
 
-    def test_entries_keep_their_hashes_and_other_machines_are_left_out(
+    def test_entries_keep_their_hashes_and_say_whether_they_are_for_here(
         self, tmp_path: Path
     ) -> None:
         lock = tmp_path / "lock"
@@ -83,8 +83,9 @@ class TestLibraries:
             "A.b==1 \\\n    --hash=sha256:1 \\\n    --hash=sha256:2\n    # via x\n"
             "c==2 ; sys_platform == 'nowhere' \\\n    --hash=sha256:3\n"
         )
-        entries = pinned(lock)
-        assert entries == {"a-b": "A.b==1 \\\n    --hash=sha256:1 \\\n    --hash=sha256:2"}
+        one, other = pins(lock)
+        assert (one.name, one.here, other.name, other.here) == ("a-b", True, "c", False)
+        assert one.text == "A.b==1 \\\n    --hash=sha256:1 \\\n    --hash=sha256:2"
 
 
 class TestAdvisories:
