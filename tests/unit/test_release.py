@@ -48,6 +48,7 @@ class TestLicences:
             "MIT WITH Commons-Clause",
             "Ask the author",
             "MIT AND",
+            "MIT GPL-3.0-only",
             "(MIT",
             "",
         ],
