@@ -83,3 +83,13 @@ def main() -> None:
     except ReviewError as error:
         complain(error.message, error.hint)
         sys.exit(1)
+    except RuntimeError as error:
+        # numba's words when it finds no folder to write to; it has no class of its own for them.
+        if "cannot cache function" not in str(error):
+            raise
+        complain(
+            "this user can write neither to the installation nor to a cache of its own, where the"
+            " compiled solver is kept",
+            "Point NUMBA_CACHE_DIR at a folder that this user alone can write.",
+        )
+        sys.exit(1)

@@ -90,6 +90,19 @@ class TestHelp:
         assert run("fly")[0] == 2
 
 
+class TestCompiled:
+    def test_without_a_place_for_it_a_sentence_says_what_to_set(
+        self, run: Run, line_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def refuse(*_arguments: object, **_options: object) -> None:
+            raise RuntimeError("cannot cache function 'f': no locator available for file 'x.py'")
+
+        monkeypatch.setattr("app.review.datasets.batch.score_files", refuse)
+        code, _, err = run("score", line_files, line_files)
+        assert code == 1
+        assert "NUMBA_CACHE_DIR" in err
+
+
 class TestImport:
     def test_tells_what_came_in_and_every_problem_with_its_place(
         self, run: Run, line_files: Path
