@@ -10,7 +10,7 @@ export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 unexport PYTHONDONTWRITEBYTECODE
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
-.PHONY: setup run test test-python test-browser check bench mutate torture paper chromium clean
+.PHONY: setup run test test-python test-browser check audit release bench mutate torture paper chromium clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready static/node_modules/.ready
@@ -51,6 +51,22 @@ check: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/npm --prefix static run check
+	$(BIN)/python -m tests.release licences
+
+# Programs that only a release needs, apart: they would double what everybody installs.
+.venv-release/ready: requirements-release.lock .venv/ready
+	@echo "Installing the programs of a release into .venv-release"
+	@test -x .venv-release/bin/python || $(PYTHON) -m venv .venv-release
+	@.venv-release/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-release.lock
+	@touch $@
+
+# Who has no network is told so, and is not wrong.
+audit: setup
+	@$(MAKE) --no-print-directory .venv-release/ready || echo "The programs that ask could not be installed."
+	@$(BIN)/python -m tests.release advisories .venv-release/bin
+
+release: setup .venv-release/ready
+	@$(BIN)/python -m tests.release build dist .venv-release/bin
 
 bench: setup
 	$(BIN)/python -m tests.bench
@@ -68,4 +84,4 @@ chromium: setup
 	@$(BIN)/python tests/e2e/install_chromium.py
 
 clean:
-	rm -rf .venv static/node_modules
+	rm -rf .venv .venv-release dist static/node_modules

@@ -9,6 +9,7 @@ Progress and complaints go to stderr. Heavy modules are imported inside the comm
 from __future__ import annotations
 
 import sys
+from typing import Annotated
 
 import typer
 
@@ -32,10 +33,9 @@ from app.errors import ReviewError
 
 app = typer.Typer(
     name="touchline",
-    help="Turn multi-view soccer frames into a trusted 3D ball dataset.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 PARTS = (
     service,
@@ -56,10 +56,40 @@ app.add_typer(datasets.commands, name="datasets")
 app.add_typer(policy.commands, name="policy")
 
 
+def _tell_version(asked: bool) -> None:
+    if asked:
+        from app.datasets.manifest import SOFTWARE, software_version
+
+        typer.echo(f"{SOFTWARE} {software_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Tell the version and end.", callback=_tell_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    """Turn multi-view soccer frames into a trusted 3D ball dataset."""
+
+
 def main() -> None:
     """Entry point: what a caller can cause is one sentence on stderr and exit code 1."""
     try:
         app()
     except ReviewError as error:
         complain(error.message, error.hint)
+        sys.exit(1)
+    except RuntimeError as error:
+        # numba's words when it finds no folder to write to; it has no class of its own for them.
+        if "cannot cache function" not in str(error):
+            raise
+        complain(
+            "this user can write neither to the installation nor to a cache of its own, where the"
+            " compiled solver is kept",
+            "Point NUMBA_CACHE_DIR at a folder that this user alone can write.",
+        )
         sys.exit(1)

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.api.security.headers import content_security_policy
+from app.folders import own_folder
 
-STATIC = Path(__file__).resolve().parents[2] / "static"
+STATIC = own_folder("static")
 _INLINE_SCRIPT = re.compile(rb"<script\b(?P<attributes>[^>]*)>(?P<text>.*?)</script>", re.S | re.I)
 _SHEET = re.compile(rb'\s*<link rel="stylesheet" href="/static/(?P<path>css/[^"]+)">')
 _ALL_SHEETS = b'\n\t<link rel="stylesheet" href="/static/all.css">'

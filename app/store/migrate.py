@@ -9,6 +9,7 @@ from sqlalchemy import Connection, Engine, inspect, text
 
 from app.config import Settings
 from app.errors import StorageError
+from app.folders import own_folder
 from app.store.anchor import renew_anchor, require_own_database
 from app.store.backup import write_backup
 from app.store.engine import WRITE, make_engine, reported
@@ -49,12 +50,15 @@ class Migrated:
 
 
 def migrations_folder() -> Path:
-    """Where the migration scripts lie: beside the package in a checkout, inside it when built."""
-    package = Path(__file__).resolve().parents[1]
-    for folder in (package.parent / "migrations", package / "migrations"):
-        if (folder / "env.py").is_file():
-            return folder
-    raise StorageError("the migration scripts are missing from this installation")
+    """Where the migration scripts lie.
+
+    Raises:
+        StorageError: They do not.
+    """
+    folder = own_folder("migrations")
+    if not (folder / "env.py").is_file():
+        raise StorageError("the migration scripts are missing from this installation")
+    return folder
 
 
 def migrate(settings: Settings) -> Migrated:

@@ -13,8 +13,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import typer
 
-from app.cli import main
+from app.cli import app, main
+from app.datasets.manifest import software_version
 from app.datasets.sn_calibration_writer import lines_to_json
 from tests.scenes import make_scenes
 
@@ -63,8 +65,42 @@ class TestHelp:
         for name in ("serve", "import", "solve", "findings", "export", "calibrate", "score"):
             assert name in done.stdout
 
+    def test_every_command_has_it_under_its_short_name_too(self, run: Run) -> None:
+        whole = typer.main.get_command(app)
+        assert isinstance(whole, typer.core.TyperGroup)
+        for name, command in whole.commands.items():
+            words = [[name, part] for part in getattr(command, "commands", {})] or [[name]]
+            for path in words:
+                code, out, _ = run(*path, "-h")
+                assert code == 0, path
+                assert f"{path[-1]} [OPTIONS]" in out, path
+
+    def test_the_version_is_that_of_manifests(self, run: Run) -> None:
+        assert run("--version")[:2] == (0, f"touchline {software_version()}\n")
+
+    def test_a_shell_completes_what_is_typed(self) -> None:
+        command = "import sys; sys.argv = ['touchline']; from app.cli import main; main()"
+        asked = {"_TOUCHLINE_COMPLETE": "complete_bash", "COMP_WORDS": "touchline back"}
+        told = subprocess.check_output(
+            [sys.executable, "-c", command], env={**os.environ, **asked, "COMP_CWORD": "1"}
+        )
+        assert told.split() == [b"backup"]
+
     def test_an_unknown_command_is_wrong_usage(self, run: Run) -> None:
         assert run("fly")[0] == 2
+
+
+class TestCompiled:
+    def test_without_a_place_for_it_a_sentence_says_what_to_set(
+        self, run: Run, line_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def refuse(*_arguments: object, **_options: object) -> None:
+            raise RuntimeError("cannot cache function 'f': no locator available for file 'x.py'")
+
+        monkeypatch.setattr("app.review.datasets.batch.score_files", refuse)
+        code, _, err = run("score", line_files, line_files)
+        assert code == 1
+        assert "NUMBA_CACHE_DIR" in err
 
 
 class TestImport:

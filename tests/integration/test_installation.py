@@ -1,0 +1,210 @@
+"""A wheel serves the whole product where there is no checkout."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import venv
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import sync_playwright
+
+from tests.e2e.install_chromium import ADVICE, find_chromium
+from tests.e2e.screen import Screen, rows
+from tests.e2e.service import ROOT
+
+SECONDS = 300
+LOAD_ALL = """(modules) => {
+  const folder = new URL('.', document.querySelector('script[src$="/main.js"]').src);
+  return Promise.all(modules.map(async (name) => { await import(new URL(name, folder).href); }));
+}"""
+WHEEL, SOURCES = "*.whl", "*.tar.gz"
+
+
+def build(project: Path, out: Path, target: str) -> subprocess.CompletedProcess[str]:
+    """Build a distribution of a project folder into ``out``, without a network."""
+    command = [sys.executable, "-m", "hatchling", "build", "-t", target, "-d", str(out)]
+    return subprocess.run(command, cwd=project, capture_output=True, text=True, timeout=SECONDS)
+
+
+@pytest.fixture(scope="module")
+def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the wheel and the source distribution of this checkout."""
+    folder = tmp_path_factory.mktemp("dist")
+    for target in ("wheel", "sdist"):
+        assert (built := build(ROOT, folder, target)).returncode == 0, built.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def sources(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The project as the source distribution has it."""
+    folder = tmp_path_factory.mktemp("sources")
+    with tarfile.open(next(dist.glob(SOURCES))) as archive:
+        archive.extractall(folder, filter="data")
+    return next(folder.iterdir())
+
+
+@dataclass(frozen=True)
+class Installation:
+    """An environment in which the wheel is installed, and an empty folder to work in."""
+
+    folder: Path
+
+    def run(self, *arguments: str) -> str:
+        """What a command of touchline prints."""
+        done = subprocess.run(
+            [self.folder / "bin" / "touchline", *arguments],
+            cwd=self.work,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=SECONDS,
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    @contextmanager
+    def serving(self) -> Iterator[str]:
+        """Address of a server."""
+        server = subprocess.Popen(
+            [self.folder / "bin" / "touchline", "serve", "--port", "0"],
+            cwd=self.work,
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            assert server.stdout is not None
+            line = server.stdout.readline()
+            assert line.startswith("Touchline is at http://127.0.0.1:")
+            yield line.split()[-1]
+        finally:
+            server.terminate()
+            server.communicate(timeout=20)
+
+    @property
+    def work(self) -> Path:
+        """A folder that was empty before the first command."""
+        return self.folder / "work"
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """Nothing of the environment that the tests run in but what every process needs."""
+        return {"PATH": os.environ["PATH"], "HOME": str(self.work)}
+
+
+@pytest.fixture(scope="module")
+def installed(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Installation:
+    """The wheel in an environment of its own, which borrows the installed libraries."""
+    folder = tmp_path_factory.mktemp("environment")
+    venv.create(folder)
+    python = folder / "bin" / "python"
+    pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "--no-deps"]
+    wheel = str(next(dist.glob(WHEEL)))
+    subprocess.run([*pip, "--no-index", "--quiet", wheel], check=True, timeout=SECONDS)
+    own = Path(sysconfig.get_path("purelib", vars={"base": str(folder)}))
+    (own / "borrowed.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    borrow_compiled(own)
+    (folder / "work").mkdir()
+    return Installation(folder)
+
+
+def borrow_compiled(own: Path) -> None:
+    """What numba has compiled for this checkout; it is the same code, and takes half a minute."""
+    for compiled in (ROOT / "app").rglob("__pycache__/*.nb[ic]"):
+        source = compiled.parents[1] / f"{compiled.name.partition('.')[0]}.py"
+        target = own / source.relative_to(ROOT)
+        shutil.copystat(source, target)
+        shutil.copy2(compiled, target.parent / "__pycache__")
+
+
+def names(wheel: Path) -> list[str]:
+    """Names of the files in a wheel."""
+    with zipfile.ZipFile(wheel) as archive:
+        return archive.namelist()
+
+
+def own_modules(dist: Path) -> list[str]:
+    """The modules of the application in a wheel, without those of libraries."""
+    held = names(next(dist.glob(WHEEL)))
+    scripts = [name.removeprefix("app/static/") for name in held if name.endswith(".js")]
+    return [name for name in scripts if not name.startswith("node_modules/")]
+
+
+class TestWheel:
+    def test_the_source_distribution_builds_the_same_bytes(
+        self, dist: Path, sources: Path, tmp_path: Path
+    ) -> None:
+        assert (built := build(sources, tmp_path, "wheel")).returncode == 0, built.stderr
+        one, other = next(dist.glob(WHEEL)), next(tmp_path.glob(WHEEL))
+        assert names(one) == names(other)
+        digests = {hashlib.sha256(wheel.read_bytes()).hexdigest() for wheel in (one, other)}
+        assert len(digests) == 1
+
+    def test_every_library_in_it_brings_its_licence_and_no_tool_is_in_it(self, dist: Path) -> None:
+        held = names(next(dist.glob(WHEEL)))
+        libraries = [name for name in held if "/node_modules/" in name]
+        assert libraries
+        for name in libraries:
+            parts = name.split("/")
+            depth = 5 if parts[3].startswith("@") else 4
+            assert "/".join([*parts[:depth], "LICENSE"]) in held
+        tools = ("typescript", "axe-core", "package.json", "tsconfig.json", ".npmrc", "tests/")
+        assert [name for name in held if any(tool in name for tool in tools)] == []
+        assert any(name.endswith("dist-info/licenses/LICENSE") for name in held)
+
+    def test_without_the_libraries_nothing_is_built(self, sources: Path, tmp_path: Path) -> None:
+        bare = tmp_path / "bare"
+        shutil.copytree(sources, bare, ignore=shutil.ignore_patterns("node_modules", "tests"))
+        built = build(bare, tmp_path / "out", "wheel")
+        assert built.returncode != 0
+        assert "make setup" in built.stderr
+
+
+class TestInstallation:
+    def test_tells_its_version_and_its_help(self, installed: Installation, dist: Path) -> None:
+        version = next(dist.glob(WHEEL)).name.split("-")[1]
+        assert installed.run("--version") == f"touchline {version}\n"
+        assert "--with-frames" in installed.run("backup", "-h")
+
+    def test_is_not_this_checkout(self, installed: Installation) -> None:
+        where = [installed.folder / "bin" / "python", "-c", "import app; print(app.__file__)"]
+        told = subprocess.check_output(where, cwd=installed.work, env=installed.environment)
+        assert Path(told.decode()).is_relative_to(installed.folder)
+
+    def test_shows_a_group_in_a_browser_which_finds_every_module(
+        self, installed: Installation, dist: Path
+    ) -> None:
+        installed.run("sample", "--groups", "2", "--no-faults", "--dataset", "sample")
+        assert (installed.work / ".local/share/touchline/touchline.db").is_file()
+        chromium = find_chromium()
+        assert chromium, ADVICE
+        with (
+            installed.serving() as address,
+            sync_playwright() as playwright,
+            playwright.chromium.launch(executable_path=chromium) as browser,
+        ):
+            page = browser.new_page(base_url=address)
+            faults: list[str] = []
+            page.on("pageerror", lambda error: faults.append(str(error)))
+            page.on("response", lambda answer: answer.ok or faults.append(answer.url))
+            page.goto(f"/review/{rows(page)[0]['id']}")
+            screen = Screen(page)
+            screen.ready()
+            assert screen.document()["solution"] is not None
+            page.goto("/help/words")
+            page.locator(".help-words dt").first.wait_for()
+            # Pages load most of their modules, and the libraries of those, when somebody asks.
+            page.evaluate(LOAD_ALL, own_modules(dist))
+            assert faults == []

@@ -1,0 +1,145 @@
+"""What has to be known before others install the product: licences, advisories, the bill."""
+
+from __future__ import annotations
+
+from email.message import Message
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.release.advisories import UNANSWERED, read_browser, read_python
+from tests.release.bill import merged
+from tests.release.libraries import EXTRAS, closure, pinned, pins
+from tests.release.licences import allowed, complaints, licence_of, python_licence
+
+
+def metadata(**fields: str) -> Any:
+    """A library's metadata."""
+    message = Message()
+    for name, text in fields.items():
+        message[name.replace("_", "-")] = text
+    return message
+
+
+class TestLicences:
+    def test_every_pinned_library_has_an_allowed_one(self) -> None:
+        assert complaints() == []
+
+    @pytest.mark.parametrize(
+        "expression",
+        [
+            "MIT",
+            "MIT OR GPL-3.0-only",
+            "BSD-2-Clause AND Apache-2.0 WITH LLVM-exception",
+            "(GPL-2.0-only OR MIT) AND ISC",
+        ],
+    )
+    def test_what_can_be_met_is_allowed(self, expression: str) -> None:
+        assert allowed(expression)
+
+    @pytest.mark.parametrize(
+        "expression",
+        [
+            "GPL-3.0-only",
+            "AGPL-3.0-or-later",
+            "MIT AND GPL-2.0-only",
+            "(MIT OR ISC) AND AGPL-3.0-only",
+            "MIT WITH Commons-Clause",
+            "Ask the author",
+            "MIT AND",
+            "MIT GPL-3.0-only",
+            "(MIT",
+            "",
+        ],
+    )
+    def test_what_cannot_or_is_no_expression_is_not(self, expression: str) -> None:
+        assert not allowed(expression)
+
+    def test_older_metadata_are_understood(self) -> None:
+        gpl = "License :: OSI Approved :: GNU General Public License v3 (GPLv3)"
+        assert licence_of(metadata(License_Expression="ISC", License="MIT")) == "ISC"
+        assert licence_of(metadata(Classifier="License :: OSI Approved :: MIT License")) == "MIT"
+        assert licence_of(metadata(License="Apache 2.0")) == "Apache-2.0"
+        assert not allowed(str(licence_of(metadata(Classifier=gpl))))
+        assert licence_of(metadata(Classifier="Topic :: Database")) is None
+
+    def test_a_library_that_is_not_there_has_none(self) -> None:
+        assert python_licence("no-such-library") is None
+
+
+class TestLibraries:
+    def test_what_a_user_installs_is_pinned_and_holds_no_tools(self) -> None:
+        base, everything = closure(), closure(EXTRAS)
+        assert base < everything < pinned()
+        assert {"uvicorn", "starlette", "numba", "llvmlite"} <= base
+        assert {"pyarrow", "matplotlib", "onnxruntime"} <= everything - base
+        assert not everything & {"pytest", "ruff", "mypy", "playwright", "hatchling"}
+
+    def test_entries_keep_their_hashes_and_say_whether_they_are_for_here(
+        self, tmp_path: Path
+    ) -> None:
+        lock = tmp_path / "lock"
+        lock.write_text(
+            "A.b==1 \\\n    --hash=sha256:1 \\\n    --hash=sha256:2\n    # via x\n"
+            "c==2 ; sys_platform == 'nowhere' \\\n    --hash=sha256:3\n"
+        )
+        one, other = pins(lock)
+        assert (one.name, one.here, other.name, other.here) == ("a-b", True, "c", False)
+        assert one.text == "A.b==1 \\\n    --hash=sha256:1 \\\n    --hash=sha256:2"
+
+
+class TestAdvisories:
+    def test_a_service_that_does_not_answer_is_told_and_is_no_weakness(self) -> None:
+        skipped = {"dependencies": [{"name": "x", "skip_reason": "not found"}]}
+        failed = {"statusCode": 405, "error": {"summary": ""}}
+        for answer in (read_python(None), read_python(skipped), read_browser(failed)):
+            assert UNANSWERED in answer.sentence
+            assert not answer.weak
+
+    def test_a_weakness_is_named(self) -> None:
+        weak = {"id": "PYSEC-1", "fix_versions": ["2.1"]}
+        items = [
+            {"name": "x", "version": "2.0", "vulns": [weak]},
+            {"name": "y", "version": "1", "vulns": []},
+        ]
+        python = read_python({"dependencies": items})
+        assert python.weak
+        assert "2 Python libraries, 1 weak" in python.sentence
+        assert "x 2.0: PYSEC-1, mended in 2.1" in python.sentence
+        browser = read_browser({"vulnerabilities": {"z": {"severity": "high"}}})
+        assert browser.weak
+        assert "z: high" in browser.sentence
+        assert not read_browser({"vulnerabilities": {}}).weak
+
+
+class TestBill:
+    def test_holds_both_halves_without_tools_and_addresses(self) -> None:
+        def component(name: str) -> dict[str, Any]:
+            links = [{"type": "distribution", "url": "https://registry.example"}]
+            return {"bom-ref": f"{name}@1", "name": name, "externalReferences": links}
+
+        root = {"bom-ref": "root-component", "name": "touchline", "externalReferences": []}
+        python = {
+            "$schema": "s",
+            "bomFormat": "CycloneDX",
+            "specVersion": "1.6",
+            "metadata": {"component": root, "tools": []},
+            "components": [component("uvicorn"), component("pyarrow"), component("pytest")],
+            "dependencies": [
+                {"ref": "root-component", "dependsOn": ["uvicorn@1", "pytest@1"]},
+                {"ref": "pytest@1", "dependsOn": ["uvicorn@1"]},
+            ],
+        }
+        browser = {
+            "metadata": {"component": {"bom-ref": "browser@0"}},
+            "components": [component("preact")],
+            "dependencies": [{"ref": "browser@0", "dependsOn": ["preact@1"]}],
+        }
+        bill = merged(python, browser)
+        scopes = {item["name"]: item.get("scope") for item in bill["components"]}
+        assert scopes == {"uvicorn": "required", "pyarrow": "optional", "preact": None}
+        assert bill["dependencies"] == [
+            {"ref": "root-component", "dependsOn": ["preact@1", "uvicorn@1"]}
+        ]
+        assert "registry.example" not in str(bill)
