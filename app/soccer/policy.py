@@ -91,6 +91,10 @@ class Policy:
     max_sigma_m: float | None = _threshold(
         None, "sigma", "Largest sigma of the position", "m", 0.01, 5.0
     )
+    min_p_value: float | None = _threshold(
+        None, "chi_square", "Smallest p-value of the residuals", "", 0.0, 0.01
+    )
+    """How unlikely by chance alone the residuals of the views in valid pairs may be."""
     low_parallax_degrees: float = _threshold(
         5.0, FINDINGS, "Finding: parallax below", "degrees", 0.0, 45.0
     )

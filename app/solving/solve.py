@@ -26,6 +26,7 @@ from app.soccer.solution import (
 from app.solving.ball_box import expect_ball, fit_ball
 from app.solving.best_ball import best_ball
 from app.solving.calibrate import calibrate_station, calibration_key
+from app.solving.contradiction import chi_square_of, contradiction
 from app.solving.facts import Facts, facts_of
 from app.solving.findings import find
 from app.solving.gates import JudgedView, describe
@@ -66,7 +67,10 @@ def solve_with_facts(
     spread = MeanSpread(facts)
     verdict = judge(facts, policy, spread)
     pairs = judged_pairs(meetings, verdict)
-    ball = mean_ball([view.key for view in group.views], facts, verdict, spread, policy)
+    names = [view.key for view in group.views]
+    ball = mean_ball(names, facts, verdict, spread, policy)
+    chi_square = chi_square_of(names, facts, verdict, policy)
+    contradicted = contradiction(chi_square, names, facts, verdict, sights, policy)
     views = tuple(
         _with_ball(view, ViewSolution(view.key, known[key], key, False, failed), ball, policy)
         for view, key, failed in zip(group.views, keys, _failed(group, verdict), strict=True)
@@ -79,8 +83,9 @@ def solve_with_facts(
         pairs=pairs,
         ball=ball,
         best_ball=best_ball(pairs, usable, policy),
-        gates=describe(judged, left_out, pairs, ball, verdict, policy),
-        findings=find(group, views, sights, pairs, ball, policy),
+        chi_square=chi_square,
+        gates=describe(judged, left_out, pairs, ball, verdict, policy, chi_square),
+        findings=find(group, views, sights, pairs, ball, policy, contradicted),
         policy_hash=policy.hash,
         solver_version=SOLVER_VERSION,
     )

@@ -24,6 +24,7 @@ LABELS = {
     "reprojection": "Views meet in one ball",
     "parallax": "Enough parallax",
     "sigma": "Certain enough",
+    "chi_square": "Residuals small enough",
 }
 """What a step of the funnel asks, for people."""
 
@@ -45,7 +46,8 @@ class CalibrationValues(_tried(CalibrationPolicy)):  # type: ignore[misc]
 class WhatIf(_tried(Policy)):  # type: ignore[misc]
     """Thresholds to try; those that are absent stay as they are.
 
-    `null` switches a gate off (`min_parallax_degrees`, `max_sigma_m`) and says nothing elsewhere.
+    `null` switches a gate off (`min_parallax_degrees`, `max_sigma_m`,
+    `min_p_value`) and says nothing elsewhere.
     """
 
     model_config = ConfigDict(
