@@ -342,7 +342,11 @@ class Finding:
 
 @dataclass(frozen=True)
 class Solution:
-    """Everything computed for one group under one policy."""
+    """Everything computed for one group under one policy.
+
+    ``ball`` is the one that leaves, and that boxes and errors follow. Where the policy asks for
+    the most likely point, ``mean_ball`` is the mean of the valid pairs in whose place it stands.
+    """
 
     views: tuple[ViewSolution, ...]
     pairs: tuple[Pair, ...]
@@ -351,8 +355,14 @@ class Solution:
     findings: tuple[Finding, ...] = ()
     best_ball: BestBall | None = None
     chi_square: ChiSquare | None = None
+    mean_ball: Ball3D | None = None
     policy_hash: str = ""
     solver_version: str = field(default=SOLVER_VERSION)
+
+    @property
+    def point(self) -> str:
+        """Which 3D ball leaves, as the policy names it: ``mean`` or ``best``."""
+        return "mean" if self.mean_ball is None else "best"
 
     @property
     def passes(self) -> bool:

@@ -108,13 +108,15 @@ def contradiction(
         return None
     chosen = [sight for sight in sights if sight.view in chi_square.views]
     if len(chosen) == 2:
-        return Contradiction(chi_square, None, None, *_apart(*chosen, verdict.point[0], policy))
+        one, other = chosen
+        gap, moved = _apart(one, other, verdict.point[0], policy)
+        return Contradiction(chi_square, None, None, gap, moved)
     view, confidence, point = _blamed(keys, facts, used, verdict.point, policy)
     if view is None:
         return Contradiction(chi_square, None, None)
     sight = next(sight for sight in chosen if sight.view == view)
-    moved = _to_level(sight, point[2])
-    level = None if moved is None else float(np.linalg.norm(moved - point))
+    place = _to_level(sight, float(point[2]))
+    level = None if place is None else float(np.linalg.norm(place - point))
     return Contradiction(chi_square, view, confidence, _off_ray(sight, point), level)
 
 
@@ -123,7 +125,9 @@ def _blamed(
 ) -> tuple[str | None, float, FloatArray]:
     """The view without which the others agree, how sure that is, and their ball, shape (3,)."""
     places = np.flatnonzero(used)
-    left = [residuals_of(facts, used & (np.arange(len(used)) != at), start, policy) for at in places]
+    left = [
+        residuals_of(facts, used & (np.arange(len(used)) != at), start, policy) for at in places
+    ]
     squares = np.array([item.chi_square[0] for item in left])
     squares[np.isnan(squares)] = np.inf
     best = int(squares.argmin())
@@ -132,9 +136,7 @@ def _blamed(
     return keys[places[best]] if agree else None, confidence, left[best].point[0]
 
 
-def _apart(
-    a: Sight, b: Sight, point: FloatArray, policy: Policy
-) -> tuple[float, float | None]:
+def _apart(a: Sight, b: Sight, point: FloatArray, policy: Policy) -> tuple[float, float | None]:
     """How far two rays miss each other, and their balls if both lie on the grass, metres."""
     gap = _rays_apart(a, b)
     grass = -policy.ball_diameter_m / 2

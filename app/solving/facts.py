@@ -213,9 +213,7 @@ def _uncertainties(
     return parameters, covariances
 
 
-def _rays(
-    meetings: Sequence[Meeting], places: Mapping[str, int]
-) -> tuple[FloatArray, FloatArray]:
+def _rays(meetings: Sequence[Meeting], places: Mapping[str, int]) -> tuple[FloatArray, FloatArray]:
     """Slope and axis of the views that meet others, NaN for those that do not."""
     slopes, axes = np.full((len(places), 2, 3), np.nan), np.full((len(places), 3), np.nan)
     for sight in {item.view: item for each in meetings for item in (each.a, each.b)}.values():

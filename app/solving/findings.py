@@ -17,7 +17,8 @@ from app.solving.triangulate import Sight
 
 MAX_SIZE_RATIO = 2.0
 """A ball box may be so many times larger or smaller than the 3D point implies."""
-HIGH_SIGMA_M = 1.0
+HIGH_SIGMA_M = 0.25
+"""Beyond it more than one ball in twenty is half a metre off or more."""
 
 _BY_WEIGHT = (
     "sides_swapped",
@@ -251,7 +252,7 @@ def _high_uncertainty(ball: Ball3D) -> Iterator[Finding]:
     if ball.sigma_m > HIGH_SIGMA_M:
         yield Finding(
             "high_uncertainty",
-            f"The position of the ball is uncertain, about ± {ball.sigma_m:.1f} m, although the "
+            f"The position of the ball is uncertain, about ± {ball.sigma_m:.2f} m, although the "
             "views agree. Decide whether that is good enough.",
             number=ball.sigma_m,
             threshold=HIGH_SIGMA_M,

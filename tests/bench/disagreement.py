@@ -145,7 +145,9 @@ def _camera_anywhere(
             # Few seats see the ball from so near the main camera's side: turn about the ball.
             turn = np.radians(rng.uniform(*degrees)) * rng.choice([-1, 1])
             x, y, z = main - ball
-            seat = ball + np.array([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z])
+            seat = ball + np.array(
+                [x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z]
+            )
             seat = seat + rng.normal(0, 1, 3)
         if degrees[0] <= np.degrees(parallax(main, seat, ball)) < degrees[1] and seat[2] < -1.5:
             camera = aim(rng, seat, ball, is_main=False)
@@ -185,17 +187,40 @@ def bench_disagreement(groups: int = GROUPS) -> None:
     )
     anywhere = from_anywhere(scenes)
     odd = judged(ordinary(anywhere), known)
-    for name, stage, quiet in (("seats of a broadcaster", scenes, calm), ("anywhere", anywhere, odd)):
+    for name, stage, quiet in (
+        ("seats of a broadcaster", scenes, calm),
+        ("anywhere", anywhere, odd),
+    ):
         print_table(
             f"One replay labelled from the other end; replays from {name}",
-            ("views", "groups", "found", "share", "pass untold", "told in ordinary groups", "other"),
+            (
+                "views",
+                "groups",
+                "found",
+                "share",
+                "pass untold",
+                "told in ordinary groups",
+                "other",
+            ),
             list(_swaps(stage, known, quiet)),
         )
     near = judged(ordinary(from_anywhere(with_views(scenes, 2), degrees=(5.0, 10.0))), known)
-    for name, stage in (("seats of a broadcaster", calm), ("anywhere", odd), ("near the main camera", near)):
+    for name, stage in (
+        ("seats of a broadcaster", calm),
+        ("anywhere", odd),
+        ("near the main camera", near),
+    ):
         print_table(
             f"Ordinary groups that pass, by angle; replays from {name}",
-            ("parallax", "groups", "sigma m, median", "wrong by > 0.5 m", "of these told", "told", "in 95 %"),
+            (
+                "parallax",
+                "groups",
+                "sigma m, median",
+                "wrong by > 0.5 m",
+                "of these told",
+                "told",
+                "in 95 %",
+            ),
             list(_angles(stage)),
         )
 
@@ -210,11 +235,22 @@ def _instants(scenes: Sequence[Scene], known: dict[str, Calibration]) -> Iterato
             named = [
                 item
                 for item in told
-                if any(f.view == item.case.view for f in item.solution.findings if f.kind in TELLING)
+                if any(
+                    f.view == item.case.view for f in item.solution.findings if f.kind in TELLING
+                )
             ]
             passing = sum(item.solution.passes for item in found)
             share = len(told) / max(1, len(wrong))
-            yield [count, f"{delay} ms", len(found), passing, len(wrong), len(told), share, len(named)]
+            yield [
+                count,
+                f"{delay} ms",
+                len(found),
+                passing,
+                len(wrong),
+                len(told),
+                share,
+                len(named),
+            ]
 
 
 def _calm(calm: Sequence[Judged]) -> list[object]:
@@ -230,12 +266,24 @@ def _swaps(
     for count in (2, 3, 4):
         found = judged(swapped(with_views(scenes, count)), known)
         named = [item for item in found if _is_named(item)]
-        silent = [item for item in found if item.solution.passes and not item.kinds & (TELLING | {"sides_swapped"})]
+        silent = [
+            item
+            for item in found
+            if item.solution.passes and not item.kinds & (TELLING | {"sides_swapped"})
+        ]
         quiet = [item for item in calm if len(item.case.group.views) == count]
         alarms = sum("sides_swapped" in item.kinds for item in quiet)
         others = sum(bool(item.kinds & TELLING) for item in quiet)
         share = len(named) / max(1, len(found))
-        yield [count, len(found), len(named), share, len(silent), f"{alarms} of {len(quiet)}", others]
+        yield [
+            count,
+            len(found),
+            len(named),
+            share,
+            len(silent),
+            f"{alarms} of {len(quiet)}",
+            others,
+        ]
 
 
 def _is_named(item: Judged) -> bool:

@@ -319,7 +319,14 @@ class SolutionDocument(Document):
     gates: list[GateDocument]
     views: list[ViewSolutionDocument]
     pairs: list[PairDocument]
-    ball: Ball3DDocument | None = Field(description="Mean of the valid pairs; exported.")
+    point: str = Field(
+        description="Which ball is exported, as the policy says: `mean` of the valid pairs, or "
+        "`best`, the most likely point."
+    )
+    ball: Ball3DDocument | None = Field(description="The 3D ball that is exported.")
+    mean_ball: Ball3DDocument | None = Field(
+        description="Mean of the valid pairs where the most likely point is exported in its place."
+    )
     best_ball: BestBallDocument | None
     chi_square: ChiSquareDocument | None
     findings: list[FindingDocument]

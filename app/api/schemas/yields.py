@@ -31,9 +31,12 @@ LABELS = {
 
 def _tried(part: type[Policy | CalibrationPolicy]) -> Any:
     """A model in which every threshold of a part of the policy can stand or be absent."""
-    hints = {bool: bool | None}
+    hints: dict[Any, Any] = {bool: bool | None}
     fields: dict[str, Any] = {
-        item.name: (hints.get(item.hint, Number | None), Field(default=None, description=item.text))
+        item.name: (
+            item.hint | None if item.is_word else hints.get(item.hint, Number | None),
+            Field(default=None, description=item.text),
+        )
         for item in thresholds_of(part)
     }
     return create_model(f"_{part.__name__}", __config__=ConfigDict(extra="forbid"), **fields)
