@@ -247,10 +247,7 @@ def _chi_square(group: _Group, found: ChiSquare | None, policy: Policy) -> Gate:
     if found is None:
         return _unjudged("chi_square", threshold, active=active)
     passed = "chi_square" not in group.failed
-    sentence = (
-        f"residuals as large by chance in {chance(found.p_value)} "
-        f"(χ² {found.value:.1f}, {found.freedom} degree{'s' if found.freedom > 1 else ''} of freedom)"
-    )
+    sentence = f"by chance in {chance(found.p_value)}, χ² {found.value:.1f}"
     return _gate("chi_square", passed, found.p_value, threshold, sentence, active=active)
 
 

@@ -1,10 +1,11 @@
 """Views that contradict each other: other instants, swapped sides, small angles, and false alarms.
 
-``python -m tests.bench.disagreement [GROUPS]`` prints the table alone.
+``python -m tests.bench.disagreement [GROUPS [SEED]]`` prints the tables.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -175,14 +176,25 @@ def judged(cases: Sequence[Case], known: dict[str, Calibration]) -> list[Judged]
     return [Judged(case, solve(case.group, PAPER, known)) for case in cases]
 
 
-def bench_disagreement(groups: int = GROUPS) -> None:
+def bench_disagreement(groups: int = GROUPS, seed: int = SEED) -> None:
     """The tables of what contradicts itself."""
-    scenes = make_scenes(groups, SEED, faults=False)
+    scenes = make_scenes(groups, seed, faults=False)
     known: dict[str, Calibration] = {}
     calm = judged(ordinary(scenes), known)
     print_table(
         f"Views of other instants, the ball at {SPEED:g} m/s, and ordinary groups",
-        ("views", "apart", "groups", "pass", "wrong by > 0.5 m", "of these told", "share", "named"),
+        (
+            "views",
+            "apart",
+            "groups",
+            "pass",
+            "wrong by > 0.5 m",
+            "of these told",
+            "share",
+            "named",
+            "delay held",
+            "called swapped",
+        ),
         [*_instants(scenes, known), _calm(calm)],
     )
     anywhere = from_anywhere(scenes)
@@ -241,6 +253,8 @@ def _instants(scenes: Sequence[Scene], known: dict[str, Calibration]) -> Iterato
             ]
             passing = sum(item.solution.passes for item in found)
             share = len(told) / max(1, len(wrong))
+            held = [inside for item in found if (inside := _delay_held(item, delay)) is not None]
+            swaps = sum("sides_swapped" in item.kinds for item in found)
             yield [
                 count,
                 f"{delay} ms",
@@ -250,14 +264,25 @@ def _instants(scenes: Sequence[Scene], known: dict[str, Calibration]) -> Iterato
                 len(told),
                 share,
                 len(named),
+                f"{sum(held)} of {len(held)}",
+                swaps,
             ]
+
+
+def _delay_held(item: Judged, delay_ms: float) -> bool | None:
+    """Whether the interval of the delay that is said holds the true one; None without one."""
+    for finding in item.solution.findings:
+        said = re.search(r"about \d+ ms \((\d+) to (\d+)\)", finding.sentence)
+        if said is not None:
+            return int(said[1]) <= delay_ms <= int(said[2])
+    return None
 
 
 def _calm(calm: Sequence[Judged]) -> list[object]:
     told = sum(bool(item.kinds & TELLING) for item in calm)
     passing = sum(item.solution.passes for item in calm)
     wrong = sum(item.wrong for item in calm)
-    return ["2-4", "0 ms", len(calm), passing, wrong, told, told / len(calm), ""]
+    return ["2-4", "0 ms", len(calm), passing, wrong, told, told / len(calm), "", "", ""]
 
 
 def _swaps(
@@ -337,4 +362,4 @@ def _seen(rng: np.random.Generator, scene: Scene, view: View, ball: FloatArray) 
 
 
 if __name__ == "__main__":
-    bench_disagreement(int(sys.argv[1]) if len(sys.argv) > 1 else GROUPS)
+    bench_disagreement(*map(int, sys.argv[1:]))

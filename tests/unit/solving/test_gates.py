@@ -276,15 +276,12 @@ class TestChiSquare:
     def test_says_how_often_chance_does_as_much(self):
         found = gates([], policy=self.POLICY, chi_square=self.FOUND)["chi_square"]
         assert (found.passed, found.value, found.threshold) == (True, 0.0088, 0.002)
-        assert found.sentence == (
-            "residuals as large by chance in 1 of 110 groups (χ² 11.6, 3 degrees of freedom)"
-        )
+        assert found.sentence == "by chance in 1 of 110 groups, χ² 11.6"
 
     def test_fails_where_the_verdict_says_so(self):
         one = ChiSquare(20.0, 1, 7.7e-6, ("a", "b"))
         found = gates([], ("chi_square",), policy=self.POLICY, chi_square=one)["chi_square"]
         assert not found.passed
-        assert found.sentence.endswith("(χ² 20.0, 1 degree of freedom)")
 
     def test_is_said_where_it_is_not_asked(self):
         found = gates([], chi_square=self.FOUND)["chi_square"]
