@@ -91,7 +91,7 @@ def contradiction(
 ) -> Contradiction | None:
     """Where the views of the ball contradict each other; None where they do not.
 
-    The uncertainty of a given camera is not known, so nothing can be said with one.
+    Nobody knows how far a given camera without covariance is off: nothing can be said with one.
 
     Args:
         chi_square: Of the group.
