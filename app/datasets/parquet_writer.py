@@ -17,7 +17,7 @@ from app.finite import json_text as finite_text
 from app.geometry.camera import Camera
 from app.soccer.frames import Box
 from app.soccer.group import View
-from app.soccer.solution import BallFit, ViewSolution
+from app.soccer.solution import Ball3D, BallFit, BestBall, Solution, ViewSolution
 
 TABLE = "views.parquet"
 ROWS = 1024
@@ -143,6 +143,24 @@ def _ball(name: str) -> Getter:
     return get
 
 
+def _of_ball(get: Callable[[Solution], Any]) -> Getter:
+    """Of the solution, in rows that have a 3D ball."""
+
+    def value(row: Row) -> Any:
+        solution = row.record.solution
+        return None if solution is None or _ball("point")(row) is None else get(solution)
+
+    return value
+
+
+def _sigma(ball: Ball3D | BestBall | None) -> float | None:
+    return None if ball is None else ball.sigma_m
+
+
+def _p_value(solution: Solution) -> float | None:
+    return None if solution.chi_square is None else solution.chi_square.p_value
+
+
 def _box(which: Callable[[Row], Box | None], name: str) -> Getter:
     def get(row: Row) -> float | None:
         box = which(row)
@@ -247,6 +265,14 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("ball_3d_z", NUMBER, _axis(2)),
     ("sigma_m", NUMBER, _ball("sigma_m")),
     ("parallax_degrees", NUMBER, _ball("parallax_degrees")),
+    ("point", TEXT, _of_ball(lambda solution: solution.point)),
+    (
+        "mean_sigma_m",
+        NUMBER,
+        _of_ball(lambda solution: _sigma(solution.mean_ball or solution.ball)),
+    ),
+    ("best_sigma_m", NUMBER, _of_ball(lambda solution: _sigma(solution.best_ball))),
+    ("p_value", NUMBER, _of_ball(_p_value)),
     ("covariance", LIST, lambda row: _listed(_ball("covariance")(row))),
     ("reprojected", LIST, _fits_pixels),
     ("error_px", NUMBER, _fit("error_px")),

@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
-from typing import Any, get_args, get_type_hints
+from typing import Any, Literal, get_args, get_type_hints
 
 from app.soccer.solution import GAMMAS_PERCENT, GATES
 
@@ -19,13 +19,14 @@ SUBJECTS = (*GATES, BOXES, FINDINGS, NOISE, PITCH, CALIBRATION)
 
 
 def _threshold(
-    default: float | bool | None,
+    default: float | bool | str | None,
     subject: str,
     label: str,
     unit: str = "",
     minimum: float | None = None,
     maximum: float | None = None,
-    choices: tuple[float, ...] = (),
+    choices: tuple[float | str, ...] = (),
+    later: bool = False,
 ) -> Any:
     """A field of a policy with what ``Threshold`` says of it."""
     known = {
@@ -35,6 +36,7 @@ def _threshold(
         "minimum": minimum,
         "maximum": maximum,
         "choices": choices,
+        "later": later,
     }
     return field(default=default, metadata=known)
 
@@ -85,12 +87,21 @@ class Policy:
     )
     min_baseline_m: float = _threshold(1.0, "baseline", "Smallest baseline", "m", 0.0, 50.0)
     ball_diameter_m: float = _threshold(0.226, BOXES, "Diameter of the ball", "m", 0.2, 0.25)
+    point: Literal["mean", "best"] = _threshold(
+        "mean", BOXES, "The 3D ball that leaves", choices=("mean", "best"), later=True
+    )
+    """``mean`` of the valid pairs, as in the paper, or ``best``: the most likely point over all
+    views. Boxes, errors and exports follow it; the gates judge the mean."""
     min_parallax_degrees: float | None = _threshold(
         None, "parallax", "Smallest parallax", "degrees", 0.0, 45.0
     )
     max_sigma_m: float | None = _threshold(
         None, "sigma", "Largest sigma of the position", "m", 0.01, 5.0
     )
+    min_p_value: float | None = _threshold(
+        None, "chi_square", "Smallest p-value of the residuals", "", 0.0, 0.01, later=True
+    )
+    """How unlikely by chance alone the residuals of the views in valid pairs may be."""
     low_parallax_degrees: float = _threshold(
         5.0, FINDINGS, "Finding: parallax below", "degrees", 0.0, 45.0
     )
@@ -120,14 +131,26 @@ class Policy:
     @cached_property
     def hash(self) -> str:
         """Digest of every value but the name."""
-        values = asdict(self)
-        del values["name"]
-        return _digest(values)
+        return _digest(digested_values(self))
 
     @cached_property
     def calibration_hash(self) -> str:
         """Digest of what a calibration depends on."""
         return _digest(asdict(self.calibration))
+
+
+def digested_values(policy: Policy) -> dict[str, Any]:
+    """What the digests of a policy cover: every value but the name.
+
+    A threshold that came later counts only where it asks for something else than before it came:
+    the hash of a policy, and of each version that was frozen with it, stays what it was.
+    """
+    values = asdict(policy)
+    del values["name"]
+    for item in fields(Policy):
+        if item.metadata.get("later") and values[item.name] == item.default:
+            del values[item.name]
+    return values
 
 
 PAPER = Policy()
@@ -144,7 +167,9 @@ class Threshold:
         hint: Type of its values.
         subject: One of ``SUBJECTS``: the gate that it decides, or what else it is about.
         minimum: None, as ``maximum`` is, for a switch.
-        choices: The values that forms offer where a range would promise too much.
+        choices: The values that forms offer where a range would promise too much; where they are
+            words, there are no others.
+        later: It came after the first release, see ``digested_values``.
     """
 
     name: str
@@ -154,13 +179,19 @@ class Threshold:
     unit: str
     minimum: float | None
     maximum: float | None
-    choices: tuple[float, ...]
+    choices: tuple[float | str, ...]
+    later: bool = False
 
     @property
-    def default(self) -> float | bool | None:
+    def default(self) -> float | bool | str | None:
         """Its value in the policy ``paper``."""
-        value: float | bool | None = self.value(PAPER)
+        value: float | bool | str | None = self.value(PAPER)
         return value
+
+    @property
+    def is_word(self) -> bool:
+        """Whether its values are words, the choices."""
+        return any(isinstance(choice, str) for choice in self.choices)
 
     @property
     def gate(self) -> str | None:

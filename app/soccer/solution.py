@@ -12,7 +12,7 @@ from itertools import pairwise
 from app.geometry.camera import Camera
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 
-SOLVER_VERSION = "2"
+SOLVER_VERSION = "3"
 """Part of every solution's key; raised by one whenever a number changes."""
 
 GAMMAS_PERCENT = (0.5, 1.0, 2.0)
@@ -26,6 +26,7 @@ GATES = (
     "reprojection",
     "parallax",
     "sigma",
+    "chi_square",
 )
 """Names of the gates in the order in which they are judged."""
 
@@ -36,6 +37,7 @@ FINDING_KINDS = (
     "bad_point",
     "under_constrained",
     "view_disagrees",
+    "views_contradict",
     "not_synchronous",
     "ball_size",
     "low_parallax",
@@ -166,6 +168,20 @@ class Ball3D:
     def height_m(self) -> float:
         """Above the grass, metres."""
         return height_above_grass(self.point[2])
+
+
+@dataclass(frozen=True)
+class ChiSquare:
+    """Whether the residuals of the most likely ball are as small as their uncertainty says."""
+
+    value: float
+    """Sum of the squared residuals over the views of valid pairs, each in units of its sigma."""
+    freedom: int
+    """Degrees of freedom: two for each view, less three of the ball."""
+    p_value: float
+    """How often chance alone makes residuals as large as these, 0 to 1."""
+    views: tuple[str, ...]
+    """Views that were tested together."""
 
 
 @dataclass(frozen=True)
@@ -326,7 +342,11 @@ class Finding:
 
 @dataclass(frozen=True)
 class Solution:
-    """Everything computed for one group under one policy."""
+    """Everything computed for one group under one policy.
+
+    ``ball`` is the one that leaves, and that boxes and errors follow. Where the policy asks for
+    the most likely point, ``mean_ball`` is the mean of the valid pairs in whose place it stands.
+    """
 
     views: tuple[ViewSolution, ...]
     pairs: tuple[Pair, ...]
@@ -334,8 +354,15 @@ class Solution:
     gates: tuple[Gate, ...]
     findings: tuple[Finding, ...] = ()
     best_ball: BestBall | None = None
+    chi_square: ChiSquare | None = None
+    mean_ball: Ball3D | None = None
     policy_hash: str = ""
     solver_version: str = field(default=SOLVER_VERSION)
+
+    @property
+    def point(self) -> str:
+        """Which 3D ball leaves, as the policy names it: ``mean`` or ``best``."""
+        return "mean" if self.mean_ball is None else "best"
 
     @property
     def passes(self) -> bool:

@@ -7,7 +7,7 @@ each other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -41,6 +41,9 @@ class Facts:
         view_parameters: Of the camera, shape (V, 8).
         view_covariance: Of the parameters, zero where it is not known, shape (V, 8, 8).
         view_ball_px: Diameter of the annotated box, 0 without one.
+        view_slope: How far a point one metre deep on the ray of the ball moves in the picture,
+            pixels per metre, NaN where the view has no such ray, shape (V, 2, 3).
+        view_axis: Direction of depth, NaN likewise, shape (V, 3).
         mark_view: Row of the view, shape (M,).
         mark_px: Largest distance of an annotated point of the marking, infinite without one.
         pair_group: Row of the group, shape (P,), like ``pair_...``.
@@ -66,6 +69,8 @@ class Facts:
     view_parameters: FloatArray
     view_covariance: FloatArray
     view_ball_px: FloatArray
+    view_slope: FloatArray
+    view_axis: FloatArray
     mark_view: IntArray
     mark_px: FloatArray
     pair_group: IntArray
@@ -102,6 +107,8 @@ COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
     "view_parameters": (np.float64, (PARAMETERS,)),
     "view_covariance": (np.float64, (PARAMETERS, PARAMETERS)),
     "view_ball_px": (np.float64, ()),
+    "view_slope": (np.float64, (2, 3)),
+    "view_axis": (np.float64, (3,)),
     "mark_view": (np.int64, ()),
     "mark_px": (np.float64, ()),
     "pair_group": (np.int64, ()),
@@ -162,6 +169,7 @@ def facts_of(
     diagonals = [view.size.diagonal for view in views]
     parameters, covariances = _uncertainties(calibrations, diagonals)
     places = {view.key: place for place, view in enumerate(views)}
+    slopes, axes = _rays(meetings, places)
     return Facts(
         groups=1,
         view_group=np.zeros(len(views), np.int64),
@@ -175,6 +183,8 @@ def facts_of(
         view_parameters=parameters,
         view_covariance=covariances,
         view_ball_px=np.array([box.diameter if box is not None else 0.0 for box in boxes], float),
+        view_slope=slopes,
+        view_axis=axes,
         mark_view=np.array([place for place, _ in marks], np.int64),
         mark_px=np.array([np.inf if apart is None else apart for _, apart in marks], float),
         pair_group=np.zeros(len(meetings), np.int64),
@@ -201,6 +211,17 @@ def _uncertainties(
             parameters[place] = parameters_from_camera(item.camera, diagonal / 2)
             covariances[place] = np.reshape(item.covariance, (PARAMETERS, PARAMETERS))
     return parameters, covariances
+
+
+def _rays(meetings: Sequence[Meeting], places: Mapping[str, int]) -> tuple[FloatArray, FloatArray]:
+    """Slope and axis of the views that meet others, NaN for those that do not."""
+    slopes, axes = np.full((len(places), 2, 3), np.nan), np.full((len(places), 3), np.nan)
+    for sight in {item.view: item for each in meetings for item in (each.a, each.b)}.values():
+        place, camera = places[sight.view], sight.camera
+        ray = camera.rays(np.array([sight.center]))[0]
+        slopes[place] = camera.jacobian(camera.position + ray)
+        axes[place] = camera.rotation[2]
+    return slopes, axes
 
 
 def _position(calibration: Calibration) -> Sequence[float] | FloatArray:

@@ -9,13 +9,16 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D, Finding, Fix, Pair, ViewSolution
 from app.solving.calibration_findings import calibration_findings
+from app.solving.contradiction import LOW_P_VALUE, SPEEDS, TYPICAL_SPEED, Contradiction
+from app.solving.gates import chance
 from app.solving.plausible import implausible
 from app.solving.sides import Swap, find_swaps
 from app.solving.triangulate import Sight
 
 MAX_SIZE_RATIO = 2.0
 """A ball box may be so many times larger or smaller than the 3D point implies."""
-HIGH_SIGMA_M = 1.0
+HIGH_SIGMA_M = 0.25
+"""Beyond it more than one ball in twenty is half a metre off or more."""
 
 _BY_WEIGHT = (
     "sides_swapped",
@@ -23,6 +26,7 @@ _BY_WEIGHT = (
     "several_balls",
     "not_synchronous",
     "view_disagrees",
+    "views_contradict",
     "implausible_ball",
     "implausible_camera",
     "under_constrained",
@@ -42,6 +46,7 @@ def find(
     pairs: Sequence[Pair],
     ball: Ball3D | None,
     policy: Policy,
+    contradicted: Contradiction | None = None,
 ) -> tuple[Finding, ...]:
     """All findings of a group, those that explain most first, then by view."""
     swaps = {swap.view: swap for swap in _swaps(group, views, sights, policy)}
@@ -62,6 +67,8 @@ def find(
         found.extend(_ball_size(solved))
     if ball is None and not swaps:
         found.extend(_not_synchronous(pairs, policy, group))
+    if contradicted is not None and not swaps:
+        found.append(_views_contradict(contradicted, group))
     if ball is not None:
         found.extend(_low_parallax(ball, policy))
         found.extend(_high_uncertainty(ball))
@@ -175,6 +182,61 @@ def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Ite
     )
 
 
+def _views_contradict(item: Contradiction, group: Group) -> Finding:
+    """Views that pass tau and are still farther apart than their uncertainty lets them be."""
+    found = item.chi_square
+    one = "The two views do" if len(found.views) == 2 else "The views do"
+    sentences = [
+        f"{one} not show one ball: chance alone makes residuals as large as these in "
+        f"{chance(found.p_value)}."
+    ]
+    if item.view is not None:
+        sentences.append("Without this view the others agree.")
+    if item.gap_m is not None and item.is_motion and not _one_clock(group):
+        sentences.append(_another_instant(item.gap_m, item.moved_m))
+    sentences.append(
+        "If its ball is drawn on the ball, leave the view out."
+        if item.view is not None
+        else "If each ball is drawn on the ball, a camera is wrong or the instants differ."
+    )
+    return Finding(
+        "views_contradict",
+        " ".join(sentences),
+        item.view,
+        number=found.p_value,
+        threshold=LOW_P_VALUE,
+        confidence=item.confidence,
+        fix=None if item.view is None else Fix("exclude_view", item.view),
+    )
+
+
+def _another_instant(gap_m: float, moved_m: float | None) -> str:
+    """How far apart in time the pictures would be, if the ball moved in between."""
+    slow, fast = SPEEDS
+    least = _milliseconds(gap_m / fast)
+    if moved_m is None:
+        return (
+            f"The rays miss each other by {gap_m:.2f} m: perhaps another instant, by at least "
+            f"{least} ms."
+        )
+    most = _milliseconds(moved_m / slow)
+    return (
+        f"The rays miss each other by {gap_m:.2f} m: perhaps another instant, about "
+        f"{_milliseconds(moved_m / TYPICAL_SPEED)} ms ({least} to {most}) for a ball at "
+        f"{TYPICAL_SPEED:.0f} m/s ({slow:.0f} to {fast:.0f})."
+    )
+
+
+def _milliseconds(seconds: float) -> int:
+    """To two digits: nobody knows the speed of the ball."""
+    return int(float(f"{1000 * seconds:.2g}"))
+
+
+def _one_clock(group: Group) -> bool:
+    """Static cameras run on one clock."""
+    return all(view.station.shared for view in group.views)
+
+
 def _low_parallax(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
     if ball.parallax_degrees < policy.low_parallax_degrees:
         yield Finding(
@@ -190,7 +252,7 @@ def _high_uncertainty(ball: Ball3D) -> Iterator[Finding]:
     if ball.sigma_m > HIGH_SIGMA_M:
         yield Finding(
             "high_uncertainty",
-            f"The position of the ball is uncertain, about ± {ball.sigma_m:.1f} m, although the "
+            f"The position of the ball is uncertain, about ± {ball.sigma_m:.2f} m, although the "
             "views agree. Decide whether that is good enough.",
             number=ball.sigma_m,
             threshold=HIGH_SIGMA_M,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import isnan
 
 from app.soccer.policy import Policy
-from app.soccer.solution import GATES, Ball3D, Calibration, Gate, Pair, margin_of
+from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, Pair, margin_of
 from app.solving.verdict import MIN_VIEWS, Verdict
 
 
@@ -68,6 +68,7 @@ def describe(
     ball: Ball3D | None,
     verdict: Verdict,
     policy: Policy,
+    chi_square: ChiSquare | None = None,
 ) -> tuple[Gate, ...]:
     """All gates in order, those that the policy does not ask for as not active.
 
@@ -78,6 +79,7 @@ def describe(
         ball: The triangulated ball, or None.
         verdict: Of the one group.
         policy: The thresholds.
+        chi_square: The test of the ball's residuals, or None.
     """
     failed = zip(GATES, verdict.failed[:, 0].tolist(), strict=True)
     group = _Group(views, left_out, frozenset(name for name, fails in failed if fails))
@@ -90,6 +92,7 @@ def describe(
         _reprojection(group, pairs),
         _parallax(group, ball, policy),
         _sigma(group, ball, policy),
+        _chi_square(group, chi_square, policy),
     )
 
 
@@ -237,6 +240,29 @@ def _sigma(group: _Group, ball: Ball3D | None, policy: Policy) -> Gate:
     value, passed = ball.sigma_m, "sigma" not in group.failed
     margin = margin_of(value, threshold, at_most=True)
     return Gate("sigma", passed, value, threshold, margin, f"{value:.2f} m", active=active)
+
+
+def _chi_square(group: _Group, found: ChiSquare | None, policy: Policy) -> Gate:
+    threshold, active = policy.min_p_value, policy.min_p_value is not None
+    if found is None:
+        return _unjudged("chi_square", threshold, active=active)
+    passed = "chi_square" not in group.failed
+    sentence = f"by chance in {chance(found.p_value)}, χ² {found.value:.1f}"
+    return _gate("chi_square", passed, found.p_value, threshold, sentence, active=active)
+
+
+def chance(p_value: float) -> str:
+    """How often something happens, for people.
+
+    Example:
+        >>> chance(0.31), chance(0.0004), chance(1e-12)
+        ('31 % of groups', '1 of 2,500 groups', 'less than 1 of a million groups')
+    """
+    if p_value >= 0.01:
+        return f"{p_value:.0%} of groups".replace("%", " %")
+    if p_value < 1e-6:
+        return "less than 1 of a million groups"
+    return f"1 of {float(f'{1 / p_value:.2g}'):,.0f} groups"
 
 
 def _gate(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from app.soccer.policy import Policy
-from app.soccer.solution import GATES, Ball3D, Pair
+from app.soccer.solution import GATES, Ball3D, BestBall, Pair
 from app.solving.facts import Facts
 from app.solving.spread import MeanSpread, longest_sigma
 from app.solving.triangulate import Meeting
@@ -54,3 +55,19 @@ def mean_ball(
         parallax_degrees=float(verdict.parallax[0]),
         views=tuple(keys[place] for place in np.unique(facts.pair_view[verdict.valid]).tolist()),
     )
+
+
+def leaving_ball(mean: Ball3D | None, best: BestBall | None, policy: Policy) -> Ball3D | None:
+    """The ball that leaves: the mean of pairs, or the most likely point where the policy says so.
+
+    Its views and its parallax are those of the valid pairs in either case: they are what the
+    gates judge.
+
+    Args:
+        mean: Of the valid pairs; without it no ball leaves.
+        best: The most likely ball.
+        policy: Says which.
+    """
+    if mean is None or best is None or policy.point == "mean":
+        return mean
+    return replace(mean, point=best.point, covariance=best.covariance, sigma_m=best.sigma_m)

@@ -12,13 +12,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.plausible import is_plausible
+from app.solving.spread import pixel_spread
 from app.solving.triangulate import Meeting, Sight, meet
 
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
+LOOSE, SIZE_SIGMA = 0.15, 0.35
+"""Logarithm of how much larger than the ball people draw its box, and the spread of that."""
+WORST = 60.0
+"""Of the cost of one pair: beyond it no pair says more."""
+CLEARLY = 8.0
+"""By so much the turned view must fit better: the likelihood is then fifty times larger."""
+MAX_COST = 30.0
+"""Of the best pair, once it is turned: a view that fits neither way shows something else."""
+MAIN_WEIGHT = 1.5
+SURE = 0.99
 
 
 @dataclass(frozen=True)
@@ -63,12 +75,13 @@ def find_swaps(
         policy: Holds tau.
     """
     if first is not None and first.camera.position[1] < 0 and _from_lines(first):
-        swap = _swap(first, _others(first, usable), pitch, policy) if first in usable else None
+        others = _others(first, usable)
+        swap = _swap(first, others, first, pitch, policy) if first in usable else None
         return (swap or Swap(first.view, None, None, confidence=0.9),)
     if len(usable) < 2:
         return ()
     swaps = (
-        _swap(replay, _others(replay, usable), pitch, policy)
+        _swap(replay, _others(replay, usable), first, pitch, policy)
         for replay in usable
         if replay is not first and _from_lines(replay)
     )
@@ -83,17 +96,26 @@ def _others(sight: Sight, sights: Sequence[Sight]) -> list[Sight]:
     return [other for other in sights if other is not sight]
 
 
-def _swap(sight: Sight, others: Sequence[Sight], pitch: Pitch, policy: Policy) -> Swap | None:
-    before = _best_error(sight, others, pitch, policy)
-    if before <= 1:
+def _swap(
+    sight: Sight, others: Sequence[Sight], first: Sight | None, pitch: Pitch, policy: Policy
+) -> Swap | None:
+    labelled = _meetings(sight, others, policy)
+    turned = _meetings(_turn(sight), others, policy)
+    if not turned:
         return None
-    after = _best_error(_turn(sight), others, pitch, policy)
-    if after >= 1:
+    after = _best_error(turned, pitch, policy)
+    costs = _costs(sight, turned, True, pitch, policy)
+    better = _weighed(_costs(sight, labelled, False, pitch, policy), labelled, first)
+    better -= _weighed(costs, turned, first)
+    if after >= 1 or min(costs) > MAX_COST or better < CLEARLY:
         return None
-    tau = sight.tau_px(policy)
-    if np.isinf(before):
-        return Swap(sight.view, None, after * tau, confidence=1.0)
-    return Swap(sight.view, before * tau, after * tau, confidence=before / (before + after))
+    before, tau = _best_error(labelled, pitch, policy), sight.tau_px(policy)
+    return Swap(
+        sight.view,
+        None if np.isinf(before) else before * tau,
+        after * tau,
+        confidence=min(SURE, 1.0 / (1.0 + float(np.exp(-better / 2)))),
+    )
 
 
 def _turn(sight: Sight) -> Sight:
@@ -101,19 +123,75 @@ def _turn(sight: Sight) -> Sight:
     return replace(sight, calibration=calibration)
 
 
-def _best_error(sight: Sight, others: Sequence[Sight], pitch: Pitch, policy: Policy) -> float:
-    """Larger error of the best pair with one of the others, in units of tau.
-
-    Two rays can meet by accident, far from any pitch: such a pair says nothing.
-    """
-    errors = [
-        max(item.errors_px[0] / item.a.tau_px(policy), item.errors_px[1] / item.b.tau_px(policy))
+def _meetings(sight: Sight, others: Sequence[Sight], policy: Policy) -> list[Meeting]:
+    """Where the sight meets the others, except from beside it."""
+    return [
+        item
         for item in meet((sight, other) for other in others)
         if item.baseline_m >= policy.min_baseline_m
-        and not _is_behind(item)
-        and is_plausible(item.place, pitch, policy)
+    ]
+
+
+def _best_error(meetings: Sequence[Meeting], pitch: Pitch, policy: Policy) -> float:
+    """Larger error of the best pair, in units of tau; infinite where none says anything."""
+    errors = [
+        max(item.errors_px[0] / item.a.tau_px(policy), item.errors_px[1] / item.b.tau_px(policy))
+        for item in meetings
+        if _says_something(item, pitch, policy)
     ]
     return min(errors, default=np.inf)
+
+
+def _weighed(costs: Sequence[float], meetings: Sequence[Meeting], first: Sight | None) -> float:
+    """Sum of costs; the main camera counts more than a replay, which may be turned itself."""
+    return sum(
+        cost * (MAIN_WEIGHT if item.b is first else 1.0)
+        for cost, item in zip(costs, meetings, strict=True)
+    )
+
+
+def _costs(
+    sight: Sight, meetings: Sequence[Meeting], turned: bool, pitch: Pitch, policy: Policy
+) -> list[float]:
+    """How badly a view fits each of the others: minus twice the logarithm of the likelihood, robustly.
+
+    Two rays can meet by accident within tau, but seldom within their uncertainty, seldom where a
+    ball can be, and seldom as far away as both boxes say.
+
+    Args:
+        sight: As labelled.
+        meetings: Of the sight, or of the turned one, with others.
+        turned: Whether the meetings are those of the turned sight.
+        pitch: Tells which meeting points are plausible.
+        policy: How noisy a click is.
+    """
+    costs = []
+    for item in meetings:
+        cost = WORST
+        if _says_something(item, pitch, policy):
+            back = _HALF_TURN @ item.point if turned else item.point
+            cost = _misfit(sight, back, policy) + _misfit(item.b, item.point, policy)
+        costs.append(min(cost, WORST))
+    return costs
+
+
+def _misfit(sight: Sight, point: FloatArray, policy: Policy) -> float:
+    """Squared residuals of a ball's place and size in a view, each in units of its sigma."""
+    offset = np.array(sight.center) - sight.camera.project(point[None])[0]
+    if np.isnan(offset).any():
+        return WORST
+    place = float(offset @ np.linalg.solve(pixel_spread(sight, point, policy), offset))
+    if not sight.diameter_px:
+        return place
+    depth = float(sight.camera.pitch_to_camera(point[None])[0, 2])
+    expected = policy.ball_diameter_m * sight.camera.focal_length[1] / depth
+    size = (np.log(sight.diameter_px / expected) - LOOSE) / SIZE_SIGMA
+    return place + min(float(size) ** 2, WORST / 4)
+
+
+def _says_something(item: Meeting, pitch: Pitch, policy: Policy) -> bool:
+    """Two rays can meet by accident, far from any pitch: such a pair says nothing."""
+    return not _is_behind(item) and is_plausible(item.place, pitch, policy)
 
 
 def _is_behind(meeting: Meeting) -> bool:

@@ -26,10 +26,11 @@ from app.soccer.solution import (
 from app.solving.ball_box import expect_ball, fit_ball
 from app.solving.best_ball import best_ball
 from app.solving.calibrate import calibrate_station, calibration_key
+from app.solving.contradiction import chi_square_of, contradiction
 from app.solving.facts import Facts, facts_of
 from app.solving.findings import find
 from app.solving.gates import JudgedView, describe
-from app.solving.mean_ball import judged_pairs, mean_ball
+from app.solving.mean_ball import judged_pairs, leaving_ball, mean_ball
 from app.solving.spread import MeanSpread
 from app.solving.triangulate import meet, sights_of
 from app.solving.verdict import PASSES, Verdict, judge
@@ -66,21 +67,28 @@ def solve_with_facts(
     spread = MeanSpread(facts)
     verdict = judge(facts, policy, spread)
     pairs = judged_pairs(meetings, verdict)
-    ball = mean_ball([view.key for view in group.views], facts, verdict, spread, policy)
-    views = tuple(
-        _with_ball(view, ViewSolution(view.key, known[key], key, False, failed), ball, policy)
-        for view, key, failed in zip(group.views, keys, _failed(group, verdict), strict=True)
-    )
-    left = {view.view for view in views if view.failed is None}
+    names = [view.key for view in group.views]
+    failed = _failed(group, verdict)
+    left = {name for name, gate in zip(names, failed, strict=True) if gate is None}
     usable = [sight for sight in sights if sight.view in left]
+    mean, best = mean_ball(names, facts, verdict, spread, policy), best_ball(pairs, usable, policy)
+    ball = leaving_ball(mean, best, policy)
+    chi_square = chi_square_of(names, facts, verdict, policy)
+    contradicted = contradiction(chi_square, names, facts, verdict, sights, policy)
+    views = tuple(
+        _with_ball(view, ViewSolution(view.key, known[key], key, False, gate), ball, policy)
+        for view, key, gate in zip(group.views, keys, failed, strict=True)
+    )
     judged, left_out = _judged(group, views, verdict, policy), _left_out(group)
     solution = Solution(
         views=views,
         pairs=pairs,
         ball=ball,
-        best_ball=best_ball(pairs, usable, policy),
-        gates=describe(judged, left_out, pairs, ball, verdict, policy),
-        findings=find(group, views, sights, pairs, ball, policy),
+        best_ball=best,
+        mean_ball=None if ball is mean else mean,
+        chi_square=chi_square,
+        gates=describe(judged, left_out, pairs, mean, verdict, policy, chi_square),
+        findings=find(group, views, sights, pairs, ball, policy, contradicted),
         policy_hash=policy.hash,
         solver_version=SOLVER_VERSION,
     )

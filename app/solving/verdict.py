@@ -11,13 +11,24 @@ from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.triangulation import parallax_angle
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES
+from app.solving.chi_square import residuals_of
 from app.solving.facts import Facts
 from app.solving.spread import MeanSpread, is_within
 
 MIN_VIEWS = 2
 PASSES = len(GATES)
 """Stands for the first failing gate of what fails none."""
-_CALIBRATABLE, _JAC, _TWO_VIEWS, _BALL, _BASELINE, _REPROJECTION, _PARALLAX, _SIGMA = range(PASSES)
+(
+    _CALIBRATABLE,
+    _JAC,
+    _TWO_VIEWS,
+    _BALL,
+    _BASELINE,
+    _REPROJECTION,
+    _PARALLAX,
+    _SIGMA,
+    _CHI_SQUARE,
+) = range(PASSES)
 
 
 @dataclass(frozen=True)
@@ -28,7 +39,7 @@ class Verdict:
         jac: Of each view at the policy's gamma, NaN where it cannot be measured, shape (V,).
         view_failed: First gate that drops an included view, or ``PASSES``, shape (V,).
         pair_failed: First gate that makes a pair invalid, or ``PASSES``, shape (P,).
-        failed: Whether a group fails a gate that the policy asks for, shape (8, G).
+        failed: Whether a group fails a gate that the policy asks for, shape (9, G).
         baseline: Widest of the views that are left, metres, 0 where one camera sees the ball
             twice, NaN where no two see it, shape (G,).
         point: Mean of the valid pairs, pitch frame, metres, NaN without one, shape (G, 3).
@@ -88,7 +99,17 @@ def judge(facts: Facts, policy: Policy, spread: MeanSpread) -> Verdict:
         spreads = spread.covariances(pair_failed == PASSES, there, point[there], policy)
         failed[_SIGMA] = True
         failed[_SIGMA, there] = ~is_within(spreads, policy.max_sigma_m)
+    if policy.min_p_value is not None:
+        residuals = residuals_of(facts, views_of(facts, pair_failed == PASSES), point, policy)
+        failed[_CHI_SQUARE] = ~(residuals.p_value >= policy.min_p_value)
     return Verdict(jac, view_failed, pair_failed, failed, baseline, point, parallax, distance)
+
+
+def views_of(facts: Facts, pairs: BoolArray) -> BoolArray:
+    """Views in any of the pairs, shape (V,)."""
+    found = np.zeros(len(facts.view_group), bool)
+    found[facts.pair_view[pairs]] = True
+    return found
 
 
 def view_jac(facts: Facts, gamma_percent: float) -> FloatArray:

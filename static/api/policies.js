@@ -16,7 +16,7 @@ import { idempotencyKey, request, requestTagged } from './client.js';
  * @property {Threshold} default null: nothing is asked
  * @property {number | null} minimum
  * @property {number | null} maximum
- * @property {number[]} choices values to offer; empty: any between the ends
+ * @property {(number | string)[]} choices values to offer; empty: any between the ends
  * @property {string | null} gate
  * @property {boolean} optional whether it can be null
  */

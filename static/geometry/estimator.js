@@ -1,20 +1,21 @@
 // @ts-check
-/** The solution measured with the most likely point in place of the mean of pairs. */
+/** The solution measured with the other 3D ball than the one that is exported. */
 
 import { fitBall, seenBalls } from './preview.js';
 
 /** @import {Ball3DJson, GroupDocument, SolutionJson} from '../api/types.js' */
 
 /**
- * The same solution with its ball, and every view's fit, taken from the most likely point.
+ * The same solution with its ball, and every view's fit, taken from the other point: the most likely one where the
+ * mean of pairs is exported, and the mean where the policy exports the most likely one.
  *
- * Gates, pairs and exports stay with the paper's estimator: only what is looked at changes.
+ * Gates, pairs and exports stay as they are: only what is looked at changes.
  *
  * @param {GroupDocument} group @param {SolutionJson} solution
- * @returns {SolutionJson} the solution itself when it has no such point, or no valid pair
+ * @returns {SolutionJson} the solution itself when it has no other point, or no valid pair
  */
-export function withBestBall(group, solution) {
-	const best = solution.best_ball;
+export function withOtherBall(group, solution) {
+	const best = solution.mean_ball ?? solution.best_ball;
 	if (!best || !solution.ball) return solution;
 	const seen = seenBalls(group, solution);
 	/** @type {Ball3DJson} */
@@ -27,4 +28,13 @@ export function withBestBall(group, solution) {
 			return { ...view, ball: one ? fitBall(one, best.point, group.policy.ball_diameter_m) : view.ball };
 		}),
 	};
+}
+
+/**
+ * What people call the 3D ball that is looked at.
+ *
+ * @param {SolutionJson | null} solution @param {'exported' | 'other'} which
+ */
+export function ballName(solution, which) {
+	return (solution?.point === 'best') !== (which === 'other') ? 'most likely point' : 'mean of pairs';
 }

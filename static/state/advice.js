@@ -13,6 +13,7 @@ const TITLES = /** @type {Record<string, string>} */ ({
 	bad_point: 'A point of @ lies off its line',
 	under_constrained: 'The lines of @ do not determine its camera',
 	view_disagrees: 'View @ disagrees with the others',
+	views_contradict: 'The views contradict each other',
 	not_synchronous: 'The views may show different instants',
 	ball_size: 'The box of the ball in @ has an odd size',
 	low_parallax: 'The rays are nearly parallel',
@@ -32,12 +33,12 @@ export function findingTitle(group, finding) {
 
 /** Findings that a reason to reject follows from. */
 const OF_FINDING = /** @type {Record<string, string>} */ ({
-	sides_swapped: 'sides_confused', not_synchronous: 'not_same_instant',
+	sides_swapped: 'sides_confused', not_synchronous: 'not_same_instant', views_contradict: 'not_same_instant',
 });
 /** The reason that fits when nothing but the gate is known. */
 const OF_GATE = /** @type {Record<string, string>} */ ({
 	calibratable: 'bad_field_lines', jac: 'bad_field_lines', two_views: 'bad_field_lines', ball: 'ball_not_visible',
-	baseline: 'duplicate_view', reprojection: 'not_same_instant', parallax: 'duplicate_view', sigma: 'bad_calibration',
+	baseline: 'duplicate_view', reprojection: 'not_same_instant', parallax: 'duplicate_view', sigma: 'bad_calibration', chi_square: 'not_same_instant',
 });
 
 /**

@@ -43,7 +43,7 @@ export const projections = stored('projections', true);
 export const boxes = stored('boxes', true);
 export const gain = stored('whisker-gain', 5);
 /** Which 3D ball is drawn and measured: the paper's mean of pairs, or the most likely point. */
-export const estimator = stored('estimator', /** @type {'mean' | 'best'} */ ('mean'));
+export const estimator = stored('estimator', /** @type {'exported' | 'other'} */ ('exported'));
 /** Whether the gates show what they ask of the group, and by how much. */
 export const gatesOpen = stored('gates-open', false);
 /** Whether every view is as large as the main camera's. */
@@ -76,7 +76,7 @@ export function cycleGain() {
 
 /** Look at the other 3D ball. */
 export function cycleEstimator() {
-	estimator.value = estimator.value === 'mean' ? 'best' : 'mean';
+	estimator.value = estimator.value === 'other' ? 'exported' : 'other';
 }
 
 /** @param {string} letter */

@@ -15,6 +15,7 @@ export const GATE_TITLES = /** @type {Record<string, string>} */ ({
 	reprojection: 'The views do not agree on one ball',
 	parallax: 'The rays are nearly parallel',
 	sigma: 'The position is too uncertain',
+	chi_square: 'The views contradict each other',
 });
 
 /** @param {GateJson} gate @param {PolicyJson} policy @returns {string} what the gate asks */
@@ -29,6 +30,7 @@ export function gateLabel(gate, policy) {
 		reprojection: `Reprojection < ${policy.tau_percent} %`,
 		parallax: threshold === null ? 'Parallax' : `Parallax ≥ ${threshold}°`,
 		sigma: threshold === null ? 'σ' : `σ ≤ ${threshold} m`,
+		chi_square: threshold === null ? 'Residuals by chance' : `Residuals by chance ≥ ${sharePercent(threshold)}`,
 	});
 	return labels[gate.name] ?? gate.name;
 }

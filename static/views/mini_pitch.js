@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 
 import { cameraFromJson, rayThrough } from '../geometry/camera.js';
+import { ballName } from '../geometry/estimator.js';
 import { pitchMarkings } from '../geometry/pitch.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { clipSegment, spreadApart, within as inBox } from '../geometry/spread.js';
@@ -167,14 +168,15 @@ function Numbers({ solution }) {
 	`;
 }
 
-/** Which 3D ball the numbers speak of, and the way to the other one. */
-function Estimator() {
-	const best = estimator.value === 'best';
+/** Which 3D ball the numbers speak of, and the way to the other one. @param {{solution: SolutionJson}} props */
+function Estimator({ solution }) {
+	const other = estimator.value === 'other';
+	const exported = ballName(solution, 'exported');
 	return html`
-		<button
-			class="card__aside link-button" type="button" aria-pressed=${best} onClick=${cycleEstimator}
-			title="The mean of the valid pairs is exported; the most likely point fits all views at once (T)"
-		>${best ? 'most likely point' : 'mean of pairs'}</button>
+		<span class="card__aside"><button
+			class="link-button" type="button" aria-pressed=${other} onClick=${cycleEstimator}
+			title=${`The ${exported} is exported, as the policy says. The mean of the valid pairs is the paper’s; the most likely point fits all views at once (T)`}
+		>${ballName(solution, estimator.value)}</button>, ${other ? 'not exported' : 'exported'}</span>
 	`;
 }
 
@@ -182,7 +184,7 @@ function Estimator() {
 export function MiniPitch({ group, solution }) {
 	return html`
 		<section class="card strip-card mini-pitch" aria-label="Pitch">
-			<h2>Pitch${solution?.best_ball ? html` <${Estimator} />` : null}</h2>
+			<h2>Pitch${solution?.best_ball ? html` <${Estimator} solution=${solution} />` : null}</h2>
 			${solution ? html`
 				<${Drawing} group=${group} solution=${solution} />
 				<${Numbers} solution=${solution} />` : html`<p class="empty-note">Not solved yet.</p>`}

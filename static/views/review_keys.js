@@ -1,7 +1,9 @@
 // @ts-check
 /** What the keys of the review screen do. */
 
+import { ballName } from '../geometry/estimator.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
+import { capital } from '../lib/format.js';
 import { toggleOccluded, toggleOutOfView } from '../state/ball_edits.js';
 import { drawHere, endDrawing, startDrawing } from '../state/drawing.js';
 import { moveCross } from '../state/drawing_cross.js';
@@ -143,7 +145,7 @@ function useView() {
 /** Which 3D ball is looked at. */
 function otherEstimator() {
 	cycleEstimator();
-	announce(estimator.value === 'mean' ? 'Mean of pairs.' : 'Most likely point.');
+	announce(`${capital(ballName(solution.value, estimator.value))}.`);
 }
 
 /** Ask for a note at the pointer. */

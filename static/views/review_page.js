@@ -6,7 +6,7 @@ import { useEffect, useMemo } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
 import { lazy } from '../lib/lazy.js';
-import { withBestBall } from '../geometry/estimator.js';
+import { withOtherBall } from '../geometry/estimator.js';
 import { picturesOf } from '../overlays/scene.js';
 import { absent } from '../state/arrival.js';
 import { conflict } from '../state/conflict.js';
@@ -45,10 +45,10 @@ function Absent() {
 function Workspace() {
 	const shown = group.value;
 	const live = isPreview.value;
-	const best = estimator.value === 'best' && !live;
+	const other = estimator.value === 'other' && !live;
 	const found = solution.value;
 	// While something moves the browser computes the mean of pairs and nothing else.
-	const solved = useMemo(() => (best && shown && found ? withBestBall(shown, found) : found), [best, shown, found]);
+	const solved = useMemo(() => (other && shown && found ? withOtherBall(shown, found) : found), [other, shown, found]);
 	const saved = groupDocument.value;
 	const plain = useMemo(() => (shown ? picturesOf(shown, solved, saved) : []), [shown, solved, saved]);
 	const predicted = usePredictions(shown !== null);

@@ -53,8 +53,9 @@ function Slider({ field, value, id, change }) {
 
 /** @param {{field: PolicyField, id: string, value: Value, change: (value: Value) => void}} props */
 function Choice({ field, id, value, change }) {
+	const chosen = (/** @type {string} */ text) => (typeof field.default === 'string' ? text : Number(text));
 	return html`
-		<select class="field threshold__number" id=${id} value=${String(value)} onChange=${(/** @type {Event} */ event) => change(Number(/** @type {HTMLSelectElement} */ (event.target).value))}>
+		<select class="field threshold__number" id=${id} value=${String(value)} onChange=${(/** @type {Event} */ event) => change(chosen(/** @type {HTMLSelectElement} */ (event.target).value))}>
 			${field.choices.map((option) => html`<option key=${option} value=${String(option)}>${option}</option>`)}
 		</select>
 		<${Unit} unit=${field.unit} />

@@ -16,7 +16,7 @@ import { MendBox } from './mend_box.js';
 /** @import {Mend} from '../state/mends.js' */
 
 /** Findings that say why a view does not meet the others. */
-const ODD = new Set(['view_disagrees', 'sides_swapped', 'not_synchronous']);
+const ODD = new Set(['view_disagrees', 'views_contradict', 'sides_swapped', 'not_synchronous']);
 
 /** @typedef {{tone: 'ok' | 'warn' | 'bad' | 'unseen', over: string, title: string, text: string}} Headline */
 

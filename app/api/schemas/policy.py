@@ -121,12 +121,15 @@ class PolicyFieldDocument(Document):
     )
     label: str
     unit: str
-    default: float | bool | None = Field(
+    default: float | bool | str | None = Field(
         description="Value in the policy `paper`; null: the threshold is off."
     )
     minimum: float | None
     maximum: float | None
-    choices: list[float] = Field(description="Values to offer; empty: any between the ends.")
+    choices: list[float | str] = Field(
+        description="Values to offer; empty: any between the ends. Where they are words, there are "
+        "no others."
+    )
     gate: str | None = Field(description="The gate that asks for it.")
     optional: bool = Field(description="Whether it can be null.")
 

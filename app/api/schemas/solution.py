@@ -209,6 +209,18 @@ class Ball3DDocument(Document):
     views: list[str]
 
 
+class ChiSquareDocument(Document):
+    """Whether the residuals of the most likely ball are as small as their uncertainty says."""
+
+    value: Measured = Field(
+        description="Sum of the squared residuals over the views of valid pairs, each in units of "
+        "its sigma."
+    )
+    freedom: int = Field(description="Two for each view, less three of the ball.")
+    p_value: float = Field(description="How often chance alone makes residuals as large as these.")
+    views: list[str]
+
+
 class BestBallDocument(Document):
     """The maximum-likelihood ball over all views; pitch frame, metres, z down."""
 
@@ -307,8 +319,16 @@ class SolutionDocument(Document):
     gates: list[GateDocument]
     views: list[ViewSolutionDocument]
     pairs: list[PairDocument]
-    ball: Ball3DDocument | None = Field(description="Mean of the valid pairs; exported.")
+    point: str = Field(
+        description="Which ball is exported, as the policy says: `mean` of the valid pairs, or "
+        "`best`, the most likely point."
+    )
+    ball: Ball3DDocument | None = Field(description="The 3D ball that is exported.")
+    mean_ball: Ball3DDocument | None = Field(
+        description="Mean of the valid pairs where the most likely point is exported in its place."
+    )
     best_ball: BestBallDocument | None
+    chi_square: ChiSquareDocument | None
     findings: list[FindingDocument]
 
     @staticmethod

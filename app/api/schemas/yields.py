@@ -24,15 +24,19 @@ LABELS = {
     "reprojection": "Views meet in one ball",
     "parallax": "Enough parallax",
     "sigma": "Certain enough",
+    "chi_square": "Residuals small enough",
 }
 """What a step of the funnel asks, for people."""
 
 
 def _tried(part: type[Policy | CalibrationPolicy]) -> Any:
     """A model in which every threshold of a part of the policy can stand or be absent."""
-    hints = {bool: bool | None}
+    hints: dict[Any, Any] = {bool: bool | None}
     fields: dict[str, Any] = {
-        item.name: (hints.get(item.hint, Number | None), Field(default=None, description=item.text))
+        item.name: (
+            item.hint | None if item.is_word else hints.get(item.hint, Number | None),
+            Field(default=None, description=item.text),
+        )
         for item in thresholds_of(part)
     }
     return create_model(f"_{part.__name__}", __config__=ConfigDict(extra="forbid"), **fields)
@@ -45,7 +49,8 @@ class CalibrationValues(_tried(CalibrationPolicy)):  # type: ignore[misc]
 class WhatIf(_tried(Policy)):  # type: ignore[misc]
     """Thresholds to try; those that are absent stay as they are.
 
-    `null` switches a gate off (`min_parallax_degrees`, `max_sigma_m`) and says nothing elsewhere.
+    `null` switches a gate off (`min_parallax_degrees`, `max_sigma_m`,
+    `min_p_value`) and says nothing elsewhere.
     """
 
     model_config = ConfigDict(

@@ -114,7 +114,7 @@ def _flat(values: Mapping[str, Any], pointer: str) -> Iterator[tuple[str, Any]]:
             yield key, value
 
 
-def _checked(threshold: Threshold, value: object, pointer: str) -> float | bool | None:
+def _checked(threshold: Threshold, value: object, pointer: str) -> float | bool | str | None:
     name, place = threshold.name, f"{pointer}/{threshold.name.replace('.', '/')}"
     if isinstance(threshold.default, bool):
         if not isinstance(value, bool):
@@ -122,6 +122,10 @@ def _checked(threshold: Threshold, value: object, pointer: str) -> float | bool 
         return value
     if value is None and threshold.optional:
         return None
+    if threshold.is_word:
+        if not isinstance(value, str) or value not in threshold.choices:
+            raise InputError(f"{name} is {' or '.join(map(str, threshold.choices))}", pointer=place)
+        return value
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not number or not math.isfinite(float(value)):  # type: ignore[arg-type]
         raise InputError(f"{name} is a number", pointer=place)

@@ -7,8 +7,8 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from app.soccer.policy import Policy
-from app.store.codecs import Json, canonical, policy_to_json
+from app.soccer.policy import Policy, digested_values
+from app.store.codecs import Json, canonical
 
 HASH_FORMAT = 1
 """Of what the hash covers; part of it."""
@@ -25,8 +25,7 @@ def version_hash(policy: Policy, solver_version: str, rows: Iterable[Mapping[str
         solver_version: What computed it.
         rows: In order of ``position``, as the table has them.
     """
-    values = policy_to_json(policy)
-    del values["name"]
+    values = digested_values(policy)
     digest = hashlib.sha256()
     _add(digest, [HASH_FORMAT, values, solver_version])
     for row in rows:

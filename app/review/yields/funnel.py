@@ -155,6 +155,7 @@ def _funnel(snapshot: Snapshot, first: IntArray, policy: Policy) -> tuple[Step, 
     inactive = {
         "parallax": policy.min_parallax_degrees is None,
         "sigma": policy.max_sigma_m is None,
+        "chi_square": policy.min_p_value is None,
     }
     dropped = np.bincount(first, minlength=len(GATES) + 1)
     left, steps = snapshot.table.groups, []

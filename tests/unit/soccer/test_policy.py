@@ -23,6 +23,12 @@ class TestHash:
         assert replace(PAPER, tau_percent=0.9).hash != PAPER.hash
         assert STRICT.hash != PAPER.hash
 
+    def test_a_threshold_that_came_later_changes_no_hash_until_it_asks_for_something(self):
+        """Versions that are frozen must verify: these are the hashes of before."""
+        assert (PAPER.hash, STRICT.hash) == ("b6b4891b3d9960d2", "172d8def1c011aaa")
+        assert replace(PAPER, point="best").hash != PAPER.hash
+        assert replace(PAPER, min_p_value=0.001).hash != PAPER.hash
+
     def test_tau_leaves_calibrations_alone(self):
         assert replace(PAPER, tau_percent=0.9).calibration_hash == PAPER.calibration_hash
         other = replace(PAPER, calibration=CalibrationPolicy(check_labels=False))
@@ -53,5 +59,7 @@ class TestThresholds:
             value = threshold.value(policy)
             if value is None:
                 assert threshold.optional, threshold.name
+            elif threshold.is_word:
+                assert value in threshold.choices, threshold.name
             elif not isinstance(value, bool):
                 assert threshold.minimum <= value <= threshold.maximum, threshold.name

@@ -43,6 +43,7 @@ def random_policy(seed: int) -> Policy:
         min_baseline_m=float(rng.choice([0.0, 1.0, 80.0])),
         min_parallax_degrees=rng.choice([None, 20.0, 60.0]),
         max_sigma_m=rng.choice([None, 0.03, 0.1, 0.5]),
+        min_p_value=rng.choice([None, 0.002, 0.2]),
         click_sigma_px=float(rng.choice([0.3, 1.0, 4.0])),
         box_sigma_share=float(rng.choice([0.0, 0.04, 0.2])),
     )

@@ -9,7 +9,17 @@ from hypothesis import strategies as st
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.policy import PAPER
-from app.soccer.solution import Ball3D, BallFit, Calibration, Finding, Fix, Pair, ViewSolution
+from app.soccer.solution import (
+    Ball3D,
+    BallFit,
+    Calibration,
+    ChiSquare,
+    Finding,
+    Fix,
+    Pair,
+    ViewSolution,
+)
+from app.solving.contradiction import Contradiction
 from app.solving.findings import _BY_WEIGHT, _sides_swapped, find
 from app.solving.sides import Swap
 from tests.cameras import SIZE
@@ -35,9 +45,9 @@ def solved(key: str, ratio: float | None = None, *, included: bool = True) -> Vi
     return ViewSolution(key, calibration, key, included, None, fit)
 
 
-def found(of, *, pairs=(), ball=GOOD, views=None, policy=PAPER) -> tuple[Finding, ...]:
+def found(of, *, pairs=(), ball=GOOD, views=None, policy=PAPER, torn=None) -> tuple[Finding, ...]:
     views = views or [solved(view.key) for view in of.views]
-    return find(of, views, [], pairs, ball, policy)
+    return find(of, views, [], pairs, ball, policy, torn)
 
 
 class TestFind:
@@ -139,14 +149,44 @@ class TestNotSynchronous:
         assert found(made("ab"), pairs=(close,), ball=None) == ()
 
 
+class TestViewsContradict:
+    TWO = ChiSquare(14.2, 1, 0.00016, ("a", "b"))
+    THREE = ChiSquare(30.0, 3, 1.4e-6, ("a", "b", "c"))
+
+    def test_two_views_say_when_the_pictures_may_have_been_taken(self) -> None:
+        (item,) = found(made("ab"), torn=Contradiction(self.TWO, None, None, 0.35, 1.2))
+        assert (item.kind, item.view, item.fix) == ("views_contradict", None, None)
+        assert (item.number, item.threshold) == (0.00016, 0.002)
+        assert "by chance" not in item.sentence and "1 of 6,200 groups" in item.sentence
+        assert "about 80 ms (10 to 170)" in item.sentence
+
+    def test_the_view_without_which_the_others_agree_is_to_be_left_out(self) -> None:
+        torn = Contradiction(self.THREE, "c", 0.97, 0.35, None)
+        (item,) = found(made("abc"), torn=torn)
+        assert (item.view, item.confidence) == ("c", 0.97)
+        assert item.fix == Fix("exclude_view", "c")
+        assert "by at least 10 ms" in item.sentence
+
+    def test_no_instant_is_named_where_no_ball_moves_as_far(self) -> None:
+        (item,) = found(made("ab"), torn=Contradiction(self.TWO, None, None, 0.35, 60.0))
+        assert " ms" not in item.sentence
+
+    def test_static_cameras_run_on_one_clock(self) -> None:
+        of = made("ab")
+        for view in of.views:
+            of = of.with_view(replace(view, station=replace(view.station, shared=True)))
+        (item,) = found(of, torn=Contradiction(self.TWO, None, None, 0.35, 1.2))
+        assert " ms" not in item.sentence
+
+
 class TestOfTheBall:
     @pytest.mark.parametrize(("angle", "kinds"), [(4.99, ["low_parallax"]), (5.0, [])])
     def test_low_parallax_lies_below_the_policys_angle(self, angle, kinds) -> None:
         items = found(made("ab"), ball=replace(GOOD, parallax_degrees=angle))
         assert [item.kind for item in items] == kinds
 
-    @pytest.mark.parametrize(("sigma", "kinds"), [(1.01, ["high_uncertainty"]), (1.0, [])])
-    def test_high_uncertainty_lies_above_a_metre(self, sigma, kinds) -> None:
+    @pytest.mark.parametrize(("sigma", "kinds"), [(0.26, ["high_uncertainty"]), (0.25, [])])
+    def test_high_uncertainty_lies_above_a_quarter_of_a_metre(self, sigma, kinds) -> None:
         items = found(made("ab"), ball=replace(GOOD, sigma_m=sigma))
         assert [item.kind for item in items] == kinds
 

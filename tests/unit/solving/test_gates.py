@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from app.soccer.policy import PAPER, Policy
-from app.soccer.solution import GATES, Ball3D, Calibration, Gate, Pair
-from app.solving.gates import JudgedView, describe
+from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, Pair
+from app.solving.gates import JudgedView, chance, describe
 from app.solving.verdict import Verdict
 
 ASKED = replace(PAPER, min_parallax_degrees=5.0, max_sigma_m=0.5)
@@ -48,6 +48,7 @@ def gates(
     ball: Ball3D | None = None,
     baseline: float = math.nan,
     policy: Policy = PAPER,
+    chi_square: ChiSquare | None = None,
 ) -> dict[str, Gate]:
     """The gates by name, of a group that fails some."""
     fails = np.array([[name in failed] for name in GATES])
@@ -62,7 +63,7 @@ def gates(
         parallax=nothing,
         distance=nothing,
     )
-    found = describe(views, left_out, pairs, ball, verdict, policy)
+    found = describe(views, left_out, pairs, ball, verdict, policy, chi_square)
     assert tuple(gate.name for gate in found) == GATES
     return {gate.name: gate for gate in found}
 
@@ -266,3 +267,38 @@ class TestSigma:
         found = gates([], policy=ASKED)["sigma"]
         assert found == Gate("sigma", False, None, 0.5, None, "not judged")
         assert gates([])["sigma"] == replace(found, threshold=None, active=False)
+
+
+class TestChiSquare:
+    FOUND = ChiSquare(11.62, 3, 0.0088, ("a", "b", "c"))
+    POLICY = replace(PAPER, min_p_value=0.002)
+
+    def test_says_how_often_chance_does_as_much(self):
+        found = gates([], policy=self.POLICY, chi_square=self.FOUND)["chi_square"]
+        assert (found.passed, found.value, found.threshold) == (True, 0.0088, 0.002)
+        assert found.sentence == "by chance in 1 of 110 groups, χ² 11.6"
+
+    def test_fails_where_the_verdict_says_so(self):
+        one = ChiSquare(20.0, 1, 7.7e-6, ("a", "b"))
+        found = gates([], ("chi_square",), policy=self.POLICY, chi_square=one)["chi_square"]
+        assert not found.passed
+
+    def test_is_said_where_it_is_not_asked(self):
+        found = gates([], chi_square=self.FOUND)["chi_square"]
+        assert (found.active, found.passed, found.value) == (False, True, 0.0088)
+
+    def test_without_a_ball_it_is_not_judged(self):
+        found = gates([], policy=self.POLICY)["chi_square"]
+        assert found == Gate("chi_square", False, None, 0.002, None, "not judged")
+
+    @pytest.mark.parametrize(
+        ("p_value", "words"),
+        [
+            (0.31, "31 % of groups"),
+            (0.01, "1 % of groups"),
+            (0.0004, "1 of 2,500 groups"),
+            (0.0, "less than 1 of a million groups"),
+        ],
+    )
+    def test_chance_is_said_for_people(self, p_value, words):
+        assert chance(p_value) == words

@@ -1,14 +1,15 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
 
 from app.soccer.policy import PAPER
-from app.soccer.solution import Calibration
+from app.soccer.solution import Ball3D, BestBall, Calibration
 from app.solving.facts import facts_of
-from app.solving.mean_ball import judged_pairs, mean_ball
+from app.solving.mean_ball import judged_pairs, leaving_ball, mean_ball
 from app.solving.spread import MeanSpread
 from app.solving.triangulate import meet, sights_of
 from app.solving.verdict import judge
@@ -66,3 +67,18 @@ class TestMeanBall:
 
     def test_without_a_valid_pair_there_is_none(self):
         assert solved(0.0, 90.0, -90.0)[1] is None
+
+
+class TestLeavingBall:
+    MEAN = Ball3D((1.0, 2.0, -0.5), (1.0,) * 9, 0.25, 20.0, ("a", "b"))
+    BEST = BestBall((1.1, 2.0, -0.4), (0.5,) * 9, 0.2, ("a", "b", "c"))
+    POLICY = replace(PAPER, point="best")
+
+    def test_the_mean_leaves_unless_the_policy_asks_for_the_most_likely_point(self):
+        assert leaving_ball(self.MEAN, self.BEST, PAPER) is self.MEAN
+        found = leaving_ball(self.MEAN, self.BEST, self.POLICY)
+        assert found == Ball3D((1.1, 2.0, -0.4), (0.5,) * 9, 0.2, 20.0, ("a", "b"))
+
+    def test_without_a_valid_pair_none_leaves_and_without_a_best_one_the_mean_does(self):
+        assert leaving_ball(None, self.BEST, self.POLICY) is None
+        assert leaving_ball(self.MEAN, None, self.POLICY) is self.MEAN

@@ -57,8 +57,7 @@ class TestFindSwaps:
         assert swaps(A, TURNED)[0].error_px is None
         (found,) = swaps(A, TURNED, max_height_m=1e6, outside_pitch_m=1e6, below_grass_m=1e6)
         assert found.error_px > 50.0
-        total = found.error_px + found.turned_error_px
-        assert found.confidence == pytest.approx(found.error_px / total)
+        assert found.confidence == 0.99
 
     def test_a_given_camera_rests_on_no_labels(self):
         given_ = replace(TURNED, calibration=replace(TURNED.calibration, source="given"))
@@ -92,3 +91,28 @@ class TestFindSwaps:
         far = sight("a", turned_camera(MAIN), source="given")
         far = replace(far, center=ImagePoint(9.0, 9.0))
         assert [swap.view for swap in swaps(far, B, first=far)] != ["a"]
+
+
+ANYWHERE = {"max_height_m": 1e6, "outside_pitch_m": 1e6, "below_grass_m": 1e6}
+
+
+class TestAnAccident:
+    """Rays of a swapped replay that meet the main camera's by accident."""
+
+    def test_a_meeting_within_tau_and_far_beyond_sigma_does_not_clear_a_view(self):
+        (found,) = swaps(A, TURNED, tau_percent=10.0, **ANYWHERE)
+        assert found.error_px < 0.10 * SIZE.diagonal
+
+    def test_a_ball_that_is_as_large_as_it_should_be_speaks_for_a_view(self):
+        """The same rays, within one sigma of each other: only the sizes of the boxes tell."""
+        vague = {"click_sigma_px": 150.0, "tau_percent": 10.0, **ANYWHERE}
+        a, b = replace(A, diameter_px=0.0), replace(TURNED, diameter_px=0.0)
+        assert swaps(a, b, first=a, **vague) == ()
+        depth = BEHIND_GOAL.pitch_to_camera(np.array([BALL]))[0, 2]
+        right = 1.15 * PAPER.ball_diameter_m * BEHIND_GOAL.focal_length[1] / depth
+        (found,) = swaps(a, replace(b, diameter_px=right), first=a, **vague)
+        assert found.view == "b"
+
+    def test_two_replays_that_are_both_swapped_do_not_clear_each_other(self):
+        other = sight("c", OPPOSITE, labelled=turned_camera(OPPOSITE))
+        assert [swap.view for swap in swaps(A, TURNED, other)] == ["b", "c"]

@@ -33,6 +33,24 @@ def clean():
     )
 
 
+class TestPoint:
+    """Which 3D ball leaves."""
+
+    def test_the_most_likely_point_leaves_with_its_boxes_where_the_policy_says_so(self):
+        cameras = zip("abc", (MAIN, BEHIND_GOAL, OPPOSITE), strict=True)
+        views = [given_view(key, camera, BALL) for key, camera in cameras]
+        views[1] = shifted(views[1], 2.0, 3.0)
+        mean, best = (
+            solve(group(*views), replace(PAPER, point=point)) for point in ("mean", "best")
+        )
+        assert (mean.point, mean.mean_ball, best.point) == ("mean", None, "best")
+        assert best.mean_ball == mean.ball
+        assert best.ball.point == best.best_ball.point == mean.best_ball.point
+        assert (best.ball.sigma_m, best.ball.views) == (best.best_ball.sigma_m, mean.ball.views)
+        assert best.gates == mean.gates
+        assert best.views[1].ball.error_px < mean.views[1].ball.error_px - 0.1
+
+
 class TestSolve:
     def test_exact_annotations_give_the_exact_ball(self, clean):
         solution = solve(clean, PAPER)

@@ -64,6 +64,8 @@ class TestPolicyFromYaml:
             ("tau_percent: [1]", "/tau_percent", "is a number"),
             ("tau_percent: -1", "/tau_percent", "lies between 0.05 and 5"),
             ("max_sigma_m: 0", "/max_sigma_m", "lies between"),
+            ("point: middle", "/point", "mean or best"),
+            ("point: null", "/point", "mean or best"),
             ("calibration: 5", "/calibration", "mapping"),
             ("calibration: {x: 5}", "/calibration/x", "no threshold"),
             ("calibration: {check_labels: 1}", "/calibration/check_labels", "true or false"),

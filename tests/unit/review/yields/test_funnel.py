@@ -86,6 +86,7 @@ def random_policy(seed: int) -> Policy:
         min_baseline_m=rng.choice([0.0, 1.0, 40.0, 70.0]),
         min_parallax_degrees=rng.choice([None, 5.0, 20.0, 60.0]),
         max_sigma_m=rng.choice([None, 0.05, 0.1, 0.3, 1.0]),
+        min_p_value=rng.choice([None, 0.002, 0.1]),
         click_sigma_px=rng.choice([0.3, 1.0, 4.0]),
         box_sigma_share=rng.choice([0.0, 0.04, 0.2]),
         low_parallax_degrees=rng.choice([5.0, 30.0]),
@@ -142,6 +143,21 @@ class TestJudgeTable:
             for factor, passes in ((1 + 1e-9, True), (1 - 1e-9, False)):
                 at = replace(policy, max_sigma_m=ball.sigma_m * factor)
                 assert judge_table(table, at).passes[place] == passes, group.key
+
+    def test_the_p_value_is_that_of_the_solution(self, filled, solutions) -> None:
+        """The gate at the very value, a billionth to either side."""
+        table = YieldStore(filled).snapshot(1).table
+        policy = replace(PAPER, click_sigma_px=0.5)
+        tested = 0
+        for place, (group, old) in enumerate(solutions):
+            found = solved_again(group, old, policy).chi_square
+            if found is None or not solved_again(group, old, policy).passes:
+                continue
+            tested += 1
+            for factor, passes in ((1 - 1e-9, True), (1 + 1e-9, False)):
+                at = replace(policy, min_p_value=found.p_value * factor)
+                assert judge_table(table, at).passes[place] == passes, group.key
+        assert tested > 3
 
     def test_jac_is_that_of_the_calibrations(self, filled, solutions) -> None:
         table = YieldStore(filled).snapshot(1).table

@@ -1,0 +1,176 @@
+"""Contradiction: which view does not fit the others, and what instant it might show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.geometry.arrays import BoolArray, FloatArray
+from app.soccer.frames import height_above_grass
+from app.soccer.policy import Policy
+from app.soccer.solution import ChiSquare
+from app.solving.chi_square import residuals_of
+from app.solving.facts import Facts
+from app.solving.triangulate import Sight
+from app.solving.verdict import Verdict, views_of
+
+LOW_P_VALUE = 0.002
+"""Below: the finding ``views_contradict``. Chance alone makes one in five hundred groups."""
+SURE = 0.9
+"""How sure the solver must be of a view to name it."""
+TYPICAL_SPEED = 15.0
+"""Of a ball in play that was passed or shot, metres a second."""
+SPEEDS = (7.0, 35.0)
+"""Between a slow pass and the hardest shot."""
+LOW_BALL_M = 1.0
+"""Up to this height above the grass a ball is taken to move along the ground."""
+LONGEST_S = 1.0
+"""Longer than this after the others no picture was taken for the same."""
+STEEP = 0.05
+"""Sine of the angle to the grass above which a ray says where it meets a level."""
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """Views whose residuals are larger than their uncertainty.
+
+    Attributes:
+        chi_square: The test that they fail.
+        view: The one without which the others agree, or None.
+        confidence: That it is this one; None without it.
+        gap_m: How far the rays miss each other: so far at least did the ball move, metres; None
+            where it is not clear between which views to measure.
+        moved_m: How far it moved if it moved level, metres; None where that is not known.
+    """
+
+    chi_square: ChiSquare
+    view: str | None
+    confidence: float | None
+    gap_m: float | None = None
+    moved_m: float | None = None
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether a ball in play moves as far within a second."""
+        least = self.gap_m if self.moved_m is None else self.moved_m
+        return least is not None and least <= SPEEDS[1] * LONGEST_S
+
+
+def chi_square_of(
+    keys: Sequence[str], facts: Facts, verdict: Verdict, policy: Policy
+) -> ChiSquare | None:
+    """The test of a group's residuals; None where no ball lies in front of all views.
+
+    Args:
+        keys: Of the views.
+        facts: Of the one group.
+        verdict: What the policy makes of them.
+        policy: How noisy a click is.
+    """
+    used = views_of(facts, verdict.valid)
+    found = residuals_of(facts, used, verdict.point, policy)
+    if not np.isfinite(found.p_value[0]):
+        return None
+    return ChiSquare(
+        value=float(found.chi_square[0]),
+        freedom=int(found.freedom[0]),
+        p_value=float(found.p_value[0]),
+        views=tuple(keys[place] for place in np.flatnonzero(used).tolist()),
+    )
+
+
+def contradiction(
+    chi_square: ChiSquare | None,
+    keys: Sequence[str],
+    facts: Facts,
+    verdict: Verdict,
+    sights: Sequence[Sight],
+    policy: Policy,
+) -> Contradiction | None:
+    """Where the views of the ball contradict each other; None where they do not.
+
+    Nobody knows how far a given camera without covariance is off: nothing can be said with one.
+
+    Args:
+        chi_square: Of the group.
+        keys: Of its views.
+        facts: Of the one group.
+        verdict: What the policy makes of them.
+        sights: Of its views.
+        policy: How noisy a click is.
+    """
+    if chi_square is None or chi_square.p_value >= LOW_P_VALUE:
+        return None
+    used = np.array([key in chi_square.views for key in keys])
+    if not (facts.view_covariance[used, 0, 0] > 0).all():
+        return None
+    chosen = [sight for sight in sights if sight.view in chi_square.views]
+    if len(chosen) == 2:
+        one, other = chosen
+        gap, moved = _apart(one, other, verdict.point[0], policy)
+        return Contradiction(chi_square, None, None, gap, moved)
+    view, confidence, point = _blamed(keys, facts, used, verdict.point, policy)
+    if view is None:
+        return Contradiction(chi_square, None, None)
+    sight = next(sight for sight in chosen if sight.view == view)
+    place = _to_level(sight, float(point[2]))
+    level = None if place is None else float(np.linalg.norm(place - point))
+    return Contradiction(chi_square, view, confidence, _off_ray(sight, point), level)
+
+
+def _blamed(
+    keys: Sequence[str], facts: Facts, used: BoolArray, start: FloatArray, policy: Policy
+) -> tuple[str | None, float, FloatArray]:
+    """The view without which the others agree, how sure that is, and their ball, shape (3,)."""
+    places = np.flatnonzero(used)
+    left = [
+        residuals_of(facts, used & (np.arange(len(used)) != at), start, policy) for at in places
+    ]
+    squares = np.array([item.chi_square[0] for item in left])
+    squares[np.isnan(squares)] = np.inf
+    best = int(squares.argmin())
+    confidence = 1.0 / float(np.exp((squares[best] - squares) / 2).sum())
+    agree = left[best].p_value[0] >= LOW_P_VALUE and confidence >= SURE
+    return keys[places[best]] if agree else None, confidence, left[best].point[0]
+
+
+def _apart(a: Sight, b: Sight, point: FloatArray, policy: Policy) -> tuple[float, float | None]:
+    """How far two rays miss each other, and their balls if both lie on the grass, metres."""
+    gap = _rays_apart(a, b)
+    grass = -policy.ball_diameter_m / 2
+    ends = _to_level(a, grass), _to_level(b, grass)
+    if height_above_grass(float(point[2])) > LOW_BALL_M or ends[0] is None or ends[1] is None:
+        return gap, None
+    return gap, float(np.linalg.norm(ends[0] - ends[1]))
+
+
+def _to_level(sight: Sight, z: float) -> FloatArray | None:
+    """Where a ray meets a level of the pitch frame, shape (3,); None where it is nearly level."""
+    direction, position = _direction(sight), sight.camera.position
+    if direction[2] < STEEP or z < position[2]:
+        return None
+    place: FloatArray = position + (z - position[2]) / direction[2] * direction
+    return place
+
+
+def _rays_apart(a: Sight, b: Sight) -> float:
+    """Smallest distance of the rays of two sights, metres."""
+    across = np.cross(_direction(a), _direction(b))
+    length = float(np.linalg.norm(across))
+    between = b.camera.position - a.camera.position
+    if length < 1e-9:
+        return float(np.linalg.norm(np.cross(between, _direction(a))))
+    return abs(float(between @ across)) / length
+
+
+def _off_ray(sight: Sight, point: FloatArray) -> float:
+    """Distance of a point from the ray of a sight, metres."""
+    return float(np.linalg.norm(np.cross(point - sight.camera.position, _direction(sight))))
+
+
+def _direction(sight: Sight) -> FloatArray:
+    ray = sight.camera.rays(np.array([sight.center]))[0]
+    direction: FloatArray = ray / np.linalg.norm(ray)
+    return direction

@@ -1,0 +1,117 @@
+"""The residuals of the most likely ball: zero for exact clicks, chi-square for noisy ones."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.soccer.annotation import BallAnnotation
+from app.soccer.policy import PAPER
+from app.soccer.solution import Calibration
+from app.solving.chi_square import Residuals, residuals_of
+from app.solving.facts import Facts, group_facts, join
+from app.solving.solve import solve
+from app.solving.spread import MeanSpread
+from app.solving.verdict import judge, views_of
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
+from tests.unit.solving.random_groups import random_policy, random_views
+
+BALL = (38.0, 2.0, -1.4)
+CAMERAS = {"a": MAIN, "b": BEHIND_GOAL, "c": OPPOSITE}
+POLICY = replace(PAPER, box_sigma_share=0.0, click_sigma_px=1.5)
+SIGMA = 1.5 * 1280 / 1920
+"""Of a click under that policy, pixels of these views."""
+
+
+def moved(view, x: float, y: float):
+    box = view.balls[0].box
+    return replace(view, balls=(BallAnnotation(box=replace(box, x=box.x + x, y=box.y + y)),))
+
+
+def views(keys: str = "abc", noise_px: float = 0.0, seed: int = 0):
+    rng = np.random.default_rng(seed)
+    return [moved(given_view(key, CAMERAS[key], BALL), *rng.normal(0, noise_px, 2)) for key in keys]
+
+
+def facts(keys: str = "abc", noise_px: float = 0.0, seed: int = 0) -> Facts:
+    calibrations = [Calibration("given", CAMERAS[key]) for key in keys]
+    return group_facts(views(keys, noise_px, seed), calibrations)
+
+
+def found(of: Facts, policy=POLICY, off: float = 0.0) -> Residuals:
+    start = np.tile(np.array(BALL) + off, (of.groups, 1))
+    return residuals_of(of, np.ones(len(of.view_group), bool), start, policy)
+
+
+class TestResidualsOf:
+    @pytest.mark.parametrize(("keys", "freedom"), [("ab", 1), ("abc", 3)])
+    def test_exact_clicks_leave_nothing(self, keys: str, freedom: int) -> None:
+        one = found(facts(keys))
+        assert one.freedom.tolist() == [freedom]
+        assert one.chi_square == pytest.approx([0.0], abs=1e-9)
+        assert one.p_value == pytest.approx([1.0], abs=1e-3)
+        assert one.point == pytest.approx(np.array([BALL]), abs=1e-6)
+
+    @pytest.mark.parametrize("off", [3.0, -8.0])
+    def test_a_start_far_off_leads_to_the_same_ball(self, off: float) -> None:
+        noisy = facts("abc", 2.0, 4)
+        assert found(noisy, off=off).chi_square == pytest.approx(found(noisy).chi_square, rel=1e-6)
+
+    def test_the_ball_is_the_most_likely_one(self) -> None:
+        for seed in range(3):
+            best = solve(group(*views("abc", 1.0, seed)), POLICY).best_ball
+            assert best is not None
+            one = found(facts("abc", 1.0, seed))
+            assert one.point[0] == pytest.approx(np.array(best.point), abs=1e-3)
+
+    @pytest.mark.parametrize("keys", ["ab", "abc"])
+    def test_chance_alone_makes_every_p_value_alike(self, keys: str) -> None:
+        p_values = found(join([facts(keys, SIGMA, seed) for seed in range(300)])).p_value
+        for share in (0.05, 0.5, 0.9):
+            assert abs((p_values < share).mean() - share) < 3.5 * np.sqrt(share * (1 - share) / 300)
+
+    def test_a_click_beside_the_ball_counts_in_units_of_its_sigma(self) -> None:
+        calm = replace(POLICY, click_sigma_px=3.0)
+        torn = facts("abc", 6.0, 2)
+        assert found(torn).chi_square == pytest.approx(4 * found(torn, calm).chi_square, rel=1e-6)
+
+    def test_the_uncertainty_of_a_calibration_counts(self) -> None:
+        torn = facts("abc", 6.0, 2)
+        vague = replace(torn, view_covariance=np.tile(1e-4 * np.eye(8), (3, 1, 1)))
+        vague = replace(vague, view_parameters=facts_with_parameters())
+        assert found(vague).chi_square[0] < 0.5 * found(torn).chi_square[0]
+
+    def test_one_view_alone_says_nothing(self) -> None:
+        three = facts("abc")
+        for used in ([True, False, False], [False, False, False]):
+            one = residuals_of(three, np.array(used), np.array([BALL]), POLICY)
+            assert np.isnan([one.chi_square[0], one.p_value[0], one.point[0, 0]]).all()
+
+    def test_without_a_start_nothing_is_said(self) -> None:
+        one = residuals_of(facts(), np.ones(3, bool), np.full((1, 3), np.nan), POLICY)
+        assert np.isnan(one.p_value).all()
+
+    @given(st.lists(st.integers(0, 10_000), min_size=1, max_size=6), st.integers(0, 1000))
+    @settings(max_examples=25, deadline=None)
+    def test_a_table_has_the_residuals_of_each_of_its_groups_bit_by_bit(self, seeds, seed):
+        policy = random_policy(seed)
+        parts = [group_facts(*random_views(seed)) for seed in seeds]
+
+        def tested(of: Facts) -> Residuals:
+            verdict = judge(of, policy, MeanSpread(of))
+            return residuals_of(of, views_of(of, verdict.valid), verdict.point, policy)
+
+        together, alone = tested(join(parts)), [tested(part) for part in parts]
+        for item in fields(Residuals):
+            pieces = np.concatenate([getattr(one, item.name) for one in alone])
+            assert np.array_equal(getattr(together, item.name), pieces, equal_nan=True), item.name
+
+
+def facts_with_parameters() -> np.ndarray:
+    covariance = tuple((1e-4 * np.eye(8)).ravel().tolist())
+    calibrations = [Calibration("lines", CAMERAS[key], covariance=covariance) for key in "abc"]
+    return group_facts(views(), calibrations).view_parameters
