@@ -18,10 +18,10 @@ import numpy.typing as npt
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
-from app.geometry.resection import PARAMETERS, residuals
+from app.geometry.resection import PARAMETERS, X, Y, residuals
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import LENGTH_RANGE, WIDTH_RANGE, Pitch
+from app.soccer.pitch import LENGTH_RANGE, MARKINGS, WIDTH_RANGE, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.observations import Observations, observe, pitch_curves
 from app.solving.resect import Resection, ResectionProblem, measurement_count
@@ -41,9 +41,22 @@ LEAST_DIFFERENCE_M = 0.3
 """A size differs from another when it is this many sigmas and metres away."""
 _MISFIT_SHARE = 4.0
 """A frame whose cost a point is so many times that of the median frame has a wrong label."""
-_ROUNDS, _SETTLED_M, _LONGEST_STEP_M, _NUDGE_M = 12, 0.01, 2.5, 0.05
+_ROUNDS, _SETTLED_M, _LONGEST_STEP_M = 12, 0.01, 2.5
+_END_M = 0.1
+"""A size this close to what the Laws allow has run into it and is unknown."""
 _LOOSE_M = 20.0
 """Standard deviation of the step: keeps a size that no frame shows where it is."""
+
+
+def _shares_of(marking: str) -> tuple[float, float]:
+    """How far a marking moves along x with each metre of length, along y with each of width."""
+    words = marking.split(" ")[1:3]
+    length = -0.5 if "left" in words else 0.5 if "right" in words else 0.0
+    width = {"Side line top": -0.5, "Side line bottom": 0.5}.get(marking, 0.0)
+    return length, width
+
+
+_SHARES = np.array([_shares_of(marking) for marking in MARKINGS])
 
 
 @dataclass(frozen=True)
@@ -174,14 +187,14 @@ class _Seen:
             fit=self.problem.refine(moved, self.fit.parameters[None]),
         )
 
-    def share(self, pitch: Pitch) -> tuple[FloatArray, FloatArray]:
+    def share(self) -> tuple[FloatArray, FloatArray]:
         """What the frame says of the sizes: random effects, a variance of its own beside the clicks'.
 
         Returns:
             Gradient, shape (2,), and information, shape (2, 2), of length and width once the
             camera is eliminated.
         """
-        gradient, information = self._normal_equations(pitch)
+        gradient, information = self._normal_equations()
         camera, size = slice(0, PARAMETERS), slice(PARAMETERS, None)
         carried = np.linalg.solve(information[camera, camera], information[camera, size])
         variance = self.problem.click_variance(self.fit.parameters, self.observations)
@@ -190,17 +203,19 @@ class _Seen:
         shrunk = np.linalg.inv(np.eye(2) + FRAME_SIGMA_M**2 * told)
         return shrunk @ score, shrunk @ told
 
-    def _normal_equations(self, pitch: Pitch) -> tuple[FloatArray, FloatArray]:
+    def _normal_equations(self) -> tuple[FloatArray, FloatArray]:
         """Gradient and J^T W J of camera, length and width, shapes (10,) and (10, 10)."""
-        offsets, by_camera = self._residuals(pitch)
-        by_size = []
-        for nudge in ((_NUDGE_M, 0.0), (0.0, _NUDGE_M)):
-            (ahead, _), (behind, _) = (
-                self._residuals(Pitch(pitch.length + way * nudge[0], pitch.width + way * nudge[1]))
-                for way in (1, -1)
-            )
-            by_size.append((ahead - behind) / (2 * _NUDGE_M))
-        rows = np.concatenate([by_camera, np.stack(by_size, axis=-1)], axis=-1)
+        offsets, by_camera = residuals(
+            self.fit.parameters,
+            self.observations.curves,
+            self.observations.sightings(),
+            self.problem.size.diagonal / 2,
+        )
+        # A marking that moves is a camera that moves the other way.
+        length, width = _SHARES[self.observations.marking].T
+        by_length = -by_camera[:, :, X] * length[:, None]
+        by_width = -by_camera[:, :, Y] * width[:, None]
+        rows = np.concatenate([by_camera, np.stack([by_length, by_width], axis=-1)], axis=-1)
         scale = self.problem.robust_scale_px * self.problem.unit
         weight = 1 / np.sqrt(1 + (offsets**2).sum(axis=1) / scale**2)
         weighted = weight[:, None, None] * rows
@@ -212,14 +227,6 @@ class _Seen:
         information[range(PARAMETERS), range(PARAMETERS)] += inverse
         return gradient, information
 
-    def _residuals(self, pitch: Pitch) -> tuple[FloatArray, FloatArray]:
-        return residuals(
-            self.fit.parameters,
-            pitch_curves(pitch),
-            self.observations.sightings(),
-            self.problem.size.diagonal / 2,
-        )
-
 
 _Share = tuple[FloatArray, FloatArray]
 
@@ -228,7 +235,7 @@ def _adjust(pitch: Pitch, seen: Sequence[_Seen]) -> tuple[Pitch, list[_Seen], li
     """Sizes and cameras adjusted together until the sizes settle."""
     for _ in range(_ROUNDS):
         seen = [item.on(pitch) for item in seen]
-        shares = [item.share(pitch) for item in seen]
+        shares = [item.share() for item in seen]
         gradient, information = (sum(part) for part in zip(*shares, strict=True))
         step = -np.linalg.solve(information + np.eye(2) / _LOOSE_M**2, gradient)
         pitch = _moved(pitch, np.clip(step, -_LONGEST_STEP_M, _LONGEST_STEP_M))
@@ -255,16 +262,14 @@ def _is_inside(pitch: Pitch) -> npt.NDArray[np.bool_]:
     """Whether length and width lie within the Laws, not at their ends, shape (2,)."""
     ends = np.array([LENGTH_RANGE, WIDTH_RANGE])
     size = np.array([pitch.length, pitch.width])
-    inside: npt.NDArray[np.bool_] = (size > ends[:, 0] + 2 * _NUDGE_M) & (
-        size < ends[:, 1] - 2 * _NUDGE_M
-    )
+    inside: npt.NDArray[np.bool_] = (size > ends[:, 0] + _END_M) & (size < ends[:, 1] - _END_M)
     return inside
 
 
 def _moved(pitch: Pitch, by: FloatArray) -> Pitch:
     """The pitch with another length and width, within the Laws of the Game."""
     ends = np.array([LENGTH_RANGE, WIDTH_RANGE])
-    low, high = ends[:, 0] + _NUDGE_M, ends[:, 1] - _NUDGE_M
+    low, high = ends[:, 0] + _END_M / 2, ends[:, 1] - _END_M / 2
     length, width = np.clip(np.array([pitch.length, pitch.width]) + by, low, high).tolist()
     return Pitch(length, width)
 
