@@ -87,13 +87,14 @@ class Places:
         """Prior of a frame of the same match that looks that way; None where too few are known."""
         if len(self._pans) < MIN_OTHERS:
             return None
-        positions, apart = self._positions, self._pans - pan
-        drift = DRIFT_M**2 * (1 - np.exp(-0.5 * (apart / DRIFT_PAN) ** 2))
+        positions, turned = self._positions, self._pans - pan
+        drift = DRIFT_M**2 * (1 - np.exp(-0.5 * (turned / DRIFT_PAN) ** 2))
         spreads = self._covariances + (WANDER_M**2 + drift)[:, None, None] * np.eye(3)
         inverses = np.linalg.inv(spreads)
         mean = np.median(positions, axis=0)
         for _ in range(_ROUNDS):
-            chi = _chi_square(positions - mean, spreads)
+            apart = positions - mean
+            chi = np.einsum("ni,nij,nj->n", apart, inverses, apart)
             weighted = ((_FREEDOM + 3) / (_FREEDOM + chi))[:, None, None] * inverses
             information = weighted.sum(axis=0)
             mean = np.linalg.solve(information, np.einsum("nij,nj->i", weighted, positions))
@@ -158,9 +159,9 @@ def guess_matches(places: Sequence[Place | None]) -> list[int]:
 def _agree(one: Place | None, other: Place | None) -> bool:
     assert one is not None and other is not None
     wander = 2 * (WANDER_M**2 + DRIFT_M**2) * np.eye(3)
-    spread = one.covariance + other.covariance + wander
-    chi = _chi_square((one.position - other.position)[None], spread[None])
-    return float(chi[0]) < NEAR_CHI_SQUARE
+    apart = one.position - other.position
+    chi = apart @ np.linalg.solve(one.covariance + other.covariance + wander, apart)
+    return float(chi) < NEAR_CHI_SQUARE
 
 
 def _between(run: dict[int, int], count: int) -> list[int]:
@@ -172,9 +173,3 @@ def _between(run: dict[int, int], count: int) -> list[int]:
         matches.append(known)
     first = next((number for number in matches if number >= 0), 0)
     return [first if number < 0 else number for number in matches]
-
-
-def _chi_square(offsets: FloatArray, covariances: FloatArray) -> FloatArray:
-    solved = np.linalg.solve(covariances, offsets[..., None])[..., 0]
-    result: FloatArray = (offsets * solved).sum(axis=-1)
-    return result
