@@ -23,7 +23,7 @@ from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import LENGTH_RANGE, MARKINGS, WIDTH_RANGE, Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.observations import Observations, observe, pitch_curves
+from app.solving.observations import Observations, observe, pitch_curves, principal_point
 from app.solving.resect import Resection, ResectionProblem, measurement_count
 
 MIN_FRAMES = 5
@@ -36,6 +36,8 @@ FRAME_SIGMA_M = 0.25
 is believed to know them better."""
 UNKNOWN_SIGMA_M = 1.0
 """A size known to no better than this is unknown."""
+MIN_VOICES = 2.0
+"""One frame alone may be wrong in ways that its sigma does not know."""
 CERTAIN_SIGMAS = 5.0
 LEAST_DIFFERENCE_M = 0.3
 """A size differs from another when it is this many sigmas and metres away."""
@@ -57,6 +59,8 @@ def _shares_of(marking: str) -> tuple[float, float]:
 
 
 _SHARES = np.array([_shares_of(marking) for marking in MARKINGS])
+
+_CROSSING = np.array([name.startswith(("Side line", "Middle line")) for name in MARKINGS])
 
 
 @dataclass(frozen=True)
@@ -123,7 +127,7 @@ def estimate_pitch(
         pitch, [item for item, kept in zip(seen, fits, strict=True) if kept]
     )
     sigma = _sigmas(shares)
-    known = (sigma <= UNKNOWN_SIGMA_M) & _is_inside(pitch)
+    known = (sigma <= UNKNOWN_SIGMA_M) & (_voices(shares) >= MIN_VOICES) & _is_inside(pitch)
     return PitchEstimate(
         length=pitch.length if known[0] else None,
         width=pitch.width if known[1] else None,
@@ -212,7 +216,7 @@ class _Seen:
             self.problem.size.diagonal / 2,
         )
         # A marking that moves is a camera that moves the other way.
-        length, width = _SHARES[self.observations.marking].T
+        length, width = self._moves(offsets[:, 1] != 0).T
         by_length = -by_camera[:, :, X] * length[:, None]
         by_width = -by_camera[:, :, Y] * width[:, None]
         rows = np.concatenate([by_camera, np.stack([by_length, by_width], axis=-1)], axis=-1)
@@ -226,6 +230,23 @@ class _Seen:
         gradient[:PARAMETERS] += (self.fit.parameters - prior.mean) * inverse
         information[range(PARAMETERS), range(PARAMETERS)] += inverse
         return gradient, information
+
+    def _moves(self, beyond: npt.NDArray[np.bool_]) -> FloatArray:
+        """How far each point's nearest place moves with the sizes, shape (N, 2).
+
+        ``beyond`` are points beyond an end: their place is the end, and ends of the lines that
+        cross the pitch are its corners, or the middle line's ends.
+        """
+        moves = _SHARES[self.observations.marking].copy()
+        camera = self.problem.camera(self.fit.parameters)
+        center = np.array(principal_point(self.problem.size))
+        for row in np.flatnonzero(beyond & _CROSSING[self.observations.marking]):
+            shape = self.observations.curves.shapes[self.observations.marking[row]]
+            ends = np.array([shape[:3], shape[3:]])
+            apart = camera.project(ends) - center - self.observations.pixels[row]
+            near = np.nan_to_num(np.hypot(*apart.T), nan=np.inf).argmin()
+            moves[row] = 0.5 * np.sign(ends[near, :2])
+        return moves
 
 
 _Share = tuple[FloatArray, FloatArray]
@@ -256,6 +277,13 @@ def _sigmas(shares: Sequence[_Share]) -> FloatArray:
     between = inverse @ (gradients.T @ gradients) @ inverse * count / (count - 2)
     sigmas: FloatArray = np.sqrt(np.maximum(np.diag(inverse), np.diag(between)))
     return sigmas
+
+
+def _voices(shares: Sequence[_Share]) -> FloatArray:
+    """How many frames speak of length and of width, as if all of them said as much, shape (2,)."""
+    told = np.array([np.diag(information) for _, information in shares])
+    voices: FloatArray = told.sum(axis=0) ** 2 / np.maximum((told**2).sum(axis=0), 1e-30)
+    return voices
 
 
 def _is_inside(pitch: Pitch) -> npt.NDArray[np.bool_]:

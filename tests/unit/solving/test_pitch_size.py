@@ -75,6 +75,12 @@ class TestEstimatePitch:
         assert (found.length, found.length_sigma_m) == (None, None)
         assert found.proposal(Pitch()) is None
 
+    def test_a_length_that_one_frame_alone_shows_is_unknown(self):
+        one_end = looking((2.0, 62.0, -16.0), (40.0, 0.0, 0.0), 2600.0, bend=BEND)
+        others = [PitchFrame(click(one_end, 0.8, seed, SMALL), SIZE) for seed in range(6)]
+        found = estimate_pitch([*others, frames(SMALL)[5]], POLICY)
+        assert found.length is None
+
     def test_too_few_frames_are_refused(self):
         with pytest.raises(DegenerateGeometryError, match="needs 5"):
             estimate_pitch(frames(Pitch(), 3), POLICY)
