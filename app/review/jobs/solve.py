@@ -140,7 +140,9 @@ def solve_work(store: Store, dataset_id: int, pool: Pool | None = None) -> Work:
         with pool() if pool is not None and large else nullcontext() as executor:
             told = counting(progress, "groups solved")
             report = solve_dataset(store, dataset_id, executor, told)
-            estimate_pitches(store, dataset_id, executor, counting(progress, "pitches estimated"))
+            # It stays at the groups that are solved, and can be stopped all the same.
+            total = report.total
+            estimate_pitches(store, dataset_id, executor, lambda *_: told(total, total))
         return {"policy": found.policy.name, **_report(report)}
 
     return work
