@@ -1,4 +1,4 @@
-"""Commands on line files: calibrate, score, pitch; they need no dataset."""
+"""Commands on line files: calibrate, score; they need no dataset."""
 
 from __future__ import annotations
 
@@ -37,12 +37,23 @@ def calibrate(
     leave_one_out: Annotated[
         bool, typer.Option("--leave-one-out", help="Also calibrate without each marking in turn.")
     ] = False,
+    matches: Annotated[
+        str | None,
+        typer.Option(
+            metavar="auto|FILE",
+            help="Share the main camera's position among the frames of a match: FILE (.json or "
+            ".csv) names the match of each frame, auto guesses it from names and positions.",
+        ),
+    ] = None,
     workers: Workers = None,
     json_: Json = False,
 ) -> None:
     """Calibrate line files (folder or zip) to camera files; needs no dataset."""
     from app.review.datasets.batch import calibrate_files
 
+    named = None if matches in (None, "auto") else Path(str(matches))
+    if named is not None and not named.is_file():
+        raise typer.BadParameter(f'"{matches}" is neither auto nor a file', param_hint="--matches")
     pool = process_pool(workers or read_settings().workers)
     with pool as executor, show_progress("Calibrating") as progress:
         result = calibrate_files(
@@ -51,6 +62,8 @@ def calibrate(
             size=size,
             labels=labels.value,
             with_leave_one_out=leave_one_out,
+            matches=named,
+            guess=matches == "auto",
             executor=executor,
             progress=progress,
         )
@@ -78,15 +91,3 @@ def score(
     with show_progress("Scoring") as progress:
         result = score_files(lines, cameras, size=size, without=without, progress=progress)
     print_values(result, json_)
-
-
-@commands.command()
-def pitch(
-    source: LineFiles,
-    size: Size,
-    json_: Json = False,
-) -> None:
-    """Estimate the size of a pitch from line files of one match."""
-    from app.review.datasets.batch import estimate_pitch_of_files
-
-    print_values(estimate_pitch_of_files(source, size=size), json_)

@@ -27,6 +27,7 @@ def solve(
     json_: Json = False,
 ) -> None:
     """Compute what is missing or out of date; can be interrupted at any time."""
+    from app.review.editing.pitches import estimate_pitches
     from app.review.editing.recompute import solve_dataset
     from app.review.policies.policy import change_policy
 
@@ -40,6 +41,7 @@ def solve(
         if chosen is not None:
             change_policy(store, dataset, chosen, if_match=None, actor="local")
         report = solve_dataset(store, dataset, executor, progress)
+        estimate_pitches(store, dataset, executor)
     print_values(vars(report), json_)
 
 

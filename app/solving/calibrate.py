@@ -18,8 +18,8 @@ from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import GAMMAS_PERCENT, SOLVER_VERSION, Calibration, MarkingFit, Suspect
 from app.solving.jaccard import jaccard, measure_markings, outcomes, project_markings
 from app.solving.labels import find_suspects
-from app.solving.observations import observe
-from app.solving.resect import ResectionProblem, measurement_count
+from app.solving.observations import Observations, observe
+from app.solving.resect import PositionPrior, Resection, ResectionProblem, measurement_count
 
 MIN_MEASUREMENTS = 7
 """A camera with one focal length has seven unknowns; the distortion has a prior."""
@@ -55,18 +55,49 @@ def calibrate(
     if policy.check_labels:
         fit, observations, suspects = find_suspects(problem, observations, fit)
     fit = problem.refine_main(fit, observations)
+    found = replace(_found(problem, fit, observations), suspects=suspects)
+    return measure(found, lines, pitch, size)
+
+
+def calibrate_near(
+    alone: Calibration,
+    near: PositionPrior,
+    lines: Lines,
+    pitch: Pitch,
+    size: ImageSize,
+    policy: CalibrationPolicy,
+) -> Calibration:
+    """A calibration once more with what other frames of the match say of the camera's position.
+
+    Args:
+        alone: What ``calibrate`` makes of the same lines.
+        near: Prior of the position.
+    """
+    if alone.camera is None:
+        return alone
+    problem = ResectionProblem.of(size, policy)
+    left_out = [suspect.marking for suspect in alone.suspects]
+    observations = observe(lines, pitch, size).without(*left_out)
+    fit = Resection(problem.parameters(alone.camera), 0.0)
+    shared = problem.refine_near(fit, observations, near)
+    if shared is fit:
+        return alone
+    found = replace(_found(problem, shared, observations), suspects=alone.suspects)
+    return measure(found, lines, pitch, size)
+
+
+def _found(problem: ResectionProblem, fit: Resection, observations: Observations) -> Calibration:
+    """The camera and how well the lines determine it; the priors count for nothing there."""
     try:
         spread = problem.covariance(fit.parameters, observations)
     except DegenerateGeometryError:
         spread = np.full((PARAMETERS, PARAMETERS), np.inf)
-    calibration = Calibration(
+    return Calibration(
         "lines",
         problem.camera(fit.parameters),
-        suspects=suspects,
         covariance=tuple(spread.ravel().tolist()) if np.isfinite(spread).all() else None,
         unobservable=_unobservable(spread),
     )
-    return measure(calibration, lines, pitch, size)
 
 
 def calibrate_station(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> Calibration:

@@ -9,12 +9,17 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate
+from app.solving.match_position import NO_PLACES, Places, share_position
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
 
 
 def leave_one_out(
-    lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+    lines: Lines,
+    pitch: Pitch,
+    size: ImageSize,
+    policy: CalibrationPolicy,
+    others: Places = NO_PLACES,
 ) -> Iterator[tuple[str, float | None]]:
     """Each marking with the largest distance of its points from where the others put it.
 
@@ -23,20 +28,27 @@ def leave_one_out(
         pitch: The pitch.
         size: Annotated size.
         policy: How the others are calibrated.
+        others: Places of the match's other frames, if its camera's position is shared.
 
     Yields:
         Marking and pixels; None where the others do not give a camera.
     """
     for marking in lines:
-        yield marking, error_without(lines, marking, pitch, size, policy)
+        yield marking, error_without(lines, marking, pitch, size, policy, others)
 
 
 def error_without(
-    lines: Lines, marking: str, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+    lines: Lines,
+    marking: str,
+    pitch: Pitch,
+    size: ImageSize,
+    policy: CalibrationPolicy,
+    others: Places = NO_PLACES,
 ) -> float | None:
     """Largest distance of a marking's points from where the others put it, pixels."""
-    others = make_lines({name: points for name, points in lines.items() if name != marking})
-    camera = calibrate(others, pitch, size, policy).camera
+    rest = make_lines({name: points for name, points in lines.items() if name != marking})
+    alone = calibrate(rest, pitch, size, policy)
+    camera = share_position(alone, others, rest, pitch, size, policy).camera
     if camera is None:
         return None
     problem = ResectionProblem.of(size, policy)

@@ -1,34 +1,74 @@
 """Pitch size: length and width of a match's pitch, estimated from many of its frames.
 
-One frame cannot tell a longer pitch from another camera; many frames of the same pitch can. The
-robust cost of all frames, each with its own best camera, is nearly a parabola in length and
-width: it is sampled on a small grid, and its minimum is where the grid is laid next.
+One frame cannot tell a longer pitch from another camera; many frames of the same pitch can. All
+cameras and the two sizes are adjusted together: what a frame says of the sizes, whatever its
+camera, is what is left once its camera is eliminated (Schur complement), and these parts add up.
+
+Source: Hartley & Zisserman, sec. A6.3 (partitioned normal equations); White (1980) for the
+covariance, which counts frames and not clicks: the clicks of a frame err together.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
+from app.geometry.resection import PARAMETERS, X, Y, residuals
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import LENGTH_RANGE, WIDTH_RANGE, Pitch
+from app.soccer.pitch import LENGTH_RANGE, MARKINGS, WIDTH_RANGE, Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.observations import Observations, observe, pitch_curves
+from app.solving.observations import Observations, observe, pitch_curves, principal_point
 from app.solving.resect import Resection, ResectionProblem, measurement_count
 
 MIN_FRAMES = 5
+MAX_FRAMES = 30
+"""More frames say little more; those that show most of length and width are taken."""
 MIN_MEASUREMENTS = 12
 """Frames with fewer say nothing about the pitch that they do not need for their camera."""
-KEPT_SHARE = 0.8
-_GRID_STEPS_M = (1.0, 0.25)
-_MAX_ROUNDS = 12
-_OFFSETS = np.array([(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
+FRAME_SIGMA_M = 0.25
+"""What lens and annotator of one frame may add to the error of its own sizes: no single frame
+is believed to know them better."""
+UNKNOWN_SIGMA_M = 1.0
+"""A size known to no better than this is unknown."""
+MIN_VOICES = 2.0
+"""One frame alone may be wrong in ways that its sigma does not know."""
+CERTAIN_SIGMAS = 5.0
+LEAST_DIFFERENCE_M = 0.3
+"""A size differs from another when it is this many sigmas and metres away."""
+_MISFIT_SHARE = 4.0
+"""A frame whose cost a point is so many times that of the median frame has a wrong label."""
+_ROUNDS, _SETTLED_M, _LONGEST_STEP_M = 12, 0.01, 2.5
+_END_M = 0.1
+"""A size this close to what the Laws allow has run into it and is unknown."""
+_LOOSE_M = 20.0
+"""Standard deviation of the step: keeps a size that no frame shows where it is."""
+
+
+def _shares_of(marking: str) -> tuple[float, float]:
+    """How far a marking moves along x with each metre of length, along y with each of width."""
+    words = marking.split(" ")[1:3]
+    length = -0.5 if "left" in words else 0.5 if "right" in words else 0.0
+    width = {"Side line top": -0.5, "Side line bottom": 0.5}.get(marking, 0.0)
+    return length, width
+
+
+_SHARES = np.array([_shares_of(marking) for marking in MARKINGS])
+
+_CROSSING = np.array([name.startswith(("Side line", "Middle line")) for name in MARKINGS])
+
+
+@dataclass(frozen=True)
+class PitchFrame:
+    """Annotated points by marking, pixels of ``size``."""
+
+    lines: Lines
+    size: ImageSize
 
 
 @dataclass(frozen=True)
@@ -36,100 +76,235 @@ class PitchEstimate:
     """An estimated pitch.
 
     Attributes:
-        pitch: The pitch.
+        length: Metres; None where the frames do not show it, like ``width``.
         length_sigma_m: Standard deviation of the length; ``width_sigma_m`` of the width.
         frames: Number of frames that it rests on.
     """
 
-    pitch: Pitch
-    length_sigma_m: float
-    width_sigma_m: float
+    length: float | None
+    width: float | None
+    length_sigma_m: float | None
+    width_sigma_m: float | None
     frames: int
+
+    def proposal(self, pitch: Pitch) -> Pitch | None:
+        """The size to use instead of this one, to a tenth of a metre; None where it agrees.
+
+        A length or width that is unknown, or agrees within its uncertainty, stays as it is.
+        """
+        length = _other(pitch.length, self.length, self.length_sigma_m)
+        width = _other(pitch.width, self.width, self.width_sigma_m)
+        if length is None and width is None:
+            return None
+        return Pitch(length or pitch.length, width or pitch.width)
 
 
 def estimate_pitch(
-    frames: Sequence[Lines], size: ImageSize, policy: CalibrationPolicy, start: Pitch | None = None
+    frames: Sequence[PitchFrame], policy: CalibrationPolicy, start: Pitch | None = None
 ) -> PitchEstimate:
     """The size of the pitch that explains the lines of many frames best.
 
     Args:
-        frames: Annotated points by marking, pixels of ``size``; frames of one match.
-        size: Annotated size.
+        frames: Of one match.
         policy: How frames are calibrated.
-        start: Where to begin, 105 x 68 m by default.
+        start: Where to begin, 105 x 68 m by default; the answer does not depend on it.
 
     Raises:
-        DegenerateGeometryError: Too few frames, or none shows enough of length or width.
+        DegenerateGeometryError: Too few frames show enough markings.
     """
     pitch = start or Pitch()
-    problem = ResectionProblem.of(size, policy)
-    for step in _GRID_STEPS_M:
-        for _ in range(_MAX_ROUNDS):
-            seen = _sound_frames(frames, pitch, problem)
-            costs = [_total_cost(seen, _moved(pitch, at * step), problem) for at in _OFFSETS]
-            shift, curvature = _parabola(_OFFSETS * step, np.array(costs))
-            pitch = _moved(pitch, np.clip(shift, -2 * step, 2 * step))
-            if np.abs(shift).max() < step:
-                break
-    points = sum(len(observations.pixels) for observations, _ in seen)
-    variance = 2 * _total_cost(seen, pitch, problem) / points
-    spread = variance * np.linalg.inv(curvature)
+    seen = [_Seen.of(frames[index], pitch, policy) for index in choose_frames(frames)]
+    if len(seen) < MIN_FRAMES:
+        raise DegenerateGeometryError(
+            f"{len(seen)} frames show enough markings, the size of a pitch needs {MIN_FRAMES}"
+        )
+    pitch, seen, _ = _adjust(pitch, seen)
+    # Labels are judged on the pitch as it is now: on one of the wrong size the touchlines look
+    # mislabelled.
+    costs = np.array([item.fit.cost / len(item.observations.pixels) for item in seen])
+    fits = costs <= _MISFIT_SHARE * np.median(costs)
+    pitch, seen, shares = _adjust(
+        pitch, [item for item, kept in zip(seen, fits, strict=True) if kept]
+    )
+    sigma = _sigmas(shares)
+    known = (sigma <= UNKNOWN_SIGMA_M) & (_voices(shares) >= MIN_VOICES) & _is_inside(pitch)
     return PitchEstimate(
-        pitch, float(np.sqrt(spread[0, 0])), float(np.sqrt(spread[1, 1])), len(seen)
+        length=pitch.length if known[0] else None,
+        width=pitch.width if known[1] else None,
+        length_sigma_m=float(sigma[0]) if known[0] else None,
+        width_sigma_m=float(sigma[1]) if known[1] else None,
+        frames=len(seen),
     )
 
 
-def _sound_frames(
-    frames: Sequence[Lines], pitch: Pitch, problem: ResectionProblem
-) -> list[tuple[Observations, Resection]]:
-    """Frames with markings to spare, without the fifth that fits worst.
+def choose_frames(frames: Sequence[PitchFrame], most: int = MAX_FRAMES) -> list[int]:
+    """Indices of the frames that say most of length and width, half of them for each.
 
-    Labels are not checked here: on a pitch of the wrong size the touchlines look mislabelled.
-
-    Raises:
-        DegenerateGeometryError: Too few are left.
+    A frame tells the length when it shows something of the middle and something of an end, and
+    the width when it shows a touchline and something whose width is fixed.
     """
-    observed = [observe(lines, pitch, problem.size) for lines in frames]
-    rich = [item for item in observed if measurement_count(item) >= MIN_MEASUREMENTS]
-    fitted = [(item, problem.resect(item)) for item in rich]
-    fitted.sort(key=lambda item: item[1].cost / len(item[0].pixels))
-    if len(fitted) < MIN_FRAMES:
-        raise DegenerateGeometryError(
-            f"{len(fitted)} frames show enough markings, the size of a pitch needs {MIN_FRAMES}"
+    rich = []
+    for index, frame in enumerate(frames):
+        count = measurement_count(observe(frame.lines, Pitch(), frame.size))
+        if count >= MIN_MEASUREMENTS:
+            rich.append((-count, index))
+    order = [index for _, index in sorted(rich)]
+    length = [index for index in order if _tells_length(frames[index].lines)]
+    width = [index for index in order if _tells_width(frames[index].lines)]
+    best = [*length[: most // 2], *width[: most // 2]]
+    chosen = dict.fromkeys([*best, *length, *width, *order])
+    return sorted(list(chosen)[:most])
+
+
+def _tells_length(lines: Lines) -> bool:
+    middle = any(name in lines for name in ("Middle line", "Circle central"))
+    left, right = (any(side in name.split(" ") for name in lines) for side in ("left", "right"))
+    return (middle and (left or right)) or (left and right)
+
+
+def _tells_width(lines: Lines) -> bool:
+    top, bottom = ("Side line top" in lines), ("Side line bottom" in lines)
+    inner = any(name.startswith(("Big", "Small", "Circle", "Goal")) for name in lines)
+    return (top and bottom) or ((top or bottom) and inner)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A frame with its best camera so far."""
+
+    problem: ResectionProblem
+    observations: Observations
+    fit: Resection
+
+    @staticmethod
+    def of(frame: PitchFrame, pitch: Pitch, policy: CalibrationPolicy) -> _Seen:
+        problem = ResectionProblem.of(frame.size, policy)
+        observations = observe(frame.lines, pitch, frame.size)
+        return _Seen(problem, observations, problem.resect(observations))
+
+    def on(self, pitch: Pitch) -> _Seen:
+        """The frame on another pitch, its camera refined."""
+        moved = replace(self.observations, curves=pitch_curves(pitch))
+        return replace(
+            self,
+            observations=moved,
+            fit=self.problem.refine(moved, self.fit.parameters[None]),
         )
-    return fitted[: math.ceil(KEPT_SHARE * len(fitted))]
+
+    def share(self) -> tuple[FloatArray, FloatArray]:
+        """What the frame says of the sizes: random effects, a variance of its own beside the clicks'.
+
+        Returns:
+            Gradient, shape (2,), and information, shape (2, 2), of length and width once the
+            camera is eliminated.
+        """
+        gradient, information = self._normal_equations()
+        camera, size = slice(0, PARAMETERS), slice(PARAMETERS, None)
+        carried = np.linalg.solve(information[camera, camera], information[camera, size])
+        variance = self.problem.click_variance(self.fit.parameters, self.observations)
+        score = (gradient[size] - carried.T @ gradient[camera]) / variance
+        told = (information[size, size] - information[size, camera] @ carried) / variance
+        shrunk = np.linalg.inv(np.eye(2) + FRAME_SIGMA_M**2 * told)
+        return shrunk @ score, shrunk @ told
+
+    def _normal_equations(self) -> tuple[FloatArray, FloatArray]:
+        """Gradient and J^T W J of camera, length and width, shapes (10,) and (10, 10)."""
+        offsets, by_camera = residuals(
+            self.fit.parameters,
+            self.observations.curves,
+            self.observations.sightings(),
+            self.problem.size.diagonal / 2,
+        )
+        # A marking that moves is a camera that moves the other way.
+        length, width = self._moves(offsets[:, 1] != 0).T
+        by_length = -by_camera[:, :, X] * length[:, None]
+        by_width = -by_camera[:, :, Y] * width[:, None]
+        rows = np.concatenate([by_camera, np.stack([by_length, by_width], axis=-1)], axis=-1)
+        scale = self.problem.robust_scale_px * self.problem.unit
+        weight = 1 / np.sqrt(1 + (offsets**2).sum(axis=1) / scale**2)
+        weighted = weight[:, None, None] * rows
+        gradient = np.einsum("nri,nr->i", weighted, offsets)
+        information = np.einsum("nri,nrj->ij", weighted, rows)
+        prior = self.problem.prior()
+        inverse = 1 / prior.sigma**2
+        gradient[:PARAMETERS] += (self.fit.parameters - prior.mean) * inverse
+        information[range(PARAMETERS), range(PARAMETERS)] += inverse
+        return gradient, information
+
+    def _moves(self, beyond: npt.NDArray[np.bool_]) -> FloatArray:
+        """How far each point's nearest place moves with the sizes, shape (N, 2).
+
+        ``beyond`` are points beyond an end: their place is the end, and ends of the lines that
+        cross the pitch are its corners, or the middle line's ends.
+        """
+        moves = _SHARES[self.observations.marking].copy()
+        camera = self.problem.camera(self.fit.parameters)
+        center = np.array(principal_point(self.problem.size))
+        for row in np.flatnonzero(beyond & _CROSSING[self.observations.marking]):
+            shape = self.observations.curves.shapes[self.observations.marking[row]]
+            ends = np.array([shape[:3], shape[3:]])
+            apart = camera.project(ends) - center - self.observations.pixels[row]
+            near = np.nan_to_num(np.hypot(*apart.T), nan=np.inf).argmin()
+            moves[row] = 0.5 * np.sign(ends[near, :2])
+        return moves
 
 
-def _total_cost(
-    seen: Sequence[tuple[Observations, Resection]], pitch: Pitch, problem: ResectionProblem
-) -> float:
-    """Robust cost of all frames on this pitch, each with its best camera."""
-    curves = pitch_curves(pitch)
-    total = 0.0
-    for observations, fit in seen:
-        moved = Observations(curves, observations.pixels, observations.marking)
-        total += problem.refine(moved, fit.parameters[None]).cost
-    return total
+_Share = tuple[FloatArray, FloatArray]
 
 
-def _parabola(offsets: FloatArray, costs: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Minimum and second derivatives of the parabola through samples of a cost.
+def _adjust(pitch: Pitch, seen: Sequence[_Seen]) -> tuple[Pitch, list[_Seen], list[_Share]]:
+    """Sizes and cameras adjusted together until the sizes settle."""
+    for _ in range(_ROUNDS):
+        seen = [item.on(pitch) for item in seen]
+        shares = [item.share() for item in seen]
+        gradient, information = (sum(part) for part in zip(*shares, strict=True))
+        step = -np.linalg.solve(information + np.eye(2) / _LOOSE_M**2, gradient)
+        pitch = _moved(pitch, np.clip(step, -_LONGEST_STEP_M, _LONGEST_STEP_M))
+        if np.abs(step).max() < _SETTLED_M:
+            break
+    return pitch, list(seen), shares
 
-    Raises:
-        DegenerateGeometryError: The cost does not curve upwards in both directions.
+
+def _sigmas(shares: Sequence[_Share]) -> FloatArray:
+    """Standard deviations of length and width, metres, shape (2,).
+
+    The larger of two: from the clicks' variance, and from how much the frames disagree.
     """
-    x, y = offsets.T
-    terms = np.column_stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2])
-    _, by_x, by_y, xx, xy, yy = np.linalg.lstsq(terms, costs, rcond=None)[0]
-    curvature = np.array([[xx, xy], [xy, yy]])
-    if np.linalg.eigvalsh(curvature)[0] <= 0:
-        raise DegenerateGeometryError("the frames do not show both length and width of the pitch")
-    return np.linalg.solve(curvature, [-by_x, -by_y]), curvature
+    gradients = np.array([gradient for gradient, _ in shares])
+    information = np.sum([part for _, part in shares], axis=0)
+    inverse = np.linalg.inv(information + np.eye(2) / _LOOSE_M**2)
+    count = len(shares)
+    between = inverse @ (gradients.T @ gradients) @ inverse * count / (count - 2)
+    sigmas: FloatArray = np.sqrt(np.maximum(np.diag(inverse), np.diag(between)))
+    return sigmas
+
+
+def _voices(shares: Sequence[_Share]) -> FloatArray:
+    """How many frames speak of length and of width, as if all of them said as much, shape (2,)."""
+    told = np.array([np.diag(information) for _, information in shares])
+    voices: FloatArray = told.sum(axis=0) ** 2 / np.maximum((told**2).sum(axis=0), 1e-30)
+    return voices
+
+
+def _is_inside(pitch: Pitch) -> npt.NDArray[np.bool_]:
+    """Whether length and width lie within the Laws, not at their ends, shape (2,)."""
+    ends = np.array([LENGTH_RANGE, WIDTH_RANGE])
+    size = np.array([pitch.length, pitch.width])
+    inside: npt.NDArray[np.bool_] = (size > ends[:, 0] + _END_M) & (size < ends[:, 1] - _END_M)
+    return inside
 
 
 def _moved(pitch: Pitch, by: FloatArray) -> Pitch:
     """The pitch with another length and width, within the Laws of the Game."""
-    return Pitch(
-        float(np.clip(pitch.length + by[0], *LENGTH_RANGE)),
-        float(np.clip(pitch.width + by[1], *WIDTH_RANGE)),
-    )
+    ends = np.array([LENGTH_RANGE, WIDTH_RANGE])
+    low, high = ends[:, 0] + _END_M / 2, ends[:, 1] - _END_M / 2
+    length, width = np.clip(np.array([pitch.length, pitch.width]) + by, low, high).tolist()
+    return Pitch(length, width)
+
+
+def _other(now: float, found: float | None, sigma: float | None) -> float | None:
+    """What was found, to a tenth of a metre, where it certainly is another size."""
+    if found is None or sigma is None:
+        return None
+    limit = max(LEAST_DIFFERENCE_M, CERTAIN_SIGMAS * sigma)
+    return round(found, 1) if abs(found - now) > limit else None

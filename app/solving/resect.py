@@ -70,6 +70,29 @@ POINTS_PER_LINE, POINTS_PER_CIRCLE = 4, 8
 """Points that the search looks at; the later stages use them all."""
 
 
+CONTRADICTION = 16.0
+"""A prior of the position that costs the lines more than this, in clicks' variances, is dropped."""
+
+
+@dataclass(frozen=True)
+class PositionPrior:
+    """What is known of a camera's position: a Student distribution for each axis.
+
+    Attributes:
+        mean: Pitch frame, metres, shape (3,).
+        sigma: Metres, shape (3,).
+        freedom: Degrees of freedom: the fewer, the more it gives way.
+    """
+
+    mean: FloatArray
+    sigma: FloatArray
+    freedom: float
+
+
+STADIUM = PositionPrior(MAIN_MEAN[1:], MAIN_SIGMA[1:], MAIN_FREEDOM)
+"""What is known of any main camera."""
+
+
 @dataclass(frozen=True)
 class Resection:
     """A camera as parameters of ``geometry.resection``, shape (8,), and its robust cost."""
@@ -143,18 +166,43 @@ class ResectionProblem:
         Where the lines determine the camera this changes nothing; where they leave a direction
         open the stadium closes it. A replay, which may stand anywhere, is left alone.
         """
-        position = fit.parameters[X : Z + 1]
-        low, high = np.transpose([MAIN_STAND_X_M, MAIN_STAND_Y_M, MAIN_STAND_Z_M])
-        if not ((low < position) & (position < high)).all():
+        if not is_main_position(fit.parameters[X : Z + 1]):
             return fit
+        return self._refine_near(fit, observations, STADIUM)
+
+    def refine_near(
+        self, alone: Resection, observations: Observations, near: PositionPrior
+    ) -> Resection:
+        """The camera once more with what other frames of its match say of the position.
+
+        A camera that does not stand like a main camera is left alone, and so is one whose lines
+        contradict the prior.
+        """
+        if not is_main_position(alone.parameters[X : Z + 1]):
+            return alone
+        shared = self._refine_near(alone, observations, near)
+        variance = self.click_variance(alone.parameters, observations)
+        loss = self._data_cost(shared, observations) - self._data_cost(alone, observations)
+        return shared if 2 * loss <= CONTRADICTION * variance else alone
+
+    def _refine_near(
+        self, fit: Resection, observations: Observations, near: PositionPrior
+    ) -> Resection:
+        """Reweighted rounds with a Student prior of roll and position."""
         variance = self.click_variance(fit.parameters, observations)
         offset = np.zeros(len(MAIN_MEAN))
         for _ in range(MAIN_ROUNDS):
-            prior = self._main_prior(variance, offset)
+            prior = self._main_prior(near, variance, offset)
             found = self._run(observations, fit.parameters[None], FINAL, prior=prior)
             fit = Resection(found.parameters[0], float(found.cost[0]))
-            offset = fit.parameters[ROLL : Z + 1] - MAIN_MEAN
+            offset = fit.parameters[ROLL : Z + 1] - prior.mean[ROLL : Z + 1]
         return fit
+
+    def _data_cost(self, fit: Resection, observations: Observations) -> float:
+        """Robust cost of the points alone, pixels squared."""
+        scale = self.robust_scale_px * self.unit
+        apart = self.distances(fit.parameters, observations)
+        return float((scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)).sum())
 
     def distances(self, parameters: FloatArray, observations: Observations) -> FloatArray:
         """Distance of each observed point to its marking, pixels, shape (N,)."""
@@ -215,7 +263,7 @@ class ResectionProblem:
         prior: Prior | None = None,
     ) -> Fit:
         scale_px = stage.scale_px or self.robust_scale_px
-        equations = self._equations(observations, scale_px, prior or self._prior())
+        equations = self._equations(observations, scale_px, prior or self.prior())
         return levenberg_marquardt(
             equations, starts, stage.steps, tolerance=stage.tolerance, damping=damping
         )
@@ -237,7 +285,7 @@ class ResectionProblem:
 
         return equations
 
-    def _prior(self) -> Prior:
+    def prior(self) -> Prior:
         """Wide enough to decide nothing that a few points decide; it keeps the rest on earth."""
         focal = np.log(2000.0 * self.unit)
         mean = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -15.0, focal, self.distortion_mean])
@@ -245,19 +293,26 @@ class ResectionProblem:
         sigma = np.array([np.inf, np.inf, level, 300.0, 300.0, 60.0, 3.0, self.distortion_sigma])
         return Prior(mean, sigma)
 
-    def _main_prior(self, variance: float, offset: FloatArray) -> Prior:
+    def _main_prior(self, near: PositionPrior, variance: float, offset: FloatArray) -> Prior:
         """Student prior of main cameras, reweighted for an offset from its mean, shape (4,).
 
         The better the clicks fit (variance, pixels squared) and the more they insist on an
         offset, the less it weighs.
         """
-        prior = self._prior()
-        prior.mean[ROLL : Z + 1] = MAIN_MEAN
-        apart = (offset / MAIN_SIGMA) ** 2
-        prior.sigma[ROLL : Z + 1] = MAIN_SIGMA * np.sqrt(1 + apart / MAIN_FREEDOM)
+        prior = self.prior()
+        sigma = np.array([MAIN_SIGMA[0], *near.sigma])
+        freedom = np.array([MAIN_FREEDOM, *[near.freedom] * 3])
+        prior.mean[ROLL : Z + 1] = [MAIN_MEAN[0], *near.mean]
+        prior.sigma[ROLL : Z + 1] = sigma * np.sqrt(1 + (offset / sigma) ** 2 / freedom)
         # The cost counts pixels as if a click's standard deviation were one.
         prior.sigma[[ROLL, X, Y, Z, KAPPA]] /= np.sqrt(variance)
         return prior
+
+
+def is_main_position(position: FloatArray) -> bool:
+    """Whether main cameras stand there (pitch frame, metres, shape (3,))."""
+    low, high = np.transpose([MAIN_STAND_X_M, MAIN_STAND_Y_M, MAIN_STAND_Z_M])
+    return bool(((low < position) & (position < high)).all())
 
 
 def best(fit: Fit, count: int) -> FloatArray:

@@ -293,6 +293,8 @@ def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> 
             _update(session, _STATION, own.id, values)
     names = ("revision", "changed", "inputs_hash")
     values = {name: getattr(after, name) for name in names}
+    pitch = after.group.pitch
+    values |= {"pitch_length": pitch.length, "pitch_width": pitch.width}
     _update(session, GroupModel.__table__, after.id, values)
 
 

@@ -28,7 +28,7 @@ class Entry:
     """One thing that was said.
 
     ``kind`` is ``dataset``, ``policy``, ``station``, ``import``, ``camera``, ``spare``,
-    ``edit``, ``undo``, ``redo``, the same after ``station_``, ``verdict``, or ``freeze``; ``body``
+    ``edit``, ``undo``, ``redo``, the same after ``station_``, ``pitch``, ``verdict``, or ``freeze``; ``body``
     is JSON that suffices to do it again.
     """
 

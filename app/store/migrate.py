@@ -29,6 +29,7 @@ KNOWN_REVISIONS = (
     "0009",
     "0010",
     "0011",
+    "0013",
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]

@@ -18,6 +18,7 @@ from app.store.models import (
     VerdictModel,
     ViewModel,
 )
+from app.store.pitches import FINDING
 
 _BATCH = 500
 Rows = Sequence[Mapping[str, Any]]
@@ -49,8 +50,9 @@ def all_spare(session: Session) -> Iterator[Any]:
 
 
 def all_noticed(session: Session) -> Iterator[Any]:
-    """The row of everything that imports noticed."""
-    return iter(session.execute(select(*ImportFindingModel.__table__.columns)))
+    """The row of everything that imports noticed; what was computed is not among it."""
+    statement = select(*ImportFindingModel.__table__.columns)
+    return iter(session.execute(statement.where(ImportFindingModel.kind != FINDING)))
 
 
 def rewrite(

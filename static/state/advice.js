@@ -22,6 +22,7 @@ const TITLES = /** @type {Record<string, string>} */ ({
 	implausible_camera: 'The camera of @ is where no camera can be',
 	several_balls: 'View @ has several balls',
 	upstream_changed: 'The imported file has changed',
+	pitch_size: 'The pitch of this match has another size',
 });
 
 /** A finding in a few words. @param {GroupDocument} group @param {FindingJson} finding */

@@ -13,6 +13,7 @@ import { queueAddress } from '../state/navigation.js';
 import { DatasetFrame } from './dataset_page.js';
 import { HeatMap } from './heat_map.js';
 import { Loading, Trouble } from './page_frame.js';
+import { Pitches } from './pitches.js';
 import { QueryBox } from './query_box.js';
 import { seriesColour, Spread } from './spread.js';
 
@@ -79,7 +80,7 @@ function StatisticsOf({ one }) {
 	return html`
 		<div class="statistics__query"><${QueryBox} field=${field} invalid=${found.error?.status === 400} onQuery=${setQuery} /></div>
 		${found.error ? html`<${Trouble} title=${found.error.status === 400 ? 'The query cannot be read' : 'The statistics cannot be shown'} error=${found.error} retry=${found.reload} />` : null}
-		${found.value ? html`<${Body} found=${found.value} dataset=${one.name} q=${q} />` : found.error ? null : html`<${Loading} what="statistics" />`}
+		${found.value ? html`<${Body} found=${found.value} dataset=${one.name} q=${q} /><${Pitches} dataset=${one.id} />` : found.error ? null : html`<${Loading} what="statistics" />`}
 	`;
 }
 

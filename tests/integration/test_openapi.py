@@ -26,6 +26,7 @@ from app.api.application import create_app
 from app.config import Settings
 from app.datasets.report import Report
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
+from app.review.editing.pitches import read_pitches
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.stations import load_station
 from app.review.editing.submit import load
@@ -162,6 +163,9 @@ class Attack:
             case.body |= {"dry_run": True}
         if case.operation.path.endswith("/policy"):
             case.body = {"name": "paper"}
+        if case.operation.path.endswith("/pitches") and case.method == "PATCH":
+            match = load(self.store, 1).group.match
+            case.body = {"match": match, "length": 105.0, "width": 68.0}
         if case.operation.path.endswith("/exports"):
             case.body = {"dataset": "small", "format": "cameras", "all": True}
 
@@ -201,6 +205,8 @@ class Attack:
             return load_station(self.store, 1).etag
         if case.operation.path.endswith("/policy"):
             return read_policy(self.store, "small").etag
+        if case.operation.path.endswith("/pitches"):
+            return read_pitches(self.store, "small").etag
         return load(self.store, 1).etag
 
 

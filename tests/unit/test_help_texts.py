@@ -32,11 +32,11 @@ PLAIN_WORDS = """
     heads health heat help histograms history hit home hooks idempotency identity if image images
     import imports in info init insight items jaccard json key keys known konva last latest lazy
     least leftovers legend lesson lessons letter licence limits list listing live locks look loupe
-    main map markdown marks match matrix meant membership menu merge metrics migrate mini missing
+    main map markdown marks match matches matrix meant membership menu merge metrics migrate mini missing
     model models modules name names navigation neighbours nested notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages
-    paint palette panel parquet parse parts patch pen pins pitch pixel place places png pointer
-    policies pool popover pose preview problem progress projection props query rail reader reasons
+    paint palette panel parquet parse parts patch pen pins pitch pitches pixel place places png pointer
+    policies pool popover pose position preview problem progress projection props query rail reader reasons
     recompute record remedies removal render reply report requests resect resource restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows shared sheet singular site smallest solve

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Mapping
-from concurrent.futures import Executor
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import asdict, dataclass, replace
 from itertools import chain
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -24,15 +24,17 @@ from app.errors import DatasetFormatError, InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
 from app.progress import Progress
+from app.review.datasets.matches import Share, read_matches, shares_of
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.soccer.solution import Finding
+from app.soccer.solution import Calibration, Finding
 from app.solving.calibrate import calibrate
 from app.solving.calibration_findings import calibration_findings
 from app.solving.leave_one_out import leave_one_out
-from app.solving.pitch_size import estimate_pitch
+from app.solving.match_position import Place, Places, place_of, share_position
+from app.solving.pitch_size import PitchFrame, estimate_pitch
 from app.solving.score import score, score_frame
 from app.solving.warm import warm_up
 
@@ -53,6 +55,8 @@ class CalibratedFrame:
     findings: tuple[Finding, ...]
     left_out: tuple[tuple[str, float | None], ...]
     milliseconds: float
+    alone: Calibration
+    place: Place | None
 
 
 def calibrate_files(
@@ -62,6 +66,8 @@ def calibrate_files(
     size: ImageSize,
     labels: str = "checked",
     with_leave_one_out: bool = False,
+    matches: Path | None = None,
+    guess: bool = False,
     executor: Executor,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
@@ -74,6 +80,9 @@ def calibrate_files(
         size: Size of the annotated images.
         labels: ``checked`` leaves out markings found mislabelled, ``given`` trusts all.
         with_leave_one_out: Also drop each marking in turn.
+        matches: File that names the match of each frame (``read_matches``): frames of a match
+            share what they say of the main camera's position.
+        guess: Without such a file: guess the matches from names and positions.
         executor: Where the frames are calibrated.
         progress: Called with frames done and in all.
 
@@ -88,18 +97,39 @@ def calibrate_files(
     files = list(read_line_files(source, size, report))
     if not files:
         raise _nothing(source, report, "line files")
+    named = None if matches is None else read_matches(matches)
+    sharing = guess or named is not None
     policy = CalibrationPolicy(check_labels=labels == "checked")
     chunks = [files[start : start + CHUNK] for start in range(0, len(files), CHUNK)]
-    jobs = [
-        executor.submit(calibrate_chunk, chunk, size, policy, with_leave_one_out)
-        for chunk in chunks
-    ]
-    frames: list[CalibratedFrame] = []
-    for job in jobs:
-        frames.extend(job.result())
-        if progress is not None:
-            progress(len(frames), len(files))
+    rounds = 2 if sharing else 1
+
+    def gather(jobs: Sequence[Future[list[CalibratedFrame]]], done: int) -> list[CalibratedFrame]:
+        frames: list[CalibratedFrame] = []
+        for job in jobs:
+            frames.extend(job.result())
+            if progress is not None:
+                progress((done + len(frames)) // rounds, len(files))
+        return frames
+
+    alone = with_leave_one_out and not sharing
+    frames = gather([executor.submit(calibrate_chunk, it, size, policy, alone) for it in chunks], 0)
+    groups = 0
+    if sharing:
+        shares = shares_of(files, [frame.place for frame in frames], named)
+        groups = len({share.match for share in shares})
+        jobs = []
+        for start in range(0, len(files), CHUNK):
+            piece = slice(start, start + CHUNK)
+            jobs.append(
+                executor.submit(
+                    share_chunk, files[piece], frames[piece], shares[piece], size, policy,
+                    with_leave_one_out,
+                )
+            )  # fmt: skip
+        frames = gather(jobs, len(files))
     summary = _summary(frames, report, time.perf_counter() - began)
+    if sharing:
+        summary["matches"] = groups
     _write(out, frames, summary, with_leave_one_out)
     return summary
 
@@ -110,6 +140,22 @@ def calibrate_chunk(
     """Calibrate some frames in this process, one after the other on one thread."""
     warm_up()
     return [_calibrate_file(file, size, policy, with_leave_one_out) for file in files]
+
+
+def share_chunk(
+    files: Sequence[LineFile],
+    frames: Sequence[CalibratedFrame],
+    shares: Sequence[Share],
+    size: ImageSize,
+    policy: CalibrationPolicy,
+    with_leave_one_out: bool,
+) -> list[CalibratedFrame]:
+    """The same frames once more, each with what the others of its match say."""
+    warm_up()
+    return [
+        _share_file(file, frame, share.others, size, policy, with_leave_one_out)
+        for file, frame, share in zip(files, frames, shares, strict=True)
+    ]
 
 
 def score_files(
@@ -167,20 +213,20 @@ def score_files(
 
 
 def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
-    """Length and width of the pitch that the line files of one match show.
+    """Length and width of the pitch that the line files of one match show; null: not shown.
 
     Raises:
         InputError: There is no line file.
-        DegenerateGeometryError: They do not show enough of the pitch.
+        DegenerateGeometryError: Too few show enough markings.
     """
     report = Report()
-    frames = [file.lines for file in read_line_files(source, size, report)]
+    frames = [PitchFrame(file.lines, size) for file in read_line_files(source, size, report)]
     if not frames:
         raise _nothing(source, report, "line files")
-    found = estimate_pitch(frames, size, CalibrationPolicy())
+    found = estimate_pitch(frames, CalibrationPolicy())
     return {
-        "length_m": found.pitch.length,
-        "width_m": found.pitch.width,
+        "length_m": found.length,
+        "width_m": found.width,
         "length_sigma_m": found.length_sigma_m,
         "width_sigma_m": found.width_sigma_m,
         "frames": found.frames,
@@ -191,19 +237,50 @@ def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
 def _calibrate_file(
     file: LineFile, size: ImageSize, policy: CalibrationPolicy, with_leave_one_out: bool
 ) -> CalibratedFrame:
+    began = time.thread_time()
+    calibration = calibrate(file.lines, Pitch(), size, policy)
+    milliseconds = 1000 * (time.thread_time() - began)
+    left_out = leave_one_out(file.lines, Pitch(), size, policy) if with_leave_one_out else ()
+    return _frame(file.stem, calibration, size, milliseconds, tuple(left_out))
+
+
+def _share_file(
+    file: LineFile,
+    frame: CalibratedFrame,
+    others: Places,
+    size: ImageSize,
+    policy: CalibrationPolicy,
+    with_leave_one_out: bool,
+) -> CalibratedFrame:
     pitch = Pitch()
     began = time.thread_time()
-    calibration = calibrate(file.lines, pitch, size, policy)
-    milliseconds = 1000 * (time.thread_time() - began)
-    left_out = leave_one_out(file.lines, pitch, size, policy) if with_leave_one_out else ()
+    calibration = share_position(frame.alone, others, file.lines, pitch, size, policy)
+    milliseconds = frame.milliseconds + 1000 * (time.thread_time() - began)
+    left_out = leave_one_out(file.lines, pitch, size, policy, others) if with_leave_one_out else ()
+    if calibration is frame.alone:
+        return replace(frame, milliseconds=milliseconds, left_out=tuple(left_out))
+    return _frame(file.stem, calibration, size, milliseconds, tuple(left_out))
+
+
+def _frame(
+    stem: str,
+    calibration: Calibration,
+    size: ImageSize,
+    milliseconds: float,
+    left_out: tuple[tuple[str, float | None], ...],
+) -> CalibratedFrame:
     camera = calibration.camera
+    # What is drawn travels no further: it is most of a calibration.
+    alone = replace(calibration, markings=())
     return CalibratedFrame(
-        stem=file.stem,
+        stem=stem,
         camera=None if camera is None else camera_text(camera),
         reason=calibration.reason,
         findings=tuple(calibration_findings(calibration, size)),
-        left_out=tuple(left_out),
+        left_out=left_out,
         milliseconds=milliseconds,
+        alone=alone,
+        place=place_of(calibration, size),
     )
 
 

@@ -13,6 +13,7 @@ from app.review.editing.edit import (
     SetBalls,
     SetCalibrationSource,
     SetLines,
+    SetPitch,
     SetStationCalibration,
     SetStationCamera,
     SetStationLines,
@@ -45,6 +46,8 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
             return {"edit": "include_view", "view": view, "included": included, **why}
         case SetCalibrationSource(view, calibration):
             return {"edit": "set_calibration", "view": view, "calibration": calibration}
+        case SetPitch(length, width):
+            return {"edit": "set_pitch", "length": float(length), "width": float(width)}
         case SetStationLines(lines):
             return {"edit": "set_station_lines", "lines": _lines_to_json(lines)}
         case SetStationCalibration(calibration):
@@ -71,6 +74,8 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
             return IncludeView(value["view"], value["included"], *why)
         case "set_calibration":
             return SetCalibrationSource(value["view"], value["calibration"])
+        case "set_pitch":
+            return SetPitch(value["length"], value["width"])
     raise ValueError(f"the log holds an unknown edit: {value['edit']}")
 
 

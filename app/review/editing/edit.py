@@ -15,7 +15,7 @@ from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
-from app.soccer.pitch import canonical_marking
+from app.soccer.pitch import Pitch, canonical_marking
 from app.soccer.reasons import left_out
 
 CALIBRATIONS = ("given", "lines")
@@ -217,6 +217,22 @@ class IncludeView:
         if view.included or view.left_out is None:
             return IncludeView(self.view, view.included)
         return IncludeView(self.view, False, view.left_out.reason, view.left_out.note)
+
+
+@dataclass(frozen=True)
+class SetPitch:
+    """Say how long and wide the pitch is, metres; the groups of a match get it together."""
+
+    length: float
+    width: float
+
+    def apply(self, group: Group) -> Group:
+        """The group on a pitch of this size."""
+        return replace(group, pitch=Pitch(self.length, self.width))
+
+    def inverse(self, group: Group) -> SetPitch:
+        """The size as it was."""
+        return SetPitch(group.pitch.length, group.pitch.width)
 
 
 STATION_EDITS = (SetLines, SetCalibrationSource)

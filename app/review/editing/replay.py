@@ -30,6 +30,7 @@ from app.store.codecs import (
 from app.store.digest import station_digest, view_digest
 from app.store.group_rows import head_values, station_values, view_values
 from app.store.log import LogEntry, read_log, verify_chain
+from app.store.pitches import PITCH
 from app.store.projection import rewrite
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
@@ -168,6 +169,7 @@ def _edit(ledger: Ledger, entry: LogEntry) -> None:
         item.view = without_station(after)
         if after.station != before.station:
             _save_station(ledger, record.dataset_id, item.station_id, after.station, None)
+    record.head = replace(record.head, pitch=changed.pitch)
     record.revision, record.changed = record.revision + 1, entry.at
 
 
@@ -298,6 +300,7 @@ _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
     "edit": _edit,
     "undo": _edit,
     "redo": _edit,
+    PITCH: _edit,
     "station_edit": _station_edit,
     "station_undo": _station_edit,
     "station_redo": _station_edit,

@@ -39,7 +39,9 @@ from app.store.spare import sorted_spare_rows
 FORMAT = "touchline"
 FORMAT_VERSION = 1
 HEAD, STATIONS, GROUPS, SPARE = "touchline.json", "stations.jsonl", "groups.jsonl", "spare.jsonl"
-EDIT_KINDS = ("edit", "undo", "redo", "station_edit", "station_undo", "station_redo")
+EDIT_KINDS = (
+    "edit", "undo", "redo", "pitch", "station_edit", "station_undo", "station_redo",
+)  # fmt: skip
 _BATCH = 200
 
 

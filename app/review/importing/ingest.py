@@ -24,6 +24,7 @@ from app.store.group_rows import NewRows
 from app.store.groups import StoredGroup, read_groups, save_group
 from app.store.imports import known_groups, newest_imports
 from app.store.log import Entry, append
+from app.store.pitches import edited_pitches, last_change
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
 
@@ -216,7 +217,9 @@ def _insert(
         return
     at, rows = now(), NewRows(session, origin.dataset_id)
     ids, entries = [], []
-    for group, digest in fresh:
+    pitches = edited_pitches(session, origin.dataset_id, {group.match for group, _ in fresh})
+    for brought, digest in fresh:
+        group = replace(brought, pitch=pitches.get(brought.match, brought.pitch))
         first = len(rows.views)
         identity = rows.add_group(group, digest, at, shared)
         places = {row["key"]: (row["id"], row["station_id"]) for row in rows.views[first:]}
@@ -239,6 +242,10 @@ def _follow(
 ) -> None:
     stored, at = read_groups(session, [group_id])[group_id], now()
     followed = follow_group(stored, incoming)
+    if last_change(session, [group_id]) is not None:
+        # A person gave the match its pitch.
+        edited = replace(followed.group, pitch=stored.group.pitch)
+        followed = replace(followed, group=edited)
     save_group(
         session, stored, followed.group, at=at, source=followed.base, digest=digest, shared=shared
     )

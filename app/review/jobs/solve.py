@@ -6,10 +6,12 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 
 from app.review.datasets.dataset import get_dataset, list_datasets
+from app.review.editing.pitches import DatasetPitches, apply_pitches, estimate_pitches
 from app.review.editing.recompute import SolveReport, solve_dataset, stale_groups
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs, Pool
 from app.review.policies.policy import PolicyState, apply_policy
+from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.store.answers import Keep, Kept, keep_nothing
 from app.store.codecs import Json
@@ -29,6 +31,14 @@ class Judged:
     """A dataset under another policy, and the job that solves what that left stale."""
 
     state: PolicyState
+    job: Job
+
+
+@dataclass(frozen=True)
+class Sized:
+    """The pitches of a dataset as they are now, and the job that solves what that left stale."""
+
+    state: DatasetPitches
     job: Job
 
 
@@ -78,6 +88,36 @@ def request_policy(
     return judged[0]
 
 
+def request_pitches(
+    jobs: Jobs,
+    store: Store,
+    dataset_id: int,
+    wanted: dict[str, Pitch],
+    *,
+    if_match: str,
+    actor: str,
+    keep: Keep[Sized] = keep_nothing,
+) -> Sized:
+    """Give matches of a dataset another pitch, and solve what that leaves stale, soon.
+
+    Raises:
+        NotFoundError: There is no such match.
+        StaleRevisionError: Somebody else was faster.
+    """
+    sized: list[Sized] = []
+
+    def change(job: Job) -> Kept:
+        def write(session: Session) -> None:
+            state = apply_pitches(session, dataset_id, wanted, if_match=if_match, actor=actor)
+            sized.append(Sized(state, job))
+            keep(sized[0])(session)
+
+        return write
+
+    request_solve(jobs, store, dataset_id, actor=actor, keep=change)
+    return sized[0]
+
+
 def resume_solving(jobs: Jobs, store: Store) -> None:
     """Let solving that an earlier server was at go on."""
     jobs.resumes(KIND, lambda job: solve_work(store, job.dataset_id or 0, jobs.pool))
@@ -100,6 +140,9 @@ def solve_work(store: Store, dataset_id: int, pool: Pool | None = None) -> Work:
         with pool() if pool is not None and large else nullcontext() as executor:
             told = counting(progress, "groups solved")
             report = solve_dataset(store, dataset_id, executor, told)
+            # It stays at the groups that are solved, and can be stopped all the same.
+            total = report.total
+            estimate_pitches(store, dataset_id, executor, lambda *_: told(total, total))
         return {"policy": found.policy.name, **_report(report)}
 
     return work

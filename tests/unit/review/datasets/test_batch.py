@@ -1,11 +1,12 @@
 import json
+import math
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_writer import write_line_files
-from app.errors import InputError
+from app.errors import DatasetFormatError, InputError
 from app.review.datasets.batch import calibrate_files, estimate_pitch_of_files, score_files
 from app.soccer.annotation import make_lines
 from app.soccer.pitch import Pitch
@@ -108,6 +109,59 @@ class TestCalibrateFiles:
         with pytest.raises(InputError, match="holds no line files"):
             run(tmp_path / "empty", tmp_path / "out")
         assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def match(tmp_path):
+    """Seven frames of one main camera, the last with few markings, and a replay."""
+    frames = {}
+    for number, x in enumerate((-38.0, -30.0, 28.0, 32.0, 36.0, 40.0)):
+        camera = looking((1.0, 60.0, -14.0), (x, -2.0, 0.0), 1700.0, bend=BEND)
+        frames[f"0{number}"] = click(camera, 1.0, number)
+    near = click(looking((1.0, 60.0, -14.0), (38.0, -2.0, 0.0), 3200.0, bend=BEND), 1.0, 3)
+    few = ("Big rect. right main", "Big rect. right top", "Circle right", "Small rect. right main")
+    frames["06"] = make_lines({name: near[name] for name in few})
+    return write(tmp_path / "match", **frames, replay=click(BEHIND_GOAL, 0.5))
+
+
+def place(out, stem):
+    return json.loads((out / f"camera_{stem}.json").read_text())["position_meters"]
+
+
+class TestMatches:
+    @pytest.mark.parametrize("ending", ["json", "csv"])
+    def test_frames_of_a_named_match_share_the_position(self, match, tmp_path, ending):
+        named = {f"0{number}": "cup" for number in range(7)} | {"replay": "cup"}
+        file = tmp_path / f"matches.{ending}"
+        rows = "".join(f"{frame},{name}\n" for frame, name in named.items())
+        file.write_text(json.dumps(named) if ending == "json" else f"frame,match\n{rows}")
+        run(match, tmp_path / "alone")
+        summary = run(match, tmp_path / "shared", matches=file)
+        assert (summary["calibrated"], summary["matches"]) == (8, 1)
+        far = [math.dist(place(tmp_path / out, "06"), (1, 60, -14)) for out in ("alone", "shared")]
+        assert far[1] < min(1.0, far[0])
+        assert place(tmp_path / "shared", "replay") == place(tmp_path / "alone", "replay")
+
+    def test_matches_are_guessed_where_nobody_names_them(self, match, tmp_path):
+        summary = run(match, tmp_path / "out", guess=True, with_leave_one_out=True)
+        assert summary["matches"] == 1
+        assert math.dist(place(tmp_path / "out", "06"), (1, 60, -14)) < 1.0
+        rows = json.loads((tmp_path / "out" / "leave_one_out.json").read_text())
+        assert {row["frame"] for row in rows} == {*(f"0{number}" for number in range(7)), "replay"}
+
+    def test_frames_that_nobody_names_are_alone(self, match, tmp_path):
+        file = tmp_path / "matches.json"
+        file.write_text("{}")
+        run(match, tmp_path / "alone")
+        run(match, tmp_path / "shared", matches=file)
+        for stem in ("00", "06"):
+            assert place(tmp_path / "shared", stem) == place(tmp_path / "alone", stem)
+
+    def test_a_file_of_something_else_is_named(self, match, tmp_path):
+        file = tmp_path / "matches.csv"
+        file.write_text("a,b\n1,2\n")
+        with pytest.raises(DatasetFormatError, match="frame"):
+            run(match, tmp_path / "out", matches=file)
 
 
 class TestScoreFiles:

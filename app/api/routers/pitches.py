@@ -1,0 +1,86 @@
+"""The pitches of a dataset's matches, and the change of one."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+
+from app.api.conflicts import current_state
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
+from app.api.jobs import job_address
+from app.api.problem import Responses, responses
+from app.api.reply import AskedUnder, Reply, document
+from app.api.schemas.job import JobDocument
+from app.api.schemas.pitches import PitchChange, PitchesDocument
+from app.review.editing.pitches import DatasetPitches, read_pitches
+from app.review.jobs.solve import Sized, request_pitches
+from app.soccer.pitch import Pitch
+
+router = APIRouter(prefix="/datasets/{dataset}/pitches", tags=["datasets"])
+
+TAGGED = {"ETag": {"description": "Of the sizes in use.", "schema": {"type": "string"}}}
+LOCATED = {"Location": {"description": "Of the job.", "schema": {"type": "string"}}}
+CHANGED: Responses = {
+    202: {
+        "description": "The job that solves what the change left stale.",
+        "headers": {**TAGGED, **LOCATED},
+    }
+}
+
+
+@router.get("", operation_id="listPitches", responses={**responses(404), 200: {"headers": TAGGED}})
+def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> PitchesDocument:
+    """How large the pitch of each match is taken to be, and how large its lines show it.
+
+    The estimate is made after solving and kept until the lines change; where it differs beyond
+    its uncertainty it is `proposed`, and the match's first group has the finding `pitch_size`.
+    """
+    state = read_pitches(store, dataset)
+    response.headers.update(_tagged(state))
+    return PitchesDocument.model_validate(state)
+
+
+@router.patch(
+    "",
+    operation_id="setPitch",
+    status_code=202,
+    response_model=JobDocument,
+    responses={**responses(404, 412, 413, 415, 428), **CHANGED},
+)
+def set_pitch(
+    dataset: DatasetPath,
+    change: PitchChange,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    asked: AskedUnder,
+) -> Response:
+    """Give a match another pitch, all its groups at once.
+
+    They are solved again by the job; `result.pitches` of the answer is the list as it is now.
+    The size before is `previous` there: sent the same way it takes the change back.
+    """
+    store = services.store
+    present = read_pitches(store, dataset)
+    reply = Reply(asked, _sized)
+    with current_state(lambda: PitchesDocument.model_validate(read_pitches(store, dataset))):
+        sized = request_pitches(
+            services.jobs,
+            store,
+            present.dataset_id,
+            {change.match: Pitch(change.length, change.width)},
+            if_match=if_match,
+            actor=actor,
+            keep=reply.keep,
+        )
+    return reply.of(sized)
+
+
+def _sized(sized: Sized) -> Response:
+    pitches = PitchesDocument.model_validate(sized.state)
+    job = JobDocument.model_validate(sized.job)
+    job.result = {"pitches": pitches.model_dump(mode="json")}
+    return document(job, 202, {**_tagged(sized.state), **job_address(sized.job)})
+
+
+def _tagged(state: DatasetPitches) -> dict[str, str]:
+    return {"ETag": state.etag, "Cache-Control": "private, no-cache"}

@@ -1,0 +1,56 @@
+"""The pitches of a dataset's matches: in use, as the lines show them, and proposed."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AliasPath, BaseModel, ConfigDict, Field
+
+from app.api.schemas.document import Document
+from app.api.schemas.group import PitchSize
+from app.soccer.pitch import LENGTH_RANGE, WIDTH_RANGE
+
+
+class PitchEstimateDocument(Document):
+    """What the lines of a match show; null: they do not show it."""
+
+    length: float | None = Field(description="Metres.")
+    width: float | None = Field(description="Metres.")
+    length_sigma_m: float | None = Field(description="Standard deviation of the length.")
+    width_sigma_m: float | None = Field(description="Standard deviation of the width.")
+    frames: int = Field(description="Pictures that it rests on.")
+
+
+class MatchPitchDocument(Document):
+    """The pitch of one match."""
+
+    match: str
+    group: str = Field(description="Key of the first of its groups.")
+    group_id: int
+    groups: int
+    length: float = Field(validation_alias=AliasPath("pitch", "length"), description="In use, m.")
+    width: float = Field(validation_alias=AliasPath("pitch", "width"), description="In use, m.")
+    mixed: bool = Field(description="Its groups were brought with several sizes.")
+    estimate: PitchEstimateDocument | None = Field(description="Null while it is not computed.")
+    problem: str | None = Field(description="Why it cannot be estimated.")
+    proposed: PitchSize | None = Field(
+        description="The size to use instead: it differs beyond its uncertainty."
+    )
+    previous: PitchSize | None = Field(description="The size before it was changed last.")
+
+
+class PitchesDocument(Document):
+    """The pitches of a dataset's matches, by name of the match."""
+
+    etag: str = Field(description="What a change of them builds on.")
+    items: list[MatchPitchDocument]
+
+
+class PitchChange(BaseModel):
+    """Give a match another pitch: all its groups at once."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    match: str = Field(min_length=1, max_length=1000)
+    length: Annotated[float, Field(ge=LENGTH_RANGE[0], le=LENGTH_RANGE[1])]
+    width: Annotated[float, Field(ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])]

@@ -1,0 +1,117 @@
+"""The command on pitches: what size line files show, or the matches of a dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.commands.opened import executor_of, opened_store
+from app.commands.options import Json, Size, Workers, read_settings
+from app.commands.terminal import print_json, print_values, say, show_progress
+from app.errors import InputError
+
+if TYPE_CHECKING:
+    from app.review.editing.pitches import DatasetPitches, PitchState
+
+commands = typer.Typer()
+
+
+@commands.command()
+def pitch(
+    source: Annotated[
+        str,
+        typer.Argument(metavar="IN", help="Folder or zip of line files, or name of a dataset."),
+    ],
+    size: Size,
+    accept: Annotated[
+        bool, typer.Option("--accept", help="Dataset: give matches the size that is proposed.")
+    ] = False,
+    match: Annotated[
+        str | None, typer.Option(help="Dataset: this match alone, as the list names it.")
+    ] = None,
+    set_: Annotated[
+        str | None,
+        typer.Option("--set", metavar="105x68|previous", help="Dataset: this size for --match."),
+    ] = None,
+    workers: Workers = None,
+    json_: Json = False,
+) -> None:
+    """Estimate the size of a pitch from line files of one match, or of each match of a dataset.
+
+    A length or width that the lines do not show is unknown. After a change of a dataset's
+    pitches, `touchline solve` computes what follows from it.
+    """
+    if Path(source).exists():
+        if accept or match or set_:
+            raise typer.BadParameter("--accept, --match and --set are for datasets")
+        from app.review.datasets.batch import estimate_pitch_of_files
+
+        print_values(estimate_pitch_of_files(Path(source), size=size), json_)
+        return
+    if set_ is not None and match is None:
+        raise typer.BadParameter("--set needs --match")
+    _print(_of_dataset(source, accept, match, set_, workers), match, json_)
+
+
+def _of_dataset(
+    dataset: str, accept: bool, match: str | None, size: str | None, workers: int | None
+) -> DatasetPitches:
+    from app.review.editing.pitches import change_pitches, estimate_pitches
+
+    settings = read_settings()
+    with (
+        opened_store(settings) as store,
+        executor_of(workers or settings.workers) as executor,
+        show_progress("Estimating") as progress,
+    ):
+        found = estimate_pitches(store, dataset, executor, progress)
+        chosen = [item for item in found.items if match in (None, item.match)]
+        if match is not None and not chosen:
+            raise InputError(f'"{dataset}" has no match {match}')
+        wanted = {item.match: item.proposed for item in chosen if accept and item.proposed}
+        if size is not None:
+            wanted = {chosen[0].match: _size(chosen[0], size)}
+        if not wanted:
+            return found
+        return change_pitches(store, dataset, wanted, if_match=found.etag, actor="local")
+
+
+def _size(state: PitchState, text: str) -> Any:
+    from app.review.editing.pitches import parse_pitch
+
+    if text != "previous":
+        return parse_pitch(text)
+    if state.previous is None:
+        raise InputError(f"the pitch of {state.match} has not been changed")
+    return state.previous
+
+
+def _print(found: DatasetPitches, match: str | None, json_: bool) -> None:
+    items = [item for item in found.items if match in (None, item.match)]
+    if json_:
+        print_json([pitch_values(item) for item in items])
+        return
+    for item in items:
+        values = pitch_values(item)
+        size = f"{item.pitch.length:g} x {item.pitch.width:g} m"
+        shown = f"length {_number(values, 'length')}, width {_number(values, 'width')}"
+        proposed = item.proposed
+        advice = "" if proposed is None else f"; use {proposed.length:g} x {proposed.width:g} m"
+        say(f"{item.match}: {size}; lines show {item.problem or shown}{advice}")
+
+
+def _number(values: dict[str, Any], name: str) -> str:
+    found = (values["estimate"] or {}).get(name)
+    if found is None:
+        return "unknown"
+    return f"{found:.2f} m (sigma {values['estimate'][f'{name}_sigma_m']:.2f})"
+
+
+def pitch_values(state: PitchState) -> dict[str, Any]:
+    """A match's pitch as plain values, as the API spells them."""
+    from dataclasses import asdict
+
+    values = asdict(state)
+    return {**values.pop("pitch"), **values}

@@ -1,0 +1,317 @@
+"""Pitches: the size that each match has, the one that its lines show, and the change to it.
+
+The estimate is computed from the lines alone, so it never depends on the size in use, and is kept
+until the lines change. Where it differs from the size in use beyond its uncertainty it is proposed:
+a finding of the match's first group, until somebody accepts it or says another size.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from app.errors import GeometryError, InputError, NotFoundError
+from app.progress import Progress
+from app.review.datasets.dataset import read_dataset
+from app.review.datasets.fan_out import fan_out
+from app.review.editing.codec import edit_from_json, edit_to_json
+from app.review.editing.edit import SetPitch
+from app.review.editing.state import require_etag
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.soccer.solution import SOLVER_VERSION
+from app.solving.pitch_size import PitchEstimate, PitchFrame, estimate_pitch
+from app.store.answers import Keep, keep_nothing
+from app.store.clock import now
+from app.store.digest import digest
+from app.store.groups import next_revision, read_groups, save_revision
+from app.store.log import Entry, append
+from app.store.pitches import (
+    PITCH,
+    MatchPitch,
+    groups_of_match,
+    last_change,
+    lines_digests,
+    lines_of_match,
+    match_pitches,
+    read_estimates,
+    replace_pitch_findings,
+    save_estimate,
+)
+from app.store.queue import refresh_queue
+from app.store.session import Session, Store
+
+_BATCH = 100
+
+
+@dataclass(frozen=True)
+class PitchState:
+    """The pitch of one match.
+
+    Attributes:
+        group_id: Of the first of its groups, like ``group`` (the key).
+        groups: How many it has.
+        pitch: The size in use; the most frequent where groups were brought with several.
+        mixed: Whether they were.
+        estimate: What its lines show; None while that is not computed, and where ``problem``
+            says why it cannot be.
+        proposed: The size to use instead, or None.
+        previous: The size before it was changed last, or None.
+    """
+
+    match: str
+    group_id: int
+    group: str
+    groups: int
+    pitch: Pitch
+    mixed: bool
+    estimate: PitchEstimate | None
+    problem: str | None
+    proposed: Pitch | None
+    previous: Pitch | None
+
+    @property
+    def sentence(self) -> str:
+        """Why the proposed size is proposed."""
+        found = self.estimate
+        assert found is not None and self.proposed is not None
+        sizes = f"{self.proposed.length:g} x {self.proposed.width:g} m"
+        return (
+            f"the lines of {found.frames} frames show a pitch of {sizes}, and it is solved as "
+            f"{self.pitch.length:g} x {self.pitch.width:g} m; accept the size for the whole match "
+            "under Statistics"
+        )
+
+
+@dataclass(frozen=True)
+class DatasetPitches:
+    """The pitches of a dataset's matches, by name of the match."""
+
+    dataset_id: int
+    dataset: str
+    items: tuple[PitchState, ...]
+
+    @property
+    def etag(self) -> str:
+        """Quoted, for ETag and If-Match: of the sizes in use."""
+        sizes = [[item.match, asdict(item.pitch), item.mixed, item.groups] for item in self.items]
+        return f'"{digest([self.dataset_id, sizes])[:16]}"'
+
+    @property
+    def proposals(self) -> tuple[PitchState, ...]:
+        """The matches for which another size is proposed."""
+        return tuple(item for item in self.items if item.proposed is not None)
+
+
+@dataclass(frozen=True)
+class _Task:
+    match: str
+    inputs: str
+    frames: tuple[PitchFrame, ...]
+    policy: CalibrationPolicy
+
+
+def read_pitches(store: Store, dataset: str | int) -> DatasetPitches:
+    """The pitches of a dataset's matches.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        return _read(session, dataset)
+
+
+def estimate_pitches(
+    store: Store,
+    dataset: str | int,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> DatasetPitches:
+    """Estimate the pitch of every match whose lines are others than when it was estimated last.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        executor: Where matches are worked on; None: here, one after the other.
+        progress: Called with matches done and in all; an error that it raises ends the run.
+    """
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        present = read_estimates(session, found.id)
+        policy = found.policy.calibration
+        stale = [
+            (match, inputs)
+            for match, value in lines_digests(session, found.id).items()
+            if (inputs := _inputs(value, policy))
+            != (present[match].inputs if match in present else "")
+        ]
+    tasks = (_task(store, found.id, match, inputs, policy) for match, inputs in stale)
+    for done, (match, values) in enumerate(fan_out(_estimate, tasks, executor), start=1):
+        with store.write() as session:
+            save_estimate(session, found.id, match, **values)
+        if progress is not None:
+            progress(done, len(stale))
+    with store.write() as session:
+        note_proposals(session, found.id)
+    return read_pitches(store, found.id)
+
+
+def change_pitches(
+    store: Store,
+    dataset: str | int,
+    wanted: dict[str, Pitch],
+    *,
+    if_match: str | None,
+    actor: str,
+    keep: Keep[DatasetPitches] = keep_nothing,
+) -> DatasetPitches:
+    """Give matches another pitch: all their groups at once; they are stale until solved again.
+
+    Each group gets an entry of the log, from which the size before can be had back.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        wanted: Sizes by match; the one in use changes nothing.
+        if_match: ETag of the pitches that the change builds on; None: whatever they are.
+        actor: Who says so.
+        keep: Keeps the answer with the change.
+
+    Raises:
+        NotFoundError: There is no such dataset or match.
+        StaleRevisionError: Somebody else was faster.
+    """
+    with store.write() as session:
+        return apply_pitches(session, dataset, wanted, if_match=if_match, actor=actor, keep=keep)
+
+
+def apply_pitches(
+    session: Session,
+    dataset: str | int,
+    wanted: dict[str, Pitch],
+    *,
+    if_match: str | None,
+    actor: str,
+    keep: Keep[DatasetPitches] = keep_nothing,
+) -> DatasetPitches:
+    """``change_pitches`` within a write session."""
+    state = _read(session, dataset)
+    if if_match is not None:
+        require_etag(state.etag, if_match, f'the pitches of "{state.dataset}"')
+    known = {item.match for item in state.items}
+    for match, pitch in wanted.items():
+        if match not in known:
+            raise NotFoundError(f'"{state.dataset}" has no match {match}')
+        _change_match(session, state.dataset_id, match, pitch, actor)
+    note_proposals(session, state.dataset_id)
+    changed = _read(session, state.dataset_id)
+    keep(changed)(session)
+    return changed
+
+
+def parse_pitch(text: str) -> Pitch:
+    """A pitch as it is typed, ``105x68``, in metres.
+
+    Raises:
+        InputError: It is none, or none that the Laws allow.
+    """
+    parts = text.lower().replace(",", ".").split("x")
+    try:
+        length, width = map(float, parts)
+    except ValueError:
+        raise InputError(f'"{text}" is not the size of a pitch; write it as 105x68') from None
+    return Pitch(length, width)
+
+
+def note_proposals(session: Session, dataset_id: int) -> None:
+    """Bring the findings of a dataset's matches in step with what is proposed now."""
+    proposals = _read(session, dataset_id).proposals
+    found = ((item.group_id, item.sentence) for item in proposals)
+    refresh_queue(session, replace_pitch_findings(session, dataset_id, found))
+
+
+def _change_match(session: Session, dataset_id: int, match: str, pitch: Pitch, actor: str) -> None:
+    edit, at = SetPitch(pitch.length, pitch.width), now()
+    ids = groups_of_match(session, dataset_id, match)
+    for start in range(0, len(ids), _BATCH):
+        entries, changed = [], []
+        for stored in read_groups(session, ids[start : start + _BATCH]).values():
+            group = edit.apply(stored.group)
+            if group == stored.group:
+                continue
+            save_revision(session, stored, next_revision(stored, group, at))
+            body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(stored.group))}
+            entries.append(Entry(PITCH, actor, at, body, dataset_id, stored.id))
+            changed.append(stored.id)
+        append(session, entries)
+        refresh_queue(session, changed)
+
+
+def _read(session: Session, dataset: str | int) -> DatasetPitches:
+    found = read_dataset(session, dataset)
+    estimates = read_estimates(session, found.id)
+    items = tuple(
+        _state(session, found.id, item, estimates.get(item.match))
+        for item in match_pitches(session, found.id)
+    )
+    return DatasetPitches(found.id, found.name, items)
+
+
+def _state(session: Session, dataset_id: int, item: MatchPitch, row: Any) -> PitchState:
+    estimate = None
+    if row is not None and row.problem is None:
+        estimate = PitchEstimate(
+            row.length, row.width, row.length_sigma, row.width_sigma, row.frames
+        )
+    pitch = item.pitches[0]
+    changed = last_change(session, [item.group_id])
+    previous = None
+    if changed is not None:
+        before = edit_from_json(changed.body["inverse"])
+        assert isinstance(before, SetPitch)
+        previous = Pitch(before.length, before.width)
+    return PitchState(
+        match=item.match,
+        group_id=item.group_id,
+        group=item.group,
+        groups=item.groups,
+        pitch=pitch,
+        mixed=len(item.pitches) > 1,
+        estimate=estimate,
+        problem=None if row is None else row.problem,
+        proposed=None if estimate is None else estimate.proposal(pitch),
+        previous=previous,
+    )
+
+
+def _inputs(lines: str, policy: CalibrationPolicy) -> str:
+    """Key of an estimate: all that it is computed from."""
+    return digest([SOLVER_VERSION, asdict(policy), lines])
+
+
+def _task(
+    store: Store, dataset_id: int, match: str, inputs: str, policy: CalibrationPolicy
+) -> _Task:
+    with store.read() as session:
+        lines = lines_of_match(session, dataset_id, match)
+    return _Task(match, inputs, tuple(PitchFrame(*item) for item in lines), policy)
+
+
+def _estimate(task: _Task) -> tuple[str, dict[str, Any]]:
+    """Values of the estimate's row; runs in a worker."""
+    nothing = PitchEstimate(None, None, None, None, 0)
+    problem = None
+    try:
+        found = estimate_pitch(task.frames, task.policy)
+    except GeometryError as error:
+        found, problem = nothing, error.message
+    return task.match, {
+        "inputs": task.inputs,
+        "length": found.length,
+        "width": found.width,
+        "length_sigma": found.length_sigma_m,
+        "width_sigma": found.width_sigma_m,
+        "frames": found.frames,
+        "problem": problem,
+    }

@@ -1,0 +1,170 @@
+"""Pitches in the database: the size that each match has, and the one that its lines show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import delete, func, insert, select
+from sqlalchemy.orm import Session
+
+from app.soccer.annotation import Lines
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+from app.store.codecs import lines_from_json, parse
+from app.store.digest import digest
+from app.store.log import read_entry
+from app.store.models import GroupModel, ImportFindingModel, LogModel, StationModel, ViewModel
+from app.store.pitch_models import PitchEstimateModel
+
+PITCH = "pitch"
+"""Kind of the log's entries that say how long and wide a pitch is, one for each group."""
+FINDING = "pitch_size"
+
+
+@dataclass(frozen=True)
+class MatchPitch:
+    """The pitch that a match has now.
+
+    Attributes:
+        group_id: Of its first group, like ``group`` (the key).
+        groups: How many it has.
+        pitches: The sizes that they have: one, but for a dataset that brought several.
+    """
+
+    match: str
+    group_id: int
+    group: str
+    groups: int
+    pitches: tuple[Pitch, ...]
+
+
+def match_pitches(session: Session, dataset_id: int) -> list[MatchPitch]:
+    """Every match of a dataset, by name; groups without a match belong to none."""
+    model = GroupModel
+    statement = (
+        select(model.match, model.pitch_length, model.pitch_width, func.count(), func.min(model.id))
+        .where(model.dataset_id == dataset_id, model.match != "")
+        .group_by(model.match, model.pitch_length, model.pitch_width)
+        .order_by(model.match, func.count().desc())
+    )
+    rows: dict[str, list[Any]] = {}
+    for row in session.execute(statement):
+        rows.setdefault(row[0], []).append(row)
+    first = {match: min(row[4] for row in found) for match, found in rows.items()}
+    keys = _keys(session, first.values())
+    return [
+        MatchPitch(
+            match,
+            first[match],
+            keys[first[match]],
+            sum(row[3] for row in found),
+            tuple(Pitch(row[1], row[2]) for row in found),
+        )
+        for match, found in rows.items()
+    ]
+
+
+def groups_of_match(session: Session, dataset_id: int, match: str) -> list[int]:
+    """Ids of the groups of a match."""
+    model = GroupModel
+    where = (model.dataset_id == dataset_id, model.match == match)
+    return list(session.scalars(select(model.id).where(*where).order_by(model.id)))
+
+
+def lines_digests(session: Session, dataset_id: int) -> dict[str, str]:
+    """Digest of the lines of each match's cameras."""
+    rows = session.execute(_cameras(StationModel.digest, dataset_id=dataset_id))
+    digests: dict[str, list[str]] = {}
+    for match, value in rows:
+        digests.setdefault(match, []).append(value)
+    return {match: digest(sorted(values)) for match, values in digests.items()}
+
+
+def lines_of_match(session: Session, dataset_id: int, match: str) -> list[tuple[Lines, ImageSize]]:
+    """Lines and size of every camera that shows the pitch of a match."""
+    columns = (StationModel.id, StationModel.lines, StationModel.width, StationModel.height)
+    statement = _cameras(*columns, dataset_id=dataset_id).where(GroupModel.match == match)
+    rows = session.execute(statement.order_by(StationModel.id)).all()
+    return [(lines_from_json(parse(row.lines)), ImageSize(row.width, row.height)) for row in rows]
+
+
+def _cameras(*columns: Any, dataset_id: int) -> Any:
+    """Each match's cameras that have lines, once."""
+    return (
+        select(GroupModel.match, *columns)
+        .join(ViewModel, ViewModel.group_id == GroupModel.id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(
+            GroupModel.dataset_id == dataset_id, GroupModel.match != "", StationModel.lines != "{}"
+        )
+        .distinct()
+    )
+
+
+def read_estimates(session: Session, dataset_id: int) -> dict[str, Any]:
+    """The rows of what was estimated, by match."""
+    model = PitchEstimateModel
+    rows = session.execute(select(*model.__table__.columns).where(model.dataset_id == dataset_id))
+    return {row.match: row for row in rows}
+
+
+def save_estimate(session: Session, dataset_id: int, match: str, **values: Any) -> None:
+    """Put an estimate in the place of the one before."""
+    statement = insert(PitchEstimateModel).prefix_with("OR REPLACE")
+    session.execute(statement, [{"dataset_id": dataset_id, "match": match, **values}])
+
+
+def edited_pitches(session: Session, dataset_id: int, matches: Iterable[str]) -> dict[str, Pitch]:
+    """The size that a person gave to matches, where one did."""
+    statement = (
+        select(GroupModel.match, GroupModel.pitch_length, GroupModel.pitch_width)
+        .join(LogModel, LogModel.group_id == GroupModel.id)
+        .where(
+            LogModel.kind == PITCH,
+            GroupModel.dataset_id == dataset_id,
+            GroupModel.match.in_(set(matches)),
+        )
+        .distinct()
+    )
+    return {match: Pitch(*size) for match, *size in session.execute(statement)}
+
+
+def last_change(session: Session, group_ids: Sequence[int]) -> Any:
+    """The newest log entry that said how large the pitch of some groups is, or None."""
+    newest = select(func.max(LogModel.id)).where(
+        LogModel.group_id.in_(group_ids), LogModel.kind == PITCH
+    )
+    number = session.scalar(newest)
+    return None if number is None else read_entry(session, number)
+
+
+def replace_pitch_findings(
+    session: Session, dataset_id: int, found: Iterable[tuple[int, str]]
+) -> list[int]:
+    """Put findings (group and sentence) in the place of a dataset's; returns groups concerned."""
+    model = ImportFindingModel
+    mine = select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
+    where = (model.kind == FINDING, model.group_id.in_(mine))
+    present = {
+        (row.group_id, row.sentence)
+        for row in session.execute(select(model.group_id, model.sentence).where(*where))
+    }
+    wanted = set(found)
+    if present == wanted:
+        return []
+    session.execute(delete(model).where(*where))
+    if wanted:
+        rows = [
+            {"group_id": group, "view": None, "kind": FINDING, "sentence": sentence}
+            for group, sentence in sorted(wanted)
+        ]
+        session.execute(insert(model), rows)
+    return sorted({group for group, _ in present ^ wanted})
+
+
+def _keys(session: Session, ids: Iterable[int]) -> dict[int, str]:
+    model = GroupModel
+    rows = session.execute(select(model.id, model.key).where(model.id.in_(list(ids))))
+    return {row.id: row.key for row in rows}

@@ -1,0 +1,58 @@
+// @ts-check
+/** How large each match's pitch is taken to be, what its lines show, and the size to accept. */
+
+import { html } from 'htm/preact';
+
+import { getPitches, setPitch } from '../api/pitches.js';
+import { count } from '../lib/format.js';
+import { matchName } from '../lib/match_name.js';
+import { pitchSize, shownSize } from '../lib/pitch_size.js';
+import { useResource } from '../lib/resource.js';
+import { JobProgress } from './job_progress.js';
+import { Trouble } from './page_frame.js';
+import { useSavePolicy } from './save_policy.js';
+
+/** @import {MatchPitchJson, PitchSizeJson} from '../api/pitches.js' */
+
+/**
+ * @param {{one: MatchPitchJson, busy: boolean, onSet: (size: PitchSizeJson) => void}} props
+ */
+function MatchPitch({ one, busy, onSet }) {
+	const { name, aside } = matchName(one.match);
+	/** @param {string} text @param {string} title @param {PitchSizeJson} size @param {string} kind */
+	const button = (text, title, size, kind) => html`
+		<button class=${`button button--small ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) onSet(size); }}>${text}</button>`;
+	const changed = one.previous !== null && (one.previous.length !== one.length || one.previous.width !== one.width);
+	return html`
+		<tr>
+			<th scope="row">${name}${aside ? html`<small>${aside}</small>` : null}</th>
+			<td>${one.mixed ? 'several sizes' : pitchSize(one)}</td>
+			<td>${one.problem ?? shownSize(one.estimate)}</td>
+			<td class="table__actions">
+				${one.proposed ? button(`Use ${pitchSize(one.proposed)}`, `Solve the ${count(one.groups)} groups of this match on this pitch`, one.proposed, 'button--primary') : null}
+				${one.previous && changed ? button('Take back', `Back to ${pitchSize(one.previous)}`, one.previous, '') : null}
+			</td>
+		</tr>`;
+}
+
+/** @param {{dataset: number}} props */
+export function Pitches({ dataset }) {
+	const { value, error, reload } = useResource((signal) => getPitches(dataset, signal), [dataset]);
+	const { job, busy, error: refused, send } = useSavePolicy(reload);
+	if (error) return html`<${Trouble} title="The pitches cannot be shown" error=${error} retry=${reload} />`;
+	if (!value?.items.length) return null;
+	const proposals = value.items.filter(({ proposed }) => proposed).length;
+	return html`
+		<section class="card card--flush statistics__matches" aria-labelledby="pitches-title">
+			<h2 id="pitches-title">Pitch sizes${proposals ? html` · ${count(proposals)} proposed` : null}</h2>
+			<table class="table">
+				<thead><tr><th>match</th><th>in use</th><th>lines show</th><th></th></tr></thead>
+				<tbody>${value.items.map((one) => html`
+					<${MatchPitch} key=${one.match} one=${one} busy=${busy} onSet=${(/** @type {PitchSizeJson} */ size) => send(() => setPitch(dataset, one.match, size, value.etag))} />`)}
+				</tbody>
+			</table>
+			${job ? html`<${JobProgress} job=${job} />` : null}
+			${refused ? html`<p class="form__error" role="alert">${refused}</p>` : null}
+		</section>
+	`;
+}

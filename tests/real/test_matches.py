@@ -1,0 +1,67 @@
+"""Frames of one match share their camera's position: real lines, left-out markings."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.datasets.report import Report
+from app.datasets.sn_calibration_reader import read_line_files
+from app.review.datasets.matches import shares_of
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.solving.calibrate import calibrate
+from app.solving.leave_one_out import error_without
+from app.solving.match_position import NO_PLACES, place_of
+from app.solving.pitch_size import PitchFrame, estimate_pitch
+
+DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
+LINES = DATA / "sn22-dev" / "lines.zip"
+pytestmark = pytest.mark.skipif(not LINES.is_file(), reason=f"no real data in {DATA}")
+
+SIZE, POLICY = ImageSize(960, 540), CalibrationPolicy()
+FRAMES, EVERY = 150, 8
+"""Whole matches are needed, so the first frames are taken, and one marking in eight is left out;
+``touchline calibrate --leave-one-out --matches auto`` takes them all."""
+NEAR_PX = 5.5
+
+
+@pytest.fixture(scope="module")
+def files():
+    return sorted(read_line_files(LINES, SIZE, Report()), key=lambda file: file.stem)[:FRAMES]
+
+
+@pytest.fixture(scope="module")
+def shares(files):
+    places = [place_of(calibrate(it.lines, Pitch(), SIZE, POLICY), SIZE) for it in files]
+    return shares_of(files, places, None)
+
+
+class TestShares:
+    def test_left_out_markings_are_predicted_better(self, files, shares):
+        asked = [(at, name) for at, file in enumerate(files) for name in file.lines][::EVERY]
+        errors = np.array(
+            [
+                [
+                    error_without(files[at].lines, name, Pitch(), SIZE, POLICY, others)
+                    for others in (NO_PLACES, shares[at].others)
+                ]
+                for at, name in asked
+            ],
+            float,
+        )
+        alone, shared = np.nanmean(errors < NEAR_PX, axis=0)
+        assert shared > 0.86
+        assert shared > alone + 0.02
+
+    def test_a_length_that_only_one_end_shows_is_unknown(self, files, shares):
+        """The frames of the second match show either end and hardly ever the middle with it."""
+        names = [share.match for share in shares]
+        second = [file for file, name in zip(files, names, strict=True) if name == names[10]]
+        found = estimate_pitch([PitchFrame(file.lines, SIZE) for file in second], POLICY)
+        assert found.length is None
+        assert found.width == pytest.approx(68.0, abs=1.5)

@@ -1,0 +1,183 @@
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+from app.errors import InputError, NotFoundError, StaleRevisionError
+from app.review.editing.edit import SetLines
+from app.review.editing.ledger import read_ledger
+from app.review.editing.pitches import (
+    change_pitches,
+    estimate_pitches,
+    parse_pitch,
+    read_pitches,
+)
+from app.review.editing.recompute import solve_dataset, stale_groups
+from app.review.editing.replay import rebuild, replay
+from app.review.editing.submit import load, submit, undo
+from app.review.importing.ingest import ingest
+from app.review.queue.findings import finding_values
+from app.soccer.group import Group, Station, View
+from app.soccer.pitch import Pitch
+from tests.cameras import SIZE, looking
+from tests.unit.solving.conftest import BEND, click
+
+SMALL, RIGHT = "a_small_pitch", "b_right_pitch"
+TRUE = Pitch(103.0, 66.0)
+
+
+@cache
+def season() -> tuple[Group, ...]:
+    """Two matches of six groups: one on a pitch smaller than the one that is assumed."""
+    groups = []
+    for match, pitch in ((SMALL, TRUE), (RIGHT, Pitch())):
+        for number in range(6):
+            target = (-30.0 + 12.0 * number, -4.0, 0.0)
+            camera = looking((1.0, 62.0, -16.0), target, 1200.0, bend=BEND)
+            station = Station(
+                f"{match}/{number}.png", SIZE, lines=click(camera, 0.7, number, pitch)
+            )
+            view = View(f"{number}.png", station)
+            groups.append(Group(f"{match}/{number}.png", (view,), match=match))
+    return tuple(groups)
+
+
+@pytest.fixture
+def solved(store, once):
+    """The season, solved, and the pitch of its matches estimated."""
+
+    def fill():
+        ingest(store, "demo", season(), source="files", actor="ann")
+        solve_dataset(store, "demo")
+        estimate_pitches(store, "demo")
+
+    once("season", fill)
+    return store
+
+
+def sizes(store):
+    return {item.match: item.pitch for item in read_pitches(store, "demo").items}
+
+
+def accept(store, match=SMALL, pitch=TRUE, **how):
+    how = {"if_match": None, "actor": "ann", **how}
+    return change_pitches(store, "demo", {match: pitch}, **how)
+
+
+class TestEstimatePitches:
+    def test_another_size_is_proposed_where_the_lines_show_one(self, solved):
+        (proposal,) = read_pitches(solved, "demo").proposals
+        assert proposal.match == SMALL
+        assert proposal.proposed.length == pytest.approx(103.0, abs=0.3)
+        assert proposal.proposed.width == pytest.approx(66.0, abs=0.3)
+
+    def test_the_match_has_one_finding(self, solved):
+        (found,) = [item for item in finding_values(solved, "demo") if item["kind"] == "pitch_size"]
+        assert found["group"] == f"{SMALL}/0.png"
+        assert "solved as 105 x 68 m" in found["sentence"]
+
+    def test_what_is_known_is_not_computed_again(self, solved, monkeypatch):
+        from app.review.editing import pitches
+
+        def refuse(*_):
+            raise AssertionError("estimated once more")
+
+        monkeypatch.setattr(pitches, "estimate_pitch", refuse)
+        estimate_pitches(solved, "demo")
+        accept(solved)
+        estimate_pitches(solved, "demo")
+        state = load(solved, 1)
+        view = state.group.views[0].key
+        submit(solved, 1, SetLines(view, {"Middle line": None}), if_match=state.etag, actor="ann")
+        with pytest.raises(AssertionError, match="once more"):
+            estimate_pitches(solved, "demo")
+
+    def test_a_match_of_few_frames_says_why_there_is_no_size(self, store):
+        ingest(store, "demo", season()[:3], source="files", actor="ann")
+        (item,) = estimate_pitches(store, "demo").items
+        assert (item.estimate, item.proposed) == (None, None)
+        assert "needs 5" in item.problem
+
+
+class TestChangePitches:
+    def test_all_groups_of_the_match_get_the_size_and_are_stale(self, solved):
+        accept(solved)
+        assert sizes(solved) == {SMALL: TRUE, RIGHT: Pitch()}
+        assert stale_groups(solved, "demo") == [1, 2, 3, 4, 5, 6]
+
+    def test_the_finding_goes_once_the_size_is_accepted(self, solved):
+        accept(solved)
+        solve_dataset(solved, "demo")
+        assert "pitch_size" not in {item["kind"] for item in finding_values(solved, "demo")}
+
+    def test_the_size_before_takes_it_back(self, solved):
+        accept(solved)
+        (small, _) = read_pitches(solved, "demo").items
+        assert small.previous == Pitch()
+        accept(solved, pitch=small.previous)
+        assert sizes(solved)[SMALL] == Pitch()
+        assert stale_groups(solved, "demo") == []
+        assert len(read_pitches(solved, "demo").proposals) == 1
+
+    def test_the_log_tells_it_again(self, solved):
+        accept(solved)
+        with solved.read() as session:
+            assert replay(session) == read_ledger(session)
+        before = [load(solved, number).stored for number in (1, 7)]
+        rebuild(solved)
+        assert [load(solved, number).stored for number in (1, 7)] == before
+
+    def test_undo_of_a_group_takes_back_its_own_edits_and_not_the_pitch(self, solved):
+        state = load(solved, 1)
+        view = state.group.views[0].key
+        submit(solved, 1, SetLines(view, {"Middle line": None}), if_match=state.etag, actor="ann")
+        accept(solved)
+        state = undo(solved, 1, if_match=load(solved, 1).etag, actor="ann")
+        assert state.group.pitch == TRUE
+        assert state.group.views[0].station.lines == season()[0].views[0].station.lines
+
+    def test_an_edit_that_builds_on_the_size_before_is_refused(self, solved):
+        state = load(solved, 1)
+        accept(solved)
+        edit = SetLines(state.group.views[0].key, {"Middle line": None})
+        with pytest.raises(StaleRevisionError):
+            submit(solved, 1, edit, if_match=state.etag, actor="ben")
+
+    def test_two_people_do_not_overwrite_each_other(self, solved):
+        etag = read_pitches(solved, "demo").etag
+        accept(solved, if_match=etag)
+        with pytest.raises(StaleRevisionError):
+            accept(solved, pitch=Pitch(100.0, 64.0), if_match=etag)
+
+    def test_the_size_in_use_changes_nothing(self, solved):
+        revision = load(solved, 1).revision
+        accept(solved, pitch=Pitch())
+        assert load(solved, 1).revision == revision
+
+    def test_an_unknown_match_is_refused(self, solved):
+        with pytest.raises(NotFoundError, match="no match nowhere"):
+            accept(solved, match="nowhere")
+
+    def test_an_import_keeps_it_and_new_groups_of_the_match_get_it(self, store):
+        first, second, third, *_ = season()
+        ingest(store, "demo", (first, second), source="files", actor="ann")
+        accept(store)
+        ingest(store, "demo", (first, third), source="files", actor="ann")
+        changed = Group(
+            second.key, second.views, match=SMALL, label="the source says more of it now"
+        )
+        ingest(store, "demo", (changed,), source="files", actor="ann")
+        assert [load(store, number).group.pitch for number in (1, 2, 3)] == [TRUE] * 3
+        assert load(store, 2).group.label == changed.label
+        with store.read() as session:
+            assert replay(session) == read_ledger(session)
+
+
+class TestParsePitch:
+    def test_is_length_by_width(self):
+        assert parse_pitch("103x66.5") == Pitch(103.0, 66.5)
+
+    def test_says_how_it_is_written(self):
+        with pytest.raises(InputError, match="write it as 105x68"):
+            parse_pitch("big")
