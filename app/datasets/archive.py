@@ -17,9 +17,10 @@ from typing import IO, Protocol
 from urllib.parse import unquote
 
 from app.config import Settings
+from app.datasets.plain_file import open_plain
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, UnsafePathError
-from app.nested_zip import open_nested
+from app.nested_zip import UNREADABLE, open_nested, open_zip
 
 _DRIVE = re.compile(r"[A-Za-z]:")
 _RATIO_FLOOR = 1024 * 1024
@@ -143,7 +144,7 @@ def open_tree(path: Path, report: Report, limits: Limits = DEFAULT_LIMITS) -> Fi
         report.note(str(path), None, None, "does not exist")
         return None
     try:
-        with path.open("rb") as file:
+        with open_plain(path) as file:
             is_zip = file.read(2) == b"PK" or path.suffix.lower() == ".zip"
         return ZipTree(path, report, limits) if is_zip else FileAlone(path, report, limits)
     except DatasetFormatError as error:
@@ -209,10 +210,7 @@ class FolderTree:
         """The content as a stream."""
         shown = self.shown(name)
         try:
-            real = resolve_inside(self.path, name)
-            if not stat.S_ISREG(real.stat().st_mode):
-                raise DatasetFormatError(shown, None, None, "is not a plain file")
-            return real.open("rb")
+            return open_plain(resolve_inside(self.path, name), shown)
         except UnsafePathError as error:
             raise DatasetFormatError(shown, None, None, error.message) from error
         except OSError as error:
@@ -353,6 +351,8 @@ class ZipTree:
         kind = stat.S_IFMT(member.external_attr >> 16)
         if kind not in (0, stat.S_IFREG):
             return "is a link or device, not a plain file"
+        if member.flag_bits & UNREADABLE:
+            return "has a name that is no text, so it cannot be read"
         if folded[member.filename.casefold()] > 1:
             return "is there more than once, or under names that differ in case alone"
         if member.file_size > _RATIO_FLOOR and (
@@ -372,7 +372,7 @@ _BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplemente
 
 def _open_zip(path: Path) -> zipfile.ZipFile:
     try:
-        return zipfile.ZipFile(path)
+        return open_zip(path)
     except (*_BROKEN, ValueError, UnicodeError) as error:
         problem = "is not a complete zip file; was it cut off while it was copied?"
         raise DatasetFormatError(str(path), None, None, problem) from error

@@ -36,7 +36,7 @@ PLAIN_WORDS = """
     model models modules name names navigation neighbours nested notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages
     paint palette panel parquet parse parts patch pen pins pitch pixel place places png pointer
-    policies pool popover pose preview problem progress projection props query rail reader reasons
+    policies plain pool popover pose preview problem progress projection props query rail reader reasons
     recompute record remedies removal render reply report requests resect resource restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows shared sheet singular site smallest solve
