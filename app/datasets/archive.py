@@ -293,13 +293,8 @@ class ZipTree:
 
     def read_bytes(self, name: str) -> bytes:
         """The whole content of one member."""
-        shown = self.shown(name)
-        try:
-            with self.open(name) as file:
-                return _read_capped(file, self._limits.file_bytes, shown)
-        except _BROKEN as error:
-            problem = "is damaged inside the zip file"
-            raise DatasetFormatError(shown, None, None, problem) from error
+        with self.open(name) as file:
+            return _read_capped(file, self._limits.file_bytes, self.shown(name))
 
     def open(self, name: str) -> IO[bytes]:
         """The content as a stream."""
@@ -387,14 +382,21 @@ def capped_chunks(file: IO[bytes], limit: int, shown: str) -> Iterator[bytes]:
     """A stream in chunks.
 
     Raises:
-        DatasetFormatError: It holds more than ``limit`` bytes.
+        DatasetFormatError: It holds more than ``limit`` bytes, or is damaged.
     """
     total = 0
-    while chunk := file.read(_CHUNK):
+    while chunk := _chunk(file, shown):
         total += len(chunk)
         if total > limit:
             raise DatasetFormatError(shown, None, None, f"is longer than {limit:,} bytes")
         yield chunk
+
+
+def _chunk(file: IO[bytes], shown: str) -> bytes:
+    try:
+        return file.read(_CHUNK)
+    except _BROKEN as error:
+        raise DatasetFormatError(shown, None, None, "is damaged, here or in its zip file") from error
 
 
 def _is_hidden(name: str) -> bool:

@@ -24,11 +24,15 @@ def open_plain(path: Path, shown: str = "") -> IO[bytes]:
         DatasetFormatError: It is a pipe, a device, a socket or a folder.
         OSError: It cannot be opened.
     """
-    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    if stat.S_ISREG(os.fstat(handle).st_mode):
-        return os.fdopen(handle, "rb")
-    os.close(handle)
+    file = open(path, "rb", opener=_without_waiting)  # noqa: SIM115 - who asked closes it
+    if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        return file
+    file.close()
     raise DatasetFormatError(shown or str(path), None, None, "is not a plain file")
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def read_plain(path: Path, limit: int = MAX_BYTES) -> bytes:
