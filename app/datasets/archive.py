@@ -396,7 +396,9 @@ def _chunk(file: IO[bytes], shown: str) -> bytes:
     try:
         return file.read(_CHUNK)
     except _BROKEN as error:
-        raise DatasetFormatError(shown, None, None, "is damaged, here or in its zip file") from error
+        raise DatasetFormatError(
+            shown, None, None, "is damaged, here or in its zip file"
+        ) from error
 
 
 def _is_hidden(name: str) -> bool:

@@ -63,7 +63,7 @@ def _supervise(seconds: float, kinds: list[str], seed: int) -> int:
                 if not under_way.exists():
                     print(done.stderr)
                     return 1
-                print(f"FAULT {CRASHED} ({done.returncode})")
+                print(f"FAULT {CRASHED} ({done.returncode})\n{done.stderr[-2000:]}")
                 case = Case.of(under_way.read_text())
                 _keep(replace(case, found=f"{CRASHED} ({done.returncode})"))
                 seed += 1

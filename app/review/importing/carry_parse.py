@@ -200,12 +200,18 @@ def _checked(station: Station) -> Station:
     for side in (station.size.width, station.size.height):
         if not isinstance(side, int) or isinstance(side, bool) or not 1 <= side <= MAX_SIDE:
             raise InputError(f"has an image side of {side}")
-    if station.calibration not in CALIBRATIONS or station.flipped not in (True, False):
-        raise InputError("has a calibration or a flip that Touchline does not know")
+    if station.calibration not in CALIBRATIONS:
+        raise InputError("has a calibration that Touchline does not know")
+    _require_truth_values("a station", station.flipped, station.shared)
     for marking, points in station.lines.items():
         if canonical_marking(marking) != marking or len(points) > MAX_POINTS:
             raise InputError(f"has {marking}, which is not a pitch marking or has too many points")
     return station
+
+
+def _require_truth_values(what: str, *values: object) -> None:
+    if not all(isinstance(value, bool) for value in values):
+        raise InputError(f"has {what} with a value in the place of true or false")
 
 
 def _verdict(value: Json) -> Mapping[str, Any]:
