@@ -25,6 +25,8 @@ from app.nested_zip import UNREADABLE, open_nested, open_zip
 _DRIVE = re.compile(r"[A-Za-z]:")
 _RATIO_FLOOR = 1024 * 1024
 _CHUNK = 1024 * 1024
+MAX_PART = 255
+"""Most bytes of the name of a file or folder; what is longer fits on no disk."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +58,15 @@ def check_name(path: str) -> str:
     """The relative path unchanged, when it stays inside whatever folder it is joined to.
 
     Raises:
-        UnsafePathError: Empty, absolute, with a drive letter, ``..``, backslash or control
-            character; also when only its decoded or normalised spelling is so.
+        UnsafePathError: Empty, absolute, longer than disks take, with a drive letter, ``..``,
+            backslash or control character; also when only its decoded or normalised spelling is so.
     """
     for spelling in _spellings(path):
         problem = _unsafe(spelling)
         if problem:
             raise UnsafePathError(f"the path {path[:200]!r} {problem}")
+    if any(len(part.encode()) > MAX_PART for part in path.split("/")):
+        raise UnsafePathError(f"the path {path[:200]!r} has a part of more than {MAX_PART} bytes")
     return path
 
 
@@ -303,7 +307,7 @@ class ZipTree:
             raise DatasetFormatError(self.shown(name), None, None, "is not in the zip file")
         try:
             return self._archive.open(member)
-        except _BROKEN as error:
+        except (*_BROKEN, UnicodeError) as error:
             problem = "is damaged or encrypted inside the zip file"
             raise DatasetFormatError(self.shown(name), None, None, problem) from error
 

@@ -53,7 +53,7 @@ def _names(path: Path) -> Iterable[str]:
             return []
         with open_zip(path) as archive:
             return archive.namelist()
-    except (zipfile.BadZipFile, OSError, ValueError):
+    except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError):
         return []
 
 

@@ -96,7 +96,7 @@ class Archives:
 def _open(path: Path) -> zipfile.ZipFile:
     try:
         return open_zip(path)
-    except (zipfile.BadZipFile, ValueError) as error:
+    except (zipfile.BadZipFile, NotImplementedError, ValueError) as error:
         raise ImageError(f"{path.name} is no complete zip archive") from error
     except OSError as error:
         raise StorageError(f"{path.name} cannot be read") from error

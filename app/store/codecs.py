@@ -50,6 +50,17 @@ def parse(text: str | bytes) -> Json:
         raise _damaged() from error
 
 
+_MISSHAPEN = (
+    ArithmeticError,
+    AttributeError,
+    GeometryError,
+    InputError,
+    LookupError,
+    TypeError,
+    ValueError,
+)
+
+
 @contextmanager
 def as_written() -> Iterator[None]:
     """For making values of stored JSON: what has another shape than we gave it is damage.
@@ -59,7 +70,7 @@ def as_written() -> Iterator[None]:
     """
     try:
         yield
-    except (AttributeError, GeometryError, InputError, LookupError, TypeError, ValueError) as error:
+    except _MISSHAPEN as error:
         raise _damaged() from error
 
 

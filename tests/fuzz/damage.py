@@ -121,7 +121,10 @@ def _places(value: Any) -> Any:
 
 
 def _damaged_csv(content: bytes, dice: random.Random) -> bytes:
-    rows = list(csv.reader(io.StringIO(content.decode("utf-8", "replace"))))
+    try:
+        rows = list(csv.reader(io.StringIO(content.decode("utf-8", "replace"))))
+    except csv.Error:
+        return _damaged_text(content, dice)
     if not rows or not (cells := dice.choice(rows)):
         return b"\n"
     number = dice.randrange(len(cells))

@@ -24,6 +24,7 @@ from app.datasets.archive import Limits
 from app.datasets.export_record import ExportRecord
 from app.datasets.format_names import ImportFormat
 from app.datasets.guess_format import guess_format
+from app.datasets.output import output_tree
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, ReviewError
 from app.evaluation.frame_names import FrameNames, NamedFrame
@@ -157,8 +158,12 @@ def _use(groups: list[Group]) -> None:
     for name in FORMATS:
         if name == "touchline" or not records:
             continue
-        with tempfile.TemporaryDirectory(prefix="touchline-case-") as out, suppress(ReviewError):
-            write_format(Path(out), records, WriteOptions(name, everything=True))
+        with (
+            tempfile.TemporaryDirectory(prefix="touchline-case-") as out,
+            suppress(ReviewError),
+            output_tree(Path(out, "export")) as root,
+        ):
+            write_format(root, records, WriteOptions(name, everything=True))
 
 
 def _require_said(report: Report) -> None:

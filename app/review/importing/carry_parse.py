@@ -25,6 +25,8 @@ from app.store.imports import VERDICT
 MAX_LINE = 32 * 1024 * 1024
 MAX_VIEWS, MAX_BALLS, MAX_SIDE, MAX_TEXT = 100, 100, 20_000, 1000
 MAX_STATES = 100_000
+_MISSHAPEN = (ArithmeticError, AttributeError, LookupError, ReviewError, TypeError, ValueError)
+"""What reading a value raises that is not of the shape that it should have."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ def read_head(tree: FileTree) -> CarriedHead:
         # Its values reach the solver: a text in place of a number would break there.
         assert policy.hash
         return CarriedHead(_text(value["dataset"]), policy)
-    except (ReviewError, AttributeError, KeyError, TypeError, ValueError) as error:
+    except _MISSHAPEN as error:
         raise DatasetFormatError(shown, None, "policy", "is not a policy") from error
 
 
@@ -113,7 +115,7 @@ def parse_station(value: Json) -> CarriedStation:
         if not (station.shared and base.shared and station.key == base.key):
             raise InputError("names two static cameras, or one that is not static")
         return CarriedStation(station, base, _states(value["states"]), _log(value["log"]))
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ReviewError) as error:
+    except _MISSHAPEN as error:
         raise _problem(error) from error
 
 
@@ -136,7 +138,7 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> CarriedGroup:
             log=_log(value["log"]),
             verdicts=tuple(map(_verdict, _list(value["verdicts"], MAX_STATES))),
         )
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ReviewError) as error:
+    except _MISSHAPEN as error:
         raise _problem(error) from error
 
 
@@ -149,7 +151,7 @@ def parse_spare(value: Json) -> tuple[str, str, Extras]:
     try:
         extras = _mapping(value)["extras"]
         return _text(value["camera"]), _text(value["frame"]), _extras(extras)
-    except (KeyError, TypeError, ValueError, AttributeError, ReviewError) as error:
+    except _MISSHAPEN as error:
         raise _problem(error) from error
 
 

@@ -33,6 +33,7 @@ HOSTILE = [
     "", "..", "../a", "a/../../b", "a/..", "/etc/passwd", "//host/share", "C:/a", "c:a",
     "a\\b", "..\\a", "a\x00b", "a\nb", "a\x7f", "%2e%2e/a", "%2e%2e%2fa", "%252e%252e%252fa",
     "..%2fa", "%2fetc/passwd", "..%5ca", "a%00b", "\uff0e\uff0e/a", "\u2025/a", "a/\ud800",
+    "a/" + "b" * 256, "é" * 128 + "/a",
 ]  # fmt: skip
 
 
@@ -45,7 +46,7 @@ class TestCheckName:
     @pytest.mark.parametrize(
         "name",
         ["7.png", "a/b/c", "spain_laliga/2014-2015/2015-02-14 - 20-00 Málaga 1 - 0 Elche/x.json",
-         "100% FC 2 - 1 A.C. Ö/..7.png", "a..b", "...", ".hidden"],
+         "100% FC 2 - 1 A.C. Ö/..7.png", "a..b", "...", ".hidden", "b" * 255 + "/" + "c" * 255],
     )  # fmt: skip
     def test_the_names_of_matches_are_fine(self, name: str) -> None:
         assert check_name(name) == name
