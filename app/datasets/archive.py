@@ -326,7 +326,8 @@ class ZipTree:
         folded = Counter(member.filename.rstrip("/").casefold() for member in members)
         checked = {}
         for member in members:
-            if member.is_dir() or any(map(_is_hidden, member.filename.split("/"))):
+            # A name that begins with NUL is empty, which ``is_dir`` does not survive.
+            if member.filename.endswith("/") or any(map(_is_hidden, member.filename.split("/"))):
                 continue
             problem = self._problem(member, folded)
             if problem is None:

@@ -260,7 +260,8 @@ def _camera(text: str) -> Camera:
 
 @lru_cache(maxsize=1024)
 def _covariance(text: str) -> tuple[float, ...] | None:
-    return codecs.covariance_from_json(codecs.parse(text).get("covariance"))
+    with codecs.as_written():
+        return codecs.covariance_from_json(codecs.parse(text).get("covariance"))
 
 
 def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
