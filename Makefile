@@ -10,7 +10,7 @@ export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 unexport PYTHONDONTWRITEBYTECODE
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
-.PHONY: setup run test test-python test-browser check audit release bench mutate torture paper chromium clean
+.PHONY: setup run test test-python test-browser check audit release bench mutate torture fuzz paper chromium clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready static/node_modules/.ready
@@ -76,6 +76,10 @@ mutate: setup
 
 torture: setup
 	$(BIN)/python -m tests.torture
+
+# Files of every format, damaged at random: ten minutes, or SECONDS=60.
+fuzz: setup
+	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),600)
 
 paper: setup
 	$(BIN)/python -m tests.paper

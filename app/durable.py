@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import secrets
 from pathlib import Path
 
 PARTIAL = ".partial"
@@ -19,8 +19,10 @@ def sync(path: Path) -> None:
         os.close(handle)
 
 
-def replace_file(path: Path, content: bytes | memoryview, *, durable: bool = True) -> None:
-    """Write a file for its owner alone: a reader sees all of it or what was there before.
+def replace_file(
+    path: Path, content: bytes | memoryview, *, durable: bool = True, private: bool = True
+) -> None:
+    """Write a file: a reader sees all of it or what was there before.
 
     Of several writers the last one stays.
 
@@ -28,9 +30,11 @@ def replace_file(path: Path, content: bytes | memoryview, *, durable: bool = Tru
         path: The file.
         content: All of it.
         durable: Whether that holds after a power cut, too; it costs a wait for the disk.
+        private: Whether it is for its owner alone; otherwise the umask decides.
     """
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=PARTIAL, dir=path.parent)
-    partial = Path(name)
+    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PARTIAL}")
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+    handle = os.open(partial, flags, 0o600 if private else 0o666)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)

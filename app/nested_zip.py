@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import io
 import os
+import stat
 import struct
 import tempfile
 import zipfile
@@ -22,7 +23,61 @@ _CHUNK = 1024 * 1024
 _HEADER = struct.Struct("<4s5H3I2H")
 """Local header of a member: name and extra field follow it, then the data."""
 _SIGNATURE = b"PK\x03\x04"
-_ENCRYPTED = 0x1
+_ENCRYPTED, _UTF_8 = 0x1, 0x800
+UNREADABLE = 0x20
+"""Flag of members that ``zipfile`` refuses to open (it means patched data, which nobody writes)."""
+_LISTED = b"PK\x01\x02"
+_ENTRY = struct.Struct("<8xH18x3H12x")
+"""Of a member in the list: its flags, and how long its name, extra field and comment are."""
+_ENTRY_BYTES = 46
+_FLAGS, _FLAGS_AT = struct.Struct("<H"), 8
+
+
+def open_zip(path: Path) -> zipfile.ZipFile:
+    """Open a zip file; a member whose name is not the text that it is said to be is ``UNREADABLE``.
+
+    Raises:
+        zipfile.BadZipFile: It is no zip file, or no plain file.
+        OSError, ValueError: It cannot be read.
+    """
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise zipfile.BadZipFile("is not a plain file")
+    try:
+        return zipfile.ZipFile(path)
+    except UnicodeDecodeError:
+        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+        return _with_any_names(_Window(handle, 0, os.fstat(handle).st_size))
+
+
+def _open_window(window: _Window) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(window)
+    except UnicodeDecodeError:
+        return _with_any_names(window)
+
+
+def _with_any_names(window: _Window) -> zipfile.ZipFile:
+    window.lenient = True
+    archive = zipfile.ZipFile(window)
+    window.lenient = False
+    return archive
+
+
+def _without_false_marks(records: bytes) -> bytes:
+    """The list of a zip's members, another mark in the place of that for UTF-8 at names that are not.
+
+    Their own headers keep the false mark, so that ``zipfile`` could not open them anyway.
+    """
+    changed, at = bytearray(records), 0
+    while records[at : at + 4] == _LISTED and at + _ENTRY_BYTES <= len(records):
+        flags, name, extra, comment = _ENTRY.unpack_from(records, at)
+        start = at + _ENTRY_BYTES
+        try:
+            records[start : start + name].decode("utf-8")
+        except UnicodeDecodeError:
+            _FLAGS.pack_into(changed, at + _FLAGS_AT, flags & ~_UTF_8 | UNREADABLE)
+        at = start + name + extra + comment
+    return bytes(changed)
 
 
 def nested_name(archive: zipfile.ZipFile, name: str) -> tuple[str, str] | None:
@@ -56,7 +111,7 @@ def open_nested(
     if member.flag_bits & _ENCRYPTED:
         raise zipfile.BadZipFile("is encrypted")
     if member.compress_type == zipfile.ZIP_STORED:
-        return zipfile.ZipFile(_stored(path, member))
+        return _open_window(_stored(path, member))
     with tempfile.TemporaryFile() as file:
         total = 0
         with archive.open(member) as packed:
@@ -66,7 +121,7 @@ def open_nested(
                     raise zipfile.BadZipFile(f"unpacks to more than {limit:,} bytes")
                 file.write(chunk)
         file.flush()
-        return zipfile.ZipFile(_Window(os.dup(file.fileno()), 0, total))
+        return _open_window(_Window(os.dup(file.fileno()), 0, total))
 
 
 def _stored(path: Path, member: zipfile.ZipInfo) -> _Window:
@@ -90,6 +145,8 @@ class _Window(io.RawIOBase):
     def __init__(self, handle: int, start: int, size: int):
         super().__init__()
         self._handle, self._start, self._size, self._at = handle, start, size, 0
+        self.lenient = False
+        """Whether it is read for the list of a zip's members, whose names may be no text."""
 
     def moved(self, start: int, size: int) -> _Window:
         """The same file, another part of it."""
@@ -120,6 +177,8 @@ class _Window(io.RawIOBase):
         """Fill a buffer as far as the part goes."""
         count = max(min(len(buffer), self._size - self._at), 0)
         data = os.pread(self._handle, count, self._start + self._at)
+        if self.lenient and data.startswith(_LISTED):
+            data = _without_false_marks(data)
         buffer[: len(data)] = data
         self._at += len(data)
         return len(data)

@@ -69,6 +69,8 @@ def read_text(path: Path, most: int) -> str:
     from app.errors import InputError
 
     try:
+        if not path.is_file():
+            raise InputError(f"{path} is not a plain file")
         with path.open(encoding="utf-8") as file:
             return file.read(most + 1)
     except (OSError, UnicodeDecodeError) as error:

@@ -15,8 +15,19 @@ from app.progress import Progress
 
 MAX_MISSING = 20
 """Missing images that are named in a table."""
+# Steering characters of terminals (C0 and C1), and those that turn the direction of writing.
+_STEERING = (*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+_SPELT = {code: f"\\u{code:04x}" for code in _STEERING if code not in (0x0A, 0x09)}
 MIN_SECONDS = 0.1
 """A bar that moves more often costs more than it shows."""
+
+
+def harmless(text: str) -> str:
+    """A text whose control characters are spelt out: a file's name must not steer a terminal.
+
+    They are spelt as JSON spells them, so that a JSON document stays what it is. Line ends stay.
+    """
+    return text.translate(_SPELT)
 
 
 @contextmanager
@@ -49,14 +60,14 @@ def show_progress(what: str) -> Iterator[Progress]:
 
 def complain(message: str, hint: str | None = None) -> None:
     """One sentence on stderr, and what to do about it."""
-    print(message, file=sys.stderr)  # noqa: T201
+    print(harmless(message), file=sys.stderr)  # noqa: T201
     if hint:
-        print(hint, file=sys.stderr)  # noqa: T201
+        print(harmless(hint), file=sys.stderr)  # noqa: T201
 
 
 def say(line: str) -> None:
     """A line of the result, at once."""
-    print(line, flush=True)  # noqa: T201
+    print(harmless(line), flush=True)  # noqa: T201
 
 
 def print_json(value: Any) -> None:

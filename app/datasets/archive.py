@@ -17,13 +17,16 @@ from typing import IO, Protocol
 from urllib.parse import unquote
 
 from app.config import Settings
+from app.datasets.plain_file import open_plain
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, UnsafePathError
-from app.nested_zip import open_nested
+from app.nested_zip import UNREADABLE, open_nested, open_zip
 
 _DRIVE = re.compile(r"[A-Za-z]:")
 _RATIO_FLOOR = 1024 * 1024
 _CHUNK = 1024 * 1024
+MAX_PART = 255
+"""Most bytes of the name of a file or folder; what is longer fits on no disk."""
 
 
 @dataclass(frozen=True)
@@ -55,13 +58,15 @@ def check_name(path: str) -> str:
     """The relative path unchanged, when it stays inside whatever folder it is joined to.
 
     Raises:
-        UnsafePathError: Empty, absolute, with a drive letter, ``..``, backslash or control
-            character; also when only its decoded or normalised spelling is so.
+        UnsafePathError: Empty, absolute, longer than disks take, with a drive letter, ``..``,
+            backslash or control character; also when only its decoded or normalised spelling is so.
     """
     for spelling in _spellings(path):
         problem = _unsafe(spelling)
         if problem:
             raise UnsafePathError(f"the path {path[:200]!r} {problem}")
+    if any(len(part.encode()) > MAX_PART for part in path.split("/")):
+        raise UnsafePathError(f"the path {path[:200]!r} has a part of more than {MAX_PART} bytes")
     return path
 
 
@@ -143,7 +148,7 @@ def open_tree(path: Path, report: Report, limits: Limits = DEFAULT_LIMITS) -> Fi
         report.note(str(path), None, None, "does not exist")
         return None
     try:
-        with path.open("rb") as file:
+        with open_plain(path) as file:
             is_zip = file.read(2) == b"PK" or path.suffix.lower() == ".zip"
         return ZipTree(path, report, limits) if is_zip else FileAlone(path, report, limits)
     except DatasetFormatError as error:
@@ -209,10 +214,7 @@ class FolderTree:
         """The content as a stream."""
         shown = self.shown(name)
         try:
-            real = resolve_inside(self.path, name)
-            if not stat.S_ISREG(real.stat().st_mode):
-                raise DatasetFormatError(shown, None, None, "is not a plain file")
-            return real.open("rb")
+            return open_plain(resolve_inside(self.path, name), shown)
         except UnsafePathError as error:
             raise DatasetFormatError(shown, None, None, error.message) from error
         except OSError as error:
@@ -295,13 +297,8 @@ class ZipTree:
 
     def read_bytes(self, name: str) -> bytes:
         """The whole content of one member."""
-        shown = self.shown(name)
-        try:
-            with self.open(name) as file:
-                return _read_capped(file, self._limits.file_bytes, shown)
-        except _BROKEN as error:
-            problem = "is damaged inside the zip file"
-            raise DatasetFormatError(shown, None, None, problem) from error
+        with self.open(name) as file:
+            return _read_capped(file, self._limits.file_bytes, self.shown(name))
 
     def open(self, name: str) -> IO[bytes]:
         """The content as a stream."""
@@ -310,7 +307,7 @@ class ZipTree:
             raise DatasetFormatError(self.shown(name), None, None, "is not in the zip file")
         try:
             return self._archive.open(member)
-        except _BROKEN as error:
+        except (*_BROKEN, UnicodeError) as error:
             problem = "is damaged or encrypted inside the zip file"
             raise DatasetFormatError(self.shown(name), None, None, problem) from error
 
@@ -329,7 +326,8 @@ class ZipTree:
         folded = Counter(member.filename.rstrip("/").casefold() for member in members)
         checked = {}
         for member in members:
-            if member.is_dir() or any(map(_is_hidden, member.filename.split("/"))):
+            # A name that begins with NUL is empty, which ``is_dir`` does not survive.
+            if member.filename.endswith("/") or any(map(_is_hidden, member.filename.split("/"))):
                 continue
             problem = self._problem(member, folded)
             if problem is None:
@@ -353,6 +351,8 @@ class ZipTree:
         kind = stat.S_IFMT(member.external_attr >> 16)
         if kind not in (0, stat.S_IFREG):
             return "is a link or device, not a plain file"
+        if member.flag_bits & UNREADABLE:
+            return "has a name that is no text, so it cannot be read"
         if folded[member.filename.casefold()] > 1:
             return "is there more than once, or under names that differ in case alone"
         if member.file_size > _RATIO_FLOOR and (
@@ -372,7 +372,7 @@ _BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplemente
 
 def _open_zip(path: Path) -> zipfile.ZipFile:
     try:
-        return zipfile.ZipFile(path)
+        return open_zip(path)
     except (*_BROKEN, ValueError, UnicodeError) as error:
         problem = "is not a complete zip file; was it cut off while it was copied?"
         raise DatasetFormatError(str(path), None, None, problem) from error
@@ -387,14 +387,23 @@ def capped_chunks(file: IO[bytes], limit: int, shown: str) -> Iterator[bytes]:
     """A stream in chunks.
 
     Raises:
-        DatasetFormatError: It holds more than ``limit`` bytes.
+        DatasetFormatError: It holds more than ``limit`` bytes, or is damaged.
     """
     total = 0
-    while chunk := file.read(_CHUNK):
+    while chunk := _chunk(file, shown):
         total += len(chunk)
         if total > limit:
             raise DatasetFormatError(shown, None, None, f"is longer than {limit:,} bytes")
         yield chunk
+
+
+def _chunk(file: IO[bytes], shown: str) -> bytes:
+    try:
+        return file.read(_CHUNK)
+    except _BROKEN as error:
+        raise DatasetFormatError(
+            shown, None, None, "is damaged, here or in its zip file"
+        ) from error
 
 
 def _is_hidden(name: str) -> bool:

@@ -61,7 +61,7 @@ def read_coco(
             if value is not None:
                 found = True
                 for view in _File(tree, name, names, value, report, calibration).views():
-                    yield from groups.add(view)
+                    yield from groups.add(view, tree.shown(name))
         yield from groups.rest()
         if not found:
             report.note(str(root), None, None, "holds no COCO file (images and annotations)")

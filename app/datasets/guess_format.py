@@ -10,6 +10,8 @@ from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 
+from app.nested_zip import open_zip
+
 MAX_NAMES = 2000
 """Names that are looked at; a large folder must not hold a request up."""
 MAX_DEPTH = 4
@@ -44,14 +46,14 @@ def guess_format(path: Path) -> str | None:
 def _names(path: Path) -> Iterable[str]:
     if path.is_dir():
         return _below(path, "", MAX_DEPTH)
-    if path.suffix.lower() != ".zip":
+    if path.suffix.lower() != ".zip" or not path.is_file():
         return [path.name]
     try:
         if _directory_bytes(path) > MAX_DIRECTORY:
             return []
-        with zipfile.ZipFile(path) as archive:
+        with open_zip(path) as archive:
             return archive.namelist()
-    except (zipfile.BadZipFile, OSError, ValueError):
+    except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError):
         return []
 
 

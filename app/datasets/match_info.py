@@ -46,7 +46,9 @@ def read_match_info(
         folder = PurePosixPath(name).parent
         for image, item in value.items():
             record = {"match": item} if isinstance(item, str) else item
-            if isinstance(record, dict):
+            if not PurePosixPath(image).name:
+                report.note(tree.shown(name), image[:80], None, "is not the name of an image")
+            elif isinstance(record, dict):
                 key = str((folder / image).with_suffix(""))
                 found[key] = {**found.get(key, {}), **record}
             else:

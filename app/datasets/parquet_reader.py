@@ -60,7 +60,7 @@ def read_parquet(root: Path, report: Report, *, limits: Limits = DEFAULT_LIMITS)
         groups = ViewGroups(report)
         for name in tables:
             for view in _views(tree, name, names, report, limits):
-                yield from groups.add(view)
+                yield from groups.add(view, tree.shown(name))
         yield from groups.rest()
 
 

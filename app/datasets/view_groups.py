@@ -31,12 +31,12 @@ class ViewGroups:
         self._waiting: dict[str, list[PlacedView]] = {}
         self._shared: dict[str, Station] = {}
 
-    def add(self, item: PlacedView) -> Iterator[Group]:
-        """The group that this view completes, if it does."""
+    def add(self, item: PlacedView, path: str) -> Iterator[Group]:
+        """The group that this view completes, if it does; ``path`` is the file that it comes from."""
         key = item.head.key
         waiting = self._waiting.setdefault(key, [])
         if any(other.view.key == item.view.key for other in waiting):
-            self._report.note("", key, item.view.key, "comes twice; the first one counts")
+            self._report.note(path, key, item.view.key, "comes twice; the first one counts")
             return
         waiting.append(item)
         if len(waiting) == item.head.views:

@@ -18,8 +18,11 @@ from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
 
-MAX_SPAN = 100_000
-"""Most frames that one framespan may cover: an hour at 25 frames a second."""
+MAX_SPAN = 10_000
+"""Most frames that one framespan may cover; ISSIA's longest covers its 3,029 frames."""
+
+MAX_FRAMES = 100_000
+"""Most frames with a ball in one file, each of which is a group: an hour at 25 frames a second."""
 
 MAX_ENTRIES = 5_000_000
 """Most entries of one file; ISSIA's have 42,000."""
@@ -158,6 +161,10 @@ def _read_item(
 ) -> None:
     if kind == "BALL" and item.tag == _DATA + "point":
         point = (_pixel(item, "x"), _pixel(item, "y"))
+        if len(track.balls) + len(frames) > MAX_FRAMES:
+            fresh = sum(frame not in track.balls for frame in frames)
+            if len(track.balls) + fresh > MAX_FRAMES:
+                raise ValueError(f"is beyond {MAX_FRAMES:,} frames with a ball")
         for frame in frames:
             points = track.balls.setdefault(frame, [])
             if point not in points:
@@ -192,7 +199,10 @@ def _frames(span: Any) -> list[int]:
         if found is None:
             raise ValueError(f"the framespan {part[:40]!r} is not first:last")
         first, last = int(found[1]), int(found[2])
-        if last < first or len(frames) + last - first >= MAX_SPAN:
-            raise ValueError(f"the framespan {part} is empty or too long")
+        if last < first:
+            raise ValueError(f"the framespan {part} ends before it begins")
+        count = len(frames) + last - first + 1
+        if count > MAX_SPAN:
+            raise ValueError(f"covers {count:,} frames; at most {MAX_SPAN:,} are read")
         frames.extend(range(first, last + 1))
     return frames

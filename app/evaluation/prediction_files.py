@@ -291,6 +291,8 @@ def _read_csv(tree: FileTree, run: PredictionRun, limits: Limits) -> None:
         run.found.report.read += 1
         with noted(run.found.report, shown, f"line {line}"):
             _add_row(run, cells)
+    if not run.found.report.read:
+        raise DatasetFormatError(shown, None, None, "holds no row: is it complete?")
 
 
 def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from app.finite import json_text
 from app.store.clock import now
-from app.store.codecs import Json, inflate
+from app.store.codecs import Json, inflate, parse
 from app.store.job_models import AnswerModel
 
 T = TypeVar("T")
@@ -61,7 +60,7 @@ class Progress:
         found = find_answer(session, self.key, self.actor)
         if found is None or found.body is None or not found.under_way:
             return None
-        return json.loads(found.body)
+        return parse(found.body)
 
     def save(self, session: Session, value: Json) -> None:
         """Say how far the work is."""
@@ -89,7 +88,7 @@ def find_answer(session: Session, key: str, actor: str) -> Answer | None:
     if row is None:
         return None
     body = inflate(row.body) if row.body else None
-    return Answer(row.request_digest, row.status, json.loads(row.headers), body)
+    return Answer(row.request_digest, row.status, parse(row.headers), body)
 
 
 def keep_answer(session: Session, key: str, actor: str, answer: Answer) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.nested_zip import nested_name, open_nested
+from app.nested_zip import nested_name, open_nested, open_zip
 
 MAX_OPEN = 16
 
@@ -95,8 +95,8 @@ class Archives:
 
 def _open(path: Path) -> zipfile.ZipFile:
     try:
-        return zipfile.ZipFile(path)
-    except zipfile.BadZipFile as error:
+        return open_zip(path)
+    except (zipfile.BadZipFile, NotImplementedError, ValueError) as error:
         raise ImageError(f"{path.name} is no complete zip archive") from error
     except OSError as error:
         raise StorageError(f"{path.name} cannot be read") from error
@@ -106,7 +106,7 @@ def _open_inside(path: Path, info: zipfile.ZipInfo) -> zipfile.ZipFile:
     shown = f"{path.name}/{info.filename}"
     try:
         # Opened anew: one that is kept open may be closed for others' sake meanwhile.
-        with zipfile.ZipFile(path) as archive:
+        with open_zip(path) as archive:
             return open_nested(archive, path, info)
     except OSError as error:
         raise StorageError(f"{shown} cannot be read") from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +10,7 @@ from sqlalchemy import insert, select, update
 from sqlalchemy.orm import Session
 
 from app.finite import json_text
+from app.store.codecs import parse
 from app.store.group_rows import next_id
 from app.store.view_models import VerdictBatchModel
 
@@ -85,7 +85,7 @@ def update_batch(session: Session, batch_id: int, **values: Any) -> None:
 
 
 def _batch(row: Any) -> Batch:
-    spans = {name: json.loads(getattr(row, name) or "null") for name in _SPANS}
+    spans = {name: parse(getattr(row, name) or "null") for name in _SPANS}
     return Batch(**{**row._mapping, **spans})
 
 

@@ -8,13 +8,14 @@ from __future__ import annotations
 import json
 import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
 
-from app.errors import EXAMINE, DamagedError
+from app.errors import EXAMINE, DamagedError, GeometryError, InputError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
@@ -37,9 +38,40 @@ def canonical(value: Json) -> str:
     )
 
 
-def parse(text: str) -> Json:
-    """The value of a JSON text."""
-    return json.loads(text)
+def parse(text: str | bytes) -> Json:
+    """The value of a JSON text of the database.
+
+    Raises:
+        DamagedError: The text is not what was written.
+    """
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise _damaged() from error
+
+
+_MISSHAPEN = (
+    ArithmeticError,
+    AttributeError,
+    GeometryError,
+    InputError,
+    LookupError,
+    TypeError,
+    ValueError,
+)
+
+
+@contextmanager
+def as_written() -> Iterator[None]:
+    """For making values of stored JSON: what has another shape than we gave it is damage.
+
+    Raises:
+        DamagedError: A member is missing, or is something else.
+    """
+    try:
+        yield
+    except _MISSHAPEN as error:
+        raise _damaged() from error
 
 
 def pack(value: Json) -> bytes:
@@ -53,10 +85,7 @@ def unpack(data: bytes) -> Json:
     Raises:
         DamagedError: The bytes are not what was written.
     """
-    try:
-        return json.loads(inflate(data))
-    except ValueError as error:
-        raise _damaged() from error
+    return parse(inflate(data))
 
 
 def inflate(data: bytes) -> bytes:

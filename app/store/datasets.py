@@ -10,7 +10,7 @@ from sqlalchemy import insert, select, update
 from sqlalchemy.orm import Session
 
 from app.soccer.policy import Policy
-from app.store.codecs import canonical, parse, policy_from_json, policy_to_json
+from app.store.codecs import as_written, canonical, parse, policy_from_json, policy_to_json
 from app.store.group_rows import next_id
 from app.store.models import DatasetModel, GroupModel
 
@@ -21,7 +21,8 @@ _ROWS = select(*DatasetModel.__table__.columns)
 @lru_cache(maxsize=64)
 def policy_of(text: str) -> Policy:
     """The policy of a dataset's row; one value a text, however often it is asked for."""
-    return policy_from_json(parse(text))
+    with as_written():
+        return policy_from_json(parse(text))
 
 
 def dataset_rows(session: Session) -> Sequence[Any]:

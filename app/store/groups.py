@@ -19,6 +19,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
+from app.soccer.reasons import LeftOut
 from app.store import codecs
 from app.store.datasets import policy_of
 from app.store.digest import inputs_hash, station_digest, view_digest
@@ -206,7 +207,7 @@ def _view_from_row(row: Any, station: Station) -> View:
         media=media,
         included=row.included,
         extras=Extras() if extras is None else _extras(extras),
-        left_out=None if why is None else codecs.left_out_from_json(codecs.parse(why)),
+        left_out=None if why is None else _left_out(why),
     )
 
 
@@ -227,30 +228,40 @@ def stored_station(row: Any) -> StoredStation:
     )
 
 
+def _left_out(text: str) -> LeftOut | None:
+    with codecs.as_written():
+        return codecs.left_out_from_json(codecs.parse(text))
+
+
 # Most requests ask for what the one before asked for.
 @lru_cache(maxsize=1024)
 def _balls(text: str) -> tuple[BallAnnotation, ...]:
-    return tuple(map(codecs.ball_from_json, codecs.parse(text)))
+    with codecs.as_written():
+        return tuple(map(codecs.ball_from_json, codecs.parse(text)))
 
 
 @lru_cache(maxsize=256)
 def _extras(data: bytes) -> Extras:
-    return codecs.extras_from_json(codecs.unpack(data))
+    with codecs.as_written():
+        return codecs.extras_from_json(codecs.unpack(data))
 
 
 @lru_cache(maxsize=1024)
 def _lines(text: str) -> Lines:
-    return codecs.lines_from_json(codecs.parse(text))
+    with codecs.as_written():
+        return codecs.lines_from_json(codecs.parse(text))
 
 
 @lru_cache(maxsize=1024)
 def _camera(text: str) -> Camera:
-    return codecs.camera_from_json(codecs.parse(text))
+    with codecs.as_written():
+        return codecs.camera_from_json(codecs.parse(text))
 
 
 @lru_cache(maxsize=1024)
 def _covariance(text: str) -> tuple[float, ...] | None:
-    return codecs.covariance_from_json(codecs.parse(text).get("covariance"))
+    with codecs.as_written():
+        return codecs.covariance_from_json(codecs.parse(text).get("covariance"))
 
 
 def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:

@@ -155,7 +155,7 @@ def trim_jobs(session: Session, kind: str, keep: int) -> None:
 
 
 def forget_jobs(session: Session, days: int) -> int:
-    """Forget jobs that ended so many days ago; one that made an export goes with its file.
+    """Forget jobs that ended so many days ago; one that made an export stays as long as its file.
 
     Returns:
         How many.
@@ -163,7 +163,8 @@ def forget_jobs(session: Session, days: int) -> int:
     oldest = (datetime.now(UTC) - timedelta(days=days)).isoformat(timespec="microseconds")
     gone = (
         delete(JobModel)
-        .where(JobModel.state.not_in(OPEN), JobModel.ended < oldest, JobModel.kind != EXPORT)
+        .where(JobModel.state.not_in(OPEN), JobModel.ended < oldest)
+        .where((JobModel.kind != EXPORT) | (JobModel.state != "done"))
         .returning(JobModel.id)
     )
     return len(session.scalars(gone).all())

@@ -10,7 +10,7 @@ from sqlalchemy import ColumnElement, delete, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.geometry.camera import Camera
-from app.store.codecs import Json, camera_from_json, camera_to_json, canonical, parse
+from app.store.codecs import Json, as_written, camera_from_json, camera_to_json, canonical, parse
 from app.store.digest import digest
 from app.store.group_rows import next_id
 from app.store.models import ViewModel
@@ -173,7 +173,8 @@ def read_predicted_cameras(session: Session, set_id: int) -> dict[int, Camera]:
     """Every camera of a set, by id of the view."""
     model = PredictedCameraModel
     rows = session.execute(select(model.view_id, model.camera).where(model.set_id == set_id))
-    return {row.view_id: camera_from_json(parse(row.camera)) for row in rows}
+    with as_written():
+        return {row.view_id: camera_from_json(parse(row.camera)) for row in rows}
 
 
 def _sets(session: Session, where: ColumnElement[bool]) -> list[PredictionSet]:

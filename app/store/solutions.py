@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +17,7 @@ from app.finite import json_text
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
 from app.store import value_codec
-from app.store.codecs import inflate
+from app.store.codecs import as_written, inflate, parse
 from app.store.models import CalibrationModel, DatasetModel, GroupModel, SolutionModel
 from app.store.summary import Summary, summarize
 
@@ -101,7 +100,7 @@ def encode_calibration(calibration: Calibration) -> bytes:
 @lru_cache(maxsize=256)
 def decode_calibration(body: bytes) -> Calibration:
     """Back from ``encode_calibration``; one value for the same bytes, however often asked."""
-    return value_codec.from_json(Calibration, json.loads(inflate(body)))
+    return value_codec.from_json(Calibration, parse(inflate(body)))
 
 
 def _compress(value: object) -> bytes:
@@ -171,9 +170,13 @@ def read_solutions(session: Session, keys: Iterable[SolutionKey]) -> dict[int, S
         if wanted[row.group_id]
         == SolutionKey(row.group_id, row.inputs_hash, row.policy_hash, row.solver_version)
     ]
-    names = {name for row in rows for name in json.loads(row.calibrations)}
+    with as_written():
+        names = {name for row in rows for name in parse(row.calibrations)}
     calibrations = read_calibrations(session, names)
-    return {row.group_id: with_calibrations(_bare_solution(row.body), calibrations) for row in rows}
+    with as_written():
+        return {
+            row.group_id: with_calibrations(_bare_solution(row.body), calibrations) for row in rows
+        }
 
 
 def decode_solution(value: Any, calibrations: Mapping[str, Calibration]) -> Solution:
@@ -191,7 +194,7 @@ def with_calibrations(solution: Solution, calibrations: Mapping[str, Calibration
 
 @lru_cache(maxsize=128)
 def _bare_solution(body: bytes) -> Solution:
-    return value_codec.from_json(Solution, json.loads(inflate(body)))
+    return value_codec.from_json(Solution, parse(inflate(body)))
 
 
 def read_calibrations(session: Session, keys: Iterable[str]) -> dict[str, Calibration]:
@@ -207,7 +210,7 @@ def read_calibration_bodies(session: Session, keys: Iterable[str]) -> dict[str, 
 
 def read_summary(text: str) -> Summary:
     """A stored summary."""
-    return value_codec.from_json(Summary, json.loads(text))
+    return value_codec.from_json(Summary, parse(text))
 
 
 def known_calibrations(session: Session, keys: Iterable[str]) -> set[str]:

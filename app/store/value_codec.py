@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint
-from app.store.codecs import camera_from_json, camera_to_json
+from app.store.codecs import as_written, camera_from_json, camera_to_json
 
 T = TypeVar("T")
 Codec = tuple[Callable[[Any], Any], Callable[[Any], Any]]
@@ -29,8 +29,13 @@ def to_json(value: Any) -> Any:
 
 
 def from_json(kind: type[T], value: Any) -> T:
-    """Back from ``to_json``; fields that the JSON does not have keep their default."""
-    result: T = _codec(kind)[1](value)
+    """Back from ``to_json``; fields that the JSON does not have keep their default.
+
+    Raises:
+        DamagedError: It is not what ``to_json`` makes.
+    """
+    with as_written():
+        result: T = _codec(kind)[1](value)
     return result
 
 

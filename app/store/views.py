@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from app.soccer.annotation import BallAnnotation
 from app.soccer.group import Media
-from app.store.codecs import ball_from_json, parse
+from app.store.codecs import as_written, ball_from_json, parse
 from app.store.conditions import Condition
 from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
 
@@ -50,7 +50,8 @@ class StoredView:
     @property
     def balls(self) -> list[BallAnnotation]:
         """The balls that were annotated in it."""
-        return [ball_from_json(value) for value in parse(self.said)]
+        with as_written():
+            return [ball_from_json(value) for value in parse(self.said)]
 
 
 def dataset_views(

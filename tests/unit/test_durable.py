@@ -21,6 +21,14 @@ class TestReplaceFile:
         assert path.stat().st_mode & 0o777 == 0o600
         assert list(tmp_path.iterdir()) == [path]
 
+    def test_what_is_made_for_others_too_follows_the_umask(self, tmp_path: Path) -> None:
+        before = os.umask(0o027)
+        try:
+            replace_file(tmp_path / "a", b"one", durable=False, private=False)
+        finally:
+            os.umask(before)
+        assert (tmp_path / "a").stat().st_mode & 0o777 == 0o640
+
     def test_two_writers_do_not_share_what_is_half_written(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -35,7 +35,7 @@ PLAIN_WORDS = """
     main map markdown marks match matches matrix meant membership menu merge metrics migrate mini missing
     model models modules name names navigation neighbours nested notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages
-    paint palette panel parquet parse parts patch pen pins pitch pitches pixel place places png pointer
+    paint palette panel parquet parse parts patch pen pins pitch pitches pixel place places plain png pointer
     policies pool popover pose position preview problem progress projection props query rail reader reasons
     recompute record remedies removal render reply report requests resect resource restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import AliasPath, BaseModel, Field
+from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
 from app.api.schemas.document import Document
 
@@ -13,6 +13,8 @@ LessonState = Literal["open", "mended", "right", "almost", "wrong"]
 
 class PracticeBody(BaseModel):
     """How the practice begins."""
+
+    model_config = ConfigDict(extra="forbid")
 
     again: bool = Field(
         default=False, description="Forget verdicts and edits of the lessons and begin again."

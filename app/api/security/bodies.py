@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from typing import Any, NoReturn
 
 import numpy as np
@@ -52,7 +53,9 @@ def read_json(body: bytes) -> Any:
         raise BodyError(400, "the body is not UTF-8 text") from None
     _require_flat(body)
     try:
-        value = json.loads(text, parse_constant=_refuse_constant)
+        value = json.loads(
+            text, parse_constant=_refuse_constant, object_pairs_hook=_without_repetition
+        )
     except ValueError as error:
         place = f" at character {error.pos}" if isinstance(error, json.JSONDecodeError) else ""
         raise BodyError(400, f"the body is not JSON{place}") from None
@@ -73,6 +76,15 @@ def _require_flat(body: bytes) -> None:
 
 def _refuse_constant(name: str) -> NoReturn:
     raise BodyError(400, f"{name} is not a number in JSON")
+
+
+def _without_repetition(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object whose names differ: of two equal ones, readers disagree which counts."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = Counter(name for name, _ in pairs)
+        raise BodyError(400, f"the body names {names.most_common(1)[0][0][:80]!r} more than once")
+    return found
 
 
 def _refuse_what_cannot_be_written(value: object) -> None:

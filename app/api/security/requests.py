@@ -52,6 +52,15 @@ class OneLength:
         await self.app(scope, receive, send)
 
 
+def _is_one_range(value: bytes) -> bool:
+    """Whether a Range names one part that ends where it begins, or later."""
+    found = _ONE_RANGE.fullmatch(value)
+    if found is None:
+        return False
+    first, _, last = found[1].partition(b"-")
+    return not first or not last or int(first) <= int(last)
+
+
 class OneRange:
     """Lets one Range through; many small ones would cost more than the whole file."""
 
@@ -63,7 +72,7 @@ class OneRange:
             await self.app(scope, receive, send)
             return
         ranges = [value for name, value in scope["headers"] if name == b"range"]
-        if len(ranges) != 1 or not _ONE_RANGE.fullmatch(ranges[0]):
+        if len(ranges) != 1 or not _is_one_range(ranges[0]):
             rest = [(name, value) for name, value in scope["headers"] if name != b"range"]
             await self.app({**scope, "headers": rest}, receive, send)
             return

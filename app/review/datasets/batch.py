@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -17,9 +16,11 @@ import numpy as np
 from app.datasets.cameras_reader import read_cameras
 from app.datasets.cameras_writer import camera_text
 from app.datasets.json_text import read_json
+from app.datasets.plain_file import read_plain
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import read_line_files
+from app.durable import replace_file
 from app.errors import DatasetFormatError, InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
@@ -326,7 +327,9 @@ def _write(
             (out / stale).unlink()
         # calibrate.json says what the folder holds, so it comes last.
         for name, text in chain(texts.items(), [("calibrate.json", _text(summary))]):
-            _write_atomically(out / name, text)
+            file = out / name
+            file.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(file, text.encode(), durable=False, private=False)
     except OSError as error:
         raise InputError(f"{out} cannot hold the cameras ({error.strerror})") from error
 
@@ -352,16 +355,9 @@ def _by_frame(cameras: Mapping[str, Camera]) -> dict[str, Camera]:
     return {**{name: bare[name] for name in bare if names[name] == 1}, **cameras}
 
 
-def _write_atomically(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(path)
-
-
 def _wrong_labels(findings: Path) -> set[tuple[str, str]]:
     """Frame and marking of each finding ``wrong_label``."""
-    value = read_json(findings.read_bytes(), str(findings))
+    value = read_json(read_plain(findings), str(findings))
     if not isinstance(value, list):
         raise DatasetFormatError(str(findings), None, None, "is not a list of findings")
     rows = [item for item in value if isinstance(item, dict) and item.get("kind") == "wrong_label"]

@@ -10,7 +10,7 @@ from app.child import Allowance, ChildEnded
 from app.child_pool import ChildPool
 from app.config import Settings
 from app.datasets.archive import Limits
-from app.errors import TooLargeError
+from app.errors import DatasetFormatError, TooLargeError
 from app.evaluation.frame_names import FrameNames
 from app.evaluation.prediction_files import (
     ReadPredictedCameras,
@@ -78,6 +78,15 @@ def read_files(files: PredictionFiles, names: FrameNames, limits: Limits) -> Fou
     return boxes, cameras
 
 
+def _without_folder(error: DatasetFormatError, files: PredictionFiles) -> DatasetFormatError:
+    """The same without the server's folders, which concern nobody who uploaded a file."""
+    shown = error.path
+    for path in (files.path, files.images, files.cameras):
+        if path is not None:
+            shown = shown.removeprefix(f"{path.parent}/")
+    return DatasetFormatError(shown, error.record, error.field, error.problem)
+
+
 class PredictionReader:
     """Reads files of somebody else in a process of its own, one set at a time."""
 
@@ -89,6 +98,7 @@ class PredictionReader:
         """``read_files``, within limits.
 
         Raises:
+            DatasetFormatError: A file is not what it should be; it is called by its name alone.
             TooLargeError: It went beyond the limits, or made the process crash.
             OverloadedError: Too many wait.
         """
@@ -98,7 +108,10 @@ class PredictionReader:
             return TooLargeError(f"{first.name if first else ''} {error}", hint=LIMITS_HINT)
 
         task = self._pool.submit(read_files, files, names, limits, explain=explain)
-        found: Found = task.future.result()
+        try:
+            found: Found = task.future.result()
+        except DatasetFormatError as error:
+            raise _without_folder(error, files) from error
         return found
 
     def close(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from app.errors import NotFoundError
 from app.finite import json_text
 from app.review.exporting.export import ExportReport
 from app.store.clock import now
+from app.store.leftovers import DAY, last_written
 
 _ID = re.compile(r"[0-9a-f]{32}|[1-9][0-9]{0,18}")
 """Ids of jobs, and those of exports that were made before there were jobs."""
@@ -94,6 +96,24 @@ class ExportFolder:
         if _ID.fullmatch(name):
             self._record(name).unlink(missing_ok=True)
             self.content(name).unlink(missing_ok=True)
+
+    def forget_unfinished(self, seconds: float = DAY) -> int:
+        """Delete zips that never got their record, or lost it: nothing lists them.
+
+        Args:
+            seconds: So long ago they must have been written; a newer one may get its record yet.
+
+        Returns:
+            How many there were.
+        """
+        gone = 0
+        for path in self.folder.glob("*.zip"):
+            name, written = path.name.removesuffix(".zip"), last_written(path)
+            known = not _ID.fullmatch(name) or self._record(name).exists()
+            if not known and written is not None and written < time.time() - seconds:
+                path.unlink(missing_ok=True)
+                gone += 1
+        return gone
 
     def _record(self, name: str) -> Path:
         return self.folder / f"{name}.json"

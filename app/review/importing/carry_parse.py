@@ -25,6 +25,8 @@ from app.store.imports import VERDICT
 MAX_LINE = 32 * 1024 * 1024
 MAX_VIEWS, MAX_BALLS, MAX_SIDE, MAX_TEXT = 100, 100, 20_000, 1000
 MAX_STATES = 100_000
+_MISSHAPEN = (ArithmeticError, AttributeError, LookupError, ReviewError, TypeError, ValueError)
+"""What reading a value raises that is not of the shape that it should have."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ def read_head(tree: FileTree) -> CarriedHead:
         # Its values reach the solver: a text in place of a number would break there.
         assert policy.hash
         return CarriedHead(_text(value["dataset"]), policy)
-    except (ReviewError, AttributeError, KeyError, TypeError, ValueError) as error:
+    except _MISSHAPEN as error:
         raise DatasetFormatError(shown, None, "policy", "is not a policy") from error
 
 
@@ -113,7 +115,7 @@ def parse_station(value: Json) -> CarriedStation:
         if not (station.shared and base.shared and station.key == base.key):
             raise InputError("names two static cameras, or one that is not static")
         return CarriedStation(station, base, _states(value["states"]), _log(value["log"]))
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ReviewError) as error:
+    except _MISSHAPEN as error:
         raise _problem(error) from error
 
 
@@ -136,7 +138,7 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> CarriedGroup:
             log=_log(value["log"]),
             verdicts=tuple(map(_verdict, _list(value["verdicts"], MAX_STATES))),
         )
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ReviewError) as error:
+    except _MISSHAPEN as error:
         raise _problem(error) from error
 
 
@@ -149,7 +151,7 @@ def parse_spare(value: Json) -> tuple[str, str, Extras]:
     try:
         extras = _mapping(value)["extras"]
         return _text(value["camera"]), _text(value["frame"]), _extras(extras)
-    except (KeyError, TypeError, ValueError, AttributeError, ReviewError) as error:
+    except _MISSHAPEN as error:
         raise _problem(error) from error
 
 
@@ -200,12 +202,18 @@ def _checked(station: Station) -> Station:
     for side in (station.size.width, station.size.height):
         if not isinstance(side, int) or isinstance(side, bool) or not 1 <= side <= MAX_SIDE:
             raise InputError(f"has an image side of {side}")
-    if station.calibration not in CALIBRATIONS or station.flipped not in (True, False):
-        raise InputError("has a calibration or a flip that Touchline does not know")
+    if station.calibration not in CALIBRATIONS:
+        raise InputError("has a calibration that Touchline does not know")
+    _require_truth_values("a station", station.flipped, station.shared)
     for marking, points in station.lines.items():
         if canonical_marking(marking) != marking or len(points) > MAX_POINTS:
             raise InputError(f"has {marking}, which is not a pitch marking or has too many points")
     return station
+
+
+def _require_truth_values(what: str, *values: object) -> None:
+    if not all(isinstance(value, bool) for value in values):
+        raise InputError(f"has {what} with a value in the place of true or false")
 
 
 def _verdict(value: Json) -> Mapping[str, Any]:

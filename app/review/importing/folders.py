@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 
 from app.config import Settings
-from app.datasets.archive import check_name, resolve_inside
+from app.datasets.archive import MAX_PART, check_name, resolve_inside
 from app.datasets.guess_format import guess_format
 from app.errors import InputError, NotFoundError
 
@@ -68,11 +68,13 @@ def resolve_folder(settings: Settings, path: str) -> Path:
             "no folders may be imported from",
             hint="The operator names them in TOUCHLINE_IMPORT_FOLDERS; or upload the data.",
         )
+    if any(len(part.encode(errors="replace")) > MAX_PART for part in path.split("/")):
+        raise NotFoundError("there is no folder of so long a name to import from")
     root, _, inside = check_name(path.rstrip("/")).partition("/")
     if root not in folders:
         raise NotFoundError(f'there is no folder "{root}" to import from')
     found = resolve_inside(folders[root], inside) if inside else folders[root]
-    if not os.path.exists(found):  # noqa: PTH110 - a name that is too long is not there either
+    if not os.path.exists(found):  # noqa: PTH110 - a path that is too long is not there either
         raise NotFoundError(f'there is no "{path}" to import from')
     return found
 

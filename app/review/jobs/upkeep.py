@@ -11,6 +11,7 @@ import structlog
 
 from app.errors import ReviewError
 from app.review.datasets.spare_calibrations import delete_spare_calibrations
+from app.review.exporting.folder import ExportFolder
 from app.review.jobs.jobs import Jobs
 from app.store.anchor import sync_anchor
 from app.store.answers import forget_answers, shorten_answers
@@ -39,6 +40,7 @@ class Tidied:
     uploads: int = 0
     cached: int = 0
     leftovers: int = 0
+    exports: int = 0
     calibrations: int = 0
 
 
@@ -59,6 +61,7 @@ def tidy(store: Store, wanted: Callable[[], bool] = lambda: True) -> Tidied:
         "uploads": lambda: expire_uploads(settings),
         "cached": lambda: expire_cache(settings),
         "leftovers": lambda: delete_leftovers(settings),
+        "exports": lambda: ExportFolder(settings.exports).forget_unfinished(),
         "calibrations": lambda: delete_spare_calibrations(store, wanted),
     }
     gone = {name: _attempt(name, step) or 0 for name, step in steps.items() if wanted()}

@@ -3,16 +3,56 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
-from app.commands.terminal import MAX_MISSING, print_export
+from app.commands.terminal import (
+    MAX_MISSING,
+    complain,
+    harmless,
+    print_export,
+    print_import,
+    print_json,
+)
 
+STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 REPORT = {
     "out": "out",
     "counts": {"groups": 2},
     "missing_images": [f"match, {number}.png: is no image" for number in range(MAX_MISSING + 3)],
 }
+
+
+class TestHarmless:
+    def test_what_steers_a_terminal_is_spelt_out(self, capsys: pytest.CaptureFixture[str]) -> None:
+        name = "a\x1b]0;owned\x07\x1b[2J\x9b31m\r\u202egnp.7\x7f"
+        print_import(
+            {
+                "skipped": [{"file": name, "record": None, "field": None, "problem": "is"}],
+                "more_skipped": 0,
+                "remarks": [name],
+            },
+            False,
+        )
+        complain(f"there is no {name}", f"Look for {name}")
+        found = capsys.readouterr()
+        assert not STEERING.search(found.out + found.err)
+        assert (
+            found.out.count(r"a\u001b]0;owned\u0007\u001b[2J\u009b31m\u000d\u202egnp.7\u007f") == 2
+        )
+        assert found.err.count(r"\u001b") == 4
+
+    def test_json_says_the_same_and_stays_json(self, capsys: pytest.CaptureFixture[str]) -> None:
+        value = {"file": "a\x1b[2J\x9b31m\u202eMálaga\n\t", "more": ["\x7f"]}
+        print_json(value)
+        out = capsys.readouterr().out
+        assert not STEERING.search(out)
+        assert json.loads(out) == value
+
+    def test_lines_and_letters_of_the_world_stay(self) -> None:
+        text = "Málaga 1 - 0 Эльче\n  足球 ⚽"
+        assert harmless(text) == text
 
 
 class TestPrintExport:

@@ -72,6 +72,15 @@ class TestFreeze:
         code, out, err = run("freeze", "--dataset", "demo", "--licence-file", str(picture))
         assert (code, out, err.strip()) == (1, "", f"{picture} cannot be read as text")
 
+    def test_a_pipe_in_the_place_of_a_licence_file_is_refused_at_once(
+        self, run: Run, frozen: Path, tmp_path: Path
+    ) -> None:
+        os.mkfifo(tmp_path / "pipe")
+        code, out, err = run(
+            "freeze", "--dataset", "demo", "--licence-file", str(tmp_path / "pipe")
+        )
+        assert (code, out, err.strip()) == (1, "", f"{tmp_path}/pipe is not a plain file")
+
     def test_nothing_to_freeze_is_one_sentence(self, run: Run, frozen: Path) -> None:
         code, out, err = run("freeze", "--dataset", "demo")
         assert (code, out) == (1, "")

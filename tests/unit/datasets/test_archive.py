@@ -4,6 +4,7 @@ import os
 import stat
 import zipfile
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -11,9 +12,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.config import Settings
-from app.datasets.archive import Limits, ZipTree, check_name, open_tree, resolve_inside
+from app.datasets.archive import (
+    FolderTree,
+    Limits,
+    ZipTree,
+    check_name,
+    open_tree,
+    resolve_inside,
+)
+from app.datasets.guess_format import guess_format
+from app.datasets.match_frames import MatchFrames
 from app.datasets.report import Report
-from app.errors import DatasetFormatError, UnsafePathError
+from app.datasets.soccernet_v3_reader import read_soccernet_v3
+from app.errors import DatasetFormatError, ImageError, UnsafePathError
+from app.store.archives import Archives
 
 MakeZip = Callable[..., Path]
 
@@ -21,6 +33,7 @@ HOSTILE = [
     "", "..", "../a", "a/../../b", "a/..", "/etc/passwd", "//host/share", "C:/a", "c:a",
     "a\\b", "..\\a", "a\x00b", "a\nb", "a\x7f", "%2e%2e/a", "%2e%2e%2fa", "%252e%252e%252fa",
     "..%2fa", "%2fetc/passwd", "..%5ca", "a%00b", "\uff0e\uff0e/a", "\u2025/a", "a/\ud800",
+    "a/" + "b" * 256, "é" * 128 + "/a",
 ]  # fmt: skip
 
 
@@ -33,7 +46,7 @@ class TestCheckName:
     @pytest.mark.parametrize(
         "name",
         ["7.png", "a/b/c", "spain_laliga/2014-2015/2015-02-14 - 20-00 Málaga 1 - 0 Elche/x.json",
-         "100% FC 2 - 1 A.C. Ö/..7.png", "a..b", "...", ".hidden"],
+         "100% FC 2 - 1 A.C. Ö/..7.png", "a..b", "...", ".hidden", "b" * 255 + "/" + "c" * 255],
     )  # fmt: skip
     def test_the_names_of_matches_are_fine(self, name: str) -> None:
         assert check_name(name) == name
@@ -246,3 +259,72 @@ class TestZipTree:
                 report.skip(error)
         if tree:
             tree.close()
+
+
+class TestNamesThatAreNoText:
+    """Some packers mark names as UTF-8 that are not."""
+
+    @pytest.fixture
+    def marked(self, make_zip: MakeZip) -> Path:
+        path = make_zip({"b/1.json": "one", "caf\u00e9.json": "two", "d.json": "three"})
+        content = path.read_bytes()
+        assert content.count("\u00e9".encode()) == 2
+        path.write_bytes(content.replace("\u00e9".encode(), b"\xe9\xff"))
+        return path
+
+    def test_one_of_them_condemns_no_other_member(self, marked: Path, report: Report) -> None:
+        tree = open_tree(marked, report)
+        assert tree is not None
+        with closing(tree):
+            assert tree.names() == ["b/1.json", "d.json"]
+            assert tree.read_bytes("b/1.json") == b"one"
+        (problem,) = report.problems
+        assert problem.record == b"caf\xe9\xff.json".decode("cp437")
+        assert problem.problem == "has a name that is no text, so it cannot be read"
+        assert guess_format(marked) == "sn-calibration"
+
+    def test_nor_inside_a_zip_inside_a_zip(
+        self, marked: Path, make_zip: MakeZip, report: Report
+    ) -> None:
+        path = make_zip({"inner.zip": marked.read_bytes()}, marked.with_name("outer.zip"))
+        outer = ZipTree(path, report, Limits())
+        with closing(outer), closing(outer.nested("inner.zip", report)) as inner:
+            assert inner.read_bytes("d.json") == b"three"
+
+    def test_a_picture_of_such_a_zip_is_read(self, marked: Path) -> None:
+        with closing(Archives()) as archives:
+            assert archives.read(marked, "b/1.json", 100) == b"one"
+            with pytest.raises(ImageError, match="cannot be read"):
+                archives.read(marked, b"caf\xe9\xff.json".decode("cp437"), 100)
+
+
+class TestPipesAndDevices:
+    """Opening a pipe waits for who writes into it; a device may have no end."""
+
+    @pytest.mark.parametrize("name", ["a", "a.zip", "a.json"])
+    def test_a_pipe_that_is_named_is_refused_at_once(
+        self, tmp_path: Path, report: Report, name: str
+    ) -> None:
+        os.mkfifo(tmp_path / name)
+        assert open_tree(tmp_path / name, report) is None
+        assert report.problems[0].problem == "is not a plain file"
+        guess_format(tmp_path / name)
+
+    def test_so_is_a_device(self, report: Report) -> None:
+        assert open_tree(Path("/dev/zero"), report) is None
+        assert report.problems[0].problem == "is not a plain file"
+
+    def test_a_pipe_in_a_folder_is_left_out(self, tmp_path: Path, report: Report) -> None:
+        os.mkfifo(tmp_path / "Labels-v3.json")
+        assert [*read_soccernet_v3(tmp_path, report)] == []
+        assert "is not a plain file" in report.problems[0].problem
+
+    def test_a_pipe_in_the_place_of_the_frames_costs_the_frames(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        os.mkfifo(tmp_path / "Frames-v3.zip")
+        frames = MatchFrames(
+            FolderTree(tmp_path, report, Limits()), "", ["Frames-v3.zip"], report, Limits()
+        )
+        assert not frames.some
+        assert "Frames-v3.zip" in report.problems[0].path

@@ -19,9 +19,9 @@ class TestViewGroups:
         self, report: Report
     ) -> None:
         groups = ViewGroups(report)
-        assert list(groups.add(placed("b", position=1))) == []
-        assert list(groups.add(placed("x", "other"))) == []
-        (group,) = groups.add(placed("a"))
+        assert list(groups.add(placed("b", position=1), "a.json")) == []
+        assert list(groups.add(placed("x", "other"), "a.json")) == []
+        (group,) = groups.add(placed("a"), "a.json")
         assert [view.key for view in group.views] == ["a", "b"]
         (rest,) = groups.rest()
         assert (rest.key, report.imported) == ("other", 3)
@@ -29,11 +29,14 @@ class TestViewGroups:
 
     def test_static_cameras_of_one_key_are_one_station(self, report: Report) -> None:
         groups = ViewGroups(report)
-        first, second = (group for name in "ab" for group in groups.add(placed("v", name, views=1)))
+        first, second = (
+            group for name in "ab" for group in groups.add(placed("v", name, views=1), "a.json")
+        )
         assert first.views[0].station is second.views[0].station
 
     def test_a_view_that_comes_twice_counts_once(self, report: Report) -> None:
         groups = ViewGroups(report)
-        assert list(groups.add(placed("a"))) == []
-        assert list(groups.add(placed("a"))) == []
-        assert "comes twice" in report.problems[0].problem
+        assert list(groups.add(placed("a"), "a.json")) == []
+        assert list(groups.add(placed("a"), "a.json")) == []
+        (problem,) = report.problems
+        assert (problem.path, "comes twice" in problem.problem) == ("a.json", True)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from app.datasets import viper_reader
 from app.datasets.archive import Limits, open_tree
 from app.datasets.report import Report
 from app.datasets.viper_reader import ViperTrack, read_viper
@@ -96,11 +97,36 @@ class TestReadViper:
         (problem,) = report.problems
         assert str(problem).endswith("1.xgtf, Person 7, framespan 9:9: y is blank")
 
-    @pytest.mark.parametrize("span", ["", "5:3", "a:b", "1", "0:99999999", "-1:3"])
+    @pytest.mark.parametrize("span", ["", "5:3", "a:b", "1", "0:99999999", "0:99999", "-1:3"])
     def test_a_wrong_framespan_is_reported(self, tmp_path: Path, report: Report, span: str) -> None:
         text = HEAD + person(7, BOX, span) + person(8, BOX) + TAIL
         assert _read(tmp_path, text, report).person_boxes == 1
-        assert "framespan" in report.problems[0].problem
+        assert report.problems[0].field == f"framespan {span}"
+
+    def test_a_framespan_beyond_the_limit_is_named_with_file_object_and_limit(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        spans = ("0:99999", "0:9999 10000:10000", "0:9999")
+        points = "".join(f'<data:point framespan="{span}" x="1" y="2"/>' for span in spans)
+        assert len(_read(tmp_path, HEAD + ball(points) + TAIL, report).balls) == 10_000
+        whole, parts = map(str, report.problems)
+        assert whole.endswith(
+            "1.xgtf, Ball 0, framespan 0:99999: covers 100,000 frames; at most 10,000 are read"
+        )
+        assert "covers 10,001 frames" in parts
+
+    def test_a_file_has_a_bounded_number_of_frames_with_a_ball(
+        self, tmp_path: Path, report: Report, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(viper_reader, "MAX_FRAMES", 10)
+        points = "".join(
+            f'<data:point framespan="{span}" x="1" y="{y}"/>'
+            for y, span in enumerate(("0:7", "4:9", "9:10", "0:9"))
+        )
+        assert sorted(_read(tmp_path, HEAD + ball(points) + TAIL, report).balls) == [*range(10)]
+        (problem,) = report.problems
+        assert problem.field == "framespan 9:10"
+        assert problem.problem == "is beyond 10 frames with a ball"
 
     def test_two_balls_in_one_frame_are_both_kept_and_a_repeated_one_once(
         self, tmp_path: Path, report: Report

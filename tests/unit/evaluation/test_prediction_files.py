@@ -175,6 +175,13 @@ class TestYolo:
 
 
 class TestCsv:
+    @pytest.mark.parametrize("text", ["", "\n\n", "frame,x,y,w,h,score\n", "\ufeff"])
+    def test_a_table_without_a_row_is_no_evaluation_of_nothing(
+        self, tmp_path, names, text: str
+    ) -> None:
+        with pytest.raises(DatasetFormatError, match=r"r\.csv: holds no row"):
+            read_predictions(write(tmp_path / "r.csv", text), "csv", names)
+
     def test_reads_a_table_like_snv3d(self, tmp_path, names) -> None:
         league, season, match = MATCH.split("/")
         head = ",league,season,match,main_action,replay,img_w,img_h,ball_bbox,score"

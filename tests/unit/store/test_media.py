@@ -166,6 +166,15 @@ class TestReadFrame:
         with pytest.raises(NotFoundError, match="no frame 7"):
             read_frame(Media(str(path), frame=7), None, False, settings)
 
+    def test_a_video_of_too_many_pixels_is_refused(self, tmp_path, settings) -> None:
+        path = tmp_path / "wide.mp4"
+        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 25, (64, 48))
+        writer.write(np.zeros((48, 64, 3), np.uint8))
+        writer.release()
+        small = settings.model_copy(update={"max_pixels": 64 * 48 - 1})
+        with pytest.raises(TooLargeError, match=r"wide\.mp4 declares 64 x 48 pixels"):
+            read_frame(Media(str(path), frame=0), None, False, small)
+
     def test_a_list_of_other_files_is_no_video(self, tmp_path, settings) -> None:
         hidden = tmp_path / "hidden.avi"
         video = cv2.VideoWriter(str(hidden), cv2.VideoWriter_fourcc(*"MJPG"), 25, (160, 96))

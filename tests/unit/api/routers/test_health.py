@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import pysqlite3.dbapi2 as sqlite
@@ -17,6 +20,9 @@ from app.api.deps import Services
 from app.config import Settings
 
 API = "/api/v1"
+SLOW = ("/events", "/remedies", "/influence", "/yield")
+"""What has no end, or solves."""
+KEY = {"Idempotency-Key": "once"}
 
 
 class TestHealth:
@@ -60,6 +66,55 @@ def forge_solutions(database: Path) -> None:
         connection.commit()
 
 
+@dataclass
+class Kept:
+    """Texts of a column before they were overwritten, by row."""
+
+    table: str = ""
+    column: str = ""
+    rows: list[tuple[str, int]] = field(default_factory=list)
+
+
+def json_columns(database: Path) -> list[tuple[str, str]]:
+    """Every column of the database that holds JSON as text."""
+    found = []
+    with closing(sqlite.connect(str(database))) as connection:
+        tables = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
+        for (table,) in tables.fetchall():
+            for row in connection.execute(f"PRAGMA table_info('{table}')").fetchall():
+                query = f"""SELECT 1 FROM "{table}" WHERE "{row[1]}" GLOB '[[{{]*'"""
+                if row[2] in ("VARCHAR", "TEXT") and connection.execute(query).fetchone():
+                    found.append((table, row[1]))
+    return found
+
+
+def overwrite_text(database: Path, table: str, column: str, text: str, kept: Kept) -> None:
+    """Every text of a column becomes another one; the column before has its own again."""
+    change = 'UPDATE "{}" SET "{}" = ? WHERE rowid = ?'
+    with closing(sqlite.connect(str(database))) as connection:
+        query = "SELECT name FROM sqlite_master WHERE type = 'trigger' AND tbl_name = ?"
+        for (name,) in connection.execute(query, (table,)).fetchall():
+            connection.execute(f"DROP TRIGGER {name}")
+        if kept.rows:
+            connection.executemany(change.format(kept.table, kept.column), kept.rows)
+        kept.table, kept.column = table, column
+        kept.rows = connection.execute(f'SELECT "{column}", rowid FROM "{table}"').fetchall()
+        rows = [(text, row) for _, row in kept.rows]
+        connection.executemany(change.format(table, column), rows)
+        connection.commit()
+
+
+def readable(app: FastAPI) -> list[str]:
+    """An address for each GET of the interface, the first of everything."""
+    found = []
+    for path, operations in app.openapi()["paths"].items():
+        if "get" in operations and not path.endswith(SLOW):
+            named = path.replace("{dataset}", "broadcast")
+            query = "?dataset=broadcast" if "{" not in path else ""
+            found.append(re.sub(r"{\w+}", "1", named) + query)
+    return found
+
+
 class TestDamage:
     @pytest.mark.parametrize("change", [overwrite_root("view"), forge_solutions])
     def test_the_first_sign_of_it_ends_all_changes(
@@ -79,3 +134,25 @@ class TestDamage:
         said = f"no change is taken: {first.json()['detail']}"
         assert [answer.json()["detail"] for answer in (refused, ready)] == [said, said]
         assert api.get(f"{API}/pitch").status_code == 200
+
+    @pytest.mark.parametrize("text", ["{", "[5]"])
+    def test_a_text_that_is_not_what_was_written_is_damage_wherever_it_stands(
+        self, app: FastAPI, spoil, api: TestClient, tmp_path: Path, text: str
+    ) -> None:
+        bulk = {"q": "", "state": "deferred"}
+        assert api.post(f"{API}/datasets/broadcast/verdicts", json=bulk, headers=KEY).is_success
+        asked = [path for path in readable(app) if api.get(path).status_code == 200]
+        refused, kept = set[str](), Kept()
+        for table, column in json_columns(tmp_path / "home" / "touchline.db"):
+            spoil(partial(overwrite_text, table=table, column=column, text=text, kept=kept))
+            with capture_logs():
+                answers = {path: api.get(path) for path in asked}
+                ready = api.get("/readyz").status_code
+            statuses = {path: answer.status_code for path, answer in answers.items()}
+            assert 500 not in statuses.values(), (table, column, statuses)
+            for answer in answers.values():
+                if answer.status_code == 503:
+                    assert "touchline doctor" in answer.json()["hint"]
+                    assert ready == 503
+                    refused.add(f"{table}.{column}")
+        assert {"dataset.policy", "station.lines", "view.balls", "solution.calibrations"} <= refused

@@ -108,6 +108,28 @@ class TestJobs:
         with store.read() as session:
             assert list(session.scalars(text("SELECT id FROM job ORDER BY id"))) == [2, 3, 4]
 
+    def test_exports_that_failed_or_were_cancelled_go_too(self, store: Store) -> None:
+        with store.write() as session:
+            for state in ("failed", "cancelled", "done"):
+                job = insert_job(session, NewJob("export", "t", "ann"))
+                update_job(session, job, state=state, ended="2020-01-01T00:00:00")
+        assert tidy(store).jobs == 2
+        with store.read() as session:
+            assert list(session.scalars(text("SELECT state FROM job"))) == ["done"]
+
+
+class TestExports:
+    def test_old_zips_without_a_record_go_and_every_finished_export_stays(
+        self, store: Store
+    ) -> None:
+        folder = store.settings.exports
+        for name in ("1.zip", "2.zip", "2.json", "mine.zip", "f" * 32 + ".zip"):
+            place(folder / name, OLD)
+        place(folder / "3.zip", time.time())
+        assert tidy(store).exports == 2
+        left = {path.name for path in folder.iterdir()}
+        assert left == {"2.zip", "2.json", "3.zip", "mine.zip"}
+
 
 class TestFiles:
     def test_old_images_and_half_written_files_go(self, store: Store) -> None:
@@ -125,6 +147,7 @@ class TestFiles:
             place(home / "uploads" / "f" / "content" / "photos.part", OLD),
             place(home / "uploads" / "f" / "content" / ".photos.partial", OLD),
             place(home / "exports" / "8.zip", OLD),
+            place(home / "exports" / "8.json", OLD),
         ]
         tidied = tidy(store)
         assert (tidied.cached, tidied.uploads, tidied.leftovers) == (1, 0, 4)

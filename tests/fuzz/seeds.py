@@ -1,0 +1,126 @@
+"""Seeds: small sound files of every kind, made by our own writers."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from app.config import Settings
+from app.datasets.export_record import ExportRecord
+from app.review.exporting.formats import FORMATS, WriteOptions, write_format
+from app.review.importing.carry import carry_out
+from app.review.importing.ingest import ingest
+from app.review.policies.text import policy_to_yaml
+from app.soccer.annotation import Extras, make_lines
+from app.soccer.group import Group, Station, View
+from app.soccer.policy import PAPER
+from app.solving.solve import solve
+from app.store.session import Store
+from tests.balls import box_around
+from tests.cameras import SIZE, looking
+from tests.fuzz.case import Case, Files
+
+MATCH = "league/2015-2016/2015-08-08 - 14-00 Home 3 - 1 Away"
+BALL = (21.0, -4.0, -1.5)
+CAMERAS = {
+    "7.png": ((5.0, 62.0, -18.0), (8.0, 0.0, 0.0), 1500.0),
+    "7_1.png": ((75.0, 6.0, -9.0), (30.0, 0.0, 0.0), 1600.0),
+}
+"""Position, a point looked at, focal length in pixels."""
+PERSON = {"class": "Person", "ID": "3", "points": {"x1": 1.0, "y1": 2.0, "x2": 9.0, "y2": 20.0}}
+
+
+def broadcast() -> Group:
+    """Two views with lines, a given camera, a ball and a person each."""
+    return Group(f"{MATCH}/7.png", tuple(map(_view, CAMERAS)), MATCH, split="train", label="A game")
+
+
+def static() -> Group:
+    """The same from two static cameras."""
+    views = []
+    for name, key in (("cam3", "7.png"), ("cam4", "7_1.png")):
+        view = _view(key)
+        views.append(replace(view, key=name, station=replace(view.station, key=name, shared=True)))
+    return Group("1200", tuple(views), "issia", label="Frame 1200")
+
+
+def seeds() -> Iterator[Case]:
+    """A sound case of every kind."""
+    with tempfile.TemporaryDirectory(prefix="touchline-seeds-") as name:
+        yield from _exported(Path(name))
+        yield from _carried(Path(name))
+    yield from _predicted()
+    yield Case("policy", {"policy.yaml": policy_to_yaml(PAPER).encode()}, "policy.yaml")
+    yield Case("text", {"licence.txt": b"Free for research.\n"}, "licence.txt")
+    query = b"status:unreviewed jac<0.95 sigma>0.5 finding:low_parallax id:1,2 sort:value"
+    yield Case("query", {"query.txt": query}, "query.txt")
+    picture = np.full((27, 48, 3), (40, 120, 50), np.uint8)
+    for ending in ("png", "jpg", "webp"):
+        data = cv2.imencode(f".{ending}", picture)[1].tobytes()
+        yield Case("image", {f"7.{ending}": data}, f"7.{ending}")
+    yield Case("video", {"cam3.mp4": _video(picture)}, "cam3.mp4")
+
+
+def _view(key: str) -> View:
+    camera = looking(*CAMERAS[key])
+    corners = {"Side line bottom": [[10.0, 700.0], [600.0, 690.0], [1200.0, 715.5]]}
+    station = Station(key, SIZE, lines=make_lines(corners), given=camera)
+    return View(key, station, (box_around(camera, BALL),), extras=Extras((PERSON,)))
+
+
+def _exported(folder: Path) -> Iterator[Case]:
+    for kind in FORMATS:
+        if kind in ("touchline", "yolo"):
+            continue
+        group = static() if kind.startswith("issia") else broadcast()
+        record = ExportRecord(group, solve(group, PAPER), "accepted")
+        root = folder / kind
+        root.mkdir()
+        write_format(root, [record], WriteOptions(kind, everything=True))
+        yield Case(kind, _files(root))
+
+
+def _carried(folder: Path) -> Iterator[Case]:
+    store = Store.open(Settings(home=folder / "home"))
+    try:
+        ingest(store, "seed", [broadcast(), static()], source="seed", actor="local")
+        carry_out(store, "seed", folder / "touchline")
+        yield Case("touchline", _files(folder / "touchline"))
+    finally:
+        store.close()
+
+
+def _predicted() -> Iterator[Case]:
+    box = {"image_id": f"{MATCH}/7.png", "category_id": 1, "bbox": [10, 20, 8, 9], "score": 0.5}
+    document = {"images": [{"id": 5, "file_name": "7_1.png", "width": 640, "height": 360}]}
+    coco = {"r.json": json.dumps([box, {**box, "image_id": 5}]), "t.json": json.dumps(document)}
+    yield Case("predictions-coco", {name: text.encode() for name, text in coco.items()})
+    yield Case("predictions-yolo", {"7_1.txt": b"0 0.5 0.5 0.01 0.02 0.9\n0 0.1 0.2 0.01 0.02\n"})
+    rows = b"image,x,y,w,h,score\n7.png,600,300,9,9,0.5\n7_1.png,1,2,3,4,\n"
+    yield Case("predictions-csv", {"r.csv": rows})
+    table = b'frame,camera,ball_bbox,score\n358,3,"[1, 2, 3, 4]",1\n'
+    yield Case("predictions-csv", {"r.csv": table})
+
+
+def _files(root: Path) -> Files:
+    return {
+        path.relative_to(root).as_posix(): path.read_bytes()
+        for path in sorted(root.rglob("*"))
+        if path.is_file() and path.name != "manifest.json"
+    }
+
+
+def _video(picture: np.ndarray) -> bytes:
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name, "v.mp4")
+        video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 25, (48, 27))
+        for shade in range(3):
+            video.write(picture + np.uint8(shade))
+        video.release()
+        return path.read_bytes()

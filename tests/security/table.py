@@ -1,0 +1,86 @@
+"""The reviewed table of ``routes.yaml``: which attacks each route is given, and why not the others."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+from fastapi import FastAPI
+
+CORPUS = Path(__file__).parent / "corpus"
+TABLE = yaml.safe_load((Path(__file__).parent / "routes.yaml").read_text())
+MISSING = "99999999"
+"""An id that nothing has."""
+_MOUNTED = {"/static": "/static/{file}", "/assets/{version}": "/assets/{version}/{file}"}
+_SAFE = ("GET", "HEAD")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One route of the table.
+
+    Attributes:
+        method: As it is asked.
+        path: With its parameters in braces.
+        kind: Of ``kinds`` in the table.
+        classes: Of attacks that it is given.
+    """
+
+    method: str
+    path: str
+    kind: str
+    classes: frozenset[str]
+
+    @property
+    def changes(self) -> bool:
+        """Whether it is asked by a method that may change something."""
+        return self.method not in _SAFE
+
+    @property
+    def parameters(self) -> list[str]:
+        """Names of its path parameters."""
+        return re.findall(r"{(\w+)", self.path)
+
+    def target(self, ids: Mapping[str, str], default: str = MISSING) -> str:
+        """Its address with these path parameters, and one that is not there for the others."""
+        return re.sub(r"{(\w+)[^}]*}", lambda name: ids.get(name[1], default), self.path)
+
+    def __str__(self) -> str:
+        return f"{self.method} {self.path}"
+
+
+def rows(of: str = "") -> list[Row]:
+    """The rows that are given a class of attacks; all without one."""
+    found = []
+    for name, words in TABLE["routes"].items():
+        method, path = name.split(" ", 1)
+        kind, *more = words.split()
+        classes = frozenset([*TABLE["kinds"][kind]["classes"], *more])
+        found.append(Row(method, _MOUNTED.get(path, path), kind, classes))
+    return [row for row in found if not of or of in row.classes]
+
+
+def served(app: FastAPI) -> set[str]:
+    """Every route that an application has, mounted folders too, as the table calls them."""
+    found = set()
+    for path, methods in _routes(app.router):
+        found |= {f"{method} {path}" for method in methods - {"HEAD"}}
+    return found
+
+
+def _routes(router: Any, prefix: str = "") -> Iterator[tuple[str, set[str]]]:
+    for route in router.routes:
+        included = getattr(route, "original_router", None)
+        if included is None:
+            yield prefix + route.path, set(getattr(route, "methods", None) or {"GET"})
+        else:
+            yield from _routes(included, prefix + route.include_context.prefix)
+
+
+def lines_of(name: str) -> list[str]:
+    """The lines of a text of the corpus, without its first, which says what it is."""
+    return (CORPUS / name).read_text().splitlines()[1:]

@@ -1,0 +1,388 @@
+"""Every route with every class of attacks that the reviewed table gives it."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+import re
+import socket
+import sqlite3
+import time
+import warnings
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import pytest
+import yaml
+
+from app.api.application import create_app
+from app.config import Settings
+from app.store.session import Store
+from tests.security.asking import JSON, Answer, assert_guarded
+from tests.security.conftest import API, FORMULA, Guarded
+from tests.security.table import CORPUS, MISSING, TABLE, Row, lines_of, rows, served
+
+STALL_SECONDS = 45.0
+"""A request that never comes whole has ended by then; the limits are 15 and 20 seconds."""
+TEXT = "text/plain"
+
+
+def target_of(row: Row, guarded: Guarded) -> str:
+    """What there is, for reading; what is not there, where asking could take something away."""
+    if row.changes or not row.path.startswith(API):
+        return row.target({} if row.changes else guarded.ids)
+    return row.target(guarded.ids) + "?dataset=small&against=1&with=1"
+
+
+def told_of(row: Row, answer: Answer, what: object) -> tuple[str, object, int, bytes]:
+    """What a failure says."""
+    return (str(row), what, answer.status, answer.body[:500])
+
+
+@pytest.fixture(scope="module")
+def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """The application, for what it says of itself."""
+    settings = Settings(home=tmp_path_factory.mktemp("table"))
+    Store.open(settings).close()
+    app = create_app(settings)
+    yield app
+    app.state.services.close()
+
+
+class TestTable:
+    def test_it_knows_every_route_and_no_other(self, app: Any) -> None:
+        known, there = set(TABLE["routes"]), served(app)
+        assert not there - known, "review these routes and add them to routes.yaml"
+        assert not known - there, "these routes are gone; take them out of routes.yaml"
+
+    def test_it_agrees_with_the_document(self, app: Any) -> None:
+        """A kind that leaves out what a route has is no reason to leave the attacks out."""
+        document = app.openapi()["paths"]
+        for row in rows():
+            assert ("paths" in row.classes) == bool(row.parameters), row
+            operation = document.get(row.path, {}).get(row.method.lower())
+            if operation is None:
+                continue
+            places = {item["in"] for item in operation.get("parameters", [])}
+            assert ("queries" in row.classes) == ("query" in places), row
+            body = operation.get("requestBody", {}).get("content", {})
+            assert ("shapes" in row.classes) == ("application/json" in body), row
+            assert (row.kind == "upload") == ("application/octet-stream" in body), row
+            assert ("reading" in row.classes) == (row.method == "GET"), row
+            given = operation["responses"].get("200", {}).get("content", {})
+            assert ("tables" in row.classes) >= ("text/csv" in given), row
+            assert ("images" in row.classes) >= ("image/jpeg" in given), row
+
+    def test_each_kind_says_why_it_leaves_a_class_out(self) -> None:
+        for name, kind in TABLE["kinds"].items():
+            assert set(kind["classes"]) | set(kind["not"]) == set(TABLE["classes"]), name
+            assert not set(kind["classes"]) & set(kind["not"]), name
+            assert all(map(str.strip, kind["not"].values())), name
+        used = {word for words in TABLE["routes"].values() for word in words.split()}
+        assert used <= set(TABLE["classes"]) | set(TABLE["kinds"])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def stalled(guarded: Guarded) -> Iterator[list[tuple[Row, float, socket.socket]]]:
+    """For each route a request that never comes whole, under way while everything else is asked."""
+    where, found = urlsplit(guarded.address), []
+    for row in rows("slow"):
+        head = f"{row.method} {row.target({})} HTTP/1.1\r\nHost: {where.netloc}\r\n"
+        if row.changes:
+            kind = "application/octet-stream" if row.kind == "upload" else "application/json"
+            head += f"Content-Type: {kind}\r\nContent-Length: 1000\r\n\r\n{{"
+        connection = socket.create_connection((where.hostname, where.port or 0), timeout=5)
+        connection.sendall(head.encode())
+        found.append((row, time.monotonic(), connection))
+    yield found
+    for _, _, connection in found:
+        connection.close()
+
+
+class TestEveryRoute:
+    def test_every_answer_carries_the_headers_and_betrays_nothing(self, guarded: Guarded) -> None:
+        statuses = set()
+        for row in rows("headers"):
+            targets = {target_of(row, guarded), row.target({}), row.target({}, "x")}
+            for target in sorted(targets):
+                if row.changes and target != row.target({}) and not row.parameters:
+                    continue
+                answer = guarded.ask(row.method, target, only_head=row.kind == "stream")
+                assert_guarded(answer, told_of(row, answer, target))
+                statuses.add(answer.status)
+                if target == target_of(row, guarded) and row.path != "/{path:elsewhere}":
+                    fits = (200, 204, 404) if row.changes else (200,)
+                    unknown = row.path.endswith("/lesson") or row.changes
+                    assert unknown or answer.status in fits, told_of(row, answer, target)
+        assert {200, 404, 422, 428} <= statuses
+
+    def test_another_host_reaches_nothing(self, guarded: Guarded) -> None:
+        for row in rows("host"):
+            for host in lines_of("hosts.txt"):
+                answer = guarded.ask(row.method, target_of(row, guarded), {"Host": host})
+                assert answer.status == 400, told_of(row, answer, host)
+                assert_guarded(answer, told_of(row, answer, host))
+
+    def test_a_page_of_another_site_changes_nothing_and_reads_nothing(
+        self, guarded: Guarded
+    ) -> None:
+        ours = guarded.ask.where.netloc
+        for row in rows("origin"):
+            for asked in yaml.safe_load((CORPUS / "origins.yaml").read_text()):
+                headers = {name: value.format(host=ours) for name, value in asked.items()}
+                target, stream = target_of(row, guarded), row.kind == "stream"
+                answer = guarded.ask(row.method, target, {**headers, **JSON}, only_head=stream)
+                assert_guarded(answer, told_of(row, answer, headers))
+                assert answer.status == 403 or not row.changes, told_of(row, answer, headers)
+            wanted = {"Origin": "http://evil.example", "Access-Control-Request-Method": row.method}
+            preflight = guarded.ask("OPTIONS", target_of(row, guarded), wanted)
+            assert_guarded(preflight, told_of(row, preflight, "preflight"))
+            assert preflight.status >= 400, told_of(row, preflight, "preflight")
+
+    def test_other_methods_do_nothing(self, guarded: Guarded) -> None:
+        for row in rows("methods"):
+            target = target_of(row, guarded)
+            for method in ("TRACE", "PROPFIND", "BREW", "get"):
+                answer = guarded.ask(method, target)
+                assert answer.status == 405, told_of(row, answer, method)
+                assert answer.headers["allow"], told_of(row, answer, method)
+                assert_guarded(answer, told_of(row, answer, method))
+            if row.changes:
+                continue
+            plain = guarded.ask("GET", target)
+            head = guarded.ask("HEAD", target)
+            assert (head.status, head.body) == (plain.status, b""), told_of(row, head, "HEAD")
+            override = {"X-HTTP-Method-Override": "DELETE", "X-Method-Override": "DELETE"}
+            answer = guarded.ask("GET", target, override)
+            assert answer.status == plain.status, told_of(row, answer, override)
+
+    def test_reading_changes_nothing(self, guarded: Guarded) -> None:
+        before = _state(guarded.home)
+        for row in rows("reading"):
+            for method in ("GET", "HEAD", "OPTIONS"):
+                guarded.ask(method, target_of(row, guarded), only_head=row.kind == "stream")
+        assert _state(guarded.home) == before
+
+    def test_hostile_paths_reach_nothing(self, guarded: Guarded) -> None:
+        for row in rows("paths"):
+            for name in row.parameters:
+                for value in lines_of("paths.txt"):
+                    if row.changes and unquote(value).strip().lstrip("+").rstrip(".0").isdigit():
+                        continue
+                    ids = {**({} if row.changes else guarded.ids), name: value}
+                    answer = guarded.ask(row.method, row.target(ids))
+                    assert_guarded(answer, told_of(row, answer, value))
+                    assert "set-cookie" not in answer.headers, told_of(row, answer, value)
+                    assert b"root:x:" not in answer.body, told_of(row, answer, value)
+                    assert b"[build-system]" not in answer.body, told_of(row, answer, value)
+                    assert answer.status < 400 or answer.status in (
+                        400,
+                        404,
+                        405,
+                        409,
+                        415,
+                        422,
+                        428,
+                    )
+
+    def test_hostile_queries_make_no_error_of_the_server(
+        self, guarded: Guarded, document: dict[str, Any]
+    ) -> None:
+        for row in rows("queries"):
+            operation = document["paths"][row.path][row.method.lower()]
+            names = [item["name"] for item in operation["parameters"] if item["in"] == "query"]
+            rest = "dataset=small&" if "dataset" in names else ""
+            ids = {} if row.changes else guarded.ids
+            for name in names:
+                for value in (*lines_of("queries.txt"), "a" * 5000, f"1&{name}=2"):
+                    target = f"{row.target(ids)}?{rest if name != 'dataset' else ''}{name}={value}"
+                    answer = guarded.ask(row.method, target, only_head=row.kind == "stream")
+                    if row.kind != "stream":
+                        assert_guarded(answer, told_of(row, answer, target))
+                    assert b"root:x:" not in answer.body, told_of(row, answer, target)
+
+    def test_a_body_that_is_no_plain_json_is_refused(self, guarded: Guarded) -> None:
+        bodies = yaml.safe_load((CORPUS / "bodies.yaml").read_text())
+        headers = {**JSON, "If-Match": '"a"'}
+        for row in rows("json"):
+            for name, parts in bodies.items():
+                pieces = zip(parts[::2], parts[1::2], strict=True)
+                body = "".join(text * times for text, times in pieces).encode("latin-1")
+                answer = guarded.ask(row.method, row.target({}), headers, body)
+                assert answer.status == 400, told_of(row, answer, name)
+                assert_guarded(answer, told_of(row, answer, name))
+
+    def test_a_body_of_the_wrong_shape_is_refused(self, guarded: Guarded) -> None:
+        headers = {**JSON, "If-Match": '"a"'}
+        for row in rows("shapes"):
+            for shape in json.loads((CORPUS / "shapes.json").read_text()):
+                body = json.dumps(shape).encode()
+                answer = guarded.ask(row.method, row.target({}), headers, body)
+                assert 400 <= answer.status < 500, told_of(row, answer, shape)
+                assert_guarded(answer, told_of(row, answer, shape))
+
+    def test_a_body_of_another_type_is_refused(self, guarded: Guarded) -> None:
+        for row in rows("types"):
+            own = "application/octet-stream" if row.kind == "upload" else "application/json"
+            for kind in (TEXT, "multipart/form-data; boundary=a", f"{own}, {TEXT}", f"x-{own}", ""):
+                headers = {"Content-Type": kind, "If-Match": '"a"'}
+                answer = guarded.ask(row.method, row.target({}) + "?name=a", headers, b"{}")
+                assert answer.status == 415, told_of(row, answer, kind)
+                assert_guarded(answer, told_of(row, answer, kind))
+
+    def test_a_body_that_is_too_large_is_refused_before_it_comes(self, guarded: Guarded) -> None:
+        for row in rows("sizes"):
+            own = "application/octet-stream" if row.kind == "upload" else "application/json"
+            for length in ("1000000000000", "9" * 30, "-1", "1e3", "0x10", "1, 2"):
+                headers = {"Content-Type": own, "Content-Length": length, "If-Match": '"a"'}
+                answer = guarded.ask(row.method, row.target({}) + "?name=a", headers)
+                assert answer.status in (400, 413), told_of(row, answer, length)
+                assert_guarded(answer, told_of(row, answer, length))
+            both = {"Content-Type": own, "Content-Length": "2", "Transfer-Encoding": "chunked"}
+            answer = guarded.ask(row.method, row.target({}) + "?name=a", both, b"0\r\n\r\n")
+            assert answer.status == 400, told_of(row, answer, both)
+            guarded.ask.close()
+
+    def test_a_list_of_ranges_costs_no_more_than_one(self, guarded: Guarded) -> None:
+        for row in rows("ranges"):
+            target = target_of(row, guarded)
+            whole = guarded.ask("GET", target)
+            for value in lines_of("ranges.txt"):
+                answer = guarded.ask("GET", target, {"Range": value})
+                assert_guarded(answer, told_of(row, answer, value))
+                assert answer.status in (whole.status, 206, 416), told_of(row, answer, value)
+                assert "multipart" not in answer.headers.get("content-type", ""), row
+                # A document that is made anew may differ by some letters of a time.
+                most = len(whole.body) + 2000
+                assert len(answer.body) <= most, told_of(row, answer, value)
+
+
+@pytest.fixture(scope="module")
+def document(guarded: Guarded) -> dict[str, Any]:
+    """The OpenAPI document."""
+    found: dict[str, Any] = json.loads(guarded.ask("GET", f"{API}/openapi.json").body)
+    return found
+
+
+def _state(home: Path) -> dict[str, int]:
+    """How many rows each table has, and how long the log of changes is."""
+    path = f"file:{home / 'touchline.db'}?mode=ro"
+    with contextlib.closing(sqlite3.connect(path, uri=True)) as database:
+        names = database.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
+        counts = {name: f'SELECT count(*) FROM "{name}"' for (name,) in names}
+        state = {name: database.execute(query).fetchone()[0] for name, query in counts.items()}
+    return state | {"version": sum(path.is_file() for path in (home / "exports").rglob("*"))}
+
+
+class TestFilesOfOthers:
+    def imported(self, guarded: Guarded, form: str, name: str, content: bytes) -> Any:
+        """The job of an import of an uploaded file."""
+        source = {"upload": guarded.upload(name, content)}
+        asked = {"dataset": "hostile", "format": form, "source": source}
+        return guarded.json("POST", "/imports", asked)
+
+    def test_hostile_members_of_a_zip_are_left_out(self, guarded: Guarded, tmp_path: Path) -> None:
+        assert {str(row) for row in rows("archives")} == {
+            f"POST {API}/imports",
+            f"POST {API}/datasets/{{dataset}}/predictions",
+        }
+        content = _archive()
+        job = self.imported(guarded, "soccernet-v3", "tree.zip", content)
+        assert job["state"] == "failed", job
+        assert not [secret for secret in ("root:x:", str(guarded.home)) if secret in str(job)]
+        body = {"name": "p", "upload": guarded.upload("p.zip", content), "format": "yolo"}
+        sent = json.dumps(body).encode()
+        answer = guarded.ask("POST", f"{API}/datasets/small/predictions", JSON, sent)
+        assert answer.status == 400, answer.body
+        assert_guarded(answer, "predictions")
+        outside = (guarded.home.parent, guarded.home, Path("/tmp"), Path.cwd())
+        assert not [path for folder in outside for path in folder.glob("*escaped*")]
+
+    def test_entities_and_dtds_are_refused(self, guarded: Guarded) -> None:
+        assert [str(row) for row in rows("xml")] == [f"POST {API}/imports"]
+        for path in sorted((CORPUS / "xml").iterdir()):
+            job = self.imported(guarded, "issia", f"ground_truth_3_{path.name}", path.read_bytes())
+            assert job["state"] == "failed", (path.name, job)
+            assert "DTD or an entity" in str(job), (path.name, job)
+            assert "root:x:" not in str(job)
+
+    def test_what_is_no_picture_or_too_large_is_not_served(self, guarded: Guarded) -> None:
+        assert {str(row) for row in rows("images")} == {
+            f"POST {API}/imports",
+            f"GET {API}/views/{{view}}/image",
+        }
+        page = json.loads(guarded.ask("GET", f"{API}/groups?dataset=spoiled").body)
+        group = json.loads(guarded.ask("GET", f"{API}/groups/{page['items'][0]['id']}").body)
+        assert len(group["views"]) >= 2
+        for view in group["views"]:
+            for width in ("", "?width=208"):
+                answer = guarded.ask("GET", view["image"] + width)
+                assert answer.status in (413, 422), (view["key"], answer.body[:200])
+                assert_guarded(answer, view["key"])
+                assert b"<s" not in answer.body
+
+    def test_no_cell_of_a_table_is_a_formula(self, guarded: Guarded) -> None:
+        cells = 0
+        for row in rows("tables"):
+            answer = guarded.ask("GET", row.target(guarded.ids))
+            assert answer.status == 200, told_of(row, answer, "")
+            for text in _tables(answer):
+                for line in csv.reader(io.StringIO(text)):
+                    for cell in line:
+                        cells += FORMULA in cell
+                        formula = cell.startswith(("=", "+", "-", "@", "\t", "\r"))
+                        number = re.fullmatch(r"[+-]?[\d.]+(e[+-]?\d+)?", cell)
+                        assert not formula or number, told_of(row, answer, cell)
+        assert cells, "no table has a name that could be a formula"
+
+
+def _tables(answer: Answer) -> list[str]:
+    if answer.headers["content-type"].startswith("text/csv"):
+        return [answer.body.decode()]
+    with zipfile.ZipFile(io.BytesIO(answer.body)) as packed:
+        names = [name for name in packed.namelist() if name.endswith(".csv")]
+        return [packed.read(name).decode() for name in names]
+
+
+def _archive() -> bytes:
+    """The zip of the corpus."""
+    out = io.BytesIO()
+    with warnings.catch_warnings(), zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as packed:
+        warnings.simplefilter("ignore")
+        for member in yaml.safe_load((CORPUS / "archives.yaml").read_text()):
+            entry = zipfile.ZipInfo("x")
+            entry.filename = member["name"]
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = int(str(member.get("mode", "100644")), 8) << 16
+            content = b"\0" * member.get("zeros", 0) or str(member.get("content", "x")).encode()
+            for _ in range(member.get("times", 1)):
+                packed.writestr(entry, content)
+    return out.getvalue()
+
+
+class TestAtLast:
+    """What has to wait until all the others were asked."""
+
+    def test_requests_that_never_came_whole_have_ended(
+        self, guarded: Guarded, stalled: list[tuple[Row, float, socket.socket]]
+    ) -> None:
+        assert len(stalled) == len(rows())
+        for row, began, connection in stalled:
+            connection.settimeout(max(began + STALL_SECONDS - time.monotonic(), 1))
+            with connection:
+                received = connection.recv(64 * 1024)
+            # A refusal that needs no body may come at once.
+            assert received == b"" or re.match(rb"HTTP/1.1 4\d\d ", received), (row, received[:80])
+            if b"application/problem+json" in received:
+                assert b"nosniff" in received, row
+
+    def test_the_server_is_as_it_was(self, guarded: Guarded) -> None:
+        assert guarded.ask("GET", "/readyz").status == 200
+        for name in ("small", "formula", "spoiled"):
+            assert guarded.ask("GET", f"{API}/datasets/{name}").status == 200
+        assert guarded.ask("GET", f"{API}/groups/{MISSING}").status == 404
