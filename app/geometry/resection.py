@@ -161,6 +161,22 @@ def distances(
     Args:
         parameters: One camera, shape (8,).
     """
+    offsets, _ = residuals(parameters, curves, sightings, half_diagonal)
+    return np.hypot(offsets[:, 0], offsets[:, 1])
+
+
+def residuals(
+    parameters: FloatArray, curves: Curves, sightings: Sightings, half_diagonal: float
+) -> tuple[FloatArray, FloatArray]:
+    """Offset of each point from its projected curve, and its derivatives by the parameters.
+
+    Args:
+        parameters: One camera, shape (8,).
+
+    Returns:
+        Across the curve and along it (zero but beyond an end), pixels, shape (N, 2), and the
+        derivatives, shape (N, 2, 8).
+    """
     offsets = np.empty((len(sightings.pixels), 2))
     jacobians = np.empty((len(sightings.pixels), 2, PARAMETERS))
     residual_rows(
@@ -173,7 +189,7 @@ def distances(
         offsets,
         jacobians,
     )
-    return np.hypot(offsets[:, 0], offsets[:, 1])
+    return offsets, jacobians
 
 
 def projection_jacobians(

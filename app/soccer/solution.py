@@ -12,7 +12,7 @@ from itertools import pairwise
 from app.geometry.camera import Camera
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 
-SOLVER_VERSION = "2"
+SOLVER_VERSION = "3"
 """Part of every solution's key; raised by one whenever a number changes."""
 
 GAMMAS_PERCENT = (0.5, 1.0, 2.0)

@@ -56,7 +56,7 @@ def calibrate(
         fit, observations, suspects = find_suspects(problem, observations, fit)
     fit = problem.refine_main(fit, observations)
     try:
-        spread = problem.covariance(fit.parameters, observations)
+        spread = problem.line_noise(fit.parameters, observations).parameters
     except DegenerateGeometryError:
         spread = np.full((PARAMETERS, PARAMETERS), np.inf)
     calibration = Calibration(
