@@ -34,11 +34,14 @@ from app.geometry.resection import (
     parameters_from_camera,
     residuals,
 )
+from app.errors import DegenerateGeometryError
+from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import CIRCLES
+from app.soccer.pitch import CIRCLES, Pitch
 from app.soccer.policy import CalibrationPolicy
+from app.soccer.solution import Calibration
 from app.solving.line_noise import LineNoise, line_noise
-from app.solving.observations import Observations, principal_point
+from app.solving.observations import Observations, observe, principal_point
 from app.solving.starts import STANDS, stand_starts
 
 REFERENCE_DIAGONAL = float(np.hypot(960, 540))
@@ -276,6 +279,20 @@ class ResectionProblem:
         # The cost counts pixels as if a click's standard deviation were one.
         prior.sigma[[ROLL, X, Y, Z, KAPPA]] /= np.sqrt(variance)
         return prior
+
+
+def view_line_noise(
+    calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+) -> LineNoise:
+    """Noise of the clicks of a view that is calibrated from them.
+
+    Raises:
+        DegenerateGeometryError: It has no camera, or its lines leave that open.
+    """
+    if calibration.camera is None:
+        raise DegenerateGeometryError("without a camera there are no residuals")
+    problem = ResectionProblem.of(size, policy)
+    return problem.line_noise(problem.parameters(calibration.camera), observe(lines, pitch, size))
 
 
 def best(fit: Fit, count: int) -> FloatArray:
