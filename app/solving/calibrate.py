@@ -19,6 +19,7 @@ from app.soccer.solution import GAMMAS_PERCENT, SOLVER_VERSION, Calibration, Mar
 from app.solving.jaccard import jaccard, measure_markings, outcomes, project_markings
 from app.solving.labels import find_suspects
 from app.solving.observations import observe
+from app.solving.picture import find_picture
 from app.solving.resect import ResectionProblem, measurement_count
 
 MIN_MEASUREMENTS = 7
@@ -65,6 +66,7 @@ def calibrate(
         suspects=suspects,
         covariance=tuple(spread.ravel().tolist()) if np.isfinite(spread).all() else None,
         unobservable=_unobservable(spread),
+        picture=find_picture(problem, fit.parameters, observations),
     )
     return measure(calibration, lines, pitch, size)
 

@@ -25,6 +25,7 @@ _BY_WEIGHT = (
     "view_disagrees",
     "implausible_ball",
     "implausible_camera",
+    "picture_geometry",
     "under_constrained",
     "bad_point",
     "high_uncertainty",

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.least_squares import (
@@ -34,7 +35,6 @@ from app.geometry.resection import (
     parameters_from_camera,
     residuals,
 )
-from app.errors import DegenerateGeometryError
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import CIRCLES, Pitch

@@ -16,7 +16,7 @@ const NUMBERS = /** @type {{[field: string]: string}} */ ({
 const FINDINGS = [
 	'any', 'none', 'wrong_label', 'sides_swapped', 'visible_not_annotated', 'bad_point', 'under_constrained',
 	'view_disagrees', 'not_synchronous', 'ball_size', 'low_parallax', 'high_uncertainty', 'implausible_ball',
-	'implausible_camera', 'several_balls', 'upstream_changed',
+	'implausible_camera', 'picture_geometry', 'several_balls', 'upstream_changed',
 ];
 const GATES = ['none', 'calibratable', 'jac', 'two_views', 'ball', 'baseline', 'reprojection', 'parallax', 'sigma'];
 const SORTS = ['value', 'newest', 'sigma', 'jac', 'error', 'error_percent', 'parallax', 'margin', 'ratio', 'height', 'distance', 'box', 'views', 'findings', 'gate', 'status', 'split', 'reviewer', 'label', 'number'];

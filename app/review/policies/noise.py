@@ -99,8 +99,9 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
     state = read_policy(store, dataset)
     misses: list[Miss] = []
     lines: dict[str, tuple[float, float]] = {}
-    groups = solved = 0
-    for groups, solved, group in _groups(store, state.dataset_id):
+    ids = _solved(store, state.dataset_id)
+    chosen = ids[:: max(-(-len(ids) // MAX_GROUPS), 1)]
+    for group in _groups(store, chosen):
         misses += _misses(group)
         lines.update(_lines(group))
     ball = estimate_ball_noise(misses, state.policy)
@@ -108,8 +109,8 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
     return Noise(
         dataset_id=state.dataset_id,
         dataset=state.dataset,
-        groups=groups,
-        solved=solved,
+        groups=len(chosen),
+        solved=len(ids),
         ball=ball,
         lines=_summary(list(lines.values())),
         advice=advice,
@@ -131,16 +132,17 @@ def apply_noise(store: Store, noise: Noise, *, actor: str) -> PolicyState:
     return change_policy(store, noise.dataset_id, policy, if_match=state.etag, actor=actor)
 
 
-def _groups(store: Store, dataset_id: int) -> Iterator[tuple[int, int, GroupState]]:
-    """Groups spread over those with a solution, with their count and that of all."""
+def _solved(store: Store, dataset_id: int) -> list[int]:
+    """Ids of the groups that have a solution, in the dataset's order."""
     with store.read() as session:
-        ids = [row[0] for row in present_solutions(session, dataset_id) if row[2] is not None]
-    chosen = ids[:: -(-len(ids) // MAX_GROUPS)] if ids else []
+        return [row[0] for row in present_solutions(session, dataset_id) if row[2] is not None]
+
+
+def _groups(store: Store, chosen: Sequence[int]) -> Iterator[GroupState]:
     for start in range(0, len(chosen), CHUNK):
         with store.read() as session:
             states = read_states(session, chosen[start : start + CHUNK])
-        for state in states:
-            yield len(chosen), len(ids), state
+        yield from states
 
 
 def _misses(state: GroupState) -> tuple[Miss, ...]:
