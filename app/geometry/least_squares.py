@@ -112,6 +112,23 @@ def require_determined(information: FloatArray) -> None:
         raise DegenerateGeometryError("a combination of parameters is not determined")
 
 
+def covariance(information: FloatArray, variance: float = 1.0) -> FloatArray:
+    """Covariance of the parameters, ``variance`` times the inverse of J^T W J.
+
+    Args:
+        information: J^T W J at the minimum, shape (n, n).
+        variance: Of one residual of weight one.
+
+    Raises:
+        DegenerateGeometryError: Some combination of parameters is not determined.
+    """
+    require_determined(information)
+    scale = np.sqrt(np.diag(information))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    inverse = vectors / values @ vectors.T
+    return np.asarray(variance * inverse / np.outer(scale, scale), dtype=np.float64)
+
+
 def _damped_step(gradient: FloatArray, information: FloatArray, damping: FloatArray) -> FloatArray:
     """Solve (J^T W J + damping diag) step = -gradient for each start."""
     step = np.empty_like(gradient)

@@ -7,6 +7,7 @@ from app.errors import DegenerateGeometryError
 from app.geometry.least_squares import (
     CONVERGED,
     OUT_OF_STEPS,
+    covariance,
     levenberg_marquardt,
     require_determined,
 )
@@ -61,6 +62,16 @@ class TestLevenbergMarquardt:
         start = np.array([[1.0, 0.0]])
         assert levenberg_marquardt(decay, start, 1).reasons == (OUT_OF_STEPS,)
         assert levenberg_marquardt(offset, start, 100).reasons == (CONVERGED,)
+
+
+class TestCovariance:
+    def test_is_the_inverse_of_the_information(self):
+        information = np.array([[4.0, 1.0], [1.0, 9.0]])
+        assert np.allclose(covariance(information, 2.0), 2 * np.linalg.inv(information))
+
+    def test_survives_parameters_of_very_different_scale(self):
+        information = np.diag([1e12, 1e-6])
+        assert np.allclose(np.diag(covariance(information)), [1e-12, 1e6])
 
 
 class TestRequireDetermined:
