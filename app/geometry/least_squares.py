@@ -95,6 +95,23 @@ def levenberg_marquardt(
     return Fit(parameters, cost, information, accepted, rejected, tuple(reasons))
 
 
+def require_determined(information: FloatArray) -> None:
+    """Refuse a minimum at which the residuals do not determine every parameter.
+
+    Args:
+        information: J^T W J at the minimum, shape (n, n).
+
+    Raises:
+        DegenerateGeometryError: Some combination of parameters is not determined.
+    """
+    scale = np.sqrt(np.diag(information))
+    if not np.all(np.isfinite(scale)) or np.any(scale <= 0):
+        raise DegenerateGeometryError("a parameter has no influence on the residuals")
+    values = np.linalg.eigvalsh(information / np.outer(scale, scale))
+    if values[0] < 1e-14 * values[-1]:
+        raise DegenerateGeometryError("a combination of parameters is not determined")
+
+
 def covariance(information: FloatArray, variance: float = 1.0) -> FloatArray:
     """Covariance of the parameters, ``variance`` times the inverse of J^T W J.
 
@@ -105,12 +122,9 @@ def covariance(information: FloatArray, variance: float = 1.0) -> FloatArray:
     Raises:
         DegenerateGeometryError: Some combination of parameters is not determined.
     """
+    require_determined(information)
     scale = np.sqrt(np.diag(information))
-    if not np.all(np.isfinite(scale)) or np.any(scale <= 0):
-        raise DegenerateGeometryError("a parameter has no influence on the residuals")
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    if values[0] < 1e-14 * values[-1]:
-        raise DegenerateGeometryError("a combination of parameters is not determined")
     inverse = vectors / values @ vectors.T
     return np.asarray(variance * inverse / np.outer(scale, scale), dtype=np.float64)
 

@@ -114,6 +114,10 @@ class Policy:
         0.04, NOISE, "Sigma of a ball, of its diameter", "share", 0.0, 0.5
     )
     """What the diameter of a ball's box adds to that standard deviation, as a share of it."""
+    given_sigma_px: float = _threshold(
+        0.0, NOISE, "Sigma of a ball by a given camera", "px at 1920x1080", 0.0, 30.0, later=True
+    )
+    """What a given camera of unknown exactness adds to it, in pixels of the ball's image."""
     below_grass_m: float = _threshold(
         0.5, FINDINGS, "Finding: below the grass by more than", "m", 0.0, 5.0
     )

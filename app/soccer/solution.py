@@ -36,6 +36,7 @@ FINDING_KINDS = (
     "visible_not_annotated",
     "bad_point",
     "under_constrained",
+    "picture_geometry",
     "view_disagrees",
     "views_contradict",
     "not_synchronous",
@@ -96,6 +97,24 @@ class Suspect:
 
 
 @dataclass(frozen=True)
+class Picture:
+    """What seems to have been done to a picture since a camera took it.
+
+    Attributes:
+        stretch: How much too wide its pixels are, as a share; negative: too narrow.
+        shift: Of the optical axis from the middle of the picture, right and down, in half
+            diagonals.
+        sigma: Standard deviations of the three.
+        ratio: F ratio of what they explain: about 1 by chance.
+    """
+
+    stretch: float
+    shift: tuple[float, float]
+    sigma: tuple[float, ...]
+    ratio: float
+
+
+@dataclass(frozen=True)
 class Calibration:
     """The camera of one view (or station), and how well it is known.
 
@@ -108,6 +127,8 @@ class Calibration:
             ``geometry.resection``), 8 x 8, row by row; None for a given camera of which
             nothing more is known, or where the lines leave a combination open.
         unobservable: Parameters that the lines do not determine, in words.
+        picture: How the picture was stretched or cropped, where the lines say so; the camera is
+            found as if it were not.
     """
 
     source: str
@@ -119,6 +140,7 @@ class Calibration:
     suspects: tuple[Suspect, ...] = ()
     covariance: tuple[float, ...] | None = None
     unobservable: tuple[str, ...] = ()
+    picture: Picture | None = None
 
     @property
     def position_sigma_m(self) -> float | None:

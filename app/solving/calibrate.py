@@ -19,6 +19,7 @@ from app.soccer.solution import GAMMAS_PERCENT, SOLVER_VERSION, Calibration, Mar
 from app.solving.jaccard import jaccard, measure_markings, outcomes, project_markings
 from app.solving.labels import find_suspects
 from app.solving.observations import Observations, observe
+from app.solving.picture import find_picture
 from app.solving.resect import PositionPrior, Resection, ResectionProblem, measurement_count
 
 MIN_MEASUREMENTS = 7
@@ -89,7 +90,7 @@ def calibrate_near(
 def _found(problem: ResectionProblem, fit: Resection, observations: Observations) -> Calibration:
     """The camera and how well the lines determine it; the priors count for nothing there."""
     try:
-        spread = problem.covariance(fit.parameters, observations)
+        spread = problem.line_noise(fit.parameters, observations).parameters
     except DegenerateGeometryError:
         spread = np.full((PARAMETERS, PARAMETERS), np.inf)
     return Calibration(
@@ -97,6 +98,7 @@ def _found(problem: ResectionProblem, fit: Resection, observations: Observations
         problem.camera(fit.parameters),
         covariance=tuple(spread.ravel().tolist()) if np.isfinite(spread).all() else None,
         unobservable=_unobservable(spread),
+        picture=find_picture(problem, fit.parameters, observations),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from app.soccer.frames import ImageSize, height_above_grass
 from app.soccer.solution import Calibration, Finding, Fix
 from app.solving.calibrate import MAX_POSITION_SIGMA_M
+from app.solving.picture import BELIEVED, MIN_SHIFT, MIN_STRETCH
 
 MAX_CAMERA_HEIGHT_M = 100.0
 MAX_CAMERA_DISTANCE_M = 250.0
@@ -39,6 +40,7 @@ def calibration_findings(
     yield from _bad_points(slips, size, view)
     yield from _not_annotated(calibration, size, view)
     yield from _under_constrained(calibration, view)
+    yield from _picture_geometry(calibration, size, view)
     yield from _implausible_camera(calibration, view)
 
 
@@ -151,6 +153,39 @@ def _under_constrained(calibration: Calibration, view: str | None) -> Iterator[F
             number=calibration.position_sigma_m,
             threshold=MAX_POSITION_SIGMA_M,
         )
+
+
+def _picture_geometry(
+    calibration: Calibration, size: ImageSize, view: str | None
+) -> Iterator[Finding]:
+    """A stretched picture, or one with a middle that is not the camera's, by what is larger."""
+    picture = calibration.picture
+    if picture is None:
+        return
+    aside = float(np.hypot(*picture.shift)) * size.diagonal / 2 / size.width
+    stretched = abs(picture.stretch) * MIN_SHIFT > aside * MIN_STRETCH
+    number, threshold = picture.ratio, BELIEVED
+    if stretched:
+        word = "wide" if picture.stretch > 0 else "narrow"
+        found = f"its pixels are {100 * abs(picture.stretch):.0f} % too {word}: a stretched picture"
+    else:
+        right, down = picture.shift
+        where = "below" if down > 0 else "above"
+        if abs(right) > abs(down):
+            where = "right of" if right > 0 else "left of"
+        found = (
+            f"the camera's axis lies {100 * aside:.0f} % of the width {where} the middle: a "
+            "cropped picture"
+        )
+    yield Finding(
+        "picture_geometry",
+        f"The lines fit far better when {found}. The camera is found as if it were not, so its "
+        "place is doubtful. Import the picture as it was taken, or leave the view out.",
+        view,
+        number=number,
+        threshold=threshold,
+        fix=None if view is None else Fix("exclude_view", view),
+    )
 
 
 def _implausible_camera(calibration: Calibration, view: str | None) -> Iterator[Finding]:

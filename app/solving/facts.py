@@ -82,6 +82,12 @@ class Facts:
     pair_point: FloatArray
     pair_moved: FloatArray
 
+    @property
+    def view_bare(self) -> BoolArray:
+        """Its camera came with the data and nobody says how exact it is, shape (V,)."""
+        bare: BoolArray = self.view_given & (self.view_covariance[:, 0, 0] == 0)
+        return bare
+
     def only(self, kept: BoolArray) -> Facts:
         """The facts of some of the groups, in the same order."""
         views = kept[self.view_group]

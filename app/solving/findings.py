@@ -29,6 +29,7 @@ _BY_WEIGHT = (
     "views_contradict",
     "implausible_ball",
     "implausible_camera",
+    "picture_geometry",
     "under_constrained",
     "bad_point",
     "high_uncertainty",

@@ -11,9 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.geometry.least_squares import Fit, NormalEquations, covariance, levenberg_marquardt
+from app.geometry.least_squares import (
+    Fit,
+    NormalEquations,
+    levenberg_marquardt,
+    require_determined,
+)
 from app.geometry.resection import (
     ARC,
     KAPPA,
@@ -27,15 +33,25 @@ from app.geometry.resection import (
     distances,
     normal_equations,
     parameters_from_camera,
+    residuals,
 )
+from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import CIRCLES
+from app.soccer.pitch import CIRCLES, Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.observations import Observations, principal_point
+from app.soccer.solution import Calibration
+from app.solving.line_noise import LineNoise, line_noise
+from app.solving.observations import Observations, observe, principal_point
 from app.solving.starts import STANDS, stand_starts
 
 REFERENCE_DIAGONAL = float(np.hypot(960, 540))
 """Scales in pixels hold for 960 x 540 and grow with the diagonal."""
+
+CLICK_SIGMA_PX = 1.0
+"""What is expected of clicks before any is seen, at 960 x 540."""
+
+WIDE = 4.0
+"""Scale of the robust weights in the covariance, in units of the fit's."""
 
 MIN_CLICK_SIGMA_PX = 0.5
 """Clicks are not trusted to be better than this, however well they fit, at 960 x 540."""
@@ -210,31 +226,36 @@ class ResectionProblem:
             parameters, observations.curves, observations.sightings(), self.size.diagonal / 2
         )
 
-    def covariance(self, parameters: FloatArray, observations: Observations) -> FloatArray:
-        """Covariance of the parameters at a minimum, shape (8, 8).
+    def line_noise(self, parameters: FloatArray, observations: Observations) -> LineNoise:
+        """Noise of the clicks, and the covariance of the parameters at a minimum, shape (8, 8).
 
-        The clicks' variance is estimated from the robust fit. Only the distortion keeps its
-        prior: what the lines do not determine must show.
+        Only the distortion keeps its prior: what the lines do not determine must show.
 
         Raises:
             DegenerateGeometryError: The lines leave a combination of parameters open.
         """
-        free = Prior(np.zeros(PARAMETERS), np.full(PARAMETERS, np.inf))
-        free.sigma[KAPPA] = self.distortion_sigma
-        scale = self.robust_scale_px * self.unit
-        # At a wider scale honest clicks weigh one, as the formula for the covariance has it.
-        _, _, information = normal_equations(
-            parameters[None],
-            observations.curves,
-            observations.sightings(),
-            free,
-            4 * scale,
-            self.size.diagonal / 2,
+        offsets, jacobians = residuals(
+            parameters, observations.curves, observations.sightings(), self.size.diagonal / 2
         )
-        variance = self.click_variance(parameters, observations)
-        # The prior's share of the information is not scaled by the clicks' variance.
-        information[0, KAPPA, KAPPA] += (variance - 1) / self.distortion_sigma**2
-        return covariance(information[0], variance)
+        # At a wider scale honest clicks weigh one, as the formula for the covariance has it.
+        scale = WIDE * self.robust_scale_px * self.unit
+        weight = (1 + (offsets**2).sum(axis=1) / scale**2) ** -0.25
+        beyond = np.flatnonzero(offsets[:, 1])
+        # What lies along the line has nothing in common with what lies across.
+        jacobian = np.vstack([jacobians[:, 0], jacobians[beyond, 1]])
+        rows = np.append(np.arange(len(offsets)), beyond)
+        prior = np.zeros(PARAMETERS)
+        prior[KAPPA] = self.distortion_sigma**-2
+        jacobian *= weight[rows, None]
+        require_determined(jacobian.T @ jacobian + np.diag(prior))
+        return line_noise(
+            np.append(offsets[:, 0], offsets[beyond, 1]) * weight[rows],
+            jacobian,
+            np.append(observations.marking, -1 - beyond),
+            prior,
+            CLICK_SIGMA_PX * self.unit,
+            MIN_CLICK_SIGMA_PX * self.unit,
+        )
 
     def click_variance(self, parameters: FloatArray, observations: Observations) -> float:
         """Variance of the clicks' distances, from the robust fit, pixels squared."""
@@ -313,6 +334,20 @@ def is_main_position(position: FloatArray) -> bool:
     """Whether main cameras stand there (pitch frame, metres, shape (3,))."""
     low, high = np.transpose([MAIN_STAND_X_M, MAIN_STAND_Y_M, MAIN_STAND_Z_M])
     return bool(((low < position) & (position < high)).all())
+
+
+def view_line_noise(
+    calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+) -> LineNoise:
+    """Noise of the clicks of a view that is calibrated from them.
+
+    Raises:
+        DegenerateGeometryError: It has no camera, or its lines leave that open.
+    """
+    if calibration.camera is None:
+        raise DegenerateGeometryError("without a camera there are no residuals")
+    problem = ResectionProblem.of(size, policy)
+    return problem.line_noise(problem.parameters(calibration.camera), observe(lines, pitch, size))
 
 
 def best(fit: Fit, count: int) -> FloatArray:

@@ -22,7 +22,9 @@ _ROUNDING = 1e-9
 """Sums this close to a limit, relatively, are computed once more the exact way."""
 
 
-def click_variance(diagonal: FloatArray, ball_px: FloatArray, policy: Policy) -> FloatArray:
+def click_variance(
+    diagonal: FloatArray, ball_px: FloatArray, policy: Policy, bare: BoolArray | None = None
+) -> FloatArray:
     """Variance of each coordinate of annotated ball centres, square pixels, shape (N,).
 
     The noise of a click grows with the picture and with the size of the ball.
@@ -30,10 +32,14 @@ def click_variance(diagonal: FloatArray, ball_px: FloatArray, policy: Policy) ->
     Args:
         diagonal: Of the images, pixels, shape (N,).
         ball_px: Diameter of the annotated boxes, 0 without one, pixels, shape (N,).
-        policy: Holds both noises.
+        policy: Holds the noises.
+        bare: Whether their camera is given, of unknown exactness, shape (N,); none by default.
     """
     click = policy.click_sigma_px * diagonal / CLICK_DIAGONAL
     sigma = np.hypot(click, policy.box_sigma_share * ball_px)
+    if bare is not None and policy.given_sigma_px:
+        given = policy.given_sigma_px * diagonal / CLICK_DIAGONAL
+        sigma = np.where(bare, np.hypot(sigma, given), sigma)
     # As Python squares a float; the square of an array differs in the last bit now and then.
     return np.float_power(sigma, 2)
 
@@ -74,11 +80,11 @@ def calibration_spread(calibration: Calibration, size: ImageSize, point: FloatAr
 def pixel_spread(sight: Sight, point: FloatArray, policy: Policy) -> FloatArray:
     """Covariance of the ball's pixel in a view, square pixels, shape (2, 2).
 
-    The noise of the click, and, where the camera comes from lines, the covariance of its
+    The noise of the click, that of a given camera, and, where the camera comes from lines, the covariance of its
     calibration carried to the ball.
     """
     diagonal, diameter = np.array([sight.size.diagonal]), np.array([sight.diameter_px])
-    noise = click_variance(diagonal, diameter, policy)
+    noise = click_variance(diagonal, diameter, policy, np.array([sight.is_bare]))
     return noise * np.eye(2) + calibration_spread(sight.calibration, sight.size, point)
 
 
@@ -152,7 +158,12 @@ class MeanSpread:
             asked[groups] = True
             views = np.flatnonzero(self._used & asked[facts.view_group])
             slopes, pixels = self._slope[views], self._carried[views]
-            noise = click_variance(facts.view_diagonal[views], facts.view_ball_px[views], policy)
+            noise = click_variance(
+                facts.view_diagonal[views],
+                facts.view_ball_px[views],
+                policy,
+                facts.view_bare[views],
+            )
             pixels = noise[:, None, None] * np.eye(2) + pixels
             parts = (slopes.transpose(0, 2, 1) @ pixels @ slopes).reshape(-1, 9)
         owner = np.searchsorted(groups, facts.view_group[views])

@@ -41,6 +41,11 @@ class Sight:
         assert self.calibration.camera is not None
         return self.calibration.camera
 
+    @property
+    def is_bare(self) -> bool:
+        """Whether its camera came with the data and nobody says how exact it is."""
+        return self.calibration.source == "given" and self.calibration.covariance is None
+
     @cached_property
     def P(self) -> FloatArray:
         """Projection matrix of the camera, shape (3, 4)."""

@@ -19,6 +19,7 @@ const TITLES = /** @type {Record<string, string>} */ ({
 	low_parallax: 'The rays are nearly parallel',
 	high_uncertainty: 'The position of the ball is uncertain',
 	implausible_ball: 'The ball is where no ball can be',
+	picture_geometry: 'The picture of @ was stretched or cropped',
 	implausible_camera: 'The camera of @ is where no camera can be',
 	several_balls: 'View @ has several balls',
 	upstream_changed: 'The imported file has changed',

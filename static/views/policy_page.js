@@ -11,11 +11,13 @@ import { loadDatasets } from '../state/datasets.js';
 import { pageAddress } from './dataset_menu.js';
 import { DatasetFrame } from './dataset_page.js';
 import { JobProgress } from './job_progress.js';
+import { NoiseCard } from './noise_card.js';
 import { Loading, Trouble } from './page_frame.js';
 import { useSavePolicy } from './save_policy.js';
 import { When } from './when.js';
 
 /** @import {JobJson} from '../api/jobs.js' */
+/** @import {NoiseJson} from '../api/noise.js' */
 /** @import {PolicyField, PolicyState, ShippedPolicy} from '../api/policies.js' */
 /** @import {DatasetJson} from '../api/types.js' */
 
@@ -77,6 +79,19 @@ function Shipped({ one, policy, etag, shipped, busy, send }) {
 	`;
 }
 
+/** @param {{one: DatasetJson, policy: PolicyState, etag: string, shipped: ShippedPolicy[], busy: boolean, send: Send}} props */
+function NoiseOf({ one, policy, etag, shipped, busy, send }) {
+	const name = shipped.some((item) => item.name === policy.name) ? 'custom' : policy.name;
+	return html`
+		<${NoiseCard} dataset=${one.id} version=${busy ? '' : `${policy.hash} ${policy.version}`}>
+			${(/** @type {NoiseJson} */ noise) => (Object.keys(noise.values).length === 0 ? null : html`
+				<p class="buttons">
+					<button class="button" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : ''} onClick=${() => { if (!busy) send(() => putPolicy(one.id, name, noise.values, etag)); }}>Use the estimates and solve</button>
+				</p>`)}
+		<//>
+	`;
+}
+
 /** @param {{policy: PolicyState}} props */
 function History({ policy }) {
 	return html`
@@ -134,6 +149,7 @@ function PolicyOf({ one }) {
 			<${PolicyText} key=${`${policy.hash} ${policy.version}`} one=${one} policy=${policy} etag=${etag} busy=${busy} send=${send} />
 			<div class="page__list">
 				<${Shipped} one=${one} policy=${policy} etag=${etag} shipped=${shipped} busy=${busy} send=${send} />
+				<${NoiseOf} one=${one} policy=${policy} etag=${etag} shipped=${shipped} busy=${busy} send=${send} />
 				<${ValueTable} policy=${policy} fields=${fields} />
 				<${History} policy=${policy} />
 			</div>

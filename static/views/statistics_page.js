@@ -12,6 +12,7 @@ import { address, navigate, pageDataset, param } from '../lib/router.js';
 import { queueAddress } from '../state/navigation.js';
 import { DatasetFrame } from './dataset_page.js';
 import { HeatMap } from './heat_map.js';
+import { NoiseCard } from './noise_card.js';
 import { Loading, Trouble } from './page_frame.js';
 import { Pitches } from './pitches.js';
 import { QueryBox } from './query_box.js';
@@ -80,7 +81,7 @@ function StatisticsOf({ one }) {
 	return html`
 		<div class="statistics__query"><${QueryBox} field=${field} invalid=${found.error?.status === 400} onQuery=${setQuery} /></div>
 		${found.error ? html`<${Trouble} title=${found.error.status === 400 ? 'The query cannot be read' : 'The statistics cannot be shown'} error=${found.error} retry=${found.reload} />` : null}
-		${found.value ? html`<${Body} found=${found.value} dataset=${one.name} q=${q} /><${Pitches} dataset=${one.id} />` : found.error ? null : html`<${Loading} what="statistics" />`}
+		${found.value ? html`<${Body} found=${found.value} dataset=${one.name} q=${q} /><${NoiseCard} dataset=${one.id} /><${Pitches} dataset=${one.id} />` : found.error ? null : html`<${Loading} what="statistics" />`}
 	`;
 }
 

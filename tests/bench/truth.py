@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -12,7 +12,9 @@ from app.soccer.camera_sigma import camera_sigma
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Ball3D, BestBall, Calibration
+from app.solving.ball_noise import estimate_ball_noise, misses_of
 from app.solving.solve import solve
+from app.solving.triangulate import sights_of
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.table import print_table
 
@@ -81,9 +83,13 @@ class Row:
 
 def bench_truth() -> None:
     """Print a row for each case."""
-    rows = [
-        [case.name, *vars(judge(make_case(case, GROUPS, SEED), PAPER)).values()] for case in CASES
-    ]
+    rows = []
+    for case in CASES:
+        made = make_case(case, GROUPS, SEED)
+        rows.append([case.name, *vars(judge(made, PAPER)).values()])
+        if case.ball_px != ORDINARY.ball_px or case is ORDINARY:
+            told = [f"{case.name}, noise estimated", *vars(judge(made, with_noise(made))).values()]
+            rows.append(told)
     header = (
         f"{GROUPS} groups each",
         "pass",
@@ -121,6 +127,21 @@ def judge(made: list[Made], policy: Policy) -> Row:
         ),
         position=_percent([_position_holds(found, camera.position) for found, camera in cameras]),
         focal=_percent([_focal_holds(found, camera.focal_length[1]) for found, camera in cameras]),
+    )
+
+
+def with_noise(made: list[Made]) -> Policy:
+    """The policy ``paper`` with the noise that the groups themselves show."""
+    misses = []
+    for one in made:
+        solution = solve(one.group, PAPER)
+        if solution.ball is not None:
+            calibrations = [view.calibration for view in solution.views]
+            misses += misses_of(solution.ball, sights_of(one.group.views, calibrations))
+    found = estimate_ball_noise(misses, PAPER)
+    assert found.click is not None and found.share is not None
+    return replace(
+        PAPER, name="estimated", click_sigma_px=found.click.value, box_sigma_share=found.share
     )
 
 

@@ -327,3 +327,13 @@ def evaluate(page: Page, predictions: Path) -> None:
     expect(page.locator("#frames-title")).to_contain_text("Frames")
     expect(page.locator(".table a[href^='/review/']").first).to_be_visible()
     usable(page)
+
+
+class TestNoise:
+    @pytest.mark.parametrize("place", ["statistics", "policy"])
+    def test_the_noise_of_the_clicks_stands_beside_what_the_policy_says(
+        self, open_page: OpenPage, place: str
+    ) -> None:
+        card = open_page(f"/datasets/sample/{place}").get_by_label("Noise of the clicks")
+        expect(card).to_contain_text("Sigma of a point on a line", timeout=MINUTE)
+        expect(card.get_by_role("row")).to_have_count(3)

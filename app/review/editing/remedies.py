@@ -28,7 +28,14 @@ MAX_BALL_SLIP_PERCENT = 3.0
 """How far a click can plausibly be off, in per cent of the diagonal; beyond it something else is
 wrong, or the ball is another one."""
 BETTER_CAUSES = frozenset(
-    {"sides_swapped", "wrong_label", "several_balls", "under_constrained", "implausible_camera"}
+    {
+        "sides_swapped",
+        "wrong_label",
+        "several_balls",
+        "under_constrained",
+        "picture_geometry",
+        "implausible_camera",
+    }
 )
 """Findings that explain why rays do not meet: then no ball is moved to make them meet."""
 RAY_DEPTHS_M = np.geomspace(1.0, 400.0, 2000)

@@ -6,7 +6,7 @@
 /** @typedef {{name: string, label: string, value: number | null, digits: number, unit: string, sigma: number | null}} CameraNumber */
 
 /** Kinds of findings that speak about a camera. */
-const ABOUT_CAMERAS = new Set(['implausible_camera', 'under_constrained', 'sides_swapped', 'view_disagrees']);
+const ABOUT_CAMERAS = new Set(['implausible_camera', 'under_constrained', 'picture_geometry', 'sides_swapped', 'view_disagrees']);
 
 /**
  * @param {CalibrationJson | null} calibration @param {number} width of the image, pixels

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from app.errors import DegenerateGeometryError
-from app.geometry.least_squares import CONVERGED, OUT_OF_STEPS, covariance, levenberg_marquardt
+from app.geometry.least_squares import (
+    CONVERGED,
+    OUT_OF_STEPS,
+    covariance,
+    levenberg_marquardt,
+    require_determined,
+)
 
 TIMES = np.linspace(0, 2, 30)
 TRUTH = np.array([3.0, -1.3])
@@ -67,10 +73,15 @@ class TestCovariance:
         information = np.diag([1e12, 1e-6])
         assert np.allclose(np.diag(covariance(information)), [1e-12, 1e6])
 
+
+class TestRequireDetermined:
+    def test_parameters_of_very_different_scale_are_determined(self):
+        require_determined(np.diag([1e12, 1e-6]))
+
     def test_an_open_combination_is_said(self):
         with pytest.raises(DegenerateGeometryError, match="not determined"):
-            covariance(np.array([[1.0, 1.0], [1.0, 1.0]]))
+            require_determined(np.array([[1.0, 1.0], [1.0, 1.0]]))
 
     def test_a_parameter_without_influence_is_said(self):
         with pytest.raises(DegenerateGeometryError, match="no influence"):
-            covariance(np.diag([1.0, 0.0]))
+            require_determined(np.diag([1.0, 0.0]))

@@ -29,7 +29,8 @@ class TestRefineMain:
         observations = observe(click(unusual, 0.5, seed=2), PITCH, SIZE)
         fit = PROBLEM.resect(observations)
         refined = PROBLEM.refine_main(fit, observations)
-        spread = PROBLEM.covariance(fit.parameters, observations)[X : Z + 1, X : Z + 1]
+        spread = PROBLEM.line_noise(fit.parameters, observations).parameters
+        spread = spread[X : Z + 1, X : Z + 1]
         moved = position(refined) - position(fit)
         assert moved @ np.linalg.solve(spread, moved) < 1.0
 

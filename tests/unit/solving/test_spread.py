@@ -45,6 +45,12 @@ class TestClickVariance:
         sigma = float(np.hypot(click * CLICK_DIAGONAL / CLICK_DIAGONAL, 0.04 * diameter))
         assert click_variance(DIAGONAL, np.array([diameter]), policy).tolist() == [sigma**2]
 
+    def test_given_cameras_add_theirs_where_nobody_says_how_exact_they_are(self):
+        policy = replace(PAPER, click_sigma_px=3.0, given_sigma_px=4.0)
+        bare = np.array([True, False])
+        found = click_variance(np.repeat(DIAGONAL, 2), np.zeros(2), policy, bare)
+        assert found == pytest.approx([25.0, 9.0])
+
 
 class TestCalibrationSpread:
     def test_a_camera_that_may_stand_aside_moves_the_pixel_by_as_much(self):
@@ -58,6 +64,13 @@ class TestCalibrationSpread:
         sight = Sight("a", calibration, ImagePoint(639.5, 359.5), 0.0, SIZE)
         noise = (SIZE.diagonal / CLICK_DIAGONAL) ** 2
         assert np.allclose(pixel_spread(sight, np.zeros(3), PAPER), spread + noise * np.eye(2))
+
+    def test_a_given_camera_counts_as_exact_until_the_policy_knows_better(self):
+        sight = Sight("a", Calibration("given", MAIN), ImagePoint(639.5, 359.5), 0.0, SIZE)
+        noise = (SIZE.diagonal / CLICK_DIAGONAL) ** 2
+        blurred = replace(PAPER, given_sigma_px=7.0)
+        assert np.allclose(pixel_spread(sight, np.array(BALL), PAPER), noise * np.eye(2))
+        assert np.allclose(pixel_spread(sight, np.array(BALL), blurred), 50 * noise * np.eye(2))
 
     def test_of_a_given_camera_nothing_is_known(self):
         assert not calibration_spread(Calibration("given", MAIN), SIZE, np.array(BALL)).any()
@@ -117,6 +130,19 @@ class TestMeanSpread:
         scattered = np.cov(np.mean(pairs, axis=0).T)
         found = self.covariance(*cameras, policy=policy)
         assert np.allclose(found, scattered, atol=0.08 * np.abs(scattered).max())
+
+    def test_grows_with_the_square_of_what_given_cameras_add(self):
+        plain, wide = (
+            self.covariance(
+                MAIN,
+                OPPOSITE,
+                policy=replace(
+                    PAPER, box_sigma_share=0.0, click_sigma_px=1.0, given_sigma_px=sigma
+                ),
+            )
+            for sigma in (0.0, np.sqrt(3.0))
+        )
+        assert np.allclose(wide, 4 * plain)
 
     def test_grows_with_the_square_of_the_click(self):
         one, two = (

@@ -1,0 +1,211 @@
+"""Ball noise: how far annotated balls lie from where they belong, from rays that should meet.
+
+Rays that see one ball miss each other by what clicks and cameras are off. The part of that miss
+which no 3D point explains (one number for two views, two more for each further one) has a variance
+that is linear in the squared noise: its most likely value over many groups is the noise of a
+dataset.
+
+Source: Hartley & Zisserman, sec. 12.5-12.6 (what a triangulation leaves of the measurements).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+
+import numpy as np
+
+from app.geometry.arrays import BoolArray, FloatArray
+from app.soccer.policy import Policy
+from app.soccer.solution import Ball3D
+from app.solving.spread import CLICK_DIAGONAL, calibration_spread
+from app.solving.triangulate import Sight
+
+MIN_NUMBERS = 20
+"""Fewer say too little."""
+LIMIT = 10.8
+"""Squared, of one number: one honest pair in a thousand lies beyond. Farther ones are mistakes."""
+TRIMMED = 0.9815
+"""Variance of a standard normal number within that limit."""
+HALF = 0.1426
+"""The same of the half that is nearest to zero."""
+SIGMAS = np.geomspace(0.1, 30.0, 191)
+"""Noises that are tried, pixels at 1920 x 1080."""
+SHARES = np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.13])
+"""What the diameter of a ball adds, as a share of it."""
+SHARE_SIGMA = 0.02
+"""How far that share is expected to lie from the policy's."""
+BLOCKS = 10
+STUDENT = 2.26
+"""95 % of Student's distribution with one degree of freedom less than blocks."""
+_ROUNDS = 30
+
+
+@dataclass(frozen=True)
+class Miss:
+    """One number that rays leave unexplained: ``miss`` has a variance linear in the squared noise.
+
+    Attributes:
+        miss: Pixels, along a direction in the images together that no 3D point moves in.
+        click: How much a squared click sigma (at 1920 x 1080) counts in the variance.
+        diameter: The same for the squared share of the ball's diameter.
+        given: The same for the squared sigma of given cameras without a covariance.
+        known: Variance by the covariance of cameras from lines, square pixels.
+    """
+
+    miss: float
+    click: float
+    diameter: float
+    given: float
+    known: float
+
+
+@dataclass(frozen=True)
+class Sigma:
+    """An estimated standard deviation with its 95 % interval, and what it rests on."""
+
+    value: float
+    low: float
+    high: float
+    numbers: int
+    """Independent numbers that rays leave unexplained."""
+    left_out: int
+    """Those among them that noise does not explain."""
+
+    def agrees(self, value: float) -> bool:
+        """Whether the interval holds a value."""
+        return self.low <= value <= self.high
+
+
+@dataclass(frozen=True)
+class BallNoise:
+    """Noise of annotated balls; None where too few groups say anything.
+
+    Attributes:
+        click: Of a coordinate of a click, pixels at 1920 x 1080; the policy's where every
+            camera is given, as it cannot be told from that of the cameras then.
+        share: Of the ball's diameter, which adds to it; with an estimated click.
+        given: Of the ball's pixel by a given camera without covariance, at 1920 x 1080.
+    """
+
+    click: Sigma | None
+    share: float | None
+    given: Sigma | None
+
+
+def misses_of(ball: Ball3D, sights: Sequence[Sight]) -> tuple[Miss, ...]:
+    """What the rays to the ball of one group leave unexplained: 2 V - 3 numbers of V views.
+
+    Args:
+        ball: Where the group's valid pairs put it.
+        sights: Of the group; those in no valid pair are left aside.
+    """
+    seen = [sight for sight in sights if sight.view in ball.views]
+    point = np.array(ball.point)
+    pixels = np.array([sight.camera.project(point[None])[0] for sight in seen])
+    if len(seen) < 2 or not np.isfinite(pixels).all():
+        return ()
+    offsets = (np.array([sight.center for sight in seen]) - pixels).ravel()
+    jacobian = np.vstack([sight.camera.jacobian(point) for sight in seen])
+    # Directions of all pixels together in which no 3D point moves ...
+    normals = np.linalg.svd(jacobian)[0][:, 3:]
+    known = np.zeros((len(offsets), len(offsets)))
+    for at, sight in enumerate(seen):
+        part = slice(2 * at, 2 * at + 2)
+        known[part, part] = calibration_spread(sight.calibration, sight.size, point)
+    # ... turned until the cameras' errors are independent in them, as equal clicks are anyway.
+    _, turn = np.linalg.eigh(normals.T @ known @ normals)
+    normals = normals @ turn
+    squared = (normals**2).reshape(len(seen), 2, -1).sum(axis=1).T
+    units = np.array([(sight.size.diagonal / CLICK_DIAGONAL) ** 2 for sight in seen])
+    diameters = np.array([sight.diameter_px**2 for sight in seen])
+    bare = np.array([sight.is_bare for sight in seen])
+    columns = (
+        offsets @ normals,
+        squared @ units,
+        squared @ diameters,
+        squared @ (units * bare),
+        np.einsum("im,ij,jm->m", normals, known, normals),
+    )
+    return tuple(Miss(*row) for row in np.transpose(columns).tolist())
+
+
+def estimate_ball_noise(misses: Sequence[Miss], policy: Policy) -> BallNoise:
+    """The noise that explains the misses of a dataset best, mistakes left aside.
+
+    Args:
+        misses: Of many groups, in the order in which they were taken: neighbours in time err
+            alike, so the interval comes from leaving out one tenth after the other.
+        policy: What is thought of the noise so far.
+    """
+    rows = np.array([astuple(miss) for miss in misses], float).reshape(-1, 5)
+    free = rows[:, 3] == 0
+    clicked, rest = rows[free], rows[~free]
+    click = share = given = None
+    if len(clicked) >= MIN_NUMBERS:
+        click, share = _jackknifed(clicked, policy.box_sigma_share)
+    if len(rest) >= MIN_NUMBERS:
+        # What clicks explain is known by now, or thought to be; the cameras explain what is left.
+        noise = policy.click_sigma_px if click is None else click.value
+        thought = policy.box_sigma_share if share is None else share
+        known = rest[:, 4] + noise**2 * rest[:, 1] + thought**2 * rest[:, 2]
+        nothing = np.zeros(len(rest))
+        given, _ = _jackknifed(
+            np.column_stack([rest[:, 0], rest[:, 3], nothing, nothing, known]), 0
+        )
+    return BallNoise(click, share, given)
+
+
+def _jackknifed(rows: FloatArray, share: float) -> tuple[Sigma, float]:
+    """Sigma and share, with an interval from leaving out one block after the other.
+
+    Args:
+        rows: Of ``Miss``, the click's slope in the second column, shape (N, 5).
+        share: Of the diameter, as expected.
+    """
+    whole, found = _fit(rows, share)
+    block = np.arange(len(rows)) * BLOCKS // len(rows)
+    parts = np.array([_fit(rows[block != at], share)[0] for at in range(BLOCKS)])
+    scatter = (BLOCKS - 1) / BLOCKS * float(((parts - parts.mean()) ** 2).sum())
+    # No sample of n independent numbers says more about its variance than this.
+    half = STUDENT * math.sqrt(max(scatter, 0.5 / len(rows)))
+    left_out = int((~_kept(rows, share)).sum())
+    low, high = math.exp(whole - half), math.exp(whole + half)
+    return Sigma(math.exp(whole), low, high, len(rows), left_out), found
+
+
+def _fit(rows: FloatArray, expected: float) -> tuple[float, float]:
+    """Logarithm of the most likely sigma, and the share of the diameter, near what is expected."""
+    kept = rows[_kept(rows, expected)]
+    fits = []
+    for share in SHARES if kept[:, 2].any() else [expected]:
+        costs = _costs(kept, share) + 0.5 * ((share - expected) / SHARE_SIGMA) ** 2
+        place = int(np.argmin(costs))
+        fits.append((float(costs[place]), float(np.log(SIGMAS[place])), float(share)))
+    _, sigma, share = min(fits)
+    return sigma, share
+
+
+def _kept(rows: FloatArray, share: float) -> BoolArray:
+    """Numbers that are no mistakes, from the median outwards until no other one joins."""
+    squared = rows[:, 0] ** 2
+    kept: BoolArray = squared <= np.median(squared)
+    trimmed = HALF
+    for _ in range(_ROUNDS):
+        place = int(np.argmin(_costs(rows[kept], share, trimmed)))
+        variance = SIGMAS[place] ** 2 * rows[:, 1] + share**2 * rows[:, 2] + rows[:, 4]
+        wider = squared <= LIMIT * variance
+        trimmed = TRIMMED
+        if (wider == kept).all():
+            break
+        kept = wider
+    return kept
+
+
+def _costs(rows: FloatArray, share: float, trimmed: float = TRIMMED) -> FloatArray:
+    """Negative log-likelihood for each of ``SIGMAS``; ``trimmed`` makes up for missing tails."""
+    known = rows[:, 4] + share**2 * rows[:, 2]
+    variance = SIGMAS[:, None] ** 2 * rows[:, 1] + known
+    costs: FloatArray = 0.5 * (np.log(variance) + rows[:, 0] ** 2 / trimmed / variance).sum(axis=1)
+    return costs

@@ -1,0 +1,108 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.soccer.policy import PAPER
+from app.soccer.solution import Ball3D, Calibration
+from app.solving.ball_noise import Miss, estimate_ball_noise, misses_of
+from app.solving.spread import CLICK_DIAGONAL
+from app.solving.triangulate import Sight
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE
+
+UNIT = SIZE.diagonal / CLICK_DIAGONAL
+POINT = (30.0, 3.0, -1.0)
+VIEWS = {"main": MAIN, "goal": BEHIND_GOAL, "opposite": OPPOSITE}
+
+
+def sights(noise_px, rng, source="lines", diameter=0.0):
+    """A ball in three views, clicked with noise."""
+    for key, camera in VIEWS.items():
+        x, y = camera.project(np.array([POINT]))[0] + rng.normal(0, noise_px, 2)
+        yield Sight(key, Calibration(source, camera), (x, y), diameter, SIZE)
+
+
+def ball_in(views):
+    return Ball3D(POINT, (0.0,) * 9, 0.0, 90.0, tuple(views))
+
+
+def dataset(noise_px, groups=120, seed=0, source="lines", views=tuple(VIEWS)):
+    rng = np.random.default_rng(seed)
+    return [
+        miss
+        for _ in range(groups)
+        for miss in misses_of(ball_in(views), list(sights(noise_px, rng, source)))
+    ]
+
+
+def blurred(rng, sigma, share, numbers=600):
+    """Misses by clicks of that sigma, of balls of 5 to 40 pixels."""
+    for diameter in rng.uniform(5, 40, numbers):
+        variance = sigma**2 + share**2 * diameter**2
+        yield Miss(rng.normal(0, np.sqrt(variance)), 1.0, diameter**2, 0.0, 0.0)
+
+
+class TestMissesOf:
+    @pytest.mark.parametrize(("views", "numbers"), [(("main", "goal"), 1), (tuple(VIEWS), 3)])
+    def test_views_leave_twice_their_number_less_three(self, views, numbers):
+        assert len(dataset(1.0, groups=1, views=views)) == numbers
+
+    def test_a_view_outside_the_valid_pairs_says_nothing(self):
+        assert dataset(1.0, groups=1, views=("main",)) == []
+
+    def test_exact_clicks_leave_nothing(self):
+        assert max(abs(item.miss) for item in dataset(0.0, groups=1)) < 1e-9
+
+    def test_a_click_counts_in_pixels_at_full_hd(self):
+        assert [item.click for item in dataset(1.0, groups=1)] == pytest.approx([UNIT**2] * 3)
+
+    def test_a_given_camera_is_told_from_one_of_lines(self):
+        assert {item.given for item in dataset(1.0, groups=1)} == {0.0}
+        assert min(item.given for item in dataset(1.0, groups=1, source="given")) > 0
+
+
+class TestEstimateBallNoise:
+    @pytest.mark.parametrize("sigma", [0.5, 1.0, 2.0, 3.0])
+    def test_the_noise_is_found_and_lies_in_its_interval(self, sigma):
+        found = estimate_ball_noise(dataset(sigma * UNIT), PAPER).click
+        assert found.value == pytest.approx(sigma, rel=0.15)
+        assert found.low < sigma < found.high
+
+    def test_one_wrong_ball_in_ten_does_no_harm(self):
+        misses = dataset(UNIT)
+        wrong = [replace(item, miss=25.0) if n % 10 == 0 else item for n, item in enumerate(misses)]
+        found = estimate_ball_noise(wrong, PAPER).click
+        assert found.value == pytest.approx(1.0, rel=0.15)
+        assert found.left_out == len(misses) // 10
+
+    def test_what_the_diameter_adds_is_told_from_the_click(self):
+        rng = np.random.default_rng(3)
+        found = estimate_ball_noise(list(blurred(rng, 0.5, 0.06)), PAPER)
+        assert found.share == pytest.approx(0.06, abs=0.011)
+        assert found.click.value == pytest.approx(0.5, abs=0.2)
+
+    def test_what_cameras_explain_is_not_blamed_on_clicks(self):
+        rng = np.random.default_rng(4)
+        misses = [Miss(rng.normal(0, 2.0), 1.0, 0.0, 0.0, 3.0) for _ in range(400)]
+        assert estimate_ball_noise(misses, PAPER).click.value == pytest.approx(1.0, rel=0.25)
+
+    def test_of_given_cameras_the_rest_is_theirs(self):
+        found = estimate_ball_noise(dataset(1.5 * UNIT, source="given"), PAPER)
+        assert found.click is None
+        # Clicks of 1 px, as the policy thinks, and cameras make 1.5 px together.
+        assert found.given.value == pytest.approx(np.sqrt(1.25), rel=0.2)
+
+    def test_neighbours_that_err_alike_widen_the_interval(self):
+        rng = np.random.default_rng(5)
+        alike = [
+            Miss(scale * rng.normal(), 1.0, 0.0, 0.0, 0.0)
+            for scale in rng.choice([0.6, 1.5], 10).repeat(60)
+        ]
+        alone = [alike[at] for at in rng.permutation(len(alike))]
+        wide, narrow = (estimate_ball_noise(item, PAPER).click for item in (alike, alone))
+        assert wide.high / wide.low > 1.5 * narrow.high / narrow.low
+
+    def test_a_few_groups_say_nothing(self):
+        found = estimate_ball_noise(dataset(1.0, groups=3), PAPER)
+        assert (found.click, found.share, found.given) == (None, None, None)
