@@ -49,7 +49,10 @@ class PitchesDocument(Document):
 class PitchChange(BaseModel):
     """Give a match another pitch: all its groups at once."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"match": "a/b/c", "length": 103.0, "width": 66.0}]},
+    )
 
     match: str = Field(min_length=1, max_length=1000)
     length: Annotated[float, Field(ge=LENGTH_RANGE[0], le=LENGTH_RANGE[1])]
