@@ -57,13 +57,14 @@ class TestDrawing:
         screen.page.keyboard.type(marking.lower())
         screen.press("Enter")
         expect(screen.page.locator(".drawing-chip")).to_contain_text(marking)
-        for x, y in ((40, 500), (90, 505), (60, 502)):
+        # Far enough apart that no click means the point before it.
+        for x, y in ((40, 500), (200, 505), (120, 502)):
             screen.page.mouse.click(*screen.place(before, x, y))
         screen.press("Escape")
         expect(screen.page.locator(".drawing-chip")).to_have_count(0)
         screen.saved()
         drawn = first_view(screen)["lines"][marking]
-        assert [point["x"] for point in drawn] == pytest.approx([40, 60, 90], abs=2)
+        assert [point["x"] for point in drawn] == pytest.approx([40, 120, 200], abs=2)
         undo(screen, before)
 
     def test_a_marking_is_found_by_the_words_that_people_use(self, review: Review) -> None:

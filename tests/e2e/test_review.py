@@ -108,7 +108,7 @@ class TestEditing:
         expect(screen.page.locator('.mini-pitch [data-number="x"]')).to_have_text(before[0])
 
     def test_gates_follow_a_ball_that_is_still_held(self, review: Callable[..., Screen]) -> None:
-        screen = review(1)
+        screen = review(3)
         writes = submitted(screen.page)
         view = screen.document()["views"][0]
         x, y, width, height = view["balls"][0]["box"]
