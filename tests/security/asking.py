@@ -37,7 +37,7 @@ class Asker:
 
     def __init__(self, address: str):
         self.where = urlsplit(address)
-        self.asked = 0
+        self.asked = self.repeated = 0
         self._connection: http.client.HTTPConnection | None = None
 
     def __call__(
@@ -59,6 +59,7 @@ class Asker:
         except (http.client.RemoteDisconnected, BrokenPipeError, ConnectionResetError):
             # The server ended the connection after the answer before.
             self.close()
+            self.repeated += 1
             return self._ask(method, target, headers or {}, body, only_head)
 
     def close(self) -> None:

@@ -10,6 +10,7 @@ import re
 import socket
 import sqlite3
 import time
+import uuid
 import warnings
 import zipfile
 from collections.abc import Iterator
@@ -30,6 +31,21 @@ from tests.security.table import CORPUS, MISSING, TABLE, Row, lines_of, rows, se
 STALL_SECONDS = 45.0
 """A request that never comes whole has ended by then; the limits are 15 and 20 seconds."""
 TEXT = "text/plain"
+SOME = slice(None, None, 5)
+"""Of a long list, on a route whose like was given all of it."""
+LARGE = 50_000
+"""A body of more bytes is sent to one route: it is read before any route is found."""
+ALL_RANGES = ("/static/{file}", f"{API}/exports/{{export}}/content", f"{API}/views/{{view}}/image")
+"""Files that are read from the disk, and what is made when it is asked for."""
+WORDS = ("figure", "table", "ending", "tab")
+KINDS_OF_PARAMETERS = {
+    "dataset": "dataset",
+    "upload": "upload",
+    "file": "file",
+    "path": "file",
+    **dict.fromkeys(WORDS, "name"),
+}
+"""The others are numbers."""
 
 
 def target_of(row: Row, guarded: Guarded) -> str:
@@ -37,6 +53,22 @@ def target_of(row: Row, guarded: Guarded) -> str:
     if row.changes or not row.path.startswith(API):
         return row.target({} if row.changes else guarded.ids)
     return row.target(guarded.ids) + "?dataset=small&against=1&with=1"
+
+
+def kind_of(row: Row, name: str) -> tuple[str, bool]:
+    """What reads a path parameter: its kind, and whether the page's routes or the API's have it."""
+    api = row.path.startswith(API)
+    is_word = row.path.startswith("/assets")
+    return KINDS_OF_PARAMETERS.get(name, "name" if is_word else "number"), api
+
+
+def full_once(of: str) -> Iterator[tuple[Row, int, bool]]:
+    """Rows with their number, and whether all values are tried: on one that reads, one that changes."""
+    seen: set[bool] = set()
+    for number, row in enumerate(rows(of)):
+        yield row, number, row.kind != "stream" and row.changes not in seen
+        if row.kind != "stream":
+            seen.add(row.changes)
 
 
 def told_of(row: Row, answer: Answer, what: object) -> tuple[str, object, int, bytes]:
@@ -122,8 +154,9 @@ class TestEveryRoute:
         assert {200, 404, 422, 428} <= statuses
 
     def test_another_host_reaches_nothing(self, guarded: Guarded) -> None:
-        for row in rows("host"):
-            for host in lines_of("hosts.txt"):
+        hosts = lines_of("hosts.txt")
+        for row, number, full in full_once("host"):
+            for host in hosts if full else [hosts[number % len(hosts)]]:
                 answer = guarded.ask(row.method, target_of(row, guarded), {"Host": host})
                 assert answer.status == 400, told_of(row, answer, host)
                 assert_guarded(answer, told_of(row, answer, host))
@@ -132,8 +165,9 @@ class TestEveryRoute:
         self, guarded: Guarded
     ) -> None:
         ours = guarded.ask.where.netloc
-        for row in rows("origin"):
-            for asked in yaml.safe_load((CORPUS / "origins.yaml").read_text()):
+        origins = yaml.safe_load((CORPUS / "origins.yaml").read_text())
+        for row, number, full in full_once("origin"):
+            for asked in origins if full else [origins[number % len(origins)]]:
                 headers = {name: value.format(host=ours) for name, value in asked.items()}
                 target, stream = target_of(row, guarded), row.kind == "stream"
                 answer = guarded.ask(row.method, target, {**headers, **JSON}, only_head=stream)
@@ -152,26 +186,28 @@ class TestEveryRoute:
                 assert answer.status == 405, told_of(row, answer, method)
                 assert answer.headers["allow"], told_of(row, answer, method)
                 assert_guarded(answer, told_of(row, answer, method))
-            if row.changes:
-                continue
-            plain = guarded.ask("GET", target)
-            head = guarded.ask("HEAD", target)
-            assert (head.status, head.body) == (plain.status, b""), told_of(row, head, "HEAD")
-            override = {"X-HTTP-Method-Override": "DELETE", "X-Method-Override": "DELETE"}
-            answer = guarded.ask("GET", target, override)
-            assert answer.status == plain.status, told_of(row, answer, override)
 
     def test_reading_changes_nothing(self, guarded: Guarded) -> None:
         before = _state(guarded.home)
+        override = {"X-HTTP-Method-Override": "DELETE", "X-Method-Override": "DELETE"}
         for row in rows("reading"):
-            for method in ("GET", "HEAD", "OPTIONS"):
-                guarded.ask(method, target_of(row, guarded), only_head=row.kind == "stream")
+            target, stream = target_of(row, guarded), row.kind == "stream"
+            answer = guarded.ask("GET", target, override, only_head=stream)
+            head = guarded.ask("HEAD", target, only_head=stream)
+            if not stream:
+                assert (head.status, head.body) == (answer.status, b""), told_of(row, head, "HEAD")
+            guarded.ask("OPTIONS", target, only_head=stream)
         assert _state(guarded.home) == before
 
     def test_hostile_paths_reach_nothing(self, guarded: Guarded) -> None:
+        values, tried = lines_of("paths.txt"), set()
         for row in rows("paths"):
             for name in row.parameters:
-                for value in lines_of("paths.txt"):
+                kind = kind_of(row, name)
+                chosen = values[SOME] if kind in tried else values
+                # A change is not asked for what there is: the whole list is for who reads.
+                tried |= set() if row.changes else {kind}
+                for value in chosen:
                     if row.changes and unquote(value).strip().lstrip("+").rstrip(".0").isdigit():
                         continue
                     ids = {**({} if row.changes else guarded.ids), name: value}
@@ -193,26 +229,34 @@ class TestEveryRoute:
     def test_hostile_queries_make_no_error_of_the_server(
         self, guarded: Guarded, document: dict[str, Any]
     ) -> None:
+        tried = set()
         for row in rows("queries"):
             operation = document["paths"][row.path][row.method.lower()]
-            names = [item["name"] for item in operation["parameters"] if item["in"] == "query"]
+            asked = [item for item in operation["parameters"] if item["in"] == "query"]
+            names = [item["name"] for item in asked]
             rest = "dataset=small&" if "dataset" in names else ""
             ids = {} if row.changes else guarded.ids
-            for name in names:
-                for value in (*lines_of("queries.txt"), "a" * 5000, f"1&{name}=2"):
+            for item in asked:
+                name, kind = item["name"], json.dumps(item["schema"], sort_keys=True)
+                values = [*lines_of("queries.txt"), "a" * 5000, f"1&{name}=2"]
+                for value in values[SOME] if (name, kind) in tried else values:
                     target = f"{row.target(ids)}?{rest if name != 'dataset' else ''}{name}={value}"
                     answer = guarded.ask(row.method, target, only_head=row.kind == "stream")
                     if row.kind != "stream":
                         assert_guarded(answer, told_of(row, answer, target))
                     assert b"root:x:" not in answer.body, told_of(row, answer, target)
+                tried.add((name, kind))
 
     def test_a_body_that_is_no_plain_json_is_refused(self, guarded: Guarded) -> None:
-        bodies = yaml.safe_load((CORPUS / "bodies.yaml").read_text())
+        bodies = {}
+        for name, parts in yaml.safe_load((CORPUS / "bodies.yaml").read_text()).items():
+            pieces = zip(parts[::2], parts[1::2], strict=True)
+            bodies[name] = "".join(text * times for text, times in pieces).encode("latin-1")
+        small = {name: body for name, body in bodies.items() if len(body) <= LARGE}
+        assert len(small) == len(bodies) - 2
         headers = {**JSON, "If-Match": '"a"'}
         for row in rows("json"):
-            for name, parts in bodies.items():
-                pieces = zip(parts[::2], parts[1::2], strict=True)
-                body = "".join(text * times for text, times in pieces).encode("latin-1")
+            for name, body in (bodies if row == rows("json")[0] else small).items():
                 answer = guarded.ask(row.method, row.target({}), headers, body)
                 assert answer.status == 400, told_of(row, answer, name)
                 assert_guarded(answer, told_of(row, answer, name))
@@ -249,10 +293,12 @@ class TestEveryRoute:
             guarded.ask.close()
 
     def test_a_list_of_ranges_costs_no_more_than_one(self, guarded: Guarded) -> None:
+        values = lines_of("ranges.txt")
+        assert set(ALL_RANGES) <= {row.path for row in rows("ranges")}
         for row in rows("ranges"):
             target = target_of(row, guarded)
             whole = guarded.ask("GET", target)
-            for value in lines_of("ranges.txt"):
+            for value in values if row.path in ALL_RANGES else values[:1]:
                 answer = guarded.ask("GET", target, {"Range": value})
                 assert_guarded(answer, told_of(row, answer, value))
                 assert answer.status in (whole.status, 206, 416), told_of(row, answer, value)
@@ -291,7 +337,9 @@ class TestFilesOfOthers:
             f"POST {API}/imports",
             f"POST {API}/datasets/{{dataset}}/predictions",
         }
-        content = _archive()
+        # No other run left a file of that name where this one looks.
+        escaped = f"escaped-{uuid.uuid4().hex}"
+        content = _archive(escaped)
         job = self.imported(guarded, "soccernet-v3", "tree.zip", content)
         assert job["state"] == "failed", job
         assert not [secret for secret in ("root:x:", str(guarded.home)) if secret in str(job)]
@@ -301,7 +349,7 @@ class TestFilesOfOthers:
         assert answer.status == 400, answer.body
         assert_guarded(answer, "predictions")
         outside = (guarded.home.parent, guarded.home, Path("/tmp"), Path.cwd())
-        assert not [path for folder in outside for path in folder.glob("*escaped*")]
+        assert not [path for folder in outside for path in folder.glob(f"*{escaped}*")]
 
     def test_entities_and_dtds_are_refused(self, guarded: Guarded) -> None:
         assert [str(row) for row in rows("xml")] == [f"POST {API}/imports"]
@@ -349,14 +397,14 @@ def _tables(answer: Answer) -> list[str]:
         return [packed.read(name).decode() for name in names]
 
 
-def _archive() -> bytes:
-    """The zip of the corpus."""
+def _archive(escaped: str) -> bytes:
+    """The zip of the corpus; members that lead out are called so."""
     out = io.BytesIO()
     with warnings.catch_warnings(), zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as packed:
         warnings.simplefilter("ignore")
         for member in yaml.safe_load((CORPUS / "archives.yaml").read_text()):
             entry = zipfile.ZipInfo("x")
-            entry.filename = member["name"]
+            entry.filename = member["name"].replace("escaped", escaped)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = int(str(member.get("mode", "100644")), 8) << 16
             content = b"\0" * member.get("zeros", 0) or str(member.get("content", "x")).encode()
@@ -385,4 +433,5 @@ class TestAtLast:
         assert guarded.ask("GET", "/readyz").status == 200
         for name in ("small", "formula", "spoiled"):
             assert guarded.ask("GET", f"{API}/datasets/{name}").status == 200
+        assert guarded.ask.repeated <= guarded.ask.asked / 20
         assert guarded.ask("GET", f"{API}/groups/{MISSING}").status == 404
