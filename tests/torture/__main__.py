@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 import tempfile
 from pathlib import Path
@@ -55,6 +56,10 @@ def _kills(folder: Path, asked: argparse.Namespace) -> list[str]:
 
 
 def _cuts(folder: Path, asked: argparse.Namespace) -> list[str]:
+    if shutil.which("strace") is None:
+        sentence = "power cuts need strace (Debian: apt-get install strace)"
+        print(f"Skipped: {sentence}")
+        return [sentence] if "cuts" in (asked.only or []) else []
     home = folder / "power"
     kills.prepare(home, folder / "power-files", clients=1, groups=2)
     steps = power.record(home, 60)

@@ -7,16 +7,18 @@ has room for.
 from __future__ import annotations
 
 import random
+import shutil
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
-from contextlib import suppress
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from alembic import command
 from alembic.config import Config
+from alembic.operations import Operations
 from sqlalchemy import Connection, MetaData, func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
@@ -32,9 +34,10 @@ from app.store.restore import restore
 from tests.e2e.service import ROOT
 
 MIGRATE = (
-    "import sys; from tests.torture.upgrades import migrate_slowly; migrate_slowly(sys.argv[1])"
+    "import sys; from tests.torture.upgrades import migrate_by_steps; migrate_by_steps(sys.argv[1])"
 )
-STARTED = "migrating\n"
+STEP = "an operation\n"
+"""What a migration says after each operation, before it waits to be told to go on."""
 SAYS = {
     ("solution", "body"): pack({"ball": None}),
     ("solution", "calibrations"): "[]",
@@ -107,20 +110,42 @@ def revision_of(settings: Settings) -> str | None:
     return found
 
 
-def migrate_slowly(home: str) -> None:
-    """Migrate, with a pause after each operation, so that a kill meets it midway."""
-    from alembic.operations import Operations
+def migrate_by_steps(home: str) -> None:
+    """Migrate; after each operation say so and wait for a line, so that a kill meets it midway."""
 
+    def wait() -> None:
+        sys.stdout.write(STEP)
+        sys.stdout.flush()
+        sys.stdin.readline()
+
+    with _after_each_operation(wait):
+        migrate(Settings(home=Path(home)))
+
+
+@contextmanager
+def _after_each_operation(do: Callable[[], None]) -> Iterator[None]:
     execute = Operations.invoke
 
-    def slowly(self: Operations, operation: object) -> object:
-        sys.stdout.write(STARTED)
-        sys.stdout.flush()
-        time.sleep(0.02)
-        return execute(self, operation)  # type: ignore[arg-type]
+    def watched(self: Operations, operation: object) -> object:
+        result = execute(self, operation)  # type: ignore[arg-type]
+        do()
+        return result
 
-    Operations.invoke = slowly  # type: ignore[method-assign, assignment]
-    migrate(Settings(home=Path(home)))
+    Operations.invoke = watched  # type: ignore[method-assign, assignment]
+    try:
+        yield
+    finally:
+        Operations.invoke = execute  # type: ignore[method-assign]
+
+
+def operations(home: Path) -> int:
+    """How many operations it takes to migrate a home; done to a copy of it."""
+    steps: list[None] = []
+    with tempfile.TemporaryDirectory(prefix="touchline-copy-") as name:
+        copy = shutil.copytree(home, Path(name, "home"))
+        with _after_each_operation(lambda: steps.append(None)):
+            migrate(Settings(home=copy))
+    return len(steps)
 
 
 def torture(
@@ -136,33 +161,52 @@ def torture(
     for revision in revisions:
         settings = Settings(home=folder / revision)
         make_old(settings, revision)
-        before = rows(settings)
-        for _ in range(kills):
-            _kill_midway(settings, chance.uniform(0, 0.15))
+        before, steps = rows(settings), operations(settings.home)
+        if steps == 0:
+            faults.append(f"schema {revision}: its migration has no operation to be killed at")
+        for _ in range(kills if steps else 0):
+            step = chance.randint(1, steps)
+            fault = _kill_at(settings, step)
             if (revision_of(settings), rows(settings)) != (revision, before):
-                faults.append(f"schema {revision}: killed midway, something had happened")
+                fault = fault or "something had happened"
+            if fault:
+                faults.append(f"schema {revision}: killed at operation {step} of {steps}: {fault}")
                 break
         migrated = migrate(settings)
         after = rows(settings)
         lost = [name for name, count in before.items() if after.get(name, count) < count]
         if lost or revision_of(settings) != KNOWN_REVISIONS[-1]:
             faults.append(f"schema {revision}: migrated, and rows are gone of {', '.join(lost)}")
-        assert migrated.copy is not None
+        if migrated.copy is None:
+            faults.append(f"schema {revision}: migrated without a backup")
+            continue
         restore(settings, migrated.copy)
         if (revision_of(settings), rows(settings)) != (revision, before):
             faults.append(f"schema {revision}: its backup is not what it was")
-        tell(f"schema {revision}: {len(before)} tables, {kills} kills, migrated and taken back")
+        tell(
+            f"schema {revision}: {len(before)} tables, {kills} kills among {steps} operations, migrated and taken back"
+        )
     return faults
 
 
-def _kill_midway(settings: Settings, seconds: float) -> None:
+def _kill_at(settings: Settings, step: int) -> str:
+    """Kill a migration after its operation of that number; what was wrong with that, if anything."""
     process = subprocess.Popen(
         [sys.executable, "-c", MIGRATE, str(settings.home)],
         cwd=ROOT,
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
     )
-    assert process.stdout is not None and process.stdout.readline() == STARTED
-    time.sleep(seconds)
-    process.send_signal(signal.SIGKILL)
-    process.communicate()
+    assert process.stdin is not None and process.stdout is not None
+    try:
+        for number in range(step):
+            if number:
+                process.stdin.write("go on\n")
+                process.stdin.flush()
+            if process.stdout.readline() != STEP:
+                return "it had ended before"
+        return ""
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
