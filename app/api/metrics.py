@@ -13,12 +13,15 @@ from prometheus_client.registry import Collector
 from prometheus_fastapi_instrumentator.middleware import PrometheusInstrumentatorMiddleware
 
 from app.api.deps import Services
+from app.api.pages import ELSEWHERE
 from app.api.security.lanes import Doors
 from app.errors import StorageError
 from app.review.jobs.vitals import Home, read_home
 
 MAX_ADDRESSES = 2000
 """Whose routes are remembered: addresses hold names of datasets, too."""
+MAX_LETTERS = 200
+"""Of a path that is remembered; a person's are shorter."""
 _NUMBER = re.compile(r"/[0-9]+(?=/|$)")
 
 
@@ -44,12 +47,16 @@ class RequestMetrics(PrometheusInstrumentatorMiddleware):
     def _get_handler(self, request: Request) -> tuple[str, bool]:
         """The route of a request, or its path where it has none; and whether it has one."""
         # No route asks more of a number than that it is one.
-        address = request.method, _NUMBER.sub("/0", request.url.path)
+        path = request.url.path
+        if len(path) > MAX_LETTERS:
+            return super()._get_handler(request)
+        address = request.method, _NUMBER.sub("/0", path)
         known = self._routes.get(address)
         if known is not None:
             return known, True
         route, found = super()._get_handler(request)
-        if found:
+        # Whatever is nowhere else has one route, and no end of addresses.
+        if found and route != ELSEWHERE:
             if len(self._routes) >= MAX_ADDRESSES:
                 self._routes.clear()
             self._routes[address] = route

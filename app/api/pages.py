@@ -40,6 +40,8 @@ class _Elsewhere(StringConvertor):
     regex = r"(?!(?:api|static|assets)(?:/|$)).*"
 
 
+ELSEWHERE = f"/{{path:{_Elsewhere.NAME}}}"
+"""The route of whatever is nowhere else."""
 register_url_convertor(_Elsewhere.NAME, _Elsewhere())
 
 
@@ -73,7 +75,7 @@ def install_pages(app: FastAPI, site: Site) -> None:
 
     for path in PAGES:
         router.add_api_route(path, page, methods=["GET", "HEAD"])
-    router.add_api_route(f"/{{path:{_Elsewhere.NAME}}}", elsewhere, methods=["GET", "HEAD"])
+    router.add_api_route(ELSEWHERE, elsewhere, methods=["GET", "HEAD"])
     router.add_api_route("/assets/{version}/all.css", styles, methods=["GET", "HEAD"])
     app.include_router(router)
     _install_modules(app, site)

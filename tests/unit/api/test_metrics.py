@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from prometheus_client import CollectorRegistry
 from prometheus_client.parser import text_string_to_metric_families
+from starlette.requests import Request
 from starlette.testclient import TestClient
 
 from app.api import metrics
@@ -80,6 +82,19 @@ def test_requests_count_for_their_route_whatever_number_is_in_their_address(
         read("http_requests_total", handler=f"{API}/groups/{{group}}", method="GET", status="2xx")
         >= 2
     )
+
+
+def test_only_addresses_that_come_to_an_end_are_remembered(api: TestClient) -> None:
+    counting = metrics.RequestMetrics(api.app, registry=CollectorRegistry())
+
+    def remembered(path: str) -> int:
+        scope = {"type": "http", "method": "GET", "path": path, "headers": [], "app": api.app}
+        assert counting._get_handler(Request(scope))[1]
+        return len(counting._routes)
+
+    assert remembered("/nothing/here") == 0
+    assert remembered(f"{API}/datasets/{'a' * 200}") == 0
+    assert remembered(f"{API}/datasets/a") == 1
 
 
 def test_a_database_that_does_not_answer_is_a_number_and_no_error(
