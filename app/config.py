@@ -16,8 +16,28 @@ def _user_data_folder() -> Path:
     return (Path(root) if root else Path.home() / ".local" / "share") / "touchline"
 
 
-def _memory() -> int:
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+def memory_bytes(
+    own: Path = Path("/proc/self/cgroup"), groups: Path = Path("/sys/fs/cgroup")
+) -> int:
+    """Memory that this process may have: the machine's, or what a container or unit is given.
+
+    Args:
+        own: Says which control groups the process is in, one ``number:controllers:path`` a line.
+        groups: Where the kernel shows them; version 1 has a folder for each controller.
+    """
+    found = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
+    for line in own.read_text().splitlines() if own.exists() else []:
+        _, controllers, path = line.split(":", 2)
+        if controllers not in ("", "memory"):
+            continue
+        name = "memory.limit_in_bytes" if controllers else "memory.max"
+        inner = Path(path.lstrip("/"))
+        # A limit of what is around it holds, too; a container may show its own as the outermost.
+        for folder in (inner, *inner.parents):
+            file = groups / controllers / folder / name
+            limit = file.read_text().strip() if file.is_file() else ""
+            found += [int(limit)] if limit.isdigit() else []
+    return min(found)
 
 
 class Settings(BaseSettings):
@@ -54,7 +74,7 @@ class Settings(BaseSettings):
     """Folders below which imports over REST may read, separated by ``:`` (or a JSON list)."""
     max_file_bytes: int = 256 * 1024 * 1024
     """Largest single data file (JSON, XML, CSV) that an importer reads."""
-    import_memory: int = Field(default_factory=lambda: min(4 * 1024**3, _memory() // 2))
+    import_memory: int = Field(default_factory=lambda: min(4 * 1024**3, memory_bytes() // 2))
     """Bytes of memory that an import over REST may use."""
     import_seconds: int = 3600
     """Seconds of processor time that an import over REST may take."""
