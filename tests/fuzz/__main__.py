@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import random
+import signal
 import subprocess
 import sys
 import tempfile
@@ -26,6 +28,12 @@ CORPUS = Path(__file__).parents[1] / "security" / "corpus" / "files"
 USED = 8
 """One case in so many is solved and written in every format, which takes longest."""
 CRASHED = "the process ended"
+STUCK = "the process did not end"
+KILLED = -1000
+"""Stands for the status of a process that did not end."""
+PROGRAM = (sys.executable, "-m", "tests.fuzz")
+GRACE = 60.0
+"""Seconds that a process may take beyond its time: it makes small what it found last."""
 
 
 def main() -> int:
@@ -39,20 +47,27 @@ def main() -> int:
     if asked.under_way is not None:
         return _work(asked)
     seed = int(time.time()) if asked.seed is None else asked.seed
-    return _supervise(asked.seconds, asked.kind or [], seed)
+    return supervise(asked.seconds, asked.kind or [], seed)
 
 
-def _supervise(seconds: float, kinds: list[str], seed: int) -> int:
-    """Let a process work; one that a library crashes leaves the case behind, and another goes on."""
+def supervise(
+    seconds: float,
+    kinds: list[str],
+    seed: int,
+    program: tuple[str, ...] = PROGRAM,
+    grace: float = GRACE,
+) -> int:
+    """Let a process work; one that crashes or sticks leaves its case, and another goes on."""
     ends, found, tried = time.monotonic() + seconds, 0, Counter[str]()
     chosen = [argument for kind in kinds for argument in ("--kind", kind)]
     with tempfile.TemporaryDirectory(prefix="touchline-fuzz-") as name:
         while (left := ends - time.monotonic()) > 0:
             under_way = Path(name, "case.json")
-            command = [sys.executable, "-m", "tests.fuzz", "--under-way", str(under_way)]
+            # What a process leaves is of its own, not of the one before.
+            under_way.unlink(missing_ok=True)
+            command = [*program, "--under-way", str(under_way)]
             command += ["--seconds", str(left), "--seed", str(seed), *chosen]
-            # Libraries complain about pictures and videos on stderr, whatever they are told.
-            done = subprocess.run(command, capture_output=True, text=True)
+            done = _run(command, left + grace)
             *faults, last = done.stdout.splitlines() or [""]
             print("\n".join(faults), end="\n" if faults else "")
             told = json.loads(last) if done.returncode == 0 else {}
@@ -63,14 +78,33 @@ def _supervise(seconds: float, kinds: list[str], seed: int) -> int:
                 if not under_way.exists():
                     print(done.stderr)
                     return 1
-                print(f"FAULT {CRASHED} ({done.returncode})\n{done.stderr[-2000:]}")
-                case = Case.of(under_way.read_text())
-                _keep(replace(case, found=f"{CRASHED} ({done.returncode})"))
+                what = f"{CRASHED} ({done.returncode})" if done.returncode != KILLED else STUCK
+                print(f"FAULT {what}\n{done.stderr[-2000:]}")
+                _keep(replace(Case.of(under_way.read_text()), found=what))
                 seed += 1
     for kind, count in sorted(tried.items()):
         print(f"{kind:20} {count:8,} files")
     print(f"{sum(tried.values()):,} damaged files, {found} faults (seed {seed})")
     return 1 if found else 0
+
+
+def _run(command: list[str], seconds: float) -> subprocess.CompletedProcess[str]:
+    """Run a process, for so long at most; it is killed then."""
+    # Libraries complain about pictures and videos on stderr, whatever they are told.
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    status: int | None = None
+    try:
+        told = process.communicate(timeout=seconds)
+        status = process.returncode
+    except subprocess.TimeoutExpired:
+        status = KILLED
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            told = process.communicate()
+    return subprocess.CompletedProcess(command, status, *told)
 
 
 def _work(asked: argparse.Namespace) -> int:

@@ -49,13 +49,15 @@ KINDS = (
 )  # fmt: skip
 SECONDS, MEMORY = 20.0, 1024 * 2**20
 """Processor time for one case, and memory beyond what the process had before it."""
+CLOCK_SECONDS = 90.0
+"""Whatever waits for something does not take processor time."""
 GROUPS = 3
 """Groups of a case that are solved and written again."""
 LIMITS = Limits(members=1000, file_bytes=8 * 2**20, total_bytes=64 * 2**20)
 
 
 class TooSlowError(BaseException):
-    """A case took more processor time than it may."""
+    """A case took more time than it may."""
 
 
 @dataclass(frozen=True)
@@ -189,19 +191,25 @@ def _fault(error: BaseException) -> Fault:
 
 @contextmanager
 def _bounded() -> Iterator[None]:
-    """Bounds on processor time and memory for what is done inside."""
+    """Bounds on processor time, time and memory for what is done inside."""
 
-    def ended(*_: Any) -> None:
-        raise TooSlowError(f"more than {SECONDS} seconds of processor time")
+    def ended(number: int, _frame: Any) -> None:
+        what = f"{SECONDS} seconds of processor time"
+        raise TooSlowError(
+            f"more than {what if number == signal.SIGPROF else f'{CLOCK_SECONDS} seconds'}"
+        )
 
-    before = signal.signal(signal.SIGPROF, ended)
+    before = {number: signal.signal(number, ended) for number in (signal.SIGPROF, signal.SIGALRM)}
     used = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
     resource.setrlimit(resource.RLIMIT_DATA, (used + MEMORY, hard))
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
+    signal.setitimer(signal.ITIMER_REAL, CLOCK_SECONDS)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.setitimer(signal.ITIMER_REAL, 0)
         resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
-        signal.signal(signal.SIGPROF, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

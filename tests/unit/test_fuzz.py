@@ -1,0 +1,54 @@
+"""``make fuzz`` itself: what sticks or crashes is a fault, and neither keeps it from ending."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import tests.fuzz.__main__ as fuzz
+from tests.fuzz import readers
+from tests.fuzz.case import Case
+
+LEAVES = """
+import sys, time
+words = sys.argv
+open(words[words.index("--under-way") + 1], "w").write({text!r})
+{then}
+"""
+
+
+@pytest.fixture
+def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(fuzz, "CORPUS", tmp_path / "corpus")
+    return tmp_path / "corpus"
+
+
+@pytest.mark.parametrize(
+    ("then", "what"),
+    [("time.sleep(60)", fuzz.STUCK), ("time.sleep(0.4); sys.exit(3)", f"{fuzz.CRASHED} (3)")],
+    ids=["sticks", "crashes"],
+)
+def test_a_process_that_does_not_come_back_leaves_its_case(
+    corpus: Path, then: str, what: str
+) -> None:
+    text = Case("text", {"a": b"b"}).text()
+    program = (sys.executable, "-ISc", LEAVES.format(text=text, then=then))
+    start = time.monotonic()
+    assert fuzz.supervise(0.3, [], 1, program, 0.5) == 1
+    assert time.monotonic() - start < 30
+    assert [Case.of(path.read_text()).found for path in corpus.iterdir()] == [what]
+
+
+def test_a_process_that_fails_before_its_first_case_ends_the_run(corpus: Path) -> None:
+    program = (sys.executable, "-ISc", "import sys; sys.exit(3)")
+    assert fuzz.supervise(60, [], 1, program) == 1
+    assert not corpus.exists()
+
+
+def test_a_case_that_waits_for_ever_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(readers, "CLOCK_SECONDS", 0.05)
+    with pytest.raises(readers.TooSlowError, match=r"0\.05 seconds$"), readers._bounded():
+        time.sleep(10)
