@@ -13,6 +13,8 @@ import hashlib
 import shutil
 import subprocess
 import sys
+import tarfile
+import tempfile
 from pathlib import Path
 
 from app.datasets.manifest import software_version
@@ -40,12 +42,15 @@ def tell_advisories(tools: Path) -> int:
 
 
 def build(out: Path, tools: Path) -> int:
-    """Make everything that a release consists of, in an empty folder."""
-    shutil.rmtree(out, ignore_errors=True)
-    out.mkdir(parents=True)
+    """Make everything that a release consists of, in a folder of its own; 1 where it cannot be."""
+    if not _emptied(out):
+        print(f"{out} holds something else than a release. Name an empty folder.", file=sys.stderr)
+        return 1
     for target in ("sdist", "wheel"):
-        command = [sys.executable, "-m", "hatchling", "build", "-t", target, "-d", str(out)]
-        subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+        _build(ROOT, out, target)
+    if not _same_again(out):
+        print("The source distribution builds another wheel than the checkout.", file=sys.stderr)
+        return 1
     name = f"touchline-{software_version()}"
     write_lock(out / "requirements.txt")
     write_lock(out / "requirements-all.txt", *EXTRAS)
@@ -55,6 +60,34 @@ def build(out: Path, tools: Path) -> int:
     (out / SUMS).write_text("".join(sums), encoding="utf-8")
     print("".join(sums), end="")
     return 0
+
+
+def _emptied(out: Path) -> bool:
+    """Make a folder empty that is there for a release; False for any other, which stays."""
+    if out.is_dir() and any(out.iterdir()):
+        if not (out / SUMS).is_file():
+            return False
+        shutil.rmtree(out)
+    elif out.exists() and not out.is_dir():
+        return False
+    out.mkdir(parents=True, exist_ok=True)
+    return True
+
+
+def _build(project: Path, out: Path, target: str) -> None:
+    command = [sys.executable, "-m", "hatchling", "build", "-t", target, "-d", str(out)]
+    subprocess.run(command, cwd=project, check=True, stdout=subprocess.DEVNULL)
+
+
+def _same_again(out: Path) -> bool:
+    """Whether the source distribution builds the wheel beside it, byte for byte."""
+    with tempfile.TemporaryDirectory(prefix="touchline-release-") as name:
+        folder = Path(name)
+        with tarfile.open(next(out.glob("*.tar.gz"))) as archive:
+            archive.extractall(folder / "sources", filter="data")
+        _build(next((folder / "sources").iterdir()), folder, "wheel")
+        one, other = next(out.glob("*.whl")), next(folder.glob("*.whl"))
+        return one.name == other.name and one.read_bytes() == other.read_bytes()
 
 
 def write_lock(out: Path, *extras: str) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from tests.release.__main__ import SUMS, _emptied, build
 from tests.release.advisories import UNANSWERED, read_browser, read_python
 from tests.release.bill import merged
 from tests.release.libraries import EXTRAS, closure, pinned, pins
@@ -20,6 +21,25 @@ def metadata(**fields: str) -> Any:
     for name, text in fields.items():
         message[name.replace("_", "-")] = text
     return message
+
+
+class TestBuild:
+    def test_a_folder_that_holds_something_else_stays(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        (kept := tmp_path / "thesis.txt").write_text("years of work")
+        assert build(tmp_path, tmp_path) == 1
+        assert build(kept, tmp_path) == 1
+        assert kept.read_text() == "years of work"
+        assert "Name an empty folder." in capsys.readouterr().err
+
+    def test_the_release_before_makes_room(self, tmp_path: Path) -> None:
+        (tmp_path / SUMS).write_text("")
+        (tmp_path / "touchline-0.1.whl").write_text("")
+        assert _emptied(tmp_path)
+        assert list(tmp_path.iterdir()) == []
+        assert _emptied(tmp_path)
+        assert _emptied(tmp_path / "new" / "folder")
 
 
 class TestLicences:
