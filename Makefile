@@ -1,6 +1,6 @@
 # The two commands of the README are `run` and `test`; every target sets up what it needs.
 
-PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3; do command -v $$p >/dev/null 2>&1 && $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3; do command -v $$p >/dev/null 2>&1 && $$p -c 'import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null && echo $$p && break; done)
 # A half of the tests that fails must fail although its output goes through a pipe.
 SHELL := bash
 .SHELLFLAGS := -o pipefail -c
@@ -16,7 +16,8 @@ NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 setup: .venv/ready static/node_modules/.ready
 
 .venv/ready: requirements.lock pyproject.toml
-	@test -n "$(PYTHON)" || { echo "Touchline needs Python 3.11 or newer with venv (Debian: apt-get install python3-venv)."; exit 1; }
+	@test -n "$(PYTHON)" || { echo "Touchline needs Python 3.11, 3.12 or 3.13 with venv (Debian: apt-get install python3-venv)."; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || { echo "$(PYTHON) is another Python than 3.11, 3.12 or 3.13, for which the libraries are pinned."; exit 1; }
 	@echo "Installing Python packages into .venv"
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
