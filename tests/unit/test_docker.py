@@ -40,8 +40,23 @@ class TestCompose:
             assert service["cap_drop"] == ["ALL"]
             assert service["security_opt"] == ["no-new-privileges:true"]
 
+    def test_neither_takes_the_whole_machine(self, services: dict[str, Any]) -> None:
+        assert all({"mem_limit", "pids_limit"} <= service.keys() for service in services.values())
+
+    def test_backups_lie_beside_the_home(self, services: dict[str, Any]) -> None:
+        assert "${TOUCHLINE_BACKUPS:-backups}:/backups" in services["touchline"]["volumes"]
+        text = (FOLDER / "Dockerfile").read_text("utf-8")
+        assert re.search(r"install -d .* -o 10001 .* /backups$", text, re.M)
+
 
 class TestDockerfile:
+    def test_what_may_be_large_is_not_made_in_memory(self, services: dict[str, Any]) -> None:
+        text = (FOLDER / "Dockerfile").read_text("utf-8")
+        for name in ("TMPDIR", "NUMBA_CACHE_DIR"):
+            folder = re.search(rf"^ENV .*\b{name}=(\S+)", text, re.M)
+            assert folder and folder[1].startswith("/data/")
+        assert re.search(r"install -d .* /data/tmp\b", text)
+
     def test_what_runs_is_not_root_and_has_no_tools(self) -> None:
         text = (FOLDER / "Dockerfile").read_text("utf-8")
         last = text.rpartition("\nFROM ")[2]
@@ -63,4 +78,7 @@ class TestUnit:
         assert service["NoNewPrivileges"] == "yes"
         assert "ReadWritePaths" not in service
         assert f"%S/{service['StateDirectory']}" in service["Environment"]
+        assert {"TasksMax", "MemoryMax"} <= service.keys()
+        assert {"StartLimitIntervalSec", "StartLimitBurst"} <= unit["Unit"].keys()
+        assert service["RestartPreventExitStatus"].split() == ["1", "2"]
         assert f"%C/{service['CacheDirectory']}" in service["Environment"]
