@@ -52,3 +52,13 @@ def test_a_case_that_waits_for_ever_is_a_fault(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(readers, "CLOCK_SECONDS", 0.05)
     with pytest.raises(readers.TooSlowError, match=r"0\.05 seconds$"), readers._bounded():
         time.sleep(10)
+
+
+def test_the_case_of_one_process_is_not_taken_for_the_next_one_s(corpus: Path) -> None:
+    then = "open(words[2] + '.seen', 'x')\nsys.exit(3)"
+    first = LEAVES.format(text=Case("text", {"a": b"b"}).text(), then=then)
+    again = "import os, sys\nwords = sys.argv\nif os.path.exists(words[2] + '.seen'): sys.exit(4)\n"
+    start = time.monotonic()
+    assert fuzz.supervise(20, [], 1, (sys.executable, "-ISc", again + first)) == 1
+    assert time.monotonic() - start < 15
+    assert len(list(corpus.iterdir())) == 1
