@@ -80,5 +80,5 @@ class TestUnit:
         assert f"%S/{service['StateDirectory']}" in service["Environment"]
         assert {"TasksMax", "MemoryMax"} <= service.keys()
         assert {"StartLimitIntervalSec", "StartLimitBurst"} <= unit["Unit"].keys()
-        assert service["RestartPreventExitStatus"].split() == ["1", "2"]
+        assert service["RestartPreventExitStatus"] == "2"
         assert f"%C/{service['CacheDirectory']}" in service["Environment"]
