@@ -143,6 +143,16 @@ class Calibration:
     picture: Picture | None = None
 
     @property
+    def is_known(self) -> bool:
+        """Whether a covariance says how exact the camera is; one of zeros says nothing."""
+        return self.covariance is not None and sum(self.covariance[::9]) > 0
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether the camera came with the data and nobody says how exact it is."""
+        return self.source == "given" and not self.is_known
+
+    @property
     def position_sigma_m(self) -> float | None:
         """Standard deviation of the camera's position, all axes together; None if unknown."""
         if self.covariance is None:

@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.policy import Policy
 from app.solving.facts import Facts
-from app.solving.spread import carried_spreads, click_variance
+from app.solving.spread import pixel_spreads
 
 _STEPS = 6
 
@@ -36,7 +36,7 @@ class Residuals:
 def residuals_of(facts: Facts, used: BoolArray, start: FloatArray, policy: Policy) -> Residuals:
     """Fit one ball to all clicks of each group, and test what is left.
 
-    A click's uncertainty is that of the hand and of its calibration, as for every sigma. Lenses
+    A click's uncertainty is that of the hand and of its camera, as for every sigma. Lenses
     are linear around the click, which is exact to a thousandth of the residual.
 
     Args:
@@ -61,6 +61,22 @@ def residuals_of(facts: Facts, used: BoolArray, start: FloatArray, policy: Polic
     p_value[there] = chdtrc(freedom[there], total[there])
     point[~there] = np.nan
     return Residuals(point, total, np.maximum(freedom, 0), p_value)
+
+
+def untestable(facts: Facts, used: BoolArray, policy: Policy) -> BoolArray:
+    """Groups whose residuals say nothing: nobody says how exact one of their cameras is, (G,).
+
+    Args:
+        facts: The groups.
+        used: Views that count, shape (V,).
+        policy: Its ``given_sigma_px`` says it of given cameras without covariance.
+    """
+    unknown = used & ~facts.view_known
+    if policy.given_sigma_px:
+        unknown &= ~facts.view_bare
+    found = np.zeros(facts.groups, bool)
+    found[facts.view_group[unknown]] = True
+    return found
 
 
 def _fitted(
@@ -95,17 +111,7 @@ def _fitted(
 
 def _weights(facts: Facts, views: IntArray, point: FloatArray, policy: Policy) -> FloatArray:
     """Inverse covariance of each view's click and calibration, at the point, (N, 2, 2)."""
-    diagonal = facts.view_diagonal[views]
-    noise = click_variance(diagonal, facts.view_ball_px[views], policy)
-    spread = noise[:, None, None] * np.eye(2)
-    known = np.flatnonzero(facts.view_covariance[views, 0, 0] > 0)
-    rows = views[known]
-    spread[known] += carried_spreads(
-        facts.view_parameters[rows],
-        facts.view_covariance[rows],
-        point[facts.view_group[rows]],
-        facts.view_diagonal[rows],
-    )
+    spread = pixel_spreads(facts, views, point[facts.view_group[views]], policy)
     (a, b), (c, d) = spread.transpose(1, 2, 0)
     adjugate = np.stack([np.stack([d, -b], -1), np.stack([-c, a], -1)], 1)
     weights: FloatArray = adjugate / (a * d - b * c)[:, None, None]

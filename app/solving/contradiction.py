@@ -11,7 +11,7 @@ from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.frames import height_above_grass
 from app.soccer.policy import Policy
 from app.soccer.solution import ChiSquare
-from app.solving.chi_square import residuals_of
+from app.solving.chi_square import residuals_of, untestable
 from app.solving.facts import Facts
 from app.solving.triangulate import Sight
 from app.solving.verdict import Verdict, views_of
@@ -91,7 +91,7 @@ def contradiction(
 ) -> Contradiction | None:
     """Where the views of the ball contradict each other; None where they do not.
 
-    Nobody knows how far a given camera without covariance is off: nothing can be said with one.
+    Where nobody says how far a given camera is off, nothing can be said with it.
 
     Args:
         chi_square: Of the group.
@@ -104,7 +104,7 @@ def contradiction(
     if chi_square is None or chi_square.p_value >= LOW_P_VALUE:
         return None
     used = np.array([key in chi_square.views for key in keys])
-    if not (facts.view_covariance[used, 0, 0] > 0).all():
+    if untestable(facts, used, policy)[0]:
         return None
     chosen = [sight for sight in sights if sight.view in chi_square.views]
     if len(chosen) == 2:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -82,10 +83,16 @@ class Facts:
     pair_point: FloatArray
     pair_moved: FloatArray
 
-    @property
+    @cached_property
+    def view_known(self) -> BoolArray:
+        """How exact its camera is is known: a covariance says so, shape (V,)."""
+        known: BoolArray = np.trace(self.view_covariance, axis1=1, axis2=2) > 0
+        return known
+
+    @cached_property
     def view_bare(self) -> BoolArray:
         """Its camera came with the data and nobody says how exact it is, shape (V,)."""
-        bare: BoolArray = self.view_given & (self.view_covariance[:, 0, 0] == 0)
+        bare: BoolArray = self.view_given & ~self.view_known
         return bare
 
     def only(self, kept: BoolArray) -> Facts:

@@ -247,6 +247,12 @@ def _chi_square(group: _Group, found: ChiSquare | None, policy: Policy) -> Gate:
     if found is None:
         return _unjudged("chi_square", threshold, active=active)
     passed = "chi_square" not in group.failed
+    cameras = [view.calibration for view in group.views if view.key in found.views]
+    if active and not all(
+        item.is_known or (item.is_bare and policy.given_sigma_px) for item in cameras
+    ):
+        sentence = "not judged: nobody says how exact a camera is"
+        return Gate("chi_square", passed, None, threshold, None, sentence, active=active)
     sentence = f"by chance in {chance(found.p_value)}, χ² {found.value:.1f}"
     return _gate("chi_square", passed, found.p_value, threshold, sentence, active=active)
 

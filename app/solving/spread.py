@@ -60,6 +60,42 @@ def carried_spreads(
     return carried
 
 
+def click_spreads(facts: Facts, views: IntArray, policy: Policy) -> FloatArray:
+    """Covariance of the ball's pixel by the click and by given cameras, square pixels, (N, 2, 2).
+
+    Args:
+        facts: The groups.
+        views: Rows of the views, shape (N,).
+        policy: Holds the noises.
+    """
+    noise = click_variance(
+        facts.view_diagonal[views], facts.view_ball_px[views], policy, facts.view_bare[views]
+    )
+    spreads: FloatArray = noise[:, None, None] * np.eye(2)
+    return spreads
+
+
+def pixel_spreads(facts: Facts, views: IntArray, points: FloatArray, policy: Policy) -> FloatArray:
+    """``pixel_spread`` of many views, square pixels, shape (N, 2, 2).
+
+    Args:
+        facts: The groups.
+        views: Rows of the views, shape (N,).
+        points: The ball of each of them, pitch frame, metres, shape (N, 3).
+        policy: Holds the noises.
+    """
+    spreads = click_spreads(facts, views, policy)
+    known = np.flatnonzero(facts.view_known[views])
+    rows = views[known]
+    spreads[known] += carried_spreads(
+        facts.view_parameters[rows],
+        facts.view_covariance[rows],
+        points[known],
+        facts.view_diagonal[rows],
+    )
+    return spreads
+
+
 def calibration_spread(calibration: Calibration, size: ImageSize, point: FloatArray) -> FloatArray:
     """Covariance of the projected point due to that of the calibration, square pixels, (2, 2).
 
@@ -158,13 +194,7 @@ class MeanSpread:
             asked[groups] = True
             views = np.flatnonzero(self._used & asked[facts.view_group])
             slopes, pixels = self._slope[views], self._carried[views]
-            noise = click_variance(
-                facts.view_diagonal[views],
-                facts.view_ball_px[views],
-                policy,
-                facts.view_bare[views],
-            )
-            pixels = noise[:, None, None] * np.eye(2) + pixels
+            pixels = click_spreads(facts, views, policy) + pixels
             parts = (slopes.transpose(0, 2, 1) @ pixels @ slopes).reshape(-1, 9)
         owner = np.searchsorted(groups, facts.view_group[views])
         total = [np.bincount(owner, part, minlength=len(groups)) for part in parts.T]
@@ -186,7 +216,7 @@ class MeanSpread:
         self._pairs[fresh] = pairs[fresh]
         self._used[fresh[facts.view_group]] = False
         self._used[views], self._slope[views] = True, slopes
-        known = views[facts.view_covariance[views, 0, 0] > 0]
+        known = views[facts.view_known[views]]
         self._carried[known] = carried_spreads(
             facts.view_parameters[known],
             facts.view_covariance[known],

@@ -44,7 +44,7 @@ class Sight:
     @property
     def is_bare(self) -> bool:
         """Whether its camera came with the data and nobody says how exact it is."""
-        return self.calibration.source == "given" and self.calibration.covariance is None
+        return self.calibration.is_bare
 
     @cached_property
     def P(self) -> FloatArray:

@@ -11,7 +11,7 @@ from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.triangulation import parallax_angle
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES
-from app.solving.chi_square import residuals_of
+from app.solving.chi_square import residuals_of, untestable
 from app.solving.facts import Facts
 from app.solving.spread import MeanSpread, is_within
 
@@ -100,8 +100,9 @@ def judge(facts: Facts, policy: Policy, spread: MeanSpread) -> Verdict:
         failed[_SIGMA] = True
         failed[_SIGMA, there] = ~is_within(spreads, policy.max_sigma_m)
     if policy.min_p_value is not None:
-        residuals = residuals_of(facts, views_of(facts, pair_failed == PASSES), point, policy)
-        failed[_CHI_SQUARE] = ~(residuals.p_value >= policy.min_p_value)
+        used = views_of(facts, pair_failed == PASSES)
+        likely = residuals_of(facts, used, point, policy).p_value >= policy.min_p_value
+        failed[_CHI_SQUARE] = ~likely & ~untestable(facts, used, policy)
     return Verdict(jac, view_failed, pair_failed, failed, baseline, point, parallax, distance)
 
 

@@ -115,3 +115,44 @@ def facts_with_parameters() -> np.ndarray:
     covariance = tuple((1e-4 * np.eye(8)).ravel().tolist())
     calibrations = [Calibration("lines", CAMERAS[key], covariance=covariance) for key in "abc"]
     return group_facts(views(), calibrations).view_parameters
+
+
+class TestGivenCameras:
+    """Of which nobody says how exact they are."""
+
+    ASKED = replace(POLICY, min_p_value=0.001, tau_percent=5.0)
+
+    def judged(self, policy, seed: int, noise_px: float = 5.0):
+        return solve(group(*views("abc", noise_px * 1280 / 1920, seed)), policy)
+
+    def test_their_sigma_counts_in_the_residuals(self) -> None:
+        policy = replace(self.ASKED, click_sigma_px=0.5, given_sigma_px=5.0)
+        failed = [
+            gate.name
+            for seed in range(25)
+            for gate in self.judged(policy, seed).gates
+            if gate.name == "chi_square" and not gate.passed
+        ]
+        assert failed == []
+
+    def test_without_a_sigma_they_are_not_judged(self) -> None:
+        solution = self.judged(self.ASKED, 1, 15.0)
+        gate = next(gate for gate in solution.gates if gate.name == "chi_square")
+        assert solution.chi_square is not None and solution.chi_square.p_value < 0.001
+        assert (gate.passed, gate.value) == (True, None)
+        assert "nobody says how exact" in gate.sentence
+        assert "views_contradict" not in {item.kind for item in solution.findings}
+
+    def test_with_a_sigma_gate_and_finding_speak(self) -> None:
+        solution = self.judged(replace(self.ASKED, given_sigma_px=1.0), 1, 15.0)
+        gate = next(gate for gate in solution.gates if gate.name == "chi_square")
+        assert not gate.passed
+        assert "views_contradict" in {item.kind for item in solution.findings}
+
+    def test_a_covariance_is_known_by_its_trace(self) -> None:
+        unknown_pan = np.diag([0.0, *[1e-6] * 7])
+        one = Calibration("given", MAIN, covariance=tuple(unknown_pan.ravel().tolist()))
+        none = replace(one, covariance=(0.0,) * 64)
+        assert (one.is_bare, none.is_bare) == (False, True)
+        of = group_facts(views("abc"), [one, none, replace(one, covariance=None)])
+        assert of.view_bare.tolist() == [False, True, True]
