@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 
 import numpy as np
+from scipy.special import chdtri
 
 from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.policy import Policy
@@ -26,12 +27,23 @@ MIN_NUMBERS = 20
 """Fewer say too little."""
 LIMIT = 10.8
 """Squared, of one number: one honest pair in a thousand lies beyond. Farther ones are mistakes."""
-TRIMMED = 0.9815
+
+
+def _trimmed_variance(limit: float) -> float:
+    """Variance of a standard normal number whose square is within a limit."""
+    end = math.sqrt(limit)
+    density = math.exp(-limit / 2) / math.sqrt(2 * math.pi)
+    return 1 - 2 * end * density / math.erf(end / math.sqrt(2))
+
+
+TRIMMED = _trimmed_variance(LIMIT)
 """Variance of a standard normal number within that limit."""
-HALF = 0.1426
+HALF = _trimmed_variance(float(chdtri(1, 0.5)))
 """The same of the half that is nearest to zero."""
 SIGMAS = np.geomspace(0.1, 30.0, 191)
 """Noises that are tried, pixels at 1920 x 1080."""
+ENDS = float(np.log(SIGMAS[0])), float(np.log(SIGMAS[-1]))
+"""An estimate there is none."""
 SHARES = np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.13])
 """What the diameter of a ball adds, as a share of it."""
 SHARE_SIGMA = 0.02
@@ -40,6 +52,7 @@ BLOCKS = 10
 STUDENT = 2.26
 """95 % of Student's distribution with one degree of freedom less than blocks."""
 _ROUNDS = 30
+_STEP = float(np.log(SIGMAS[1] / SIGMAS[0]))
 
 
 @dataclass(frozen=True)
@@ -83,8 +96,8 @@ class BallNoise:
     """Noise of annotated balls; None where too few groups say anything.
 
     Attributes:
-        click: Of a coordinate of a click, pixels at 1920 x 1080; the policy's where every
-            camera is given, as it cannot be told from that of the cameras then.
+        click: Of a coordinate of a click, pixels at 1920 x 1080; None where every camera is
+            given, as it cannot be told from that of the cameras then.
         share: Of the ball's diameter, which adds to it; with an estimated click.
         given: Of the ball's pixel by a given camera without covariance, at 1920 x 1080.
     """
@@ -97,14 +110,23 @@ class BallNoise:
 def misses_of(ball: Ball3D, sights: Sequence[Sight]) -> tuple[Miss, ...]:
     """What the rays to the ball of one group leave unexplained: 2 V - 3 numbers of V views.
 
+    Given cameras with a covariance are left aside: those of one rig err together, and a
+    covariance of each alone would explain away what the clicks are off.
+
     Args:
         ball: Where the group's valid pairs put it.
         sights: Of the group; those in no valid pair are left aside.
     """
-    seen = [sight for sight in sights if sight.view in ball.views]
+    seen = [
+        sight
+        for sight in sights
+        if sight.view in ball.views and (sight.calibration.source != "given" or sight.is_bare)
+    ]
+    if len(seen) < 2:
+        return ()
     point = np.array(ball.point)
     pixels = np.array([sight.camera.project(point[None])[0] for sight in seen])
-    if len(seen) < 2 or not np.isfinite(pixels).all():
+    if not np.isfinite(pixels).all():
         return ()
     offsets = (np.array([sight.center for sight in seen]) - pixels).ravel()
     jacobian = np.vstack([sight.camera.jacobian(point) for sight in seen])
@@ -144,27 +166,31 @@ def estimate_ball_noise(misses: Sequence[Miss], policy: Policy) -> BallNoise:
     clicked, rest = rows[free], rows[~free]
     click = share = given = None
     if len(clicked) >= MIN_NUMBERS:
-        click, share = _jackknifed(clicked, policy.box_sigma_share)
+        found = _jackknifed(clicked, policy.box_sigma_share)
+        click, share = (None, None) if found is None else found
     if len(rest) >= MIN_NUMBERS:
         # What clicks explain is known by now, or thought to be; the cameras explain what is left.
         noise = policy.click_sigma_px if click is None else click.value
         thought = policy.box_sigma_share if share is None else share
         known = rest[:, 4] + noise**2 * rest[:, 1] + thought**2 * rest[:, 2]
         nothing = np.zeros(len(rest))
-        given, _ = _jackknifed(
-            np.column_stack([rest[:, 0], rest[:, 3], nothing, nothing, known]), 0
-        )
+        found = _jackknifed(np.column_stack([rest[:, 0], rest[:, 3], nothing, nothing, known]), 0)
+        given = None if found is None else found[0]
     return BallNoise(click, share, given)
 
 
-def _jackknifed(rows: FloatArray, share: float) -> tuple[Sigma, float]:
+def _jackknifed(rows: FloatArray, share: float) -> tuple[Sigma, float] | None:
     """Sigma and share, with an interval from leaving out one block after the other.
+
+    None where no sigma that is tried explains the rows better than the first or the last one.
 
     Args:
         rows: Of ``Miss``, the click's slope in the second column, shape (N, 5).
         share: Of the diameter, as expected.
     """
     whole, found = _fit(rows, share)
+    if not ENDS[0] < whole < ENDS[1]:
+        return None
     block = np.arange(len(rows)) * BLOCKS // len(rows)
     parts = np.array([_fit(rows[block != at], share)[0] for at in range(BLOCKS)])
     scatter = (BLOCKS - 1) / BLOCKS * float(((parts - parts.mean()) ** 2).sum())
@@ -181,10 +207,23 @@ def _fit(rows: FloatArray, expected: float) -> tuple[float, float]:
     fits = []
     for share in SHARES if kept[:, 2].any() else [expected]:
         costs = _costs(kept, share) + 0.5 * ((share - expected) / SHARE_SIGMA) ** 2
-        place = int(np.argmin(costs))
-        fits.append((float(costs[place]), float(np.log(SIGMAS[place])), float(share)))
+        fits.append((*_lowest(costs), float(share)))
     _, sigma, share = min(fits)
     return sigma, share
+
+
+def _lowest(costs: FloatArray) -> tuple[float, float]:
+    """The lowest cost and the logarithm of its sigma, by the parabola through three of them."""
+    place = int(np.argmin(costs))
+    at = float(np.log(SIGMAS[place]))
+    if not 0 < place < len(costs) - 1:
+        return float(costs[place]), at
+    before, least, after = costs[place - 1 : place + 2].tolist()
+    bend = before - 2 * least + after
+    if bend <= 0:
+        return least, at
+    off = (before - after) / (2 * bend)
+    return least - bend * off**2 / 2, at + off * _STEP
 
 
 def _kept(rows: FloatArray, share: float) -> BoolArray:

@@ -5,7 +5,7 @@ import pytest
 
 from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, Calibration
-from app.solving.ball_noise import Miss, estimate_ball_noise, misses_of
+from app.solving.ball_noise import LIMIT, TRIMMED, Miss, estimate_ball_noise, misses_of
 from app.solving.spread import CLICK_DIAGONAL
 from app.solving.triangulate import Sight
 from tests.cameras import SIZE
@@ -106,3 +106,39 @@ class TestEstimateBallNoise:
     def test_a_few_groups_say_nothing(self):
         found = estimate_ball_noise(dataset(1.0, groups=3), PAPER)
         assert (found.click, found.share, found.given) == (None, None, None)
+
+    @pytest.mark.parametrize("miss", [0.0, 500.0], ids=["none", "enormous"])
+    def test_an_estimate_at_the_end_of_what_is_tried_is_none(self, miss):
+        rng = np.random.default_rng(6)
+        alike = [Miss(rng.normal(0, miss), 1.0, 0.0, 0.0, 1.0) for _ in range(100)]
+        found = estimate_ball_noise(alike, PAPER)
+        assert (found.click, found.share) == (None, None)
+        rest = [replace(item, given=1.0) for item in alike]
+        assert estimate_ball_noise(rest, PAPER).given is None
+
+    def test_the_estimate_moves_by_less_than_the_steps_that_are_tried(self):
+        rng = np.random.default_rng(8)
+        misses = [Miss(miss, 1.0, 0.0, 0.0, 0.0) for miss in rng.normal(0, 1.0, 400)]
+        larger = [replace(item, miss=1.01 * item.miss) for item in misses]
+        one, other = (estimate_ball_noise(item, PAPER).click.value for item in (misses, larger))
+        assert other / one == pytest.approx(1.01, abs=0.001)
+
+    def test_numbers_within_the_limit_have_the_variance_that_makes_up_for_the_others(self):
+        numbers = np.linspace(-np.sqrt(LIMIT), np.sqrt(LIMIT), 200_001)
+        density = np.exp(-(numbers**2) / 2)
+        assert pytest.approx((numbers**2 * density).sum() / density.sum(), abs=1e-5) == TRIMMED
+
+
+class TestRigs:
+    """Given cameras with a covariance, which is mostly common to all of a rig."""
+
+    def test_they_say_nothing_of_clicks(self):
+        rng = np.random.default_rng(0)
+        vague = tuple(np.diag([0.0, 0.0, 0.0, 0.01, 0.01, 0.01, 0.0, 0.0]).ravel().tolist())
+        rig = [
+            replace(sight, calibration=replace(sight.calibration, covariance=vague))
+            for sight in sights(2.0, rng, "given")
+        ]
+        assert misses_of(ball_in(VIEWS), rig) == ()
+        one = [*sights(2.0, rng, "given")][:2] + rig[2:]
+        assert len(misses_of(ball_in(VIEWS), one)) == 1
