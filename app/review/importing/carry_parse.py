@@ -13,11 +13,12 @@ from app.errors import DatasetFormatError, InputError, ReviewError
 from app.review.editing.edit import CALIBRATIONS, MAX_POINTS
 from app.review.editing.lineage import logged_group
 from app.review.importing.carry import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
+from app.review.policies.text import CUSTOM, policy_values, policy_with
 from app.review.verdicts.verdict import STATES
 from app.soccer.annotation import Extras
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import canonical_marking
-from app.soccer.policy import Policy
+from app.soccer.policy import PAPER, Policy
 from app.soccer.reasons import MAX_NOTE, REASONS, left_out
 from app.store.codecs import Json, extras_from_json, policy_from_json, station_from_json
 from app.store.imports import VERDICT
@@ -77,8 +78,11 @@ def read_head(tree: FileTree) -> CarriedHead:
     try:
         policy = policy_from_json(_mapping(value["policy"]))
         # Its values reach the solver: a text in place of a number would break there.
-        assert policy.hash
+        policy_with(PAPER, policy_values(policy), name=CUSTOM)
+        _text(policy.name)
         return CarriedHead(_text(value["dataset"]), policy)
+    except InputError as error:
+        raise DatasetFormatError(shown, None, "policy", f"is not a policy: {error}") from error
     except _MISSHAPEN as error:
         raise DatasetFormatError(shown, None, "policy", "is not a policy") from error
 

@@ -12,9 +12,30 @@ from app.datasets.archive import open_tree
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
 from app.review.importing.carry_parse import FORMAT, FORMAT_VERSION, HEAD, read_head
+from app.soccer.policy import PAPER
+from app.store.codecs import policy_to_json
 
 
 class TestReadHead:
+    @pytest.mark.parametrize(
+        ("threshold", "value", "said"),
+        [
+            ("point", "xyz", "point is "),
+            ("min_p_value", "a", "min_p_value is a number"),
+            ("tau_percent", -1.0, "tau_percent lies between"),
+        ],
+    )
+    def test_an_impossible_threshold_is_named(
+        self, tmp_path: Path, threshold: str, value: Any, said: str
+    ) -> None:
+        policy = {**policy_to_json(PAPER), "name": "theirs", threshold: value}
+        head = {"format": FORMAT, "version": FORMAT_VERSION, "dataset": "demo", "policy": policy}
+        (tmp_path / HEAD).write_text(json.dumps(head))
+        tree = open_tree(tmp_path, Report())
+        assert tree is not None
+        with pytest.raises(DatasetFormatError, match=f"is not a policy: {said}"):
+            read_head(tree)
+
     @pytest.mark.parametrize("policy", [{"calibration": 12}, {"calibration": None}, 5, None])
     def test_a_policy_that_is_none_is_named(self, tmp_path: Path, policy: Any) -> None:
         head = {"format": FORMAT, "version": FORMAT_VERSION, "dataset": "demo", "policy": policy}
