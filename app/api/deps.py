@@ -26,6 +26,7 @@ from app.review.jobs.jobs import Jobs, Pool
 from app.review.jobs.solve import resume_solving, solve_leftovers
 from app.review.jobs.upkeep import Upkeep
 from app.review.jobs.versions import resume_versions
+from app.review.policies.noise_store import NoiseStore
 from app.review.practice.practice import resume_practice
 from app.review.yields.store import YieldStore
 from app.solving.warm import warm_up
@@ -54,6 +55,7 @@ class Services:
     jobs: Jobs
     events: Events
     yields: YieldStore
+    noises: NoiseStore
     upkeep: Upkeep
     stopping: Event = field(default_factory=Event)
 
@@ -72,6 +74,7 @@ class Services:
             jobs,
             Events(store, jobs),
             YieldStore(store),
+            NoiseStore(store),
             Upkeep(store, jobs),
         )
 

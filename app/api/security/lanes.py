@@ -52,7 +52,7 @@ _API = re.compile(r"/api/v\d+/")
 _STREAM = re.compile(r"/events$")
 _IMAGE = re.compile(r"/(?:image|figures/[^/]+|views/[^/]+/neighbours)$")
 _ZIP = re.compile(r"/exports/[^/]+/content$")
-_SOLVING = re.compile(r"/(?:preview|influence|remedies|yield)$")
+_SOLVING = re.compile(r"/(?:preview|influence|remedies|yield|noise)$")
 _UPLOAD = re.compile(r"/uploads$")
 
 

@@ -38,6 +38,7 @@ class TestLaneOf:
             ("POST", "/groups/1/preview", PREVIEWS),
             ("GET", "/views/1/influence", PREVIEWS),
             ("POST", "/datasets/a/yield", PREVIEWS),
+            ("GET", "/datasets/a/noise", PREVIEWS),
             ("GET", "/views/1/image", IMAGES),
             ("GET", "/evaluations/1/figures/precision.svg", IMAGES),
             ("GET", "/views/1/neighbours", IMAGES),
