@@ -41,14 +41,15 @@ def noise(
     if policy is not None:
         say("The policy holds the estimates now; `touchline solve` computes what that changes.")
     elif found.values:
-        say("Run it again with --apply to put the estimates into the policy.")
+        changes = ", ".join(f"{name} to {value:g}" for name, value in found.values.items())
+        say(f"Run it again with --apply to put the estimates into the policy: {changes}.")
 
 
 def _say(found: Noise) -> None:
     for item in found.advice:
         say(
-            f"{item.label}: {item.estimate:g} px ({item.low:g} to {item.high:g}); the policy says "
-            f"{item.present:g} px"
+            f"{item.label}: {item.estimate:g}{item.short_unit} ({item.low:g} to {item.high:g}); "
+            f"the policy says {item.present:g}{item.short_unit}"
         )
     if found.lines is not None:
         lines = found.lines

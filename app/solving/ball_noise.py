@@ -46,6 +46,8 @@ ENDS = float(np.log(SIGMAS[0])), float(np.log(SIGMAS[-1]))
 """An estimate there is none."""
 SHARES = np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.13])
 """What the diameter of a ball adds, as a share of it."""
+SHARE_STEP = 0.01
+"""Between most of them."""
 SHARE_SIGMA = 0.02
 """How far that share is expected to lie from the policy's."""
 BLOCKS = 10
@@ -100,11 +102,13 @@ class BallNoise:
             given, as it cannot be told from that of the cameras then.
         share: Of the ball's diameter, which adds to it; with an estimated click.
         given: Of the ball's pixel by a given camera without covariance, at 1920 x 1080.
+        share_interval: Of the share, 95 %; None where no ball has a diameter.
     """
 
     click: Sigma | None
     share: float | None
     given: Sigma | None
+    share_interval: tuple[float, float] | None = None
 
 
 def misses_of(ball: Ball3D, sights: Sequence[Sight]) -> tuple[Miss, ...]:
@@ -164,10 +168,11 @@ def estimate_ball_noise(misses: Sequence[Miss], policy: Policy) -> BallNoise:
     rows = np.array([astuple(miss) for miss in misses], float).reshape(-1, 5)
     free = rows[:, 3] == 0
     clicked, rest = rows[free], rows[~free]
-    click = share = given = None
+    click = share = given = interval = None
     if len(clicked) >= MIN_NUMBERS:
         found = _jackknifed(clicked, policy.box_sigma_share)
-        click, share = (None, None) if found is None else found
+        if found is not None:
+            click, share, interval = found
     if len(rest) >= MIN_NUMBERS:
         # What clicks explain is known by now, or thought to be; the cameras explain what is left.
         noise = policy.click_sigma_px if click is None else click.value
@@ -176,11 +181,11 @@ def estimate_ball_noise(misses: Sequence[Miss], policy: Policy) -> BallNoise:
         nothing = np.zeros(len(rest))
         found = _jackknifed(np.column_stack([rest[:, 0], rest[:, 3], nothing, nothing, known]), 0)
         given = None if found is None else found[0]
-    return BallNoise(click, share, given)
+    return BallNoise(click, share, given, interval if clicked[:, 2].any() else None)
 
 
-def _jackknifed(rows: FloatArray, share: float) -> tuple[Sigma, float] | None:
-    """Sigma and share, with an interval from leaving out one block after the other.
+def _jackknifed(rows: FloatArray, share: float) -> tuple[Sigma, float, tuple[float, float]] | None:
+    """Sigma and share and its interval; intervals are from leaving out one block after the other.
 
     None where no sigma that is tried explains the rows better than the first or the last one.
 
@@ -192,13 +197,16 @@ def _jackknifed(rows: FloatArray, share: float) -> tuple[Sigma, float] | None:
     if not ENDS[0] < whole < ENDS[1]:
         return None
     block = np.arange(len(rows)) * BLOCKS // len(rows)
-    parts = np.array([_fit(rows[block != at], share)[0] for at in range(BLOCKS)])
-    scatter = (BLOCKS - 1) / BLOCKS * float(((parts - parts.mean()) ** 2).sum())
+    parts = np.array([_fit(rows[block != at], share) for at in range(BLOCKS)])
+    squares = ((parts - parts.mean(axis=0)) ** 2).sum(axis=0)
+    scatter, of_share = ((BLOCKS - 1) / BLOCKS * squares).tolist()
     # No sample of n independent numbers says more about its variance than this.
     half = STUDENT * math.sqrt(max(scatter, 0.5 / len(rows)))
     left_out = int((~_kept(rows, share)).sum())
     low, high = math.exp(whole - half), math.exp(whole + half)
-    return Sigma(math.exp(whole), low, high, len(rows), left_out), found
+    wide = max(STUDENT * math.sqrt(of_share), SHARE_STEP / 2)
+    interval = max(found - wide, 0.0), found + wide
+    return Sigma(math.exp(whole), low, high, len(rows), left_out), found, interval
 
 
 def _fit(rows: FloatArray, expected: float) -> tuple[float, float]:

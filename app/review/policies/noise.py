@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.errors import InputError
+from app.errors import DegenerateGeometryError, InputError
 from app.review.editing.state import GroupState, read_states
 from app.review.policies.policy import PolicyState, change_policy, read_policy
 from app.review.policies.text import CUSTOM, policy_with
@@ -59,6 +59,11 @@ class Advice:
         """Whether the interval holds the present value."""
         return self.low <= self.present <= self.high
 
+    @property
+    def short_unit(self) -> str:
+        """As it follows a number in a sentence: a share has none."""
+        return " px" if self.unit.startswith("px") else ""
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -84,10 +89,7 @@ class Noise:
         """The thresholds that would make the policy agree; nothing where it does already."""
         if all(item.agrees for item in self.advice):
             return {}
-        found = {item.name: item.estimate for item in self.advice}
-        if self.ball.share is not None:
-            found["box_sigma_share"] = self.ball.share
-        return found
+        return {item.name: item.estimate for item in self.advice}
 
 
 def read_noise(store: Store, dataset: str | int) -> Noise:
@@ -162,9 +164,13 @@ def _lines(state: GroupState) -> Iterator[tuple[str, tuple[float, float]]]:
         if calibration.source == "lines" and calibration.covariance is not None:
             left_out = {suspect.marking for suspect in calibration.suspects}
             lines = {k: at for k, at in view.station.lines.items() if k not in left_out}
-            noise = view_line_noise(
-                calibration, lines, state.group.pitch, size, state.policy.calibration
-            )
+            try:
+                noise = view_line_noise(
+                    calibration, lines, state.group.pitch, size, state.policy.calibration
+                )
+            except (DegenerateGeometryError, np.linalg.LinAlgError):
+                # Lines that leave the camera open say nothing of their noise.
+                continue
             unit = size.diagonal / REFERENCE_DIAGONAL
             yield solved.calibration_key, (float(np.sqrt(noise.variance)) / unit, noise.share)
 
@@ -178,16 +184,24 @@ def _summary(found: Sequence[tuple[float, float]]) -> LineNoiseSummary | None:
 
 
 def _advice(ball: BallNoise, policy: Policy) -> Iterator[Advice]:
-    for name, sigma in (("click_sigma_px", ball.click), ("given_sigma_px", ball.given)):
-        if sigma is not None:
-            yield _advised(name, sigma, policy)
+    if ball.click is not None:
+        yield _advised("click_sigma_px", _ends(ball.click), policy)
+    if ball.share is not None and ball.share_interval is not None:
+        yield _advised("box_sigma_share", (ball.share, *ball.share_interval), policy)
+    if ball.given is not None:
+        yield _advised("given_sigma_px", _ends(ball.given), policy)
 
 
-def _advised(name: str, sigma: Sigma, policy: Policy) -> Advice:
+def _ends(sigma: Sigma) -> tuple[float, float, float]:
+    return sigma.value, sigma.low, sigma.high
+
+
+def _advised(name: str, found: tuple[float, float, float], policy: Policy) -> Advice:
+    """Advice on a threshold from an estimate and the ends of its interval."""
     threshold = next(item for item in THRESHOLDS if item.name == name)
     least, most = threshold.minimum or 0.0, threshold.maximum or np.inf
-    estimate = round(float(np.clip(sigma.value, least, most)), DECIMALS)
-    low, high = round(sigma.low, DECIMALS), round(sigma.high, DECIMALS)
+    estimate = round(float(np.clip(found[0], least, most)), DECIMALS)
+    low, high = round(found[1], DECIMALS), round(found[2], DECIMALS)
     present = float(threshold.value(policy))
     return Advice(name, threshold.label, threshold.unit, present, estimate, low, high)
 
@@ -202,7 +216,8 @@ def _notices(advice: Sequence[Advice]) -> Iterator[str]:
         if not item.agrees:
             word = "small" if item.present < item.low else "large"
             yield (
-                f"{item.label}: the policy says {item.present:g} px, this dataset {item.estimate:g} "
-                f"px ({item.low:g} to {item.high:g}). Uncertainties are too "
+                f"{item.label}: the policy says {item.present:g}{item.short_unit}, this dataset "
+                f"{item.estimate:g}{item.short_unit} ({item.low:g} to {item.high:g}). "
+                "Uncertainties are too "
                 f"{word} until the policy says so too."
             )

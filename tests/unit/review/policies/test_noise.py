@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.errors import InputError, NotFoundError
+from app.errors import DegenerateGeometryError, InputError, NotFoundError
 from app.review.editing.recompute import solve_dataset, stale_groups
 from app.review.importing.ingest import ensure_dataset, ingest
+from app.review.policies import noise
 from app.review.policies.noise import apply_noise, read_noise
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
+from app.solving.ball_noise import Miss
 from app.solving.spread import CLICK_DIAGONAL
 from app.store.session import Store
 from tests.cameras import SIZE
@@ -64,6 +66,41 @@ class TestReadNoise:
         assert (found.advice, found.values, len(found.notices)) == ((), {}, 1)
         with pytest.raises(NotFoundError):
             read_noise(store, "nothing")
+
+    @pytest.mark.parametrize("error", [np.linalg.LinAlgError, DegenerateGeometryError])
+    def test_lines_that_leave_a_camera_open_are_passed_over(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch, error: type[Exception]
+    ) -> None:
+        make(store, given=False)
+
+        def fails(*_: object) -> None:
+            raise error("open")
+
+        monkeypatch.setattr(noise, "view_line_noise", fails)
+        found = read_noise(store, "demo")
+        assert (found.lines, len(found.advice)) == (None, 1)
+
+    def test_what_is_put_into_the_policy_is_what_was_shown(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        make(store, given=False)
+        rng = np.random.default_rng(2)
+        misses = [
+            Miss(rng.normal(0, np.hypot(0.5, 0.08 * size)), 1.0, size**2, 0.0, 0.0)
+            for size in rng.uniform(5, 40, 600)
+        ]
+        shown = iter([misses])
+        monkeypatch.setattr(noise, "_misses", lambda _: next(shown, ()))
+        found = read_noise(store, "demo")
+        click, share = found.advice
+        assert (click.name, share.name, share.unit) == (
+            "click_sigma_px",
+            "box_sigma_share",
+            "share",
+        )
+        assert share.low < 0.08 < share.high and share.present == 0.04 and not share.agrees
+        assert found.values == {item.name: item.estimate for item in found.advice}
+        assert not any("0.08 px" in sentence for sentence in found.notices)
 
 
 class TestApplyNoise:
