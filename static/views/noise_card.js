@@ -11,6 +11,16 @@ import { Loading, Trouble } from './page_frame.js';
 /** @import {ComponentChildren} from 'preact' */
 /** @import {AdviceJson, NoiseJson} from '../api/noise.js' */
 
+/**
+ * What the estimates change in the policy, for people.
+ *
+ * @param {NoiseJson} noise @returns {string}
+ */
+export function changesOf({ advice, values }) {
+	const changed = advice.filter(({ name, present }) => name in values && values[name] !== present);
+	return changed.map(({ name, label, present }) => `“${label}” to ${values[name].toFixed(2)} (now ${present.toFixed(2)})`).join(', ');
+}
+
 /** @param {{item: AdviceJson}} props */
 function Row({ item }) {
 	return html`

@@ -2,7 +2,7 @@
 /** The policy as text: read, downloaded, replaced; and every one that came before. */
 
 import { html } from 'htm/preact';
-import { useState } from 'preact/hooks';
+import { useRef, useState } from 'preact/hooks';
 
 import { getPolicies, getPolicy, putPolicy, putPolicyText } from '../api/policies.js';
 import { saveText } from '../lib/save_text.js';
@@ -11,7 +11,7 @@ import { loadDatasets } from '../state/datasets.js';
 import { pageAddress } from './dataset_menu.js';
 import { DatasetFrame } from './dataset_page.js';
 import { JobProgress } from './job_progress.js';
-import { NoiseCard } from './noise_card.js';
+import { changesOf, NoiseCard } from './noise_card.js';
 import { Loading, Trouble } from './page_frame.js';
 import { useSavePolicy } from './save_policy.js';
 import { When } from './when.js';
@@ -82,9 +82,13 @@ function Shipped({ one, policy, etag, shipped, busy, send }) {
 /** @param {{one: DatasetJson, policy: PolicyState, etag: string, shipped: ShippedPolicy[], busy: boolean, send: Send}} props */
 function NoiseOf({ one, policy, etag, shipped, busy, send }) {
 	const name = shipped.some((item) => item.name === policy.name) ? 'custom' : policy.name;
+	const version = useRef('');
+	// While groups are solved the answer would be of no use a moment later.
+	if (!busy || !version.current) version.current = `${policy.hash} ${policy.version}`;
 	return html`
-		<${NoiseCard} dataset=${one.id} version=${busy ? '' : `${policy.hash} ${policy.version}`}>
+		<${NoiseCard} dataset=${one.id} version=${version.current}>
 			${(/** @type {NoiseJson} */ noise) => (Object.keys(noise.values).length === 0 ? null : html`
+				<p class="note">The button sets ${changesOf(noise)}.</p>
 				<p class="buttons">
 					<button class="button" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : ''} onClick=${() => { if (!busy) send(() => putPolicy(one.id, name, noise.values, etag)); }}>Use the estimates and solve</button>
 				</p>`)}

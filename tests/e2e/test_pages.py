@@ -337,3 +337,41 @@ class TestNoise:
         card = open_page(f"/datasets/sample/{place}").get_by_label("Noise of the clicks")
         expect(card).to_contain_text("Sigma of a point on a line", timeout=MINUTE)
         expect(card.get_by_role("row")).to_have_count(3)
+
+    def test_the_button_says_what_it_changes_and_the_noise_is_asked_once_for_each_policy(
+        self, open_page: OpenPage
+    ) -> None:
+        page, asked, version = open_page(None), [], [1]
+        share = {"name": "box_sigma_share", "label": "Of its diameter", "unit": "share"}
+        numbers = {"present": 0.04, "estimate": 0.08, "low": 0.07, "high": 0.09, "agrees": False}
+        noise = {"groups": 3, "solved": 3, "ball": {}, "lines": None, "notices": []}
+        noise |= {"advice": [share | numbers], "values": {"box_sigma_share": 0.08}}
+        job = {"id": 999, "kind": "solve", "title": "Solve", "dataset": "sample", "done": 0}
+        job |= {"total": 1, "sentence": "", "result": None, "problem": None, "ended": None}
+        job |= {"created": "2026-01-01T00:00:00Z", "started": None, "actor": "local"}
+
+        def policy(route: Route) -> None:
+            if route.request.method == "PUT":
+                assert route.request.post_data_json["values"] == {"box_sigma_share": 0.08}
+                version.append(version[-1] + 1)
+                route.fulfill(status=202, json={**job, "state": "running"})
+                return
+            answer = route.fetch()
+            route.fulfill(response=answer, json={**answer.json(), "version": version[-1]})
+
+        def tell(route: Route) -> None:
+            asked.append(version[-1])
+            route.fulfill(json=noise)
+
+        page.route("**/api/v1/datasets/*/policy", policy)
+        page.route("**/api/v1/datasets/*/noise", tell)
+        page.route("**/api/v1/jobs/999", lambda route: route.fulfill(json={**job, "state": "done"}))
+        page.goto("/datasets/sample/policy")
+        card = page.get_by_label("Noise of the clicks")
+        expect(card).to_contain_text("sets “Of its diameter” to 0.08 (now 0.04)", timeout=MINUTE)
+        button = card.get_by_role("button", name="Use the estimates and solve")
+        button.click()
+        expect(button).to_have_attribute("aria-disabled", "true")
+        expect(button).to_have_attribute("aria-disabled", "false", timeout=MINUTE)
+        page.wait_for_load_state("networkidle")
+        assert asked == [1, 2]
