@@ -336,7 +336,7 @@ class TestNoise:
     ) -> None:
         card = open_page(f"/datasets/sample/{place}").get_by_label("Noise of the clicks")
         expect(card).to_contain_text("Sigma of a point on a line", timeout=MINUTE)
-        expect(card.get_by_role("row")).to_have_count(3)
+        expect(card.get_by_role("row")).to_have_count(4)
 
     def test_the_button_says_what_it_changes_and_the_noise_is_asked_once_for_each_policy(
         self, open_page: OpenPage
