@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.store.codecs import lines_from_json, parse
 from app.store.digest import digest
-from app.store.log import read_entry
+from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, ImportFindingModel, LogModel, StationModel, ViewModel
 from app.store.pitch_models import PitchEstimateModel
 
@@ -117,27 +117,34 @@ def save_estimate(session: Session, dataset_id: int, match: str, **values: Any) 
 
 
 def edited_pitches(session: Session, dataset_id: int, matches: Iterable[str]) -> dict[str, Pitch]:
-    """The size that a person gave to matches, where one did."""
+    """The size that a person gave to matches last, where one did."""
+    newest = _newest(dataset_id).where(GroupModel.match.in_(set(matches)))
     statement = (
         select(GroupModel.match, GroupModel.pitch_length, GroupModel.pitch_width)
         .join(LogModel, LogModel.group_id == GroupModel.id)
-        .where(
-            LogModel.kind == PITCH,
-            GroupModel.dataset_id == dataset_id,
-            GroupModel.match.in_(set(matches)),
-        )
-        .distinct()
+        .where(LogModel.id.in_(newest))
     )
     return {match: Pitch(*size) for match, *size in session.execute(statement)}
 
 
-def last_change(session: Session, group_ids: Sequence[int]) -> Any:
-    """The newest log entry that said how large the pitch of some groups is, or None."""
-    newest = select(func.max(LogModel.id)).where(
-        LogModel.group_id.in_(group_ids), LogModel.kind == PITCH
+def last_changes(session: Session, dataset_id: int) -> dict[str, LogEntry]:
+    """The newest log entry that said how large the pitch of each match is, where one did."""
+    entries = {
+        entry.group_id: entry for entry in read_log(session, LogModel.id.in_(_newest(dataset_id)))
+    }
+    model = GroupModel
+    rows = session.execute(select(model.id, model.match).where(model.id.in_(entries)))
+    return {row.match: entries[row.id] for row in rows}
+
+
+def _newest(dataset_id: int) -> Any:
+    """Ids of the newest entry about the pitch of each match."""
+    return (
+        select(func.max(LogModel.id))
+        .join(GroupModel, GroupModel.id == LogModel.group_id)
+        .where(LogModel.kind == PITCH, GroupModel.dataset_id == dataset_id, GroupModel.match != "")
+        .group_by(GroupModel.match)
     )
-    number = session.scalar(newest)
-    return None if number is None else read_entry(session, number)
 
 
 def replace_pitch_findings(

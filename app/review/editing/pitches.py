@@ -7,6 +7,7 @@ a finding of the match's first group, until somebody accepts it or says another 
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -26,12 +27,12 @@ from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.digest import digest
 from app.store.groups import next_revision, read_groups, save_revision
-from app.store.log import Entry, append
+from app.store.log import Entry, LogEntry, append
 from app.store.pitches import (
     PITCH,
     MatchPitch,
     groups_of_match,
-    last_change,
+    last_changes,
     lines_digests,
     lines_of_match,
     match_pitches,
@@ -54,9 +55,10 @@ class PitchState:
         groups: How many it has.
         pitch: The size in use; the most frequent where groups were brought with several.
         mixed: Whether they were.
-        estimate: What its lines show; None while that is not computed, and where ``problem``
-            says why it cannot be.
-        proposed: The size to use instead, or None.
+        estimate: What its lines show; None while that is not computed of the lines as they are
+            now, and where ``problem`` says why it cannot be.
+        proposed: The size to use instead, or None; where groups have several sizes that the
+            estimate agrees with, the most frequent one.
         previous: The size before it was changed last, or None.
     """
 
@@ -77,9 +79,10 @@ class PitchState:
         found = self.estimate
         assert found is not None and self.proposed is not None
         sizes = f"{self.proposed.length:g} x {self.proposed.width:g} m"
+        used = f"{self.pitch.length:g} x {self.pitch.width:g} m"
         return (
             f"the lines of {found.frames} frames show a pitch of {sizes}, and it is solved as "
-            f"{self.pitch.length:g} x {self.pitch.width:g} m; accept the size for the whole match "
+            f"{'several sizes' if self.mixed else used}; accept the size for the whole match "
             "under Statistics"
         )
 
@@ -138,14 +141,8 @@ def estimate_pitches(
     """
     with store.read() as session:
         found = read_dataset(session, dataset)
-        present = read_estimates(session, found.id)
         policy = found.policy.calibration
-        stale = [
-            (match, inputs)
-            for match, value in lines_digests(session, found.id).items()
-            if (inputs := _inputs(value, policy))
-            != (present[match].inputs if match in present else "")
-        ]
+        stale = _stale(session, found.id, policy)
     tasks = (_task(store, found.id, match, inputs, policy) for match, inputs in stale)
     for done, (match, values) in enumerate(fan_out(_estimate, tasks, executor), start=1):
         with store.write() as session:
@@ -155,6 +152,13 @@ def estimate_pitches(
     with store.write() as session:
         note_proposals(session, found.id)
     return read_pitches(store, found.id)
+
+
+def stale_matches(store: Store, dataset: str | int) -> list[str]:
+    """The matches that ``estimate_pitches`` would estimate."""
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        return [match for match, _ in _stale(session, found.id, found.policy.calibration)]
 
 
 def change_pitches(
@@ -203,9 +207,12 @@ def apply_pitches(
     for match, pitch in wanted.items():
         if match not in known:
             raise NotFoundError(f'"{state.dataset}" has no match {match}')
-        _change_match(session, state.dataset_id, match, pitch, actor)
-    note_proposals(session, state.dataset_id)
-    changed = _read(session, state.dataset_id)
+        ids = groups_of_match(session, state.dataset_id, match)
+        give_pitch(session, state.dataset_id, ids, pitch, actor)
+    # What the lines show is not asked again: it does not depend on the size in use.
+    shown = {item.match: (item.estimate, item.problem) for item in state.items}
+    changed = _read(session, state.dataset_id, shown)
+    _note(session, changed)
     keep(changed)(session)
     return changed
 
@@ -226,14 +233,19 @@ def parse_pitch(text: str) -> Pitch:
 
 def note_proposals(session: Session, dataset_id: int) -> None:
     """Bring the findings of a dataset's matches in step with what is proposed now."""
-    proposals = _read(session, dataset_id).proposals
-    found = ((item.group_id, item.sentence) for item in proposals)
-    refresh_queue(session, replace_pitch_findings(session, dataset_id, found))
+    _note(session, _read(session, dataset_id))
 
 
-def _change_match(session: Session, dataset_id: int, match: str, pitch: Pitch, actor: str) -> None:
+def _note(session: Session, state: DatasetPitches) -> None:
+    found = ((item.group_id, item.sentence) for item in state.proposals)
+    refresh_queue(session, replace_pitch_findings(session, state.dataset_id, found))
+
+
+def give_pitch(
+    session: Session, dataset_id: int, ids: Sequence[int], pitch: Pitch, actor: str
+) -> None:
+    """Give groups another pitch, each with an entry of the log; one that has it stays as it is."""
     edit, at = SetPitch(pitch.length, pitch.width), now()
-    ids = groups_of_match(session, dataset_id, match)
     for start in range(0, len(ids), _BATCH):
         entries, changed = [], []
         for stored in read_groups(session, ids[start : start + _BATCH]).values():
@@ -248,24 +260,49 @@ def _change_match(session: Session, dataset_id: int, match: str, pitch: Pitch, a
         refresh_queue(session, changed)
 
 
-def _read(session: Session, dataset: str | int) -> DatasetPitches:
+_Shown = tuple[PitchEstimate | None, str | None]
+"""What the lines of a match show: the estimate, or why there is none."""
+
+
+def _read(
+    session: Session, dataset: str | int, shown: Mapping[str, _Shown] | None = None
+) -> DatasetPitches:
     found = read_dataset(session, dataset)
-    estimates = read_estimates(session, found.id)
+    if shown is None:
+        shown = _shown(session, found.id, found.policy.calibration)
+    changes = last_changes(session, found.id)
     items = tuple(
-        _state(session, found.id, item, estimates.get(item.match))
+        _state(item, shown.get(item.match, (None, None)), changes.get(item.match))
         for item in match_pitches(session, found.id)
     )
     return DatasetPitches(found.id, found.name, items)
 
 
-def _state(session: Session, dataset_id: int, item: MatchPitch, row: Any) -> PitchState:
-    estimate = None
-    if row is not None and row.problem is None:
-        estimate = PitchEstimate(
-            row.length, row.width, row.length_sigma, row.width_sigma, row.frames
-        )
-    pitch = item.pitches[0]
-    changed = last_change(session, [item.group_id])
+def _shown(session: Session, dataset_id: int, policy: CalibrationPolicy) -> dict[str, _Shown]:
+    """What was estimated of the lines as they are now; the other matches are not computed."""
+    stale = {match for match, _ in _stale(session, dataset_id, policy)}
+    shown: dict[str, _Shown] = {}
+    for match, row in read_estimates(session, dataset_id).items():
+        if match in stale:
+            continue
+        sizes = (row.length, row.width, row.length_sigma, row.width_sigma)
+        estimate = None if row.problem is not None else PitchEstimate(*sizes, row.frames)
+        shown[match] = (estimate, row.problem)
+    return shown
+
+
+def _stale(session: Session, dataset_id: int, policy: CalibrationPolicy) -> list[tuple[str, str]]:
+    """Matches whose lines are others than when they were estimated, and what keys them now."""
+    present = read_estimates(session, dataset_id)
+    return [
+        (match, inputs)
+        for match, value in lines_digests(session, dataset_id).items()
+        if (inputs := _inputs(value, policy)) != (present[match].inputs if match in present else "")
+    ]
+
+
+def _state(item: MatchPitch, shown: _Shown, changed: LogEntry | None) -> PitchState:
+    estimate, problem = shown
     previous = None
     if changed is not None:
         before = edit_from_json(changed.body["inverse"])
@@ -276,13 +313,21 @@ def _state(session: Session, dataset_id: int, item: MatchPitch, row: Any) -> Pit
         group_id=item.group_id,
         group=item.group,
         groups=item.groups,
-        pitch=pitch,
+        pitch=item.pitches[0],
         mixed=len(item.pitches) > 1,
         estimate=estimate,
-        problem=None if row is None else row.problem,
-        proposed=None if estimate is None else estimate.proposal(pitch),
+        problem=problem,
+        proposed=None if estimate is None else _proposed(item.pitches, estimate),
         previous=previous,
     )
+
+
+def _proposed(pitches: Sequence[Pitch], estimate: PitchEstimate) -> Pitch | None:
+    """The size that a match's groups should have; the most frequent of theirs comes first."""
+    found = (estimate.proposal(pitch) for pitch in pitches)
+    proposal = next((pitch for pitch in found if pitch is not None), None)
+    known = estimate.length is not None and estimate.width is not None
+    return pitches[0] if proposal is None and len(pitches) > 1 and known else proposal
 
 
 def _inputs(lines: str, policy: CalibrationPolicy) -> str:

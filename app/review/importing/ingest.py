@@ -10,6 +10,7 @@ from pathlib import Path
 
 from app.progress import Progress
 from app.review.datasets.dataset import insert_dataset
+from app.review.editing.pitches import give_pitch
 from app.review.editing.shared_stations import SharedStations
 from app.review.editing.upstream import KIND, Kept, follow_group
 from app.review.importing.body import import_body, places_of
@@ -24,7 +25,7 @@ from app.store.group_rows import NewRows
 from app.store.groups import StoredGroup, read_groups, save_group
 from app.store.imports import known_groups, newest_imports
 from app.store.log import Entry, append
-from app.store.pitches import edited_pitches, last_change
+from app.store.pitches import edited_pitches
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
 
@@ -217,9 +218,7 @@ def _insert(
         return
     at, rows = now(), NewRows(session, origin.dataset_id)
     ids, entries = [], []
-    pitches = edited_pitches(session, origin.dataset_id, {group.match for group, _ in fresh})
-    for brought, digest in fresh:
-        group = replace(brought, pitch=pitches.get(brought.match, brought.pitch))
+    for group, digest in fresh:
         first = len(rows.views)
         identity = rows.add_group(group, digest, at, shared)
         places = {row["key"]: (row["id"], row["station_id"]) for row in rows.views[first:]}
@@ -228,6 +227,10 @@ def _insert(
         ids.append(identity)
     rows.insert()
     append(session, entries)
+    pitches = edited_pitches(session, origin.dataset_id, {group.match for group, _ in fresh})
+    for identity, (group, _) in zip(ids, fresh, strict=True):
+        if (pitch := pitches.get(group.match)) is not None:
+            give_pitch(session, origin.dataset_id, [identity], pitch, origin.actor)
     refresh_queue(session, ids)
 
 
@@ -242,10 +245,10 @@ def _follow(
 ) -> None:
     stored, at = read_groups(session, [group_id])[group_id], now()
     followed = follow_group(stored, incoming)
-    if last_change(session, [group_id]) is not None:
+    pitches = edited_pitches(session, origin.dataset_id, {incoming.match})
+    if (pitch := pitches.get(incoming.match)) is not None:
         # A person gave the match its pitch.
-        edited = replace(followed.group, pitch=stored.group.pitch)
-        followed = replace(followed, group=edited)
+        followed = replace(followed, group=replace(followed.group, pitch=pitch))
     save_group(
         session, stored, followed.group, at=at, source=followed.base, digest=digest, shared=shared
     )

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
+from sqlalchemy import Engine, event
 
 from app.errors import InputError, NotFoundError, StaleRevisionError
 from app.review.editing.edit import SetLines
@@ -10,12 +12,15 @@ from app.review.editing.ledger import read_ledger
 from app.review.editing.pitches import (
     change_pitches,
     estimate_pitches,
+    give_pitch,
+    note_proposals,
     parse_pitch,
     read_pitches,
+    stale_matches,
 )
 from app.review.editing.recompute import solve_dataset, stale_groups
 from app.review.editing.replay import rebuild, replay
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import history, load, submit, undo
 from app.review.importing.ingest import ingest
 from app.review.queue.findings import finding_values
 from app.soccer.group import Group, Station, View
@@ -172,6 +177,92 @@ class TestChangePitches:
         assert load(store, 2).group.label == changed.label
         with store.read() as session:
             assert replay(session) == read_ledger(session)
+
+    def test_an_import_keeps_it_for_groups_that_came_later(self, store):
+        first, second, third, *_ = season()
+        ingest(store, "demo", (first, second), source="files", actor="ann")
+        accept(store)
+        ingest(store, "demo", (third,), source="files", actor="ann")
+        changed = Group(third.key, third.views, match=SMALL, label="the source says more now")
+        ingest(store, "demo", (changed,), source="files", actor="ann")
+        assert load(store, 3).group == replace(changed, pitch=TRUE)
+        assert [entry.kind for entry in history(store, 3)] == ["import", "pitch", "import"]
+        assert_replays(store)
+
+    def test_a_group_that_comes_later_gets_the_newest_size(self, store):
+        first, second, third, *_ = season()
+        ingest(store, "demo", (first, second), source="files", actor="ann")
+        accept(store)
+        accept(store, pitch=Pitch(101.0, 65.0))
+        ingest(store, "demo", (third,), source="files", actor="ann")
+        assert load(store, 3).group.pitch == Pitch(101.0, 65.0)
+
+
+class TestReadPitches:
+    def test_of_groups_of_several_sizes_each_is_held_against_the_lines(self, solved):
+        with solved.write() as session:
+            give_pitch(session, 1, [4, 5], TRUE, "ann")
+            give_pitch(session, 1, [7, 8], TRUE, "ann")
+            note_proposals(session, 1)
+        small, right = read_pitches(solved, "demo").items
+        assert (small.mixed, right.mixed) == (True, True)
+        assert small.proposed.length == pytest.approx(103.0, abs=0.3)
+        assert right.proposed.length == pytest.approx(105.0, abs=0.3)
+        assert (small.previous, right.previous) == (Pitch(), Pitch())
+        assert "solved as several sizes" in right.sentence
+
+    def test_a_minority_of_another_size_is_told(self, solved):
+        accept(solved)
+        with solved.write() as session:
+            give_pitch(session, 1, [2], Pitch(), "ann")
+        small, _ = read_pitches(solved, "demo").items
+        assert (small.pitch, small.mixed) == (TRUE, True)
+        assert small.proposed.length == pytest.approx(103.0, abs=0.3)
+        assert small.previous == TRUE
+
+    def test_sizes_that_both_agree_with_the_lines_become_one(self, solved):
+        accept(solved)
+        near = Pitch(TRUE.length + 0.1, TRUE.width)
+        with solved.write() as session:
+            give_pitch(session, 1, [2], near, "ann")
+        small, _ = read_pitches(solved, "demo").items
+        assert small.proposed == TRUE
+
+    def test_an_estimate_of_other_lines_is_not_shown(self, solved):
+        state = load(solved, 1)
+        view = state.group.views[0].key
+        submit(solved, 1, SetLines(view, {"Middle line": None}), if_match=state.etag, actor="ann")
+        small, right = read_pitches(solved, "demo").items
+        assert (small.estimate, small.problem, small.proposed) == (None, None, None)
+        assert right.estimate is not None
+        assert stale_matches(solved, "demo") == [SMALL]
+
+    def test_many_matches_cost_no_more_questions_than_one(self, solved):
+        accept(solved)
+        assert len(questions(solved)) == (one := len(questions(solved)))
+        more = [
+            replace(group, key=f"{group.key}+", match=f"{number}")
+            for number, group in enumerate(season())
+        ]
+        ingest(solved, "demo", more, source="files", actor="ann")
+        assert len(questions(solved)) == one
+
+
+def questions(store):
+    """Statements that reading the pitches of the dataset costs."""
+    asked = []
+    note = lambda *said: asked.append(said[2])  # noqa: E731
+    event.listen(Engine, "before_cursor_execute", note)
+    try:
+        read_pitches(store, "demo")
+    finally:
+        event.remove(Engine, "before_cursor_execute", note)
+    return asked
+
+
+def assert_replays(store):
+    with store.read() as session:
+        assert replay(session) == read_ledger(session)
 
 
 class TestParsePitch:
