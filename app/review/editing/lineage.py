@@ -38,12 +38,14 @@ class Lineage:
         views: Digests of the states of each view, oldest first; the last is the present one, and
             one that came back stands there again.
         stations: The same of the stations that views have for themselves, by view.
+        pitches: The same of its pitch, as the sizes themselves.
     """
 
     base: Group
     bases: tuple[str, ...]
     views: Mapping[str, tuple[str, ...]]
     stations: Mapping[str, tuple[str, ...]]
+    pitches: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,11 @@ def base_digest(group: Group) -> str:
     return digest([group_head_to_json(group), views])
 
 
+def pitch_size(pitch: Pitch) -> str:
+    """The size of a pitch as lineages have it."""
+    return f"{float(pitch.length)!r}x{float(pitch.width)!r}"
+
+
 @dataclass
 class _Walk:
     """One group's log on the way from its first entry to its last."""
@@ -76,6 +83,7 @@ class _Walk:
     bases: dict[str, None] = field(default_factory=dict)
     views: dict[str, list[str]] = field(default_factory=dict)
     stations: dict[str, list[str]] = field(default_factory=dict)
+    pitches: list[str] = field(default_factory=list)
 
     def take(self, entry: LogEntry, by_key: Mapping[str, Station]) -> None:
         assert entry.group_id is not None
@@ -103,6 +111,7 @@ class _Walk:
                 self.base = self.base.with_view(replace(view, station=station))
 
     def _note(self, group: Group) -> None:
+        _add(self.pitches, pitch_size(group.pitch))
         for view in group.views:
             _add(self.views.setdefault(view.key, []), view_digest(view))
             if not view.station.shared:
@@ -146,6 +155,7 @@ class Lineages:
             bases=tuple(walk.bases),
             views={key: tuple(states) for key, states in walk.views.items()},
             stations={key: tuple(states) for key, states in walk.stations.items()},
+            pitches=tuple(walk.pitches),
         )
 
 
@@ -160,6 +170,7 @@ def _untouched(stored: StoredGroup) -> Lineage:
             for view in group.views
             if not view.station.shared
         },
+        pitches=(pitch_size(group.pitch),),
     )
 
 

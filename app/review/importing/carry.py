@@ -127,6 +127,7 @@ def _group(session: Session, stored: StoredGroup, lineage: Lineage, verdicts: Js
         "bases": list(lineage.bases),
         "views": {key: list(states) for key, states in lineage.views.items()},
         "stations": {key: list(states) for key, states in lineage.stations.items()},
+        "pitches": list(lineage.pitches),
         "log": _log(group_entries(session, stored.id)) if walked else [],
         "verdicts": verdicts,
     }

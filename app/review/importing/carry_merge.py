@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from app.review.editing.lineage import Lineage
+from app.review.editing.lineage import Lineage, pitch_size
+from app.review.editing.pitches import give_pitch
 from app.review.editing.upstream import Kept
 from app.review.importing.body import import_body, places_of
 from app.review.importing.carry_parse import CarriedGroup
@@ -74,8 +75,10 @@ def merge_group(
 ) -> bool:
     """Bring a group up to what another installation made of it; whether anything changed."""
     merged, kept = _merged(stored, lineage, carried)
+    pitch = decide(*_pitch_sides(stored, lineage, carried))
+    kept += _kept(None, pitch, f"pitch of {merged.key}")
     fresh = _not_noticed(session, stored.id, kept)
-    if merged == stored.group and not fresh:
+    if merged == stored.group and pitch not in (FOLLOW, UPSTREAM) and not fresh:
         return False
     at = now()
     save_group(session, stored, merged, at=at, source=lineage.base)
@@ -86,6 +89,9 @@ def merge_group(
     body["kept"] = [[item.view, item.sentence] for item in noticed]
     body["carried"] = list(carried.log)
     append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, stored.id)])
+    if pitch in (FOLLOW, UPSTREAM):
+        # An edit of its own: the size before can be had back here, too.
+        give_pitch(session, origin.dataset_id, [stored.id], carried.group.pitch, origin.actor)
     report.findings += len(fresh)
     return True
 
@@ -103,28 +109,34 @@ def _merged(
             view = replace(
                 view, balls=other.balls, included=other.included, left_out=other.left_out
             )
-        kept += _kept(view, ball, "ball")
+        kept += _kept(view.key, ball, f"ball of {view.key}")
         if not view.station.shared:
             here, there = _station_side(stored, lineage, view), _other_station(carried, other, base)
             lines = decide(here, there)
             if lines in (FOLLOW, UPSTREAM):
                 view = replace(view, station=view.station.with_said(other.station))
-            kept += _kept(view, lines, "lines or the camera")
+            kept += _kept(view.key, lines, f"lines or the camera of {view.key}")
         group = group.with_view(view)
     return group, kept
 
 
-def _kept(view: View, decision: str, what: str) -> list[Kept]:
+def _kept(view: str | None, decision: str, what: str) -> list[Kept]:
     if decision == CONFLICT:
-        sentence = f"another installation edited the {what} of {view.key} too; what is here stays"
+        sentence = f"another installation edited the {what} too; what is here stays"
     elif decision == UPSTREAM:
         sentence = (
-            f"another installation edited the {what} of {view.key} on another state of the "
+            f"another installation edited the {what} on another state of the "
             "dataset; its edit is in place now"
         )
     else:
         return []
-    return [Kept(view.key, sentence)]
+    return [Kept(view, sentence)]
+
+
+def _pitch_sides(stored: StoredGroup, lineage: Lineage, carried: CarriedGroup) -> tuple[Side, Side]:
+    here = Side(pitch_size(stored.group.pitch), pitch_size(lineage.base.pitch), lineage.pitches)
+    size, base = pitch_size(carried.group.pitch), pitch_size(carried.base.pitch)
+    return here, Side(size, base, carried.pitches)
 
 
 def _view_side(stored: StoredGroup, lineage: Lineage, view: View) -> Side:

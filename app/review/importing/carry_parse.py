@@ -11,7 +11,7 @@ from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, InputError, ReviewError
 from app.review.editing.edit import CALIBRATIONS, MAX_POINTS
-from app.review.editing.lineage import logged_group
+from app.review.editing.lineage import logged_group, pitch_size
 from app.review.importing.carry import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
 from app.review.policies.text import CUSTOM, policy_values, policy_with
 from app.review.verdicts.verdict import STATES
@@ -56,6 +56,7 @@ class CarriedGroup:
     base: Group
     views: Mapping[str, tuple[str, ...]]
     stations: Mapping[str, tuple[str, ...]]
+    pitches: tuple[str, ...]
     log: tuple[Json, ...]
     verdicts: tuple[Mapping[str, Any], ...]
 
@@ -139,6 +140,7 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> CarriedGroup:
             base=base,
             views={key: _states(item) for key, item in _mapping(value["views"]).items()},
             stations={key: _states(item) for key, item in _mapping(value["stations"]).items()},
+            pitches=_pitches(value, group, base),
             log=_log(value["log"]),
             verdicts=tuple(map(_verdict, _list(value["verdicts"], MAX_STATES))),
         )
@@ -252,6 +254,13 @@ def _extras(value: Json) -> Extras:
             _mapping(item)
     _mapping(value["metadata"])
     return extras_from_json(value)
+
+
+def _pitches(value: Json, group: Group, base: Group) -> tuple[str, ...]:
+    """The sizes that a group's pitch had; exports of before do not say more than two of them."""
+    if "pitches" in value:
+        return _states(value["pitches"])
+    return tuple(dict.fromkeys(map(pitch_size, (base.pitch, group.pitch))))
 
 
 def _states(value: Json) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from app.review.editing.edit import (
     SetStationLines,
 )
 from app.review.editing.ledger import read_ledger
+from app.review.editing.pitches import change_pitches, read_pitches
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import replay
 from app.review.editing.stations import load_station, submit_station, undo_station
@@ -35,7 +36,9 @@ from app.review.verdicts.verdict import set_verdict
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImagePoint
+from app.soccer.pitch import Pitch
 from app.soccer.policy import STRICT
+from app.store.findings import group_findings
 from app.store.models import LogModel
 from app.store.session import Store
 
@@ -396,3 +399,54 @@ class TestBrokenFiles:
         (tmp_path / "out" / STATIONS).write_text("")
         report = bring_file(there, tmp_path / "out")
         assert (report.new, len(report.problems)) == (0, 1)
+
+
+class TestPitch:
+    """The size of a match's pitch is said for the match and goes along with each group."""
+
+    @pytest.fixture
+    def match(self, make_group) -> list:
+        return [replace(make_group(number), match="cup") for number in (7, 8)]
+
+    @pytest.fixture
+    def sized(self, store: Store, match) -> Store:
+        ingest(store, "demo", match, source="files", actor="ann")
+        resize(store, SMALL)
+        return store
+
+    def test_an_accepted_size_arrives_in_an_empty_home(self, sized, there, bring) -> None:
+        bring(sized, there)
+        (item,) = read_pitches(there, "demo").items
+        assert (item.pitch, item.previous, item.mixed) == (SMALL, Pitch(), False)
+        assert_replays(there)
+        before = entries(there)
+        assert bring(sized, there, "again.zip").changed == 0
+        assert entries(there) == before
+
+    def test_it_goes_on_back_when_the_other_says_another(self, sized, there, bring) -> None:
+        bring(sized, there)
+        resize(there, Pitch())
+        assert bring(there, sized, "back.zip").changed == 2
+        assert read_pitches(sized, "demo").items[0].pitch == Pitch()
+
+    def test_who_changed_it_too_keeps_the_size_and_is_told(
+        self, sized, there, bring, match
+    ) -> None:
+        ingest(there, "demo", match, source="files", actor="ben")
+        resize(there, Pitch(101.0, 65.0))
+        bring(sized, there)
+        assert read_pitches(there, "demo").items[0].pitch == Pitch(101.0, 65.0)
+        with there.read() as session:
+            ((view, sentence),) = group_findings(session, 1)
+        assert view is None
+        assert "edited the pitch" in sentence
+        before = entries(there)
+        bring(sized, there, "again.zip")
+        assert entries(there) == before
+
+
+SMALL = Pitch(100.0, 64.0)
+
+
+def resize(store: Store, pitch: Pitch) -> None:
+    change_pitches(store, "demo", {"cup": pitch}, if_match=None, actor="ann")
