@@ -52,6 +52,12 @@ class TestSetPitch:
         assert item["estimate"]["length"] == pytest.approx(105.0, abs=0.2)
         assert item["proposed"]["length"] == pytest.approx(105.0, abs=0.2)
 
+    def test_the_history_of_a_group_tells_the_size(self, api, match) -> None:
+        patch(api, {"match": match, "length": 103.0, "width": 66.0})
+        (item,) = api.get(PITCHES).json()["items"]
+        *_, last = api.get(f"/api/v1/groups/{item['group_id']}/history").json()["items"]
+        assert (last["kind"], last["body"]["edit"]["length"]) == ("pitch", 103.0)
+
     def test_an_older_state_is_412_with_the_present_one(self, api, match) -> None:
         etag = api.get(PITCHES).headers["etag"]
         body = {"match": match, "length": 103.0, "width": 66.0}
