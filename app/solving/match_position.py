@@ -13,6 +13,7 @@ Source: Lange, Little and Taylor (1989) for the weights of the Student distribut
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,14 +83,22 @@ class Places:
         self._positions = np.array([place.position for place in places]).reshape(-1, 3)
         self._covariances = np.array([place.covariance for place in places]).reshape(-1, 3, 3)
         self._pans = np.array([place.pan for place in places])
+        self._left_out: int | None = None
+
+    def without(self, index: int) -> Places:
+        """The same but for one of them; what they hold is shared, so a match costs it once."""
+        rest = copy(self)
+        rest._left_out = index
+        return rest
 
     def prior(self, pan: float) -> PositionPrior | None:
         """Prior of a frame of the same match that looks that way; None where too few are known."""
-        if len(self._pans) < MIN_OTHERS:
+        rest = np.arange(len(self._pans)) != self._left_out
+        if rest.sum() < MIN_OTHERS:
             return None
-        positions, turned = self._positions, self._pans - pan
+        positions, turned = self._positions[rest], self._pans[rest] - pan
         drift = DRIFT_M**2 * (1 - np.exp(-0.5 * (turned / DRIFT_PAN) ** 2))
-        spreads = self._covariances + (WANDER_M**2 + drift)[:, None, None] * np.eye(3)
+        spreads = self._covariances[rest] + (WANDER_M**2 + drift)[:, None, None] * np.eye(3)
         inverses = np.linalg.inv(spreads)
         mean = np.median(positions, axis=0)
         for _ in range(_ROUNDS):
@@ -101,7 +110,8 @@ class Places:
         scatter = float(np.median(chi))
         if scatter > GIVE_UP:
             return None
-        variance = np.diag(np.linalg.inv(information)) + WANDER_M**2
+        # Frames that look the same way drift together: more of them do not say more of another way.
+        variance = np.maximum(np.diag(np.linalg.inv(information)), drift.min()) + WANDER_M**2
         variance *= max(1.0, scatter / SCATTER)
         return PositionPrior(mean, np.sqrt(variance), _FREEDOM)
 
@@ -134,7 +144,7 @@ def guess_matches(places: Sequence[Place | None]) -> list[int]:
     """A match for each frame, from 0, where nobody names them: runs whose positions agree.
 
     Frames of a match follow each other by name in the files that there are. Where they do not,
-    runs are short and nothing is shared.
+    runs are short and nothing is shared; nor is it where no frame is sure.
 
     Args:
         places: Of all frames by name; None where a frame says nothing.
@@ -166,6 +176,8 @@ def _agree(one: Place | None, other: Place | None) -> bool:
 
 def _between(run: dict[int, int], count: int) -> list[int]:
     """Runs of all frames: those that say nothing go with the sure one before, else after."""
+    if not run:
+        return list(range(count))
     matches: list[int] = []
     known = -1
     for index in range(count):

@@ -60,12 +60,14 @@ def shares_of(
     members = defaultdict(list)
     for index, file in enumerate(files):
         members[match[file.stem]].append(index)
-    return [
-        Share(name, _others(index, members[name], places) if name else NO_PLACES)
-        for index, name in enumerate(match[file.stem] for file in files)
-    ]
-
-
-def _others(index: int, members: Sequence[int], places: Sequence[Place | None]) -> Places:
-    found = (places[other] for other in members if other != index)
-    return Places([place for place in found if place is not None])
+    shares = [Share(match[file.stem], NO_PLACES) for file in files]
+    for name, indices in members.items():
+        if not name:
+            continue
+        known = {index: place for index in indices if (place := places[index]) is not None}
+        all_ = Places(list(known.values()))
+        row = {index: at for at, index in enumerate(known)}
+        for index in indices:
+            others = all_.without(row[index]) if index in row else all_
+            shares[index] = Share(name, others)
+    return shares

@@ -85,6 +85,19 @@ class TestPrior:
         prior = Places([*here, *turned]).prior(0.5)
         assert prior.mean[0] - STAND[0] < 0.8
 
+    def test_many_frames_that_look_elsewhere_say_no_more_than_their_common_drift(self):
+        turned = [Place(it.position, it.covariance, -0.6) for it in around(STAND, 100)]
+        assert (Places(turned).prior(0.5).sigma > 0.6).all()
+        assert (Places(turned).prior(-0.6).sigma < 0.2).all()
+
+    def test_one_is_left_out_without_a_copy_of_the_others(self):
+        odd = place(off(0.0, 9.0, -3.0))
+        every = Places([*around(STAND, 3), odd])
+        rest = every.without(3)
+        assert rest.prior(0.5).mean == pytest.approx(Places(around(STAND, 3)).prior(0.5).mean)
+        assert Places(around(STAND, 3)).without(0).prior(0.5) is None
+        assert rest._positions is every._positions
+
     def test_frames_of_several_stadiums_say_nothing(self):
         mixed = [
             item
@@ -145,6 +158,10 @@ class TestGuessMatches:
         frames = around(STAND, 6)
         frames[3] = place(off(15.0, 15.0, -10.0))
         assert guess_matches(frames) == [0, 0, 0, 1, 0, 0]
+
+    def test_where_no_frame_is_sure_each_is_a_match_of_its_own(self):
+        vague = [place(STAND, sigma=2.0) for _ in range(3)]
+        assert guess_matches([None, *vague]) == [0, 1, 2, 3]
 
     def test_no_frames_are_no_matches(self):
         assert guess_matches([]) == []

@@ -40,6 +40,12 @@ class TestSharesOf:
         assert first.match == "cup"
         assert first.others.prior(0.0).mean[1] == pytest.approx(60.0)
 
+    def test_the_places_of_a_match_are_held_once(self):
+        four, named = files("1", "2", "3", "4"), dict.fromkeys("1234", "cup")
+        shares = shares_of(four, [None, *places(90.0, 60.0, 60.0)], named)
+        assert len({id(share.others._positions) for share in shares}) == 1
+        assert len(shares[0].others._positions) == 3
+
     def test_matches_are_guessed_in_the_order_of_the_names(self):
         mixed = files("4", "1", "3", "2")
         found = shares_of(mixed, places(80.0, 60.0, 80.0, 60.0), None)
