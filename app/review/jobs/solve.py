@@ -6,7 +6,12 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 
 from app.review.datasets.dataset import get_dataset, list_datasets
-from app.review.editing.pitches import DatasetPitches, apply_pitches, estimate_pitches
+from app.review.editing.pitches import (
+    DatasetPitches,
+    apply_pitches,
+    estimate_pitches,
+    stale_matches,
+)
 from app.review.editing.recompute import SolveReport, solve_dataset, stale_groups
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs, Pool
@@ -22,6 +27,8 @@ from app.store.session import Session, Store
 KIND = "solve"
 WORTH_A_POOL = 400
 """Groups from which on starting processes costs less than it saves the requests."""
+MATCHES_WORTH_A_POOL = 4
+"""The same in matches whose pitch is estimated: that looks at all lines of a match."""
 NAMED = 20
 """Groups whose solving broke that are named in a result; all are counted."""
 
@@ -136,7 +143,10 @@ def solve_work(store: Store, dataset_id: int, pool: Pool | None = None) -> Work:
     def work(progress: JobProgress) -> Json:
         found = get_dataset(store, dataset_id)
         progress(0, None, f"Solving {found.name}.")
-        large = len(stale_groups(store, dataset_id)) >= WORTH_A_POOL
+        large = (
+            len(stale_groups(store, dataset_id)) >= WORTH_A_POOL
+            or len(stale_matches(store, dataset_id)) >= MATCHES_WORTH_A_POOL
+        )
         with pool() if pool is not None and large else nullcontext() as executor:
             told = counting(progress, "groups solved")
             report = solve_dataset(store, dataset_id, executor, told)

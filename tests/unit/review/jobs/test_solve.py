@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import pytest
 
@@ -47,6 +48,24 @@ class TestRequestSolve:
         assert (done.done, done.total) == (2, 2)
         assert done.sentence == "2 of 2 groups solved"
         assert stale_groups(store, "demo") == []
+
+    @pytest.mark.parametrize(("worth", "made"), [(2, 1), (3, 0)])
+    def test_many_matches_are_estimated_in_processes_of_their_own(
+        self, store: Store, fill, make_group, monkeypatch: pytest.MonkeyPatch, worth, made
+    ) -> None:
+        pools: list[ThreadPoolExecutor] = []
+
+        def pool() -> ThreadPoolExecutor:
+            pools.append(ThreadPoolExecutor(1))
+            return pools[-1]
+
+        monkeypatch.setattr(solve_job, "MATCHES_WORTH_A_POOL", worth)
+        fill(*(replace(make_group(number), match=f"{number}") for number in (7, 8)), solved=True)
+        jobs = Jobs(store, pool=pool)
+        job = request_solve(jobs, store, get_dataset(store, "demo").id, actor="ann")
+        jobs.wait(job.id, SECONDS)
+        assert len(pools) == made
+        jobs.close()
 
     @pytest.mark.parametrize(("worth", "made"), [(2, 1), (3, 0)])
     def test_many_groups_are_solved_in_processes_of_their_own(
