@@ -21,9 +21,16 @@ commands = typer.Typer()
 @commands.command()
 def pitch(
     source: Annotated[
-        str,
-        typer.Argument(metavar="IN", help="Folder or zip of line files, or name of a dataset."),
-    ],
+        str | None,
+        typer.Argument(
+            metavar="[IN]",
+            help="Folder or zip of line files; the name of a dataset, where nothing is called so.",
+        ),
+    ] = None,
+    *,
+    dataset: Annotated[
+        str | None, typer.Option("--dataset", help="Name of the dataset, in the place of IN.")
+    ] = None,
     size: Size,
     accept: Annotated[
         bool, typer.Option("--accept", help="Dataset: give matches the size that is proposed.")
@@ -43,7 +50,9 @@ def pitch(
     A length or width that the lines do not show is unknown. After a change of a dataset's
     pitches, `touchline solve` computes what follows from it.
     """
-    if Path(source).exists():
+    if (source is None) == (dataset is None):
+        raise typer.BadParameter("give either line files or --dataset")
+    if source is not None and Path(source).exists():
         if accept or match or set_:
             raise typer.BadParameter("--accept, --match and --set are for datasets")
         from app.review.datasets.batch import estimate_pitch_of_files
@@ -52,7 +61,8 @@ def pitch(
         return
     if set_ is not None and match is None:
         raise typer.BadParameter("--set needs --match")
-    _print(_of_dataset(source, accept, match, set_, workers), match, json_)
+    name = dataset or source or ""
+    _print(_of_dataset(name, accept, match, set_, workers), match, json_)
 
 
 def _of_dataset(

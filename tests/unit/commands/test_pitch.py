@@ -82,6 +82,14 @@ class TestPitch:
         (back,) = json.loads(run("demo", "--match", MATCH, "--set", "previous", "--json")[1])
         assert (back["length"], back["width"]) == (105.0, 68.0)
 
+    def test_a_folder_of_the_same_name_does_not_hide_a_dataset(
+        self, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        (tmp_path / "demo").mkdir()
+        monkeypatch.chdir(tmp_path)
+        (found,) = json.loads(run("--dataset", "demo", "--json")[1])
+        assert found["match"] == MATCH
+
     def test_a_person_may_know_better(self, run: Run) -> None:
         (found,) = json.loads(run("demo", "--match", MATCH, "--set", "100x64", "--json")[1])
         assert (found["length"], found["width"]) == (100.0, 64.0)
@@ -94,6 +102,8 @@ class TestPitch:
             (("demo", "--match", MATCH, "--set", "big"), 1, "write it as 105x68"),
             (("demo", "--match", MATCH, "--set", "previous"), 1, "has not been changed"),
             (("nothing",), 1, "nothing"),
+            ((), 2, "give either line files or --dataset"),
+            (("demo", "--dataset", "demo"), 2, "give either line files or --dataset"),
         ],
     )
     def test_what_cannot_be_is_said(self, run: Run, words, code: int, sentence: str) -> None:
