@@ -192,8 +192,9 @@ class TestChangePitches:
     def test_a_group_that_comes_later_gets_the_newest_size(self, store):
         first, second, third, *_ = season()
         ingest(store, "demo", (first, second), source="files", actor="ann")
-        accept(store)
-        accept(store, pitch=Pitch(101.0, 65.0))
+        with store.write() as session:
+            give_pitch(session, 1, [2], TRUE, "ann")
+            give_pitch(session, 1, [1], Pitch(101.0, 65.0), "ann")
         ingest(store, "demo", (third,), source="files", actor="ann")
         assert load(store, 3).group.pitch == Pitch(101.0, 65.0)
 
