@@ -64,6 +64,22 @@ function close() {
 }
 
 /**
+ * Hear of groups that change, and of a dataset as a whole: so many groups are told as one change of theirs.
+ *
+ * @param {(data: any) => void} heard of one group
+ * @param {(dataset: string | null) => void} missed anything may have changed: in a dataset, by its name, or, where
+ *   the stream is there again after a while without one, in any
+ * @returns {() => void}
+ */
+export function listenToGroups(heard, missed) {
+	const deaf = [
+		listen('group', heard, () => missed(null)),
+		listen('dataset', (/** @type {{dataset: string | null}} */ event) => missed(event.dataset)),
+	];
+	return () => { for (const stop of deaf) stop(); };
+}
+
+/**
  * Hear of what happens, wherever it was done, until the returned function is called.
  *
  * @param {EventKind} kind @param {(data: any) => void} heard

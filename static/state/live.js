@@ -3,7 +3,7 @@
 
 import { effect, signal, untracked } from '@preact/signals';
 
-import { listen } from '../api/events.js';
+import { listenToGroups } from '../api/events.js';
 import { ApiError } from '../api/problem.js';
 import { page } from '../lib/router.js';
 import { forget, forgetOthers, known, load } from './documents.js';
@@ -50,7 +50,7 @@ async function catchUp() {
 	}
 }
 
-/** Nobody was told for a while: what lies ready may be old, and so may the group on screen. */
+/** Nobody was told for a while, or of no group by itself: what lies ready may be old, and so may the group on screen. */
 function missed() {
 	const at = groupDocument.value;
 	forgetOthers(at?.id ?? null);
@@ -59,7 +59,7 @@ function missed() {
 
 /** Listen while a group is on screen. */
 export function startLive() {
-	effect(() => (page.value.page === 'review' ? untracked(() => listen('group', heard, missed)) : undefined));
+	effect(() => (page.value.page === 'review' ? untracked(() => listenToGroups(heard, missed)) : undefined));
 	effect(() => {
 		if (draft.value === null && outbox.value && groupDocument.value) untracked(catchUp);
 	});

@@ -1,7 +1,7 @@
 // @ts-check
 /** The queue follows what happens to its groups elsewhere. */
 
-import { listen } from '../api/events.js';
+import { listenToGroups } from '../api/events.js';
 import { latest } from '../lib/latest.js';
 import { openQueue, queue } from './queue.js';
 
@@ -23,9 +23,11 @@ export function followQueue(dataset) {
 	const reading = latest(PAUSE, async () => {
 		if (queue.value.error === null) await openQueue(dataset, queue.value.q);
 	});
-	const stop = listen('group', (/** @type {{group: number, dataset: string}} */ event) => {
+	const stop = listenToGroups((/** @type {{group: number, dataset: string}} */ event) => {
 		if (event.dataset === dataset.name) reading.run(event.group);
-	}, () => reading.run(0));
+	}, (name) => {
+		if (name === null || name === dataset.name) reading.run(0);
+	});
 	return () => {
 		reading.cancel();
 		stop();

@@ -3,7 +3,7 @@
 
 import { computed, effect, signal, untracked } from '@preact/signals';
 
-import { listen } from '../api/events.js';
+import { listenToGroups } from '../api/events.js';
 import { ApiError } from '../api/problem.js';
 import { getTimeline } from '../api/timeline.js';
 import { latest } from '../lib/latest.js';
@@ -89,7 +89,7 @@ export function startTimeline() {
 		const at = groupDocument.value;
 		if (at && (name === null || name === at.dataset.name)) fetching.run({ dataset: at.dataset.id, match: at.match });
 	};
-	const deaf = listen('group', (/** @type {{dataset: string}} */ event) => again(event.dataset), () => again(null));
+	const deaf = listenToGroups((/** @type {{dataset: string}} */ event) => again(event.dataset), again);
 	return () => { stop(); deaf(); fetching.cancel(); playing.value = false; };
 }
 
