@@ -41,7 +41,7 @@ CAMERAS, SIGMA = "cameras", "sigma"
 EDIT = "set_station_camera"
 CHUNK = 200
 MIN_OFFSET_FRAMES, MIN_OFFSET_SIGMAS = 0.1, 3.0
-"""A smaller difference in time is none."""
+"""What a difference in time is more than, both."""
 
 
 @dataclass(frozen=True)
@@ -226,23 +226,30 @@ def anchor_sentence(proposal: RigProposal) -> str:
 
 
 def time_sentence(proposal: RigProposal) -> str:
-    """What the balls say about the time of the cameras."""
+    """What the balls say about the time of the cameras: the largest difference that is one."""
     known = [
-        (pair.offset_frames, pair.offset_sigma_frames)
+        (pair, pair.offset_frames, pair.offset_sigma_frames)
         for pair in proposal.pairs
         if pair.offset_frames is not None and pair.offset_sigma_frames
     ]
     if not known:
-        return "too few moving balls to see whether a camera is late"
-    largest, sigma = max(known, key=lambda item: abs(item[0]) / item[1])
-    if abs(largest) > MIN_OFFSET_FRAMES and abs(largest) > MIN_OFFSET_SIGMAS * sigma:
+        return "too few moving balls to see whether a camera is ahead of another"
+    sure = [
+        item for item in known if abs(item[1]) > max(MIN_OFFSET_FRAMES, MIN_OFFSET_SIGMAS * item[2])
+    ]
+    if not sure:
+        pair, offset, sigma = min(known, key=lambda item: item[2])
         return (
-            f"two cameras differ by {largest:+.2f} +- {sigma:.2f} frames; "
-            "times are not adjusted: look for a wrong frame offset"
+            "no camera is ahead of another: "
+            f"{pair.b} of {pair.a} by {offset:+.3f} +- {sigma:.3f} frames, the surest pair"
         )
-    weight = sum(1 / sigma**2 for _, sigma in known)
-    mean = sum(offset / sigma**2 for offset, sigma in known) / weight
-    return f"no camera is late: {mean:+.3f} +- {weight**-0.5:.3f} frames between two of them"
+    pair, offset, sigma = max(sure, key=lambda item: abs(item[1]))
+    first, second = (pair.b, pair.a) if offset > 0 else (pair.a, pair.b)
+    return (
+        f"{first} is {abs(offset):.2f} +- {sigma:.2f} frames ahead of {second}: its frame t shows "
+        f"what {second} shows at t + {abs(offset):.2f}; times are not adjusted: look for a wrong "
+        "frame offset"
+    )
 
 
 def _read_lines(path: Path, states: Sequence[StationState]) -> dict[str, Lines]:

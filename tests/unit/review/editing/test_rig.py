@@ -82,11 +82,32 @@ class TestPropose:
         assert all(item.given == GIVEN[key] for key, item in stations(store, proposed).items())
         assert all(load_station(store, s.id).revision == 1 for s in proposed.stations.values())
 
-    def test_says_what_holds_the_rig_and_that_no_camera_is_late(self, proposed) -> None:
+    def test_says_what_holds_the_rig_and_that_no_camera_is_ahead(self, proposed) -> None:
         assert "points of field lines" in anchor_sentence(proposed.proposal)
-        assert time_sentence(proposed.proposal).startswith("no camera is late")
+        assert time_sentence(proposed.proposal).startswith("no camera is ahead")
         values = proposal_values(proposed)
         assert json.loads(json.dumps(values)) == values
+
+    def test_tells_the_largest_difference_in_time_that_is_one(self, proposed) -> None:
+        def said(*offsets: tuple[float, float]) -> str:
+            pairs = tuple(
+                replace(pair, offset_frames=offset, offset_sigma_frames=sigma)
+                for pair, (offset, sigma) in zip(proposed.proposal.pairs, offsets, strict=False)
+            )
+            return time_sentence(replace(proposed.proposal, pairs=pairs))
+
+        first, second = proposed.proposal.pairs[:2]
+        # Small and sure, large and sure enough, larger and unsure.
+        found = said((0.05, 0.001), (0.40, 0.08), (0.9, 0.5))
+        assert found.startswith(f"{second.b} is 0.40 +- 0.08 frames ahead of {second.a}")
+        assert f"what {second.a} shows at t + 0.40" in found
+        found = said((-0.40, 0.08))
+        assert found.startswith(f"{first.a} is 0.40 +- 0.08 frames ahead of {first.b}")
+        # Not the mean: which of two comes first says nothing.
+        none = said((0.05, 0.01), (-0.05, 0.02))
+        assert none.startswith("no camera is ahead")
+        assert f"{first.b} of {first.a} by +0.050 +- 0.010 frames" in none
+        assert said() == "too few moving balls to see whether a camera is ahead of another"
 
     def test_a_ball_that_was_put_where_others_see_it_says_nothing(self, store, fill) -> None:
         inferred = BallAnnotation(point=ImagePoint(10, 10), inferred=True)
