@@ -15,7 +15,7 @@ from app.datasets.archive import check_name
 from app.datasets.camera_json import camera_from_json, camera_to_json
 from app.datasets.soccernet_record import MAX_SIDE
 from app.errors import DatasetFormatError, InputError, UnknownMarkingError, UnsafePathError
-from app.geometry.covariance import camera_covariance
+from app.geometry.camera import camera_covariance
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import EXAMINE, DamagedError, GeometryError, InputError
-from app.geometry.camera import Camera
-from app.geometry.covariance import camera_covariance
+from app.geometry.camera import Camera, camera_covariance
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, Station, View
