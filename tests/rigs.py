@@ -71,14 +71,16 @@ def flight(times: np.ndarray) -> np.ndarray:
 
 
 def frames(
-    count: int = 200, noise_px: float = 0.5, seed: int = 1, late: Mapping[str, float] = {}
+    count: int = 200, noise_px: float = 0.5, seed: int = 1, ahead: Mapping[str, float] = {}
 ) -> list[RigFrame]:
-    """Balls as the true cameras show them; ``late``: by how many frames a camera is ahead."""
+    """Balls as the true cameras show them; ``ahead``: by how many
+    frames; frame t of such a camera shows the instant of frame t + ahead of the others.
+    """
     generator = np.random.default_rng(seed)
     times = np.arange(count)
     balls: list[dict[str, ImagePoint]] = [{} for _ in times]
     for key, camera in TRUTH.items():
-        pixels = camera.project(flight(times + late.get(key, 0.0)))
+        pixels = camera.project(flight(times + ahead.get(key, 0.0)))
         pixels += generator.normal(0, noise_px, pixels.shape)
         for place, (x, y) in enumerate(pixels.tolist()):
             if 0 <= x < SIZE.width and 0 <= y < SIZE.height:

@@ -73,7 +73,7 @@ def _print(values: dict[str, Any]) -> None:
             f"{item['focal_percent']:8.2f} {item['picture_px']:11.1f} "
             f"{item['position_sigma_m']:8.2f} {item['picture_sigma_px']:9.1f}  {lines}"
         )
-    say("pair            frames  gap px          held out  gap px          late, frames")
+    say("pair            frames  gap px          held out  gap px          2nd ahead, frames")
     for item in values["pairs"]:
         gap = _change(item["before_px"], item["after_px"])
         unseen = _change(item["held_out_before_px"], item["held_out_after_px"])

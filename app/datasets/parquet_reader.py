@@ -36,6 +36,7 @@ OPTIONAL = (
     "shared",
     "flipped",
     "calibration",
+    "given_covariance",
     "file_name",
 )
 _BATCH = 512

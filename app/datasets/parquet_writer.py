@@ -289,6 +289,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("lines", TEXT, _said_json("lines")),
     ("balls", TEXT, _said_json("balls")),
     ("given", TEXT, _said_json("given")),
+    ("given_covariance", LIST, lambda row: row.said.get("given_covariance")),
     ("extras", TEXT, lambda row: json_text(extras_to_json(row.view.extras))),
     *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
     ("solver_version", TEXT, lambda row: _solver(row)),

@@ -15,6 +15,7 @@ from app.datasets.archive import check_name
 from app.datasets.camera_json import camera_from_json, camera_to_json
 from app.datasets.soccernet_record import MAX_SIDE
 from app.errors import DatasetFormatError, InputError, UnknownMarkingError, UnsafePathError
+from app.geometry.camera import camera_covariance
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
@@ -58,6 +59,7 @@ def head_to_json(group: Group) -> dict[str, Any]:
 def view_to_json(view: View) -> dict[str, Any]:
     """Everything that was said of a view but its size, its media and its extras."""
     station, given, why = view.station, view.station.given, view.left_out
+    covariance = station.given_covariance
     return {
         "view": view.key,
         "included": view.included,
@@ -67,6 +69,7 @@ def view_to_json(view: View) -> dict[str, Any]:
         "flipped": station.flipped,
         "calibration": station.calibration,
         "given": None if given is None else camera_to_json(given),
+        **({} if covariance is None else {"given_covariance": [*map(float, covariance)]}),
         "lines": lines_to_json(station.lines),
         "balls": [ball_to_json(ball) for ball in view.balls],
     }
@@ -190,10 +193,23 @@ class StateReader:
             given=None if given is None else camera_from_json(given, self.path, self.record),
             calibration=calibration,
             flipped=self.flag("flipped", False),
+            given_covariance=self.covariance(),
         )
         included = self.flag("included", True)
         why = None if included else self.left_out()
         return View(key, station, self.balls(), None, included, extras, why)
+
+    def covariance(self) -> tuple[float, ...] | None:
+        """What is known of the given camera, 64 numbers row by row; None where nothing is."""
+        found = self.value.get("given_covariance")
+        if found is None:
+            return None
+        try:
+            if self.value.get("given") is None:
+                raise ValueError("has no given camera")
+            return camera_covariance(fields.numbers(found, 64))
+        except ValueError as error:
+            raise self.error("given_covariance", str(error)) from error
 
     def left_out(self) -> LeftOut | None:
         """Why a view was left out: ``{"reason": ..., "note": ...}``; None where nobody said."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -191,3 +192,30 @@ class Camera:
         x = self.focal_length[0] * ideal[:, 0] + self.skew * ideal[:, 1] + self.principal_point[0]
         y = self.focal_length[1] * ideal[:, 1] + self.principal_point[1]
         return np.column_stack([x, y])
+
+
+_CORRELATION_ROUNDING = 1e-6
+"""How far correlations of a covariance may be from what they have to be."""
+
+
+def camera_covariance(values: Iterable[float]) -> tuple[float, ...]:
+    """The covariance of a camera's parameters (``geometry.resection``), row by row, shape (64,).
+
+    Raises:
+        ValueError: It is not symmetric with a variance above zero in each parameter, and none
+            below zero in any direction.
+    """
+    covariance = tuple(map(float, values))
+    if len(covariance) != 8 * 8 or not all(map(math.isfinite, covariance)):
+        raise ValueError("the covariance of a camera is 64 numbers")
+    matrix = np.array(covariance).reshape(8, 8)
+    variances = matrix.diagonal()
+    if not (variances > 0).all():
+        raise ValueError("the variance of each number of a camera is above zero")
+    scale = np.sqrt(variances)
+    shares = matrix / np.outer(scale, scale)
+    if not (np.abs(shares - shares.T) < _CORRELATION_ROUNDING).all():
+        raise ValueError("the covariance of a camera is symmetric")
+    if np.linalg.eigvalsh(shares)[0] < -_CORRELATION_ROUNDING:
+        raise ValueError("no variance of a camera is negative")
+    return covariance

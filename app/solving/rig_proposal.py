@@ -85,8 +85,8 @@ class PairChange:
         held_out: Instants in blocks of time that the judged cameras were not adjusted to.
         held_out_before_px: Median gap there; None without any.
         held_out_after_px: The same with cameras that never saw those instants.
-        offset_frames: How much later camera b shows the same instant; None where too few balls
-            move.
+        offset_frames: How far camera b is ahead of a: its frame t shows the instant that a shows
+            at t + offset. None where too few balls move.
         offset_sigma_frames: Standard deviation of that.
     """
 
@@ -217,10 +217,11 @@ def _pair_changes(
 
 
 def time_offset(rig: Rig, fit: RigFit, a: int, b: int) -> tuple[float, float] | None:
-    """How many frames later camera b shows the same instant than camera a, and its sigma.
+    """How many frames camera b is ahead of camera a, and the sigma of that.
 
-    A ball that moves is then seen in b where it is a little later, so that the rays pass each
-    other in proportion to its speed. The sigma is that of blocks of time, because the gaps of
+    Ahead by ``offset``: frame t of b shows the instant that a shows at t + offset. A ball that
+    moves is then seen in b where it is a little later, so that the rays pass each other in
+    proportion to its speed. The sigma is that of blocks of time, because the gaps of
     neighbouring frames are alike.
 
     Returns:

@@ -6,7 +6,6 @@ Floats go through ``repr`` and come back the same bits. Nothing here knows the d
 from __future__ import annotations
 
 import json
-import math
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import EXAMINE, DamagedError, GeometryError, InputError
-from app.geometry.camera import Camera
+from app.geometry.camera import Camera, camera_covariance
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -26,9 +25,6 @@ from app.soccer.reasons import LeftOut
 
 Json = Any
 """What ``json`` makes: dict, list, str, int, float, bool or None."""
-
-_ROUNDING = 1e-6
-"""How far correlations of a covariance may be from what they have to be."""
 
 
 def canonical(value: Json) -> str:
@@ -182,22 +178,11 @@ def covariance_from_json(value: Sequence[float] | None) -> tuple[float, ...] | N
     """Back from ``covariance_to_json``.
 
     Raises:
-        ValueError: It is not symmetric with no negative variance in any direction.
+        ValueError: As ``camera_covariance`` does.
     """
     if value is None:
         return None
-    covariance = tuple(map(float, value))
-    if len(covariance) != 64 or not all(map(math.isfinite, covariance)):
-        raise ValueError("the covariance of a camera is 64 numbers")
-    matrix = np.array(covariance).reshape(8, 8)
-    scale = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
-    scale[scale == 0] = 1.0
-    shares = matrix / np.outer(scale, scale)
-    if not (np.abs(shares - shares.T) < _ROUNDING).all():
-        raise ValueError("the covariance of a camera is symmetric")
-    if np.linalg.eigvalsh(shares)[0] < -_ROUNDING:
-        raise ValueError("no variance of a camera is negative")
-    return covariance
+    return camera_covariance(value)
 
 
 def given_to_json(station: Station) -> Json:
@@ -231,8 +216,14 @@ def station_to_json(station: Station) -> Json:
 
 
 def station_from_json(value: Mapping[str, Any]) -> Station:
-    """Back from ``station_to_json``."""
-    given = value["given"]
+    """Back from ``station_to_json``.
+
+    Raises:
+        ValueError: It has the covariance of a camera that it does not have.
+    """
+    given, covariance = value["given"], value.get("given_covariance")
+    if given is None and covariance is not None:
+        raise ValueError("a station has the covariance of a camera, and no given camera")
     return Station(
         key=value["key"],
         size=ImageSize(*value["size"]),
@@ -241,7 +232,7 @@ def station_from_json(value: Mapping[str, Any]) -> Station:
         given=None if given is None else camera_from_json(given),
         calibration=value["calibration"],
         flipped=value["flipped"],
-        given_covariance=covariance_from_json(value.get("given_covariance")),
+        given_covariance=covariance_from_json(covariance),
     )
 
 

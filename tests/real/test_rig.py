@@ -50,7 +50,7 @@ class TestIssia:
         assert pair.held_out_before_px > before
         assert pair.held_out_after_px < after
 
-    def test_no_camera_is_late(self, proposal):
+    def test_no_camera_is_ahead(self, proposal):
         known = [pair for pair in proposal.pairs if pair.offset_frames is not None]
         assert len(known) >= 4
         for pair in known:

@@ -32,7 +32,8 @@ def adjust_rig(
     """Adjust the static cameras of a dataset to lines and balls over time.
 
     The job's result is the proposal: each camera and each pair before and after, on instants that
-    were used and on instants that were held out. With `accept` it is saved as an edit of each camera.
+    were used and on instants that were held out. With `accept` and the `inputs` of the
+    proposal that was looked at it is saved as an edit of each camera.
     """
     reply = Reply(asked, job_answer)
     job = request_rig(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 
 class RigRequest(BaseModel):
@@ -18,8 +18,15 @@ class RigRequest(BaseModel):
     )
     inputs: Annotated[str, Field(pattern="^[0-9a-f]{32}$")] | None = Field(
         default=None,
-        description="`inputs` of the proposal that was looked at: another one is not saved.",
+        description="`inputs` of the proposal that was looked at: another one is not saved. "
+        "`accept` needs it.",
     )
+
+    @model_validator(mode="after")
+    def _seen(self) -> RigRequest:
+        if self.accept is not None and self.inputs is None:
+            raise ValueError("to accept a proposal, give the inputs of the one that was looked at")
+        return self
 
 
 class RigTakenBack(BaseModel):

@@ -22,6 +22,9 @@ class StationDetail(BaseModel):
     height: int
     calibration: Literal["given", "lines"]
     has_given: bool
+    has_given_covariance: bool = Field(
+        description="Whether its given camera says how far it may be off; an accepted rig does."
+    )
     flipped: bool
     lines: LineDocuments
     groups: int = Field(description="How many groups it takes part in.")
@@ -43,6 +46,7 @@ class StationDetail(BaseModel):
             "height": station.size.height,
             "calibration": station.calibration,
             "has_given": station.given is not None,
+            "has_given_covariance": station.given_covariance is not None,
             "flipped": station.flipped,
             "lines": lines_document(station.lines),
             "groups": len(state.groups),

@@ -108,6 +108,8 @@ class SetStationCamera:
 
     def apply(self, station: Station) -> Station:
         """The station with that camera."""
+        if self.given is None and self.covariance is not None:
+            raise InputError("a covariance is that of a camera", pointer="/covariance")
         return replace(
             station,
             given=self.given,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from app.soccer.frames import ImagePoint
 from app.soccer.group import View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
+from app.soccer.solution import SOLVER_VERSION
 from app.solving.calibrate import calibrate_station
 from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import RigProposal, propose_rig
@@ -40,7 +41,7 @@ CAMERAS, SIGMA = "cameras", "sigma"
 EDIT = "set_station_camera"
 CHUNK = 200
 MIN_OFFSET_FRAMES, MIN_OFFSET_SIGMAS = 0.1, 3.0
-"""A smaller difference in time is none."""
+"""What a difference in time is more than, both."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ class ProposedRig:
     """
 
     proposal: RigProposal
+    pitch: Pitch
     stations: Mapping[str, StationState]
     inputs: str
 
@@ -96,13 +98,15 @@ def propose(
         proposal = executor.submit(propose_rig, *asked).result()
     inputs = digest(
         [
+            SOLVER_VERSION,
             policy.hash,
+            asdict(pitch),
             [state.etag for state in states],
             [lines_to_json(camera.lines) for camera in cameras],
             [[frame.time, {key: [*at] for key, at in frame.balls.items()}] for frame in frames],
         ]
     )
-    return ProposedRig(proposal, {state.station.key: state for state in states}, inputs)
+    return ProposedRig(proposal, pitch, {state.station.key: state for state in states}, inputs)
 
 
 def adjustable(store: Store, dataset: str | int) -> tuple[list[StationState], Pitch, Policy]:
@@ -143,11 +147,12 @@ def accept(store: Store, proposed: ProposedRig, what: str, *, actor: str) -> Non
         proposed: What ``propose`` said.
         what: ``CAMERAS`` for the adjusted cameras with their covariance; ``SIGMA`` to keep the
             cameras in use and save how far they may be off, so that no ball moves and its
-            sigma is honest.
+            uncertainty becomes right.
         actor: Who says so.
 
     Raises:
         StaleRevisionError: A camera has changed since.
+        ConflictError: The size of the pitch has changed since.
         InputError: ``what`` is neither.
     """
     if what not in (CAMERAS, SIGMA):
@@ -161,7 +166,17 @@ def accept(store: Store, proposed: ProposedRig, what: str, *, actor: str) -> Non
         )
         for change in proposed.proposal.cameras
     ]
-    submit_stations(store, edits, actor=actor)
+    datasets = {state.dataset_id for state in proposed.stations.values()}
+
+    def check(session: Session) -> None:
+        found = {pitch for item in datasets for _, pitch in station_pitches(session, item)}
+        if found != {proposed.pitch}:
+            raise ConflictError(
+                "the size of the pitch has changed since that proposal",
+                hint="Look at a new one, and accept that.",
+            )
+
+    submit_stations(store, edits, actor=actor, check=check)
 
 
 def take_back(store: Store, dataset: str | int, *, actor: str) -> int:
@@ -211,23 +226,30 @@ def anchor_sentence(proposal: RigProposal) -> str:
 
 
 def time_sentence(proposal: RigProposal) -> str:
-    """What the balls say about the time of the cameras."""
+    """What the balls say about the time of the cameras: the largest difference that is one."""
     known = [
-        (pair.offset_frames, pair.offset_sigma_frames)
+        (pair, pair.offset_frames, pair.offset_sigma_frames)
         for pair in proposal.pairs
         if pair.offset_frames is not None and pair.offset_sigma_frames
     ]
     if not known:
-        return "too few moving balls to see whether a camera is late"
-    largest, sigma = max(known, key=lambda item: abs(item[0]) / item[1])
-    if abs(largest) > MIN_OFFSET_FRAMES and abs(largest) > MIN_OFFSET_SIGMAS * sigma:
+        return "too few moving balls to see whether a camera is ahead of another"
+    sure = [
+        item for item in known if abs(item[1]) > max(MIN_OFFSET_FRAMES, MIN_OFFSET_SIGMAS * item[2])
+    ]
+    if not sure:
+        pair, offset, sigma = min(known, key=lambda item: item[2])
         return (
-            f"two cameras differ by {largest:+.2f} +- {sigma:.2f} frames; "
-            "times are not adjusted: look for a wrong frame offset"
+            "no camera is ahead of another: "
+            f"{pair.b} of {pair.a} by {offset:+.3f} +- {sigma:.3f} frames, the surest pair"
         )
-    weight = sum(1 / sigma**2 for _, sigma in known)
-    mean = sum(offset / sigma**2 for offset, sigma in known) / weight
-    return f"no camera is late: {mean:+.3f} +- {weight**-0.5:.3f} frames between two of them"
+    pair, offset, sigma = max(sure, key=lambda item: abs(item[1]))
+    first, second = (pair.b, pair.a) if offset > 0 else (pair.a, pair.b)
+    return (
+        f"{first} is {abs(offset):.2f} +- {sigma:.2f} frames ahead of {second}: its frame t shows "
+        f"what {second} shows at t + {abs(offset):.2f}; times are not adjusted: look for a wrong "
+        "frame offset"
+    )
 
 
 def _read_lines(path: Path, states: Sequence[StationState]) -> dict[str, Lines]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 from app.review.editing.upstream import KIND, FollowedStation, follow_station
 from app.soccer.group import Station
@@ -52,8 +51,7 @@ class SharedStations:
         if stored is None:
             self._insert(incoming)
             return
-        source = None if incoming.lines else self._source_of(stored)
-        followed = follow_station(stored, incoming, source)
+        followed = follow_station(stored, incoming, self._source_of(stored))
         changed = followed.station != stored.station
         if changed or station_digest(followed.base) != stored.source_digest:
             self._save(stored, followed)
@@ -68,7 +66,7 @@ class SharedStations:
             if entry.kind == "station":
                 said = station_from_json(entry.body["base"] or entry.body["station"])
             elif entry.kind == "camera" and said is not None:
-                said = replace(said, given=camera_from_json(entry.body["given"]))
+                said = said.with_given(camera_from_json(entry.body["given"]))
             if said is not None and station_digest(said) == stored.source_digest:
                 found = said
         return found

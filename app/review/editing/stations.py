@@ -121,7 +121,11 @@ def submit_station(
 
 
 def submit_stations(
-    store: Store, edits: Sequence[tuple[StationState, StationEdit]], *, actor: str
+    store: Store,
+    edits: Sequence[tuple[StationState, StationEdit]],
+    *,
+    actor: str,
+    check: Callable[[Session], None] | None = None,
 ) -> None:
     """Save edits of several static cameras that belong together: all of them, or none.
 
@@ -129,6 +133,7 @@ def submit_stations(
         store: The database.
         edits: What each camera was when its edit was thought of, and the edit.
         actor: Who says so.
+        check: Raises where what else they rest on has changed; nothing is saved then.
 
     Raises:
         StaleRevisionError: One of the cameras has changed since.
@@ -146,6 +151,8 @@ def submit_stations(
 
     steps = [(state.id, plan(edit), state.etag) for state, edit in edits]
     with store.write() as session:
+        if check is not None:
+            check(session)
         _save_all(session, steps, actor)
 
 

@@ -83,8 +83,10 @@ def follow_station(
     """
     if incoming.shared and not incoming.lines and source is not None and source.lines:
         incoming = replace(incoming, lines=source.lines, calibration=source.calibration)
-    if incoming.given is None and stored.station.given is not None:
-        incoming = incoming.with_given(stored.station.given, stored.station.given_covariance)
+    # Under an edit the stored camera may be a person's; that of the dataset is the source's.
+    brought = stored.station if source is None else source
+    if incoming.given is None and brought.given is not None:
+        incoming = incoming.with_given(brought.given, brought.given_covariance)
     if not stored.edited:
         return FollowedStation(incoming, incoming, None)
     kept = None

@@ -35,7 +35,7 @@ def request_rig(
         store: The database.
         dataset: Name or id.
         what: What of the proposal is saved, as ``editing.rig.accept`` takes it; None: nothing.
-        inputs: Of the proposal that a person saw; another one is not saved.
+        inputs: Of the proposal that a person saw; no other one is saved.
         actor: Who wants it.
         keep: Keeps the answer with the job.
 
@@ -77,7 +77,7 @@ def rig_work(
             proposed = propose(store, dataset_id, executor=executor)
         progress.check()
         if what is not None:
-            if inputs is not None and inputs != proposed.inputs:
+            if inputs != proposed.inputs:
                 raise ConflictError(
                     "balls, lines or cameras have changed since that proposal",
                     hint="Look at a new one, and accept that.",

@@ -2,12 +2,13 @@
 /** All static cameras adjusted together: what that would change, then saved or taken back. */
 
 import { html } from 'htm/preact';
-import { useState } from 'preact/hooks';
+import { useCallback, useState } from 'preact/hooks';
 
+import { getStation } from '../../api/calibration.js';
 import { ApiError } from '../../api/problem.js';
 import { deleteRig, postRig } from '../../api/rig.js';
 import { capital, count, fixed } from '../../lib/format.js';
-import { sentenceOf } from '../../lib/resource.js';
+import { sentenceOf, useResource } from '../../lib/resource.js';
 import { follow, isOver } from '../../state/jobs.js';
 import { announce } from '../../state/notice.js';
 import { watchSolving } from '../../state/solving.js';
@@ -19,7 +20,7 @@ import { JobProgress } from '../job_progress.js';
 
 const CHOICES = /** @type {{name: Accepted, label: string, note: string}[]} */ ([
 	{ name: 'cameras', label: 'The adjusted cameras', note: 'balls move; undo takes it back' },
-	{ name: 'sigma', label: 'Only how far the cameras in use may be off', note: 'no ball moves, its sigma is honest' },
+	{ name: 'sigma', label: 'Only how far the cameras in use may be off', note: 'no ball moves, its uncertainty becomes right' },
 ]);
 
 /** @param {number | null} before @param {number | null} after */
@@ -32,7 +33,7 @@ function Proposal({ proposal }) {
 	return html`
 		<div class="table__scroll" tabindex="0" role="region" aria-label="Cameras and pairs, before and after">
 			<table class="table">
-				<thead><tr><th>Camera</th><th data-numeric="true">Moves</th><th data-numeric="true">Grass moves</th><th data-numeric="true">Field lines</th></tr></thead>
+				<thead><tr><th>Camera</th><th data-numeric="true">Moves</th><th data-numeric="true">Picture of the grass moves</th><th data-numeric="true">Field lines</th></tr></thead>
 				<tbody>${proposal.cameras.map((camera) => html`
 					<tr key=${camera.key} data-camera=${camera.key}>
 						<th scope="row">${camera.key}</th>
@@ -52,17 +53,20 @@ function Proposal({ proposal }) {
 					</tr>`)}</tbody>
 			</table>
 		</div>
-		<p>${count(proposal.frames)} instants were used, ${count(proposal.gross)} contradict themselves and were left out. Balls move by ${fixed(proposal.ball_moved_m, 2, ' m')} in the median. The cameras are ${proposal.anchor}. ${capital(proposal.time)}.</p>
+		<p>${count(proposal.frames)} instants were used, ${count(proposal.gross)} were left out, because their cameras do not show one ball. Balls move by ${fixed(proposal.ball_moved_m, 2, ' m')} in the median. The cameras are ${proposal.anchor}. ${capital(proposal.time)}.</p>
 		${proposal.left_alone.length ? html`<p data-grade="warn">Too few common balls: ${proposal.left_alone.join(', ')}</p>` : null}
 	`;
 }
 
-/** @param {{dataset: {id: number, name: string}, onClose: () => void}} props */
-export function RigDialog({ dataset, onClose }) {
+/** @param {{dataset: {id: number, name: string}, station: number, onClose: () => void}} props */
+export function RigDialog({ dataset, station, onClose }) {
 	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
 	const [proposal, setProposal] = useState(/** @type {RigProposal | null} */ (null));
 	const [what, setWhat] = useState(/** @type {Accepted} */ ('sigma'));
 	const [problem, setProblem] = useState(/** @type {{text: string, adjusted: boolean} | null} */ (null));
+	const read = useCallback((/** @type {AbortSignal} */ signal) => getStation(station, signal), [station]);
+	const present = useResource(read, [station]);
+	const adjusted = problem?.adjusted || present.value?.has_given_covariance;
 	const busy = job !== null && !isOver(job);
 	/** @param {() => Promise<void>} act */
 	async function attempt(act) {
@@ -79,7 +83,11 @@ export function RigDialog({ dataset, onClose }) {
 		await attempt(async () => {
 			const body = proposal ? { accept: what, inputs: proposal.inputs } : {};
 			const over = await follow(await postRig(dataset.id, body), setJob);
-			if (over.state !== 'done') return;
+			if (over.state !== 'done') {
+				// What it rests on may have changed: the next one is looked at first.
+				if (over.state === 'failed') setProposal(null);
+				return;
+			}
 			if (!over.result.accepted) { setProposal(over.result); return; }
 			announce(what === 'cameras' ? 'The adjusted cameras count.' : 'The cameras stay, their uncertainty is known.');
 			watchSolving(dataset.name);
@@ -98,7 +106,7 @@ export function RigDialog({ dataset, onClose }) {
 		<${FormDialog}
 			wide=${true} title="Adjust static cameras together" onClose=${onClose} onSubmit=${send}
 			buttons=${html`
-				${problem?.adjusted ? html`<button class="button" type="button" onClick=${takeBack}>Take it back</button>` : null}
+				${adjusted ? html`<button class="button" type="button" onClick=${takeBack}>Take it back</button>` : null}
 				<button class="button button--primary" type="submit" aria-disabled=${busy} title=${busy ? 'Under way' : ''}>${proposal ? 'Save' : 'Propose'}</button>`}
 		>
 			<p>Balls that several cameras show at once tell how the cameras stand to each other; field lines and the cameras in use hold them in their place. Nothing is saved before you have seen what changes.</p>

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -13,20 +14,24 @@ from app.datasets.export_record import ExportRecord
 from app.datasets.parquet_reader import read_parquet
 from app.datasets.parquet_writer import write_parquet
 from app.datasets.report import Report
+from app.geometry.camera import Camera
 from app.soccer.group import Group
 from app.soccer.reasons import LeftOut
 
 Solved = Callable[..., ExportRecord]
 Make = Callable[..., Group]
+COVARIANCE = tuple(np.diag(np.arange(1, 9) / 7).ravel().tolist())
 
 
 class TestReadParquet:
     def test_a_file_alone_a_folder_and_a_zip_give_the_same(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, make_zip: Callable[..., Path],
-        report: Report,
+        report: Report, camera: Camera,
     ) -> None:  # fmt: skip
         groups = [soccer_group(), soccer_group("8.png", split="test", label="x")]
         why = LeftOut("other", "another match")
+        known = replace(groups[0].views[0].station, given=camera, given_covariance=COVARIANCE)
+        groups[0] = groups[0].with_view(replace(groups[0].views[0], station=known))
         groups[1] = groups[1].with_view(replace(groups[1].views[1], included=False, left_out=why))
         folder = tmp_path / "out"
         folder.mkdir()

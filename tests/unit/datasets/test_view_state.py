@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.datasets.view_state import (
@@ -22,6 +23,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.reasons import LeftOut
 
 Make = Callable[..., Group]
+COVARIANCE = tuple(np.outer(*2 * [np.arange(1, 9) / 7]).ravel().tolist())
 
 
 def read(value: Any) -> StateReader:
@@ -37,7 +39,12 @@ class TestStateReader:
             BallAnnotation(out_of_view=True),
         )
         station = replace(
-            group.views[0].station, given=camera, calibration="lines", flipped=True, shared=True
+            group.views[0].station,
+            given=camera,
+            given_covariance=COVARIANCE,
+            calibration="lines",
+            flipped=True,
+            shared=True,
         )
         why = LeftOut("duplicate_view", "as camera 2")
         view = replace(group.views[0], balls=balls, included=False, station=station, left_out=why)
@@ -61,6 +68,9 @@ class TestStateReader:
             ("balls", [{"box": [1, 2, 3, 4], "point": [1, 2]}]),
             ("balls", {"box": 1}),
             ("given", {"pan_degrees": 1}),
+            ("given_covariance", [1.0] * 63),
+            ("given_covariance", [0.0] * 64),
+            ("given_covariance", [1.0] * 64),
         ],
     )
     def test_what_is_wrong_is_named(self, soccer_group: Make, name: str, value: Any) -> None:

@@ -55,15 +55,28 @@ class TestProposeRig:
             off = GIVEN[change.key].position - TRUTH[change.key].position
             assert (np.abs(off) < 3 * np.sqrt(np.diag(wide)[3:6])).all()
 
-    def test_cameras_of_one_time_are_not_late(self, proposal):
+    def test_cameras_of_one_time_are_not_ahead(self, proposal):
         found = pair(proposal)
         assert abs(found.offset_frames) < 4 * max(found.offset_sigma_frames, 0.005)
         assert found.offset_sigma_frames < 0.05
 
     def test_a_camera_that_is_ahead_is_seen(self):
-        found = pair(propose_rig(cameras(), frames(late={"cam2": 0.4}), Pitch(), PAPER))
+        found = pair(propose_rig(cameras(), frames(ahead={"cam2": 0.4}), Pitch(), PAPER))
         assert found.offset_frames == pytest.approx(0.4, abs=0.12)
         assert found.offset_frames > 4 * found.offset_sigma_frames
+
+    def test_ahead_is_to_show_a_later_instant_under_the_same_number(self):
+        # Frame t of camera 2 is what it would have shown at t + 1.
+        early = frames()
+        following = {frame.time: frame.balls.get("cam2") for frame in early}
+        seen = []
+        for frame in early:
+            balls = {key: at for key, at in frame.balls.items() if key != "cam2"}
+            if (later := following.get(frame.time + 1)) is not None:
+                balls["cam2"] = later
+            seen.append(RigFrame(frame.time, balls))
+        found = pair(propose_rig(cameras(), seen, Pitch(), PAPER))
+        assert found.offset_frames > max(0.3, 4 * found.offset_sigma_frames)
 
     def test_nothing_can_be_held_out_of_one_block(self):
         found = pair(propose_rig(cameras(), frames(45), Pitch(), PAPER))

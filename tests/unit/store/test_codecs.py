@@ -28,8 +28,8 @@ class TestGroup:
         assert value["station"] == "cam1"
         assert codecs.view_from_json(value, view.station) == view
 
-    def test_the_covariance_of_a_given_camera_comes_back(self, group) -> None:
-        station = group.views[0].station
+    def test_the_covariance_of_a_given_camera_comes_back(self, group, camera) -> None:
+        station = replace(group.views[0].station, given=camera)
         bare = codecs.station_to_json(station)
         assert "given_covariance" not in bare  # digests of stations without one stay
         known = replace(station, given_covariance=COVARIANCE)
@@ -41,14 +41,20 @@ class TestGroup:
         [
             ([1.0] * 63, "64 numbers"),
             ([float("inf")] * 64, "64 numbers"),
-            ([float(n) for n in range(64)], "symmetric"),
-            ((-np.eye(8)).ravel().tolist(), "negative"),
+            ([float(n + 1) for n in range(64)], "symmetric"),
+            ((-np.eye(8)).ravel().tolist(), "above zero"),
+            (np.diag([1.0] * 7 + [0.0]).ravel().tolist(), "above zero"),
             ((2 * np.ones((8, 8)) - np.eye(8)).ravel().tolist(), "negative"),
         ],
     )
     def test_a_covariance_that_is_none_is_refused(self, wrong, why) -> None:
         with pytest.raises(ValueError, match=why):
             codecs.covariance_from_json(wrong)
+
+    def test_a_covariance_of_no_camera_is_refused(self, group) -> None:
+        station = replace(group.views[0].station, given=None, given_covariance=COVARIANCE)
+        with pytest.raises(ValueError, match="no given camera"):
+            codecs.station_from_json(codecs.station_to_json(station))
 
     def test_integers_and_floats_are_one_text(self) -> None:
         whole = BallAnnotation(box=Box(1, 2, 3, 4))

@@ -69,6 +69,12 @@ class TestRig:
         answer = api.post("/api/v1/datasets/broadcast/rig", json={})
         assert (answer.status_code, "0 static cameras" in answer.json()["detail"]) == (400, True)
 
+    def test_nothing_is_accepted_that_nobody_saw(self, api, services) -> None:
+        for body in ({"accept": "cameras"}, {"accept": "sigma", "inputs": None}):
+            answer = api.post(ADDRESS, json=body)
+            assert (answer.status_code, "inputs" in answer.json()["detail"]) == (422, True)
+        assert services.jobs.find(kinds=["rig"]) == []
+
     def test_anything_else_is_refused(self, api) -> None:
         answer = api.post(ADDRESS, json={"accept": "everything"})
         assert (answer.status_code, answer.json()["pointer"]) == (422, "/accept")

@@ -1,11 +1,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from app.errors import ConflictError, InputError, StaleRevisionError
-from app.review.editing.edit import SetStationCalibration
+from app.review.editing import rig
+from app.review.editing.edit import SetStationCalibration, SetStationCamera
+from app.review.editing.pitches import change_pitches, read_pitches
 from app.review.editing.recompute import stale_groups
 from app.review.editing.replay import replay
 from app.review.editing.rig import (
@@ -25,6 +29,7 @@ from app.review.importing.ingest import ingest
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
+from app.soccer.pitch import Pitch
 from app.store.frozen import freeze_said, thaw_group
 from tests.cameras import SIZE
 from tests.rigs import GIVEN, cameras, frames
@@ -77,11 +82,32 @@ class TestPropose:
         assert all(item.given == GIVEN[key] for key, item in stations(store, proposed).items())
         assert all(load_station(store, s.id).revision == 1 for s in proposed.stations.values())
 
-    def test_says_what_holds_the_rig_and_that_no_camera_is_late(self, proposed) -> None:
+    def test_says_what_holds_the_rig_and_that_no_camera_is_ahead(self, proposed) -> None:
         assert "points of field lines" in anchor_sentence(proposed.proposal)
-        assert time_sentence(proposed.proposal).startswith("no camera is late")
+        assert time_sentence(proposed.proposal).startswith("no camera is ahead")
         values = proposal_values(proposed)
         assert json.loads(json.dumps(values)) == values
+
+    def test_tells_the_largest_difference_in_time_that_is_one(self, proposed) -> None:
+        def said(*offsets: tuple[float, float]) -> str:
+            pairs = tuple(
+                replace(pair, offset_frames=offset, offset_sigma_frames=sigma)
+                for pair, (offset, sigma) in zip(proposed.proposal.pairs, offsets, strict=False)
+            )
+            return time_sentence(replace(proposed.proposal, pairs=pairs))
+
+        first, second = proposed.proposal.pairs[:2]
+        # Small and sure, large and sure enough, larger and unsure.
+        found = said((0.05, 0.001), (0.40, 0.08), (0.9, 0.5))
+        assert found.startswith(f"{second.b} is 0.40 +- 0.08 frames ahead of {second.a}")
+        assert f"what {second.a} shows at t + 0.40" in found
+        found = said((-0.40, 0.08))
+        assert found.startswith(f"{first.a} is 0.40 +- 0.08 frames ahead of {first.b}")
+        # Not the mean: which of two comes first says nothing.
+        none = said((0.05, 0.01), (-0.05, 0.02))
+        assert none.startswith("no camera is ahead")
+        assert f"{first.b} of {first.a} by +0.050 +- 0.010 frames" in none
+        assert said() == "too few moving balls to see whether a camera is ahead of another"
 
     def test_a_ball_that_was_put_where_others_see_it_says_nothing(self, store, fill) -> None:
         inferred = BallAnnotation(point=ImagePoint(10, 10), inferred=True)
@@ -160,6 +186,45 @@ class TestAccept:
     def test_anything_else_is_refused(self, store, proposed) -> None:
         with pytest.raises(InputError, match='"sigma"'):
             accept(store, proposed, "all", actor="ann")
+
+    def test_a_pitch_that_has_changed_since_makes_another_proposal(self, store, proposed) -> None:
+        etag = read_pitches(store, "demo").etag
+        change_pitches(store, "demo", {"rig": Pitch(104.0, 67.0)}, if_match=etag, actor="ann")
+        with pytest.raises(ConflictError, match="size of the pitch has changed"):
+            accept(store, proposed, CAMERAS, actor="ann")
+        assert stations(store, proposed)["cam1"].given_covariance is None
+        assert propose(store, "demo").inputs != proposed.inputs
+
+    def test_a_solver_that_has_changed_since_makes_another_proposal(
+        self, store, ids, proposed, monkeypatch
+    ) -> None:
+        monkeypatch.setattr(rig, "propose_rig", lambda *asked: proposed.proposal)
+        assert propose(store, "demo").inputs == proposed.inputs
+        monkeypatch.setattr(rig, "SOLVER_VERSION", "another")
+        assert propose(store, "demo").inputs != proposed.inputs
+
+    def test_importing_again_does_not_take_an_accepted_camera_for_the_datasets(
+        self, store, fill
+    ) -> None:
+        bare = [
+            Group(
+                g.key,
+                tuple(View(v.key, replace(v.station, given=None), v.balls) for v in g.views),
+                "rig",
+            )
+            for g in groups()[:2]
+        ]
+        fill(*bare, solved=False)
+        view = load(store, 1).group.views[0]
+        before = load_station(store, load(store, 1).station_ids[view.key])
+        assert before.station.given is None
+        covariance = tuple((np.eye(8) / 7).ravel().tolist())
+        edit = SetStationCamera(GIVEN[view.key], covariance)
+        submit_station(store, before.id, edit, if_match=before.etag, actor="ann")
+        edited = load_station(store, before.id)
+        report = ingest(store, "demo", bare, source="test", actor="ann")
+        assert (report.changed, report.findings) == (0, 0)
+        assert load_station(store, before.id) == edited
 
 
 class TestTakeBack:

@@ -357,6 +357,7 @@ class TestBrokenFiles:
             (("group", "views", 0, "station", "given"), {"rotation": [1]}),
             (("group", "views", 0, "station", "calibration"), "guess"),
             (("group", "views", 0, "station", "given_covariance"), [1.0]),
+            (("group", "views", 0, "station", "given_covariance"), [0.0] * 64),
             (("group", "views", 0, "station"), "cam9"),
             (("group", "views", 0, "balls"), [{"box": [1, 2, 3]}]),
             (("group", "views", 0, "extras"), {"boxes": 1, "lines": [], "metadata": {}}),
