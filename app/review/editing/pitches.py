@@ -78,9 +78,9 @@ class PitchState:
         assert found is not None and self.proposed is not None
         sizes = f"{self.proposed.length:g} x {self.proposed.width:g} m"
         return (
-            f"the lines of {found.frames} frames show a pitch of {sizes}, and it is solved as "
+            f"The lines of {found.frames} frames show a pitch of {sizes}, and it is solved as "
             f"{self.pitch.length:g} x {self.pitch.width:g} m; accept the size for the whole match "
-            "under Statistics"
+            "under Statistics."
         )
 
 
