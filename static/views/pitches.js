@@ -29,10 +29,10 @@ function MatchPitch({ one, busy, onSet }) {
 			<th scope="row">${name}${aside ? html`<small>${aside}</small>` : null}</th>
 			<td>${one.mixed ? 'several sizes' : pitchSize(one)}</td>
 			<td>${one.problem ?? shownSize(one.estimate)}</td>
-			<td class="table__actions">
+			<td><span class="table__actions">
 				${one.proposed ? button(`Use ${pitchSize(one.proposed)}`, `Solve the ${count(one.groups)} groups of this match on this pitch`, one.proposed, 'button--primary') : null}
 				${one.previous && changed ? button('Take back', `Back to ${pitchSize(one.previous)}`, one.previous, '') : null}
-			</td>
+			</span></td>
 		</tr>`;
 }
 

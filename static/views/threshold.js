@@ -58,7 +58,7 @@ const CHOICES = /** @type {{[name: string]: string}} */ ({ mean: 'mean of pairs'
 function Choice({ field, id, value, change }) {
 	const chosen = (/** @type {string} */ text) => (typeof field.default === 'string' ? text : Number(text));
 	return html`
-		<select class="field threshold__number" id=${id} value=${String(value)} onChange=${(/** @type {Event} */ event) => change(chosen(/** @type {HTMLSelectElement} */ (event.target).value))}>
+		<select class=${`field threshold__${typeof field.default === 'string' ? 'words' : 'number'}`} id=${id} value=${String(value)} onChange=${(/** @type {Event} */ event) => change(chosen(/** @type {HTMLSelectElement} */ (event.target).value))}>
 			${field.choices.map((option) => html`<option key=${option} value=${String(option)}>${CHOICES[option] ?? option}</option>`)}
 		</select>
 		<${Unit} unit=${field.unit} />

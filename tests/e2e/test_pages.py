@@ -381,11 +381,11 @@ class TestNoise:
 
 
 @pytest.fixture
-def wrong_pitch(server: str) -> Iterator[int]:
-    """Which match of the sample is solved on a pitch that is too small: the largest."""
+def wrong_pitch(server: str) -> Iterator[tuple[int, int]]:
+    """The match of the sample that is solved on too small a pitch: its place, its first group."""
     path = f"{server}/api/v1/datasets/sample/pitches"
-    groups = [item["groups"] for item in httpx.get(path).json()["items"]]
-    which = groups.index(max(groups))
+    items = httpx.get(path).json()["items"]
+    which = max(range(len(items)), key=lambda place: items[place]["groups"])
 
     def solve_on(length: float, width: float) -> None:
         answer = httpx.get(path)
@@ -397,18 +397,21 @@ def wrong_pitch(server: str) -> Iterator[int]:
             sleep(0.1)
 
     solve_on(103.0, 66.0)
-    yield which
+    yield which, items[which]["group_id"]
     solve_on(105.0, 68.0)
 
 
 class TestPitchSizes:
     def test_a_proposed_size_is_accepted_and_taken_back_by_keyboard(
-        self, open_page: OpenPage, wrong_pitch: int
+        self, open_page: OpenPage, wrong_pitch: tuple[int, int]
     ) -> None:
-        page = open_page("/datasets/sample/statistics")
+        which, group = wrong_pitch
+        page = open_page(f"/review/{group}")
+        page.get_by_role("link", name="Pitch sizes under Statistics").click()
+        page.wait_for_url("**/datasets/sample/statistics")
         card = page.get_by_role("region", name="Pitch sizes")
         heading = card.get_by_role("heading")
-        row = card.locator("tbody tr").nth(wrong_pitch)
+        row = card.locator("tbody tr").nth(which)
         expect(row.get_by_role("cell").first).to_have_text("103 × 66 m", timeout=MINUTE)
         expect(heading).to_contain_text("1 proposed")
         expect(card.get_by_role("columnheader").last).to_have_text("actions")
