@@ -88,7 +88,7 @@ class Policy:
     min_baseline_m: float = _threshold(1.0, "baseline", "Smallest baseline", "m", 0.0, 50.0)
     ball_diameter_m: float = _threshold(0.226, BOXES, "Diameter of the ball", "m", 0.2, 0.25)
     point: Literal["mean", "best"] = _threshold(
-        "mean", BOXES, "The 3D ball that leaves", choices=("mean", "best"), later=True
+        "mean", BOXES, "3D ball that is exported", choices=("mean", "best"), later=True
     )
     """``mean`` of the valid pairs, as in the paper, or ``best``: the most likely point over all
     views. Boxes, errors and exports follow it; the gates judge the mean."""

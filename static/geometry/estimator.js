@@ -38,3 +38,17 @@ export function withOtherBall(group, solution) {
 export function ballName(solution, which) {
 	return (solution?.point === 'best') !== (which === 'other') ? 'most likely point' : 'mean of pairs';
 }
+
+/**
+ * What stands beside the numbers of the 3D ball: its name, and whether it is what leaves.
+ *
+ * @param {SolutionJson} solution that is shown
+ * @param {'exported' | 'other'} which
+ * @param {SolutionJson | null} saved the server's
+ * @param {boolean} live whether an edit is not saved yet: the other ball is not known then
+ */
+export function ballTold(solution, which, saved, live) {
+	if (!live) return { name: ballName(solution, which), state: which === 'other' ? 'not exported' : 'exported' };
+	const same = which === 'exported' && (solution.point === 'best') === (saved?.point === 'best');
+	return { name: ballName(solution, 'exported'), state: same ? 'exported' : 'until saved' };
+}

@@ -43,7 +43,7 @@ export function diagonal(view) {
 /**
  * The solution with its pairs, ball and ball fits computed again from the group's balls.
  *
- * Calibrations, gates and findings stay: they are the server's.
+ * Calibrations, gates and findings stay: they are the server's. The ball is the mean of pairs whatever the policy exports.
  *
  * @param {GroupDocument} group
  * @param {SolutionJson} solution
@@ -58,6 +58,8 @@ export function previewBall(group, solution) {
 	return {
 		...solution,
 		pairs,
+		point: 'mean',
+		mean_ball: null,
 		ball: point && {
 			point,
 			height_m: -point[2],

@@ -42,7 +42,7 @@ export const overlaysHidden = signal(false);
 export const projections = stored('projections', true);
 export const boxes = stored('boxes', true);
 export const gain = stored('whisker-gain', 5);
-/** Which 3D ball is drawn and measured: the paper's mean of pairs, or the most likely point. */
+/** Which 3D ball is drawn and measured: the one that the policy exports, mean of pairs or most likely point, or the other. */
 export const estimator = stored('estimator', /** @type {'exported' | 'other'} */ ('exported'));
 /** Whether the gates show what they ask of the group, and by how much. */
 export const gatesOpen = stored('gates-open', false);

@@ -7,6 +7,7 @@ import { findingTitle } from '../state/advice.js';
 import { mends, toldFinding } from '../state/mends.js';
 import { focusView } from '../state/workspace.js';
 import { Letter } from './letter.js';
+import { pageAddress } from './dataset_menu.js';
 import { carryOut } from './mend_actions.js';
 
 /** @import {FindingJson, GroupDocument, SolutionJson} from '../api/types.js' */
@@ -23,12 +24,18 @@ function Finding({ group, finding }) {
 				${view ? html`<button class="row-button" type="button" aria-label=${`Focus view ${view.letter}`} onClick=${() => focusView(view.letter)}><${Letter} letter=${view.letter} /></button>` : null}
 				<strong>${title}${sure}.</strong> ${finding.sentence}
 			</p>
+			${finding.kind === 'pitch_size' ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
 			${offered.length === 0 ? null : html`
 				<p class="finding__fixes">
 					${offered.map((mend) => html`<button type="button" class="button button--fix" onClick=${() => carryOut(mend)}>${mend.label}</button>`)}
 				</p>`}
 		</li>
 	`;
+}
+
+/** Where the size of a match's pitch is accepted. @param {{dataset: string}} props */
+export function PitchLink({ dataset }) {
+	return html`<p><a class="link" href=${pageAddress(dataset, 'statistics')}>Pitch sizes under Statistics</a></p>`;
 }
 
 /** @param {{group: GroupDocument, solution: SolutionJson}} props */

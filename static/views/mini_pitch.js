@@ -4,12 +4,13 @@
 import { html } from 'htm/preact';
 
 import { cameraFromJson, rayThrough } from '../geometry/camera.js';
-import { ballName } from '../geometry/estimator.js';
+import { ballName, ballTold } from '../geometry/estimator.js';
 import { pitchMarkings } from '../geometry/pitch.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { clipSegment, spreadApart, within as inBox } from '../geometry/spread.js';
 import { fixed } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
+import { groupDocument, isPreview } from '../state/group.js';
 import { cycleEstimator, estimator } from '../state/workspace.js';
 
 /** @import {GroupDocument, SolutionJson, ViewJson} from '../api/types.js' */
@@ -171,12 +172,14 @@ function Numbers({ solution }) {
 /** Which 3D ball the numbers speak of, and the way to the other one. @param {{solution: SolutionJson}} props */
 function Estimator({ solution }) {
 	const other = estimator.value === 'other';
-	const exported = ballName(solution, 'exported');
+	const saved = groupDocument.value?.solution ?? null;
+	const exported = ballName(saved, 'exported');
+	const { name, state } = ballTold(solution, estimator.value, saved, isPreview.value);
 	return html`
 		<span class="card__aside"><button
 			class="link-button" type="button" aria-pressed=${other} onClick=${cycleEstimator}
 			title=${`The ${exported} is exported, as the policy says. The mean of the valid pairs is the paper’s; the most likely point fits all views at once (T)`}
-		>${ballName(solution, estimator.value)}</button>, ${other ? 'not exported' : 'exported'}</span>
+		>${name}</button>, <span class="mini-pitch__state">${state}</span></span>
 	`;
 }
 

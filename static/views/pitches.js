@@ -2,7 +2,7 @@
 /** How large each match's pitch is taken to be, what its lines show, and the size to accept. */
 
 import { html } from 'htm/preact';
-import { useEffect } from 'preact/hooks';
+import { useEffect, useRef } from 'preact/hooks';
 
 import { listenToGroups } from '../api/events.js';
 import { getPitches, setPitch } from '../api/pitches.js';
@@ -29,17 +29,17 @@ function MatchPitch({ one, busy, onSet }) {
 	const { name, aside } = matchName(one.match);
 	/** @param {string} text @param {string} title @param {PitchSizeJson} size @param {string} kind */
 	const button = (text, title, size, kind) => html`
-		<button class=${`button button--small ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) onSet(size); }}>${text}</button>`;
+		<button class=${`button button--small ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) onSet(size); }}>${text}<span class="hidden-text"> for ${name}</span></button>`;
 	const changed = one.previous !== null && (one.previous.length !== one.length || one.previous.width !== one.width);
 	return html`
 		<tr>
 			<th scope="row">${name}${aside ? html`<small>${aside}</small>` : null}</th>
 			<td>${one.mixed ? 'several sizes' : pitchSize(one)}</td>
 			<td>${one.problem ?? shownSize(one.estimate)}</td>
-			<td class="table__actions">
+			<td><span class="table__actions">
 				${one.proposed ? button(`Use ${pitchSize(one.proposed)}`, `Solve the ${count(one.groups)} groups of this match on this pitch`, one.proposed, 'button--primary') : null}
 				${one.previous && changed ? button('Take back', `Back to ${pitchSize(one.previous)}`, one.previous, '') : null}
-			</td>
+			</span></td>
 		</tr>`;
 }
 
@@ -51,15 +51,21 @@ export function Pitches({ dataset }) {
 		const stop = listenToGroups((/** @type {{kind: string}} */ { kind }) => { if (CONCERNED.includes(kind)) reading.run(null); }, () => reading.run(null));
 		return () => { stop(); reading.cancel(); };
 	}, [reload]);
-	const { job, busy, error: refused, send } = useSavePolicy(reload);
+	const card = useRef(/** @type {HTMLElement | null} */ (null));
+	// The button that was pressed goes: whoever is still here, or nowhere, goes on from the heading.
+	const { job, busy, error: refused, send } = useSavePolicy(() => {
+		const at = document.activeElement;
+		if (!at || at === document.body || card.current?.contains(at)) card.current?.querySelector('h2')?.focus();
+		reload();
+	});
 	if (error) return html`<${Trouble} title="The pitches cannot be shown" error=${error} retry=${reload} />`;
 	if (!value?.items.length) return null;
 	const proposals = value.items.filter(({ proposed }) => proposed).length;
 	return html`
-		<section class="card card--flush statistics__matches" aria-labelledby="pitches-title">
-			<h2 id="pitches-title">Pitch sizes${proposals ? html` · ${count(proposals)} proposed` : null}</h2>
+		<section class="card card--flush statistics__matches" aria-labelledby="pitches-title" ref=${card}>
+			<h2 id="pitches-title" tabindex="-1">Pitch sizes${proposals ? html` · ${count(proposals)} proposed` : null}</h2>
 			<table class="table">
-				<thead><tr><th>match</th><th>in use</th><th>lines show</th><th></th></tr></thead>
+				<thead><tr><th>match</th><th>in use</th><th>lines show</th><th><span class="hidden-text">actions</span></th></tr></thead>
 				<tbody>${value.items.map((one) => html`
 					<${MatchPitch} key=${one.match} one=${one} busy=${busy} onSet=${(/** @type {PitchSizeJson} */ size) => send(() => setPitch(dataset, one.match, size, value.etag))} />`)}
 				</tbody>

@@ -81,7 +81,11 @@ function StatisticsOf({ one }) {
 	return html`
 		<div class="statistics__query"><${QueryBox} field=${field} invalid=${found.error?.status === 400} onQuery=${setQuery} /></div>
 		${found.error ? html`<${Trouble} title=${found.error.status === 400 ? 'The query cannot be read' : 'The statistics cannot be shown'} error=${found.error} retry=${found.reload} />` : null}
-		${found.value ? html`<${Body} found=${found.value} dataset=${one.name} q=${q} /><${NoiseCard} dataset=${one.id} /><${Pitches} dataset=${one.id} />` : found.error ? null : html`<${Loading} what="statistics" />`}
+		${found.value ? html`
+			<${Body} found=${found.value} dataset=${one.name} q=${q} />
+			<h2 class="statistics__whole">Of the whole dataset</h2>
+			<${NoiseCard} dataset=${one.id} />
+			<${Pitches} dataset=${one.id} />` : found.error ? null : html`<${Loading} what="statistics" />`}
 	`;
 }
 

@@ -51,12 +51,15 @@ function Slider({ field, value, id, change }) {
 	`;
 }
 
+/** What a choice is called, where it is a word of the policy's. */
+const CHOICES = /** @type {{[name: string]: string}} */ ({ mean: 'mean of pairs', best: 'most likely point' });
+
 /** @param {{field: PolicyField, id: string, value: Value, change: (value: Value) => void}} props */
 function Choice({ field, id, value, change }) {
 	const chosen = (/** @type {string} */ text) => (typeof field.default === 'string' ? text : Number(text));
 	return html`
-		<select class="field threshold__number" id=${id} value=${String(value)} onChange=${(/** @type {Event} */ event) => change(chosen(/** @type {HTMLSelectElement} */ (event.target).value))}>
-			${field.choices.map((option) => html`<option key=${option} value=${String(option)}>${option}</option>`)}
+		<select class=${`field threshold__${typeof field.default === 'string' ? 'words' : 'number'}`} id=${id} value=${String(value)} onChange=${(/** @type {Event} */ event) => change(chosen(/** @type {HTMLSelectElement} */ (event.target).value))}>
+			${field.choices.map((option) => html`<option key=${option} value=${String(option)}>${CHOICES[option] ?? option}</option>`)}
 		</select>
 		<${Unit} unit=${field.unit} />
 	`;

@@ -30,7 +30,7 @@ export function ThresholdForm({ fields, shipped, present, values, change, idle =
 	return html`
 		${fields.filter(({ gate }) => gate).map(one)}
 		<details class="thresholds__rest">
-			<summary>Findings, noise, pitch and calibration</summary>
+			<summary>Exported 3D ball, findings, noise, pitch and calibration</summary>
 			${fields.filter(({ gate }) => !gate).map(one)}
 		</details>
 	`;

@@ -10,6 +10,7 @@ import { mend, toldFinding } from '../state/mends.js';
 import { REASONS } from '../state/reasons.js';
 import { isBlind } from '../state/verdicts.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
+import { PitchLink } from './findings.js';
 import { MendBox } from './mend_box.js';
 
 /** @import {GroupDocument, SolutionJson, VerdictJson, ViewJson} from '../api/types.js' */
@@ -109,6 +110,7 @@ export function VerdictCard({ group, solution, live }) {
 			<p class="verdict-card__over">${over}</p>
 			<h1>${title}</h1>
 			<p class="verdict-card__text">${text}${sure === null ? '' : html` <span class="verdict-card__sure">${Math.round(sure * 100)} % sure.</span>`}</p>
+			${solution?.findings.some(({ kind, sentence }) => kind === 'pitch_size' && sentence === text) ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
 			<${MendBox} group=${group} solution=${solution} />
 			${isBlind(group) ? html`<p><span class="pill" data-status="no-picture">no picture</span> <span data-grade="warn">No view of this group has a picture to look at.</span></p>` : null}
 			${verdict.state === 'unreviewed' && !verdict.note ? null : html`

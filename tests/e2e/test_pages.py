@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from time import sleep
 from zipfile import ZipFile
 
+import httpx
 import pytest
 from playwright.sync_api import Page, Route, expect
 
@@ -40,6 +42,7 @@ TOO_WIDE = """() => [document.documentElement, document.querySelector('.page__ma
 FOCUS_INSIDE = """() => document.activeElement === document.body
   || document.activeElement.closest('dialog[open], [popover]:popover-open') !== null"""
 MINUTE = 60_000
+JOB_IS_OVER = {"done", "failed", "cancelled"}
 
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])
@@ -375,3 +378,51 @@ class TestNoise:
         expect(button).to_have_attribute("aria-disabled", "false", timeout=MINUTE)
         page.wait_for_load_state("networkidle")
         assert asked == [1, 2]
+
+
+@pytest.fixture
+def wrong_pitch(server: str) -> Iterator[tuple[int, int]]:
+    """The match of the sample that is solved on too small a pitch: its place, its first group."""
+    path = f"{server}/api/v1/datasets/sample/pitches"
+    items = httpx.get(path).json()["items"]
+    which = max(range(len(items)), key=lambda place: items[place]["groups"])
+
+    def solve_on(length: float, width: float) -> None:
+        answer = httpx.get(path)
+        body = {"match": answer.json()["items"][which]["match"], "length": length, "width": width}
+        job = httpx.patch(path, json=body, headers={"If-Match": answer.headers["etag"]})
+        assert job.is_success, job.text
+        state = f"{server}/api/v1/jobs/{job.json()['id']}"
+        while httpx.get(state).json()["state"] not in JOB_IS_OVER:
+            sleep(0.1)
+
+    solve_on(103.0, 66.0)
+    yield which, items[which]["group_id"]
+    solve_on(105.0, 68.0)
+
+
+class TestPitchSizes:
+    def test_a_proposed_size_is_accepted_and_taken_back_by_keyboard(
+        self, open_page: OpenPage, wrong_pitch: tuple[int, int]
+    ) -> None:
+        which, group = wrong_pitch
+        page = open_page(f"/review/{group}")
+        page.get_by_role("link", name="Pitch sizes under Statistics").click()
+        page.wait_for_url("**/datasets/sample/statistics")
+        card = page.get_by_role("region", name="Pitch sizes")
+        heading = card.get_by_role("heading")
+        row = card.locator("tbody tr").nth(which)
+        expect(row.get_by_role("cell").first).to_have_text("103 × 66 m", timeout=MINUTE)
+        expect(heading).to_contain_text("1 proposed")
+        expect(card.get_by_role("columnheader").last).to_have_text("actions")
+        name = row.get_by_role("rowheader").inner_text().split("\n")[0]
+        use = row.get_by_role("button", name=f" for {name}").filter(has_text="Use ")
+        size = use.inner_text().split("\n")[0].removeprefix("Use ").split(" for ")[0]
+        use.press("Enter")
+        expect(row.get_by_role("cell").first).to_have_text(size, timeout=MINUTE)
+        expect(heading).to_be_focused()
+        back = row.get_by_role("button", name=f"Take back for {name}")
+        expect(back).to_have_attribute("aria-disabled", "false", timeout=MINUTE)
+        back.press("Enter")
+        expect(row.get_by_role("cell").first).to_have_text("103 × 66 m", timeout=MINUTE)
+        expect(heading).to_be_focused()

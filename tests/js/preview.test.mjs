@@ -2,6 +2,7 @@ import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
 import { cameraFromJson, project } from '../../static/geometry/camera.js';
+import { ballTold } from '../../static/geometry/estimator.js';
 import { previewBall } from '../../static/geometry/preview.js';
 import { close, goalCamera, mainCamera } from './scene.mjs';
 
@@ -56,5 +57,22 @@ describe('previewBall', () => {
 		const a = viewOf('a', mainCamera);
 		const group = { policy, views: [{ ...a, balls: [...a.balls, ...a.balls] }, viewOf('b', goalCamera)] };
 		assert.deepEqual(previewBall(group, solution).pairs, []);
+	});
+
+	it('is the mean of pairs and says so, where the policy exports the most likely point', () => {
+		const group = { policy, views: [viewOf('a', mainCamera), viewOf('b', goalCamera)] };
+		const exported = { ...solution, point: 'best', mean_ball: { point: [0, 0, 0] } };
+		const next = previewBall(group, exported);
+		assert.equal(next.point, 'mean');
+		assert.equal(next.mean_ball, null);
+		assert.deepEqual(ballTold(next, 'exported', exported, true), { name: 'mean of pairs', state: 'until saved' });
+		assert.deepEqual(ballTold(exported, 'exported', exported, false), { name: 'most likely point', state: 'exported' });
+	});
+
+	it('stays what is exported where that is the mean of pairs', () => {
+		const group = { policy, views: [viewOf('a', mainCamera), viewOf('b', goalCamera)] };
+		const next = previewBall(group, solution);
+		assert.deepEqual(ballTold(next, 'exported', solution, true), { name: 'mean of pairs', state: 'exported' });
+		assert.deepEqual(ballTold(next, 'other', solution, true), { name: 'mean of pairs', state: 'until saved' });
 	});
 });

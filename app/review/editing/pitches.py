@@ -81,9 +81,9 @@ class PitchState:
         sizes = f"{self.proposed.length:g} x {self.proposed.width:g} m"
         used = f"{self.pitch.length:g} x {self.pitch.width:g} m"
         return (
-            f"the lines of {found.frames} frames show a pitch of {sizes}, and it is solved as "
+            f"The lines of {found.frames} frames show a pitch of {sizes}, and it is solved as "
             f"{'several sizes' if self.mixed else used}; accept the size for the whole match "
-            "under Statistics"
+            "under Statistics."
         )
 
 
