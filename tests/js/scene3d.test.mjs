@@ -200,6 +200,12 @@ describe('sceneOf', () => {
 		assert.ok(Math.abs(dot(along, across)) < 1e-6);
 	});
 
+	it('shows the mean of pairs as such where the most likely point is exported', () => {
+		const [mean, best] = [[5, -10, -6], [5.2, -10, -6]].map((point) => ({ point, height_m: 6, sigma_m: 0.1, covariance: [] }));
+		const scene = sceneOf(group, { views: [solved], pairs: [], ball: best, mean_ball: mean, best_ball: best });
+		assert.deepEqual([scene.ball.point, scene.best.point], [mean.point, best.point]);
+	});
+
 	it('is a bare pitch while nothing is solved', () => {
 		const scene = sceneOf(group, null);
 		assert.deepEqual([scene.stands, scene.pairs, scene.ball, scene.best], [[], [], null, null]);

@@ -49,7 +49,7 @@ const DEVIATIONS = 2;
 /** @param {GroupDocument} group @param {SolutionJson | null} solution @returns {SceneValues} */
 export function sceneOf(group, solution) {
 	const best = solution?.best_ball ?? null;
-	const ball = solution?.ball ?? null;
+	const ball = solution?.mean_ball ?? solution?.ball ?? null;
 	return {
 		pitch: group.pitch,
 		stands: solution ? standsOf(group, solution) : [],
