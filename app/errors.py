@@ -15,6 +15,7 @@
       GeometryError
         DegenerateGeometryError
       StorageError          the disk or the database refuses
+        BusyError           another process writes for longer than one waits
         DamagedError        the database is not what was written
       OverloadedError       more work waits than is taken
     ShapeError(ValueError)  our own mistake, outside the tree
@@ -151,6 +152,10 @@ class DegenerateGeometryError(GeometryError):
 
 class StorageError(ReviewError):
     """The disk or the database refuses; what was acknowledged before is safe."""
+
+
+class BusyError(StorageError):
+    """Another process writes for longer than one waits."""
 
 
 EXAMINE = "Run touchline doctor: it says what is damaged, and how to restore a backup."

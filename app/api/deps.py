@@ -16,7 +16,7 @@ from fastapi import Depends, Header, Path, Query, Request
 from app.api.errors import PreconditionRequiredError
 from app.api.events import Events
 from app.config import Settings
-from app.errors import InputError
+from app.errors import BusyError, InputError
 from app.review.evaluating.prediction_reader import PredictionReader
 from app.review.exporting.folder import ExportFolder
 from app.review.jobs.evaluations import resume_evaluations
@@ -35,6 +35,7 @@ from app.store.session import Store
 
 LOCAL_USER = "local"
 """Who acts in single-user mode."""
+LEFTOVERS_AGAIN_S = 2.0
 MAX_ID = 2**63 - 1
 _STRONG_ETAG = re.compile(r'"[\x21\x23-\x7e]*"')
 
@@ -89,8 +90,21 @@ class Services:
         resume_evaluations(self.jobs, self.store)
         resume_practice(self.jobs, self.store, self.settings)
         self.jobs.start()
-        solve_leftovers(self.jobs, self.store, actor=LOCAL_USER)
+        if not self._solved_leftovers():
+            Thread(target=self._solve_leftovers_later, daemon=True).start()
         self.upkeep.start()
+
+    def _solved_leftovers(self) -> bool:
+        """Whether what an earlier run left is taken up; not while another process keeps writing."""
+        try:
+            solve_leftovers(self.jobs, self.store, actor=LOCAL_USER)
+        except BusyError:
+            return False
+        return True
+
+    def _solve_leftovers_later(self) -> None:
+        while not self.stopping.wait(LEFTOVERS_AGAIN_S) and not self._solved_leftovers():
+            pass
 
     def close(self) -> None:
         """Let the running work end, and close processes and database."""

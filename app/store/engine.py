@@ -12,7 +12,7 @@ from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.exc import DBAPIError, OperationalError
 
 from app.config import Settings
-from app.errors import EXAMINE, DamagedError, InputError, StorageError
+from app.errors import EXAMINE, BusyError, DamagedError, InputError, StorageError
 
 PRAGMAS: dict[str, tuple[str, object]] = {
     "journal_mode": ("WAL", "wal"),
@@ -129,7 +129,7 @@ def _storage_error(error: DBAPIError, settings: Settings) -> StorageError:
             hint="Free some space and send the change again.",
         )
     if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
-        return StorageError(
+        return BusyError(
             "another process is writing; the change was not saved", hint="Try again in a moment."
         )
     if _is_damage(error):

@@ -42,7 +42,10 @@ def bring_in(page: Page, file: Path, dataset: str) -> None:
 
 @pytest.fixture
 def blind(labels_file: Path, tmp_path: Path, server: str) -> Iterator[Path]:
-    """A zip with the labels of one match, without frames, and one file that cannot be read."""
+    """A zip with the labels of one match, without frames, and one file that cannot be read.
+
+    Ask for it before the page: what was imported goes after the page has closed.
+    """
     target = tmp_path / "blind.zip"
     with ZipFile(target, "w") as archive:
         archive.write(labels_file, "/".join(labels_file.parts[-4:]))
@@ -80,7 +83,7 @@ class TestImportOfNothing:
 
 class TestGroupsWithoutAPicture:
     def test_are_counted_after_the_import_and_accepted_only_with_a_note(
-        self, open_page: OpenPage, blind: Path
+        self, blind: Path, open_page: OpenPage
     ) -> None:
         page = open_page("/import")
         bring_in(page, blind, "blind")

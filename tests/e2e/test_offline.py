@@ -59,8 +59,9 @@ class TestOutbox:
         page.route("**/api/v1/views/**", lambda route: route.abort())
         screen.press("i", "Shift+ArrowLeft")
         expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
-        page.unroute("**/api/v1/views/**")
         page.reload()
+        expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
+        page.unroute("**/api/v1/views/**")
         screen.saved()
         assert screen.document()["views"][0]["balls"][0]["box"][0] == box[0] - 5
         leave_as_found(page, [], edited=chain[0])

@@ -131,6 +131,8 @@ def address(touchline, tree: Path, spoiled_tree: Path) -> Iterator[str]:
     try:
         line = server.stdout.readline()
         assert line.startswith("Touchline is at http://127.0.0.1:"), log.read_text()
+        # The address is told before what an earlier run left is taken up.
+        assert httpx.get(f"{line.split()[-1]}/readyz", timeout=60).status_code == 200
         yield line.split()[-1]
     finally:
         server.terminate()

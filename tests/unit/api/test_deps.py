@@ -9,11 +9,12 @@ from threading import Event
 
 import pytest
 
+from app.api import deps
 from app.api.deps import Services, get_actor, get_services, get_store, require_if_match
 from app.api.errors import PreconditionRequiredError
 from app.api.reply import get_asked
 from app.config import Settings
-from app.errors import InputError
+from app.errors import BusyError, InputError
 from app.review.jobs import upkeep
 
 
@@ -55,3 +56,30 @@ class TestDependencies:
     def test_none_that_every_request_asks_takes_a_thread(self) -> None:
         for given in (get_services, get_store, get_actor, require_if_match, get_asked):
             assert iscoroutinefunction(given), given.__name__
+
+
+class TestStart:
+    """A server that starts while an import of the command line keeps the write lock."""
+
+    def test_what_was_left_is_taken_up_once_the_other_has_written(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        answers = [BusyError("another process is writing"), BusyError("still"), None]
+        done = Event()
+
+        def leftovers(*_arguments: object, **_options: object) -> None:
+            answer = answers.pop(0)
+            if answer is not None:
+                raise answer
+            done.set()
+
+        monkeypatch.setattr(deps, "solve_leftovers", leftovers)
+        monkeypatch.setattr(deps, "LEFTOVERS_AGAIN_S", 0.01)
+        services = Services.open(Settings(home=tmp_path / "home"))
+        services.start()
+        try:
+            assert done.wait(20)
+        finally:
+            services.stopping.set()
+            services.close()
+        assert answers == []
