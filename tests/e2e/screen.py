@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from time import monotonic
 from typing import Any
 
 from playwright.sync_api import Page, Request, expect
+
+from tests.e2e.windows import TIMEOUT_MS
 
 Document = dict[str, Any]
 TWO_FRAMES = "() => new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))"
@@ -72,6 +76,14 @@ class Screen:
         # The first edit of a server may have to wait for its compiled solver.
         patient = expect(self.page.locator('.save[data-unsaved="0"]'))
         patient.to_contain_text("Saved", timeout=60_000)
+
+
+def until(page: Page, happens: Callable[[], Any]) -> None:
+    """Wait for what a page or its server says when asked; the browser takes a promise for a yes."""
+    end = monotonic() + TIMEOUT_MS / 1000
+    while not happens():
+        assert monotonic() < end, "it did not happen in time"
+        page.wait_for_timeout(50)
 
 
 def rows(page: Page) -> list[Document]:

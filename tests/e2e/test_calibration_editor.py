@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from app.soccer.pitch import MARKINGS
 from tests.e2e.film import FRAMES
-from tests.e2e.screen import passing, submitted
+from tests.e2e.screen import passing, submitted, until
 from tests.e2e.test_access import CUT_OFF, NESTED_SCROLLERS, SIZES, serious
 
 OpenPage = Callable[..., Page]
@@ -270,14 +270,7 @@ class TestStation:
         assert changed["lines"] == editor.lines != before
         editor.press("Control+z")
         editor.staged(0)
-        page.wait_for_function(
-            """async ([address, group, key, y, marking]) => {
-              const answer = await fetch(`${address}/api/v1/groups/${group}`);
-              const { views } = await answer.json();
-              return views.find((view) => view.key === key).lines[marking][0].y === y;
-            }""",
-            arg=[film, editor.group, editor.key, before[marking][0]["y"], marking],
-        )
+        until(page, lambda: editor.lines == before)
         editor.saved()
         page.get_by_role("button", name="Given camera").click()
         expect(page.get_by_role("button", name="Given camera")).to_have_attribute(

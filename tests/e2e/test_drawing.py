@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e.screen import Document, Screen, interior_point
+from tests.e2e.screen import Document, Screen, interior_point, until
 
 Review = Callable[..., Screen]
 
@@ -116,11 +116,7 @@ class TestObjects:
         assert first_view(screen)["balls"] != before["balls"]
         screen.press("u")
         expect(screen.page.locator(".save")).to_have_attribute("data-unsaved", "0")
-        screen.page.wait_for_function(
-            "async ([id, x]) => (await (await fetch(`/api/v1/groups/${id}`)).json())"
-            ".views[0].balls[0].box[0] === x",
-            arg=[screen.group, before["balls"][0]["box"][0]],
-        )
+        until(screen.page, lambda: first_view(screen)["balls"] == before["balls"])
 
     def test_undo_goes_across_views_and_survives_a_reload(self, review: Review) -> None:
         screen = review(1)

@@ -16,7 +16,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.solving.jaccard import project_markings
 from tests.e2e.conftest import OpenPage
-from tests.e2e.screen import Screen
+from tests.e2e.screen import Screen, until
 from tests.e2e.service import run_touchline, serving
 from tests.e2e.test_access import serious, serious_in_both
 
@@ -285,8 +285,6 @@ class TestPractice:
         assert serious_in_both(page) == []
 
 
-CHANGED = """async ([group, etag]) =>
-    (await (await fetch(`/api/v1/groups/${group}`)).json()).etag !== etag"""
 MOST_KEYS = 5
 """From the cause that is seen to the verdict."""
 
@@ -351,7 +349,7 @@ class TestFiveKeys:
             screen.press("Escape")
             expect(chip).to_have_count(0)
             keys += 3
-        page.wait_for_function(CHANGED, arg=[screen.group, before])
+        until(page, lambda: screen.document()["etag"] != before)
         screen.saved()
         return keys
 

@@ -7,12 +7,15 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Locator, Page, Request, expect
 
-from tests.e2e.screen import withdraw_verdict
+from tests.e2e.screen import until, withdraw_verdict
 from tests.e2e.season import SEASON
 from tests.e2e.test_access import serious
 
 OpenPage = Callable[..., Page]
 ROW_HEIGHT = 72
+CONNECTED = """async () => (await import(
+  document.querySelector('script[src$="main.js"]').src.replace('main.js', 'api/events.js')
+)).connected.value"""
 
 
 def opened(open_page: OpenPage, query: str = "") -> Page:
@@ -289,11 +292,7 @@ class TestFollowing:
         page = opened(open_page, "number<=2")
         other = opened(open_page, "number<=2")
         # The stream must be open before the other window acts.
-        page.wait_for_function(
-            "async () => (await import("
-            "document.querySelector('script[src$=\"main.js\"]').src.replace('main.js', 'api/events.js')"
-            ")).connected.value"
-        )
+        until(page, lambda: page.evaluate(CONNECTED))
         other.keyboard.press("b")
         other.get_by_label("Defer").check()
         other.get_by_role("button", name="Defer 2 groups").click()
