@@ -2,14 +2,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import replace
 from typing import Any
 
 import pytest
 from sqlalchemy import text
 
-from app.config import Settings
 from app.errors import (
     ConflictError,
     NotFoundError,
@@ -224,12 +223,10 @@ class TestUndo:
 
     def test_survives_a_restart(self, store, state) -> None:
         after = change(store, state, SetBall("7.png", BALL))
-        store.close()
-        other = Store.open(Settings(home=store.settings.home))
-        back = undo(other, state.id, if_match=after.etag, actor="ben")
+        with closing(Store.open(store.settings)) as other:
+            back = undo(other, state.id, if_match=after.etag, actor="ben")
         assert back.group == state.group
         assert (back.can_undo, back.can_redo) == (False, True)
-        other.close()
 
     def test_without_an_edit_there_is_nothing_to_undo(self, store, state) -> None:
         with pytest.raises(ConflictError, match="nothing to undo"):
