@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 from anyio.to_thread import current_default_thread_limiter
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
 
 from app.api.deps import LOCAL_USER, Services
 from app.api.errors import install_handlers
@@ -50,6 +50,7 @@ from app.api.security.lanes import THREADS, Doors, Lanes
 from app.api.security.origin import KnownHosts, SameOrigin
 from app.api.security.requests import HeadAsGet, OneLength, OneRange
 from app.api.site import STATIC, Site
+from app.api.unknown_names import refuse_unknown_parameters
 from app.config import Settings
 from app.datasets.manifest import software_version
 from app.review.jobs.jobs import Pool
@@ -117,7 +118,9 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None =
     # Before the API: nobody asks for as much at once as somebody who opens the first page.
     install_pages(app, site)
     for router in ROUTERS:
-        app.include_router(router.router, prefix=PREFIX)
+        app.include_router(
+            router.router, prefix=PREFIX, dependencies=[Depends(refuse_unknown_parameters)]
+        )
     describe(app)
     _add_middleware(app, settings, site)
     return app

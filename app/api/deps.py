@@ -172,6 +172,7 @@ DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the
 DatasetQuery = Annotated[
     str, Query(alias="dataset", max_length=200, description="Name or id of the dataset.")
 ]
+DryRun = Annotated[bool, Query(description="Only report what would happen.")]
 QueryText = Annotated[
     str,
     Query(

@@ -13,6 +13,7 @@ from starlette.exceptions import HTTPException
 
 from app.api.problem import TITLES, make_problem, problem_response
 from app.api.schemas.problem import FieldProblem
+from app.api.unknown_names import UNKNOWN, sentence_about
 from app.errors import (
     ConflictError,
     DamagedError,
@@ -118,7 +119,7 @@ async def _validation_error(request: Request, error: Exception) -> Response:
     if any(detail["loc"][0] == "path" for detail in details):
         return problem_response(make_problem(404, "there is nothing with such an id"))
     errors = [
-        FieldProblem(pointer=_pointer(detail["loc"]), detail=_sentence(detail["msg"]))
+        FieldProblem(pointer=_pointer(detail["loc"]), detail=_sentence(request, detail))
         for detail in details[:20]
     ]
     first = errors[0]
@@ -127,9 +128,11 @@ async def _validation_error(request: Request, error: Exception) -> Response:
     return problem_response(problem)
 
 
-def _sentence(message: str) -> str:
+def _sentence(request: Request, detail: dict[str, Any]) -> str:
     """Pydantic's message without the prefix that it gives to our own validators."""
-    text = message.removeprefix("Value error, ")
+    if detail["type"] == UNKNOWN:
+        return sentence_about(request, detail["loc"])
+    text = str(detail["msg"]).removeprefix("Value error, ")
     return text[:1].lower() + text[1:]
 
 

@@ -6,7 +6,9 @@ from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
+from pydantic import BaseModel
 
+from app.api.schemas.event import EVENTS
 from app.api.schemas.problem import Problem
 
 DESCRIPTION = """
@@ -27,9 +29,13 @@ TAGS = {
     "views": "One image of an instant: its lines, its ball, its frame.",
     "stations": "Static cameras, whose lines many views share.",
     "findings": "What a person should look at.",
+    "insight": "What would mend a group, and which points move its ball most.",
     "verdicts": "Many groups judged at once.",
     "queue": "Saved queries, and who has reviewed how much.",
     "yield": "What a policy lets through, and what another one would.",
+    "imports": "Files and folders that become datasets.",
+    "predictions": "What detectors say, beside what people said.",
+    "evaluations": "Detectors measured on what was accepted.",
     "versions": "Datasets as they were frozen.",
     "exports": "Datasets as files.",
     "policies": "The thresholds that judge a dataset.",
@@ -39,6 +45,9 @@ TAGS = {
     "pitch": "Names and shapes of the 26 markings.",
     "health": "For whoever runs the service.",
 }
+
+
+REFERENCE = "#/components/schemas/{model}"
 
 
 def describe(app: FastAPI) -> None:
@@ -61,24 +70,32 @@ def _document(app: FastAPI) -> dict[str, Any]:
         routes=app.routes,
         tags=[{"name": name, "description": text} for name, text in TAGS.items()],
     )
-    _add_keys(document)
+    _mend_operations(document)
     schemas = document["components"]["schemas"]
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
-    problem = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
-    schemas.update(problem.pop("$defs", {}))
-    schemas["Problem"] = problem
+    models: tuple[type[BaseModel], ...] = (Problem, *EVENTS.values())
+    for model in models:
+        described = model.model_json_schema(ref_template=REFERENCE)
+        schemas.update(described.pop("$defs", {}))
+        schemas[model.__name__] = described
     return document
 
 
-def _add_keys(document: dict[str, Any]) -> None:
-    """Say of every operation that changes something that it takes an Idempotency-Key."""
+def _mend_operations(document: dict[str, Any]) -> None:
+    """Say what the framework cannot know, and not what belongs to a newer OpenAPI."""
     for operations in document["paths"].values():
         for method, operation in operations.items():
             parameters = operation.setdefault("parameters", [])
+            for parameter in parameters:
+                # Asked for by our own code, which answers 428 where it is missing.
+                if parameter["name"] == "If-Match":
+                    parameter |= {"required": True, "schema": {"type": "string"}}
             named = {parameter["name"] for parameter in parameters}
             if method != "get" and KEY_PARAMETER["name"] not in named:
                 parameters.append(KEY_PARAMETER)
+            for answer in operation["responses"].values():
+                answer.get("content", {}).get("text/event-stream", {}).pop("itemSchema", None)
 
 
 KEY_PARAMETER: dict[str, Any] = {

@@ -48,6 +48,8 @@ class _Linear:
         normal = (self.normal + np.diag(prior))[:width, :width]
         pull = (self.pull + prior * offset)[:width]
         scale = np.sqrt(np.diag(normal))
+        if not scale.all():
+            raise np.linalg.LinAlgError("the lines say nothing of one of the unknowns")
         solved = np.linalg.solve(normal / np.outer(scale, scale), pull / scale)
         step: FloatArray = solved / scale
         return step

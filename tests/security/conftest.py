@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,16 @@ class Guarded:
         assert answer.status < 300, (target, answer.body)
         found = json.loads(answer.body)
         return self.ended(found["id"]) if answer.status == 202 else found
+
+    @cached_property
+    def document(self) -> Any:
+        """What the server says of itself."""
+        return self.json("GET", "/openapi.json")
+
+    def queries(self, path: str, method: str) -> list[Any]:
+        """The query parameters of a route of the API."""
+        operation = self.document["paths"].get(path, {}).get(method.lower(), {})
+        return [item for item in operation.get("parameters", []) if item["in"] == "query"]
 
     def ended(self, job: int) -> Any:
         """A job once it is over."""

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from app.api.deps import Actor, AppStore, DatasetPath, Id
+from app.api.deps import Actor, AppStore, DatasetPath, DryRun, Id
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.bulk import (
@@ -20,8 +20,6 @@ from app.review.datasets.dataset import dataset_id
 from app.review.verdicts import bulk, bulk_redo, bulk_undo
 
 router = APIRouter(tags=["verdicts"])
-
-DryRun = Annotated[bool, Query(description="Only report what would happen.")]
 
 
 @router.post(

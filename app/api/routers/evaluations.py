@@ -47,21 +47,20 @@ Bound = Annotated[float | None, Query(ge=-1e9, le=1e9, allow_inf_nan=False)]
 JSON_FILE, CSV_FILE, PNG_FILE = "application/json", "text/csv", "image/png"
 
 
-def _files(description: str, document: str, *others: str) -> Responses:
+def _files(description: str, document: type[BaseModel], *others: str) -> Responses:
     """What a route answers that gives a document as JSON, and as files of other types."""
-    schema: dict[str, object] = {"$ref": f"#/components/schemas/{document}"}
-    content: dict[str, object] = {JSON_FILE: {"schema": schema}}
+    content: dict[str, object] = {}
     for kind in others:
         text = {"type": "string"}
         content[kind] = {"schema": text if kind == CSV_FILE else {**text, "format": "binary"}}
-    return {200: {"description": description, "content": content}}
+    return {200: {"description": description, "model": document, "content": content}}
 
 
 FIGURE_FILES = _files(
-    "The figure: its values as JSON or CSV, or drawn as PNG.", "FigureDocument", CSV_FILE, PNG_FILE
+    "The figure: its values as JSON or CSV, or drawn as PNG.", FigureDocument, CSV_FILE, PNG_FILE
 )
 TABLE_FILES = _files(
-    "The table: as JSON, or as CSV with intervals and denominators.", "TableDocument", CSV_FILE
+    "The table: as JSON, or as CSV with intervals and denominators.", TableDocument, CSV_FILE
 )
 
 

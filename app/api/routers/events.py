@@ -11,6 +11,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from app.api.deps import AppServices, Services, get_services
 from app.api.events import Feed, hello
 from app.api.problem import Responses, responses
+from app.api.schemas.event import EVENTS
 from app.api.security.requests import is_head
 from app.review.datasets.dataset import dataset_id
 
@@ -18,8 +19,16 @@ router = APIRouter(prefix="/events", tags=["events"])
 
 STREAM: Responses = {
     200: {
-        "description": "Server-sent events `group`, `job` and `dataset`, without end.",
-        "content": {"text/event-stream": {"schema": {"type": "string"}}},
+        "description": "Server-sent events without end; `x-events` says what the data of each is.",
+        "content": {
+            "text/event-stream": {
+                "schema": {"type": "string"},
+                "x-events": {
+                    kind: {"$ref": f"#/components/schemas/{model.__name__}"}
+                    for kind, model in EVENTS.items()
+                },
+            }
+        },
     }
 }
 
@@ -69,7 +78,7 @@ def under_way(
 
 @router.get(
     "",
-    operation_id="listen",
+    operation_id="listenToEvents",
     response_class=EventSourceResponse,
     responses={**responses(404), **STREAM},
 )

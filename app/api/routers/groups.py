@@ -187,7 +187,7 @@ def preview_group(group: Id, changes: PreviewRequest, store: AppStore) -> Previe
 
 @router.post(
     "/{group}/undo",
-    operation_id="undo",
+    operation_id="undoGroup",
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
@@ -201,7 +201,7 @@ def undo(
 
 @router.post(
     "/{group}/redo",
-    operation_id="redo",
+    operation_id="redoGroup",
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )

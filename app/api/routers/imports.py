@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from app.api.deps import Actor, AppServices
+from app.api.deps import Actor, AppServices, DryRun
 from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import responses
 from app.api.schemas.imports import FolderDocument, ImportBody
@@ -43,6 +43,7 @@ def start_import(
     services: AppServices,
     actor: Actor,
     response: Response,
+    dry_run: DryRun = False,
 ) -> JobDocument:
     """Read files into a dataset, which is made when there is none of that name.
 
@@ -53,7 +54,7 @@ def start_import(
         services.jobs,
         services.store,
         services.settings,
-        request.value(),
+        request.value(dry_run=dry_run),
         actor=actor,
     )
     return accepted(job, response)

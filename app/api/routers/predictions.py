@@ -7,7 +7,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, IfMatch
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
 from app.api.jobs import ACCEPTED, accepted
 from app.api.problem import responses
 from app.api.reply import AskedUnder
@@ -102,6 +102,7 @@ def accept_predictions(
     services: AppServices,
     actor: Actor,
     response: Response,
+    dry_run: DryRun = False,
 ) -> AcceptOutcome | Response:
     """Make annotations of predictions, as edits in the log that can be undone.
 
@@ -109,7 +110,7 @@ def accept_predictions(
     makes a job (202), whose result has `changed`, `groups` and `refused`.
     """
     store, value = services.store, request.value()
-    if request.dry_run:
+    if dry_run or request.dry_run:
         return AcceptOutcome.planned(plan_accept(store, request.dataset, value))
     if request.views is not None:
         return AcceptOutcome.done(accept(store, request.dataset, value, actor=actor))

@@ -32,7 +32,7 @@ def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
 
 @router.post(
     "/datasets/{dataset}/saved-views",
-    operation_id="saveView",
+    operation_id="createSavedView",
     response_model=SavedViewDocument,
     status_code=201,
     responses={

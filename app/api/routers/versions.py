@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id
+from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, DryRun, Id
 from app.api.jobs import ACCEPTED, job_answer
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
@@ -53,13 +53,14 @@ def freeze_version(
     services: AppServices,
     actor: Actor,
     asked: AskedUnder,
+    dry_run: DryRun = False,
 ) -> Response:
     """Freeze the dataset as it is into a version that never changes.
 
     409 when the name is taken or groups that might enter are not solved; 400 when none enters.
     The job's result names the version.
     """
-    if request.dry_run:
+    if dry_run or request.dry_run:
         plan = plan_freeze(services.store, dataset, request.value())
         return document(FreezePlanDocument.model_validate(plan))
     reply = Reply(asked, job_answer)

@@ -10,7 +10,6 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
-    JsonValue,
     StrictBool,
     WithJsonSchema,
     model_validator,
@@ -95,49 +94,41 @@ def points_of(lines: dict[str, list[Point] | None]) -> dict[str, tuple[ImagePoin
     }
 
 
-_NO_PLACE: dict[str, JsonValue] = {"type": "null"}
-_SEEN: dict[str, JsonValue] = {"const": False}
+def _as_union(schema: dict[str, Any]) -> None:
+    """Describe the ball edit as the three things that it may be, each complete in itself."""
+    said = schema.pop("properties")
+    del schema["type"], schema["additionalProperties"]
+    box, point = (said[name].pop("anyOf")[0] for name in ("box", "point"))
+    nowhere = {"type": "null"}
+
+    def one(title: str, place: str, **own: Any) -> dict[str, Any]:
+        own = {"box": nowhere, "point": nowhere, "out_of_view": {"const": False}, **own}
+        properties = {name: said[name] | own.get(name, {}) for name in said}
+        properties[place].pop("default", None)
+        return {
+            "title": title,
+            "type": "object",
+            "properties": properties,
+            "required": [place],
+            "additionalProperties": False,
+        }
+
+    schema["examples"] = [
+        {"box": [801.5, 322.0, 14.0, 14.5]},
+        {"point": [808.5, 329.0]},
+        {"out_of_view": True},
+    ]
+    schema["oneOf"] = [
+        one("BallByBox", "box", box=box),
+        one("BallByPoint", "point", point=point),
+        one("BallOutOfView", "out_of_view", out_of_view={"const": True}),
+    ]
 
 
 class BallEdit(BaseModel):
     """The ball of a view: its box, or its centre alone, or that it is out of view."""
 
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {"box": [801.5, 322.0, 14.0, 14.5]},
-                {"point": [808.5, 329.0]},
-                {"out_of_view": True},
-            ],
-            "oneOf": [
-                {
-                    "required": ["box"],
-                    "properties": {
-                        "box": {"type": "array"},
-                        "point": _NO_PLACE,
-                        "out_of_view": _SEEN,
-                    },
-                },
-                {
-                    "required": ["point"],
-                    "properties": {
-                        "box": _NO_PLACE,
-                        "point": {"type": "array"},
-                        "out_of_view": _SEEN,
-                    },
-                },
-                {
-                    "required": ["out_of_view"],
-                    "properties": {
-                        "box": _NO_PLACE,
-                        "point": _NO_PLACE,
-                        "out_of_view": {"const": True},
-                    },
-                },
-            ],
-        },
-    )
+    model_config = ConfigDict(extra="forbid", json_schema_extra=_as_union)
 
     box: BoxNumbers | None = None
     point: PointNumbers | None = None

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pydantic import BaseModel, Field
 
+from app.api.schemas.job import JobDocument
+
 
 class GroupEvent(BaseModel):
     """A group has changed; whoever shows it under another ETag reads it again."""
@@ -23,3 +25,11 @@ class DatasetEvent(BaseModel):
     dataset: str | None = Field(description="Name of the dataset; null when it is deleted.")
     kind: str
     actor: str | None
+
+
+EVENTS: dict[str, type[BaseModel]] = {
+    "group": GroupEvent,
+    "dataset": DatasetEvent,
+    "job": JobDocument,
+}
+"""What the data of each kind of event is."""

@@ -79,10 +79,10 @@ class ImportBody(BaseModel):
     source: ImportPlace
     options: ImportOptions = ImportOptions()
     dry_run: StrictBool = Field(
-        default=False, description="Report what an import would do, and save nothing."
+        default=False, description="The same as the parameter: report, and save nothing."
     )
 
-    def value(self) -> ImportRequest:
+    def value(self, *, dry_run: bool = False) -> ImportRequest:
         """The import as the review floor takes it; options that were not given are left out."""
         options: dict[str, Any] = self.options.model_dump(
             mode="json", exclude_defaults=True, exclude={"lines"}
@@ -94,7 +94,7 @@ class ImportBody(BaseModel):
             self.source.values(),
             None if lines is None else lines.values(),
             options,
-            self.dry_run,
+            dry_run or self.dry_run,
         )
 
 

@@ -1,0 +1,72 @@
+"""Names that nobody knows: a parameter or field that would be ignored is refused, with the nearest one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from difflib import get_close_matches
+from functools import lru_cache
+from typing import Any
+
+from fastapi import Request
+from fastapi.dependencies.utils import get_dependant, get_flat_params
+from fastapi.exceptions import RequestValidationError
+from fastapi.routing import APIRoute
+from pydantic import TypeAdapter
+
+UNKNOWN = "extra_forbidden"
+"""What the framework calls a field that a body does not have."""
+
+
+async def refuse_unknown_parameters(request: Request) -> None:
+    """Refuse a query parameter that its route does not read.
+
+    Raises:
+        RequestValidationError: There is one; a misspelt ``dry_run`` must not become a deed.
+    """
+    known = _parameters(request.scope["route"])
+    unknown = [name for name in request.query_params if name not in known]
+    if unknown:
+        raise RequestValidationError(
+            [{"type": UNKNOWN, "loc": ("query", name), "msg": ""} for name in unknown]
+        )
+
+
+def sentence_about(request: Request, location: tuple[int | str, ...]) -> str:
+    """What to say of a name that nobody knows, at its place in the request."""
+    place, name = location[0], str(location[-1])
+    route = request.scope["route"]
+    known = _parameters(route) if place == "query" else _fields(route)
+    what = "parameter" if place == "query" else "field"
+    nearest = get_close_matches(name, known, n=1)
+    meant = f"; did you mean {nearest[0]}?" if nearest else ""
+    return f"there is no such {what}{meant}"
+
+
+def _parameters(route: APIRoute) -> frozenset[str]:
+    return _read_by(route.path_format, route.endpoint)
+
+
+@lru_cache(maxsize=256)
+def _read_by(path: str, endpoint: Callable[..., Any]) -> frozenset[str]:
+    dependant = get_dependant(path=path, call=endpoint)
+    return frozenset(parameter.alias for parameter in get_flat_params(dependant))
+
+
+def _fields(route: APIRoute) -> frozenset[str]:
+    """Every name that stands anywhere in the body of a route."""
+    if route.body_field is None:
+        return frozenset()
+    body: Any = route.body_field.field_info.annotation
+    return frozenset(_names(TypeAdapter(body).json_schema()))
+
+
+def _names(schema: Any) -> Iterator[str]:
+    if isinstance(schema, dict):
+        properties = schema.get("properties")
+        if isinstance(properties, dict):
+            yield from properties
+        for part in schema.values():
+            yield from _names(part)
+    elif isinstance(schema, list):
+        for part in schema:
+            yield from _names(part)

@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import pytest
+
+API = "/api/v1"
+
+
+class TestParameters:
+    def test_one_that_nobody_reads_is_refused_with_the_nearest_name(self, api) -> None:
+        answer = api.get(f"{API}/groups", params={"datset": "broadcast"})
+        assert answer.status_code == 422
+        assert answer.json()["errors"] == [
+            {
+                "pointer": "/datset",
+                "detail": "there is no such parameter; did you mean dataset?",
+            }
+        ]
+
+    def test_one_that_resembles_nothing_is_refused_too(self, api) -> None:
+        answer = api.get(f"{API}/jobs", params={"zzz": "1"})
+        assert answer.json()["detail"] == "/zzz: there is no such parameter"
+
+    def test_a_misspelt_dry_run_does_nothing(self, api, app) -> None:
+        body = {"name": "v1", "groups": "passing"}
+        address = f"{API}/datasets/broadcast/versions"
+        answer = api.post(address, params={"dryrun": True}, json=body)
+        assert (answer.status_code, "dry_run" in answer.json()["detail"]) == (422, True)
+        assert app.state.services.jobs.find() == []
+
+    def test_those_of_what_a_route_depends_on_are_known(self, api) -> None:
+        assert api.get(f"{API}/events", params={"dataset": "nowhere"}).status_code == 404
+
+
+class TestFields:
+    @pytest.mark.parametrize(
+        ("body", "pointer", "nearest"),
+        [
+            ({"nam": "v1"}, "/nam", "name"),
+            ({"name": "v1", "split": {"kind": "given", "sed": 1}}, "/split/sed", "seed"),
+        ],
+    )
+    def test_an_unknown_one_is_refused_with_the_nearest_name(
+        self, api, body, pointer, nearest
+    ) -> None:
+        answer = api.post(f"{API}/datasets/broadcast/versions", json=body)
+        assert answer.status_code == 422
+        told = {one["pointer"]: one["detail"] for one in answer.json()["errors"]}
+        assert told[pointer] == f"there is no such field; did you mean {nearest}?"
+
+
+class TestDryRun:
+    def test_is_a_parameter_wherever_there_is_one(self, app) -> None:
+        document = app.openapi()
+        for path, operations in document["paths"].items():
+            for method, operation in operations.items():
+                schema = operation.get("requestBody", {}).get("content", {})
+                reference = schema.get("application/json", {}).get("schema", {}).get("$ref", "")
+                body = document["components"]["schemas"].get(reference.rpartition("/")[2], {})
+                if "dry_run" in body.get("properties", {}):
+                    names = {one["name"] for one in operation["parameters"]}
+                    assert "dry_run" in names, f"{method} {path}"
+
+    def test_a_freeze_that_is_only_tried_freezes_nothing(self, api, app) -> None:
+        body = {"name": "v1", "groups": "passing"}
+        address = f"{API}/datasets/broadcast/versions"
+        answer = api.post(address, params={"dry_run": True}, json=body)
+        assert (answer.status_code, answer.json()["groups"]) == (200, 3)
+        assert app.state.services.jobs.find() == []
