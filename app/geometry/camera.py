@@ -11,14 +11,8 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, require_shape
-from app.geometry.distortion import (
-    COEFFICIENTS,
-    distort,
-    distort_jacobian,
-    distort_point,
-    fold_radius,
-    undistort,
-)
+from app.geometry.distortion import COEFFICIENTS
+from app.geometry.lens import BROWN_CONRADY, LENSES, LensModel
 from app.geometry.rotation import pan_tilt_roll_from_rotation
 
 MIN_DEPTH = 1e-3
@@ -39,7 +33,9 @@ class Camera:
         focal_length: alpha_x and alpha_y, pixels.
         principal_point: x0 and y0, pixels.
         skew: s, pixels.
-        distortion: OpenCV's k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, shape (12,).
+        distortion: Coefficients of the lens; OpenCV's k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4, shape
+            (12,), unless ``lens`` says otherwise.
+        lens: Name of the distortion model (``geometry.lens``).
     """
 
     rotation: FloatArray
@@ -48,9 +44,16 @@ class Camera:
     principal_point: tuple[float, float]
     skew: float = 0.0
     distortion: FloatArray = field(default_factory=_no_distortion)
+    lens: str = BROWN_CONRADY
 
     def __post_init__(self) -> None:
-        for name, shape in (("rotation", (3, 3)), ("position", (3,)), ("distortion", (12,))):
+        if self.lens not in LENSES:
+            raise DegenerateGeometryError(
+                f'"{self.lens}" is no lens that is known',
+                hint=f"Lenses are {', '.join(LENSES)}.",
+            )
+        shapes = (("rotation", (3, 3)), ("position", (3,)), ("distortion", (self.model.count,)))
+        for name, shape in shapes:
             array = require_shape(getattr(self, name), shape, name).copy()
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -60,23 +63,38 @@ class Camera:
             raise DegenerateGeometryError("a camera parameter is not a finite number")
         if min(self.focal_length) <= 0:
             raise DegenerateGeometryError("the focal length of a camera must be positive")
+        self.model.check(self.distortion.tolist())
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Camera) and np.array_equal(self.parameters, other.parameters)
+        return (
+            isinstance(other, Camera)
+            and self.lens == other.lens
+            and np.array_equal(self.parameters, other.parameters)
+        )
 
     def __hash__(self) -> int:
         return hash(self.parameters.tobytes())
 
     @cached_property
     def parameters(self) -> FloatArray:
-        """Every number of the camera, in a fixed order, shape (29,)."""
+        """Every number of the camera, in a fixed order, shape (29,) but for another lens."""
         numbers = [*self.focal_length, *self.principal_point, self.skew]
         return np.concatenate([self.rotation.ravel(), self.position, numbers, self.distortion])
+
+    @property
+    def model(self) -> LensModel:
+        """How the lens bends rays."""
+        return LENSES[self.lens]
+
+    @cached_property
+    def is_wide(self) -> bool:
+        """Whether the lens is one for strong wide angle, which is no pinhole even at its best."""
+        return self.lens != BROWN_CONRADY
 
     @cached_property
     def distorts(self) -> bool:
         """Whether the lens distorts at all."""
-        return bool(self.distortion.any())
+        return self.is_wide or bool(self.distortion.any())
 
     @cached_property
     def K(self) -> FloatArray:
@@ -108,7 +126,8 @@ class Camera:
         Args:
             points: Pitch frame, metres, shape (N, 3).
             folded: Also give pixels to points beyond the radius where distortion folds the
-                picture. No lens shows them; the public evaluator counts them.
+                picture. No lens shows them; the public evaluator counts them. Lenses that it
+                does not know have none.
 
         Returns:
             Shape (N, 2); NaN where the point lies less than a millimetre in front of the camera
@@ -123,8 +142,9 @@ class Camera:
         ideal = in_camera[:, :2] / safe[:, None]
         if self.distorts:
             if not folded:
-                visible &= np.hypot(ideal[:, 0], ideal[:, 1]) <= fold_radius(self.distortion)
-            ideal = distort(np.where(visible[:, None], ideal, 0.0), self.distortion)
+                edge = self.model.fold_radius(self.distortion)
+                visible &= np.hypot(ideal[:, 0], ideal[:, 1]) <= edge
+            ideal = self.model.distort(np.where(visible[:, None], ideal, 0.0), self.distortion)
         pixels = self._unit_to_pixel(ideal)
         pixels[~visible] = np.nan
         return pixels
@@ -136,9 +156,9 @@ class Camera:
             return np.nan, np.nan
         x, y = x / depth, y / depth
         if self.distorts:
-            if not (folded or np.hypot(x, y) <= fold_radius(self.distortion)):
+            if not (folded or np.hypot(x, y) <= self.model.fold_radius(self.distortion)):
                 return np.nan, np.nan
-            x, y = distort_point(x, y, self.distortion.tolist())
+            x, y = self.model.distort_point(x, y, self.distortion.tolist())
         (ax, ay), (x0, y0) = self.focal_length, self.principal_point
         return ax * x + self.skew * y + x0, ay * y + y0
 
@@ -151,7 +171,8 @@ class Camera:
         x, y, z = self.rotation @ (require_shape(point, (3,), "point") - self.position)
         ideal = np.array([[1.0, 0.0, -x / z], [0.0, 1.0, -y / z]]) / z @ self.rotation
         if self.distorts:
-            ideal = distort_jacobian(np.array([[x / z, y / z]]), self.distortion)[0] @ ideal
+            place = np.array([[x / z, y / z]])
+            ideal = self.model.jacobian(place, self.distortion)[0] @ ideal
         slope: FloatArray = self.K[:2, :2] @ ideal
         return slope
 
@@ -162,12 +183,28 @@ class Camera:
             return pixels.copy()
         return self._unit_to_pixel(self.pixel_to_ideal(pixels))
 
+    def undistort_jacobian(self, pixel: FloatArray) -> FloatArray:
+        """Derivative of ``undistort`` by the pixel: what noise there becomes here, shape (2, 2).
+
+        Args:
+            pixel: As the image shows it, shape (2,); NaN comes back where it has no ray.
+        """
+        if not self.distorts:
+            return np.eye(2)
+        ideal = self.pixel_to_ideal(require_shape(pixel, (2,), "pixel")[None])
+        if np.isnan(ideal).any():
+            return np.full((2, 2), np.nan)
+        K = self.K[:2, :2]
+        bent = self.model.jacobian(ideal, self.distortion)[0]
+        slope: FloatArray = K @ np.linalg.inv(bent) @ np.linalg.inv(K)
+        return slope
+
     def pixel_to_ideal(self, pixels: FloatArray) -> FloatArray:
         """Ideal normalised coordinates (K^-1 and undistortion), both shape (N, 2)."""
         pixels = require_shape(pixels, (None, 2), "pixels")
         y = (pixels[:, 1] - self.principal_point[1]) / self.focal_length[1]
         x = (pixels[:, 0] - self.principal_point[0] - self.skew * y) / self.focal_length[0]
-        return undistort(np.column_stack([x, y]), self.distortion)
+        return self.model.undistort(np.column_stack([x, y]), self.distortion)
 
     def rays(self, pixels: FloatArray) -> FloatArray:
         """Directions (not of unit length: camera z is 1) in the pitch frame, shape (N, 3)."""

@@ -7,7 +7,6 @@ import numpy as np
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, cross, require_shape
 from app.geometry.camera import Camera
-from app.geometry.distortion import distort
 
 _OUTLINE_POINTS = 64
 _ANGLES = np.linspace(0, 2 * np.pi, _OUTLINE_POINTS, endpoint=False)[:, None]
@@ -23,17 +22,23 @@ def position_from_diameter(
     Args:
         camera: The camera.
         center: Pixels as the image shows them, shape (2,).
-        diameter_px: Vertical extent, pixels.
+        diameter_px: Vertical extent, pixels; through a wide lens the mean of width and height.
         diameter_m: True diameter, metres.
 
     Raises:
         DegenerateGeometryError: The diameter is not positive.
 
-    Source: SoccerNet-v3D (arXiv 2504.10106), 3D ball localisation from its diameter.
+    Source: SoccerNet-v3D (arXiv 2504.10106), 3D ball localisation from its diameter; through a
+        wide lens ``apparent_scale``.
     """
     center = require_shape(center, (2,), "center")
     if not diameter_px > 0:
         raise DegenerateGeometryError("a ball's diameter must be positive")
+    if camera.is_wide:
+        ideal = camera.pixel_to_ideal(center[None])[0]
+        ray = camera.rotation.T @ np.append(ideal, 1.0)
+        distance = diameter_m * apparent_scale(camera, ideal) / diameter_px
+        return np.asarray(camera.position + distance / np.linalg.norm(ray) * ray)
     half = np.array([0.0, diameter_px / 2])
     ideal = camera.pixel_to_ideal(np.vstack([center, center + half, center - half]))
     apart = np.linalg.norm(ideal[1] - ideal[2])
@@ -62,22 +67,49 @@ def optimal_diameter(
     Raises:
         DegenerateGeometryError: The point lies behind the camera.
 
-    Source: closed form of the box optimisation of SoccerNet-v3D (arXiv 2504.10106).
+    Source: closed form of the box optimisation of SoccerNet-v3D (arXiv 2504.10106); through a
+        wide lens ``apparent_scale``.
     """
     center = require_shape(center, (2,), "center")
     ideal = camera.pixel_to_ideal(center[None])[0]
     ray = camera.rotation.T @ np.append(ideal, 1.0)
     offset = require_shape(point, (3,), "point") - camera.position
     depth = float(ray @ offset / (ray @ ray))
+    if camera.is_wide and not np.isfinite(ideal).all():
+        raise DegenerateGeometryError("the centre lies beyond what the lens shows")
     if depth <= 0:
         raise DegenerateGeometryError("the point lies behind the camera")
+    off_ray = float(np.linalg.norm(offset - depth * ray))
+    if camera.is_wide:
+        distance = depth * float(np.linalg.norm(ray))
+        return diameter_m * apparent_scale(camera, ideal) / distance, off_ray
     # With skew, "vertical in the image" leans in normalised coordinates.
     upright = np.array([-camera.skew / camera.focal_length[0], 1.0])
     half = diameter_m / depth / 2 * upright / np.linalg.norm(upright)
     ends = _unit_to_pixel(
-        camera, distort(np.vstack([ideal + half, ideal - half]), camera.distortion)
+        camera, camera.model.distort(np.vstack([ideal + half, ideal - half]), camera.distortion)
     )
-    return float(np.hypot(*(ends[0] - ends[1]))), float(np.linalg.norm(offset - depth * ray))
+    return float(np.hypot(*(ends[0] - ends[1]))), off_ray
+
+
+def apparent_scale(camera: Camera, ideal: FloatArray) -> float:
+    """Mean of width and height of a small sphere's image, pixels for each radian that it fills.
+
+    A disc that is parallel to the image, which the paper measures a ball by, is seen from its
+    edge at the rim of a wide lens; the outline of a sphere faces the camera everywhere. To first
+    order it is the ellipse ``A u``, u a unit vector across the ray, and the sides of its box are
+    the lengths of the rows of A.
+
+    Args:
+        camera: The camera.
+        ideal: Ideal normalised coordinates of the centre, shape (2,).
+    """
+    x, y = ideal.tolist()
+    # Derivative of the ideal coordinates by a point at distance 1; its null space is the ray.
+    across = np.array([[1.0, 0.0, -x], [0.0, 1.0, -y]]) * np.sqrt(1 + x * x + y * y)
+    bent = camera.model.jacobian(ideal[None], camera.distortion)[0]
+    rows = camera.K[:2, :2] @ bent @ across
+    return float(np.linalg.norm(rows, axis=1).mean())
 
 
 def tight_box(camera: Camera, center: FloatArray, radius: float) -> FloatArray:
@@ -92,15 +124,18 @@ def tight_box(camera: Camera, center: FloatArray, radius: float) -> FloatArray:
         radius: Metres.
 
     Raises:
-        DegenerateGeometryError: The sphere does not lie wholly in front of the camera.
+        DegenerateGeometryError: The sphere does not lie wholly in front of the camera, or of
+            a wide lens.
 
     Source: Hartley & Zisserman, result 8.6 for the dual of a projected quadric.
     """
     in_camera = camera.pitch_to_camera(require_shape(center, (3,), "center")[None])[0]
     if in_camera[2] <= radius:
         raise DegenerateGeometryError("the ball does not lie wholly in front of the camera")
-    if camera.distortion.any():
+    if camera.distorts:
         outline = camera.project(_outline(in_camera, radius) @ camera.rotation + camera.position)
+        if camera.is_wide and np.isnan(outline).any():
+            raise DegenerateGeometryError("the ball does not lie wholly in what the lens shows")
         return np.concatenate([outline.min(axis=0), outline.max(axis=0)])
     # A line l touches the outline when the plane K^T l is at distance r from the centre.
     dual = camera.K @ (np.outer(in_camera, in_camera) - radius**2 * np.eye(3)) @ camera.K.T

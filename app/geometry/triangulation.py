@@ -54,13 +54,20 @@ def triangulate_pairs(
 
 
 def moved_points(
-    P_a: FloatArray, P_b: FloatArray, pixels_a: FloatArray, pixels_b: FloatArray, step_px: float
+    P_a: FloatArray,
+    P_b: FloatArray,
+    pixels_a: FloatArray,
+    pixels_b: FloatArray,
+    step_px: float,
+    slopes: tuple[FloatArray, FloatArray] | None = None,
 ) -> FloatArray:
     """Where ``triangulate_pairs`` puts its points when one pixel of a view is moved.
 
     Args:
         P_a: As ``triangulate_pairs`` takes them, like ``P_b``, ``pixels_a`` and ``pixels_b``.
         step_px: How far the pixel is moved.
+        slopes: Derivatives of the undistorted pixels of each view by those of the image, shapes
+            (N, 2, 2); None where the lenses bend so little that they are the same.
 
     Returns:
         Pitch frame, metres, shape (N, 2, 2, 2, 3): view a or b, pixel axis, forwards or back.
@@ -68,11 +75,14 @@ def moved_points(
     ways = np.array([step_px, -step_px])[:, None, None]
     # By view and axis, then way: what is added to the pixels of both views.
     steps = (ways * np.eye(4).reshape(4, 1, 2, 2)).reshape(8, 2, 2)
+    by_a, by_b = steps[:, 0], steps[:, 1]
+    if slopes is not None:
+        by_a, by_b = by_a @ slopes[0].transpose(0, 2, 1), by_b @ slopes[1].transpose(0, 2, 1)
     moved = triangulate_pairs(
         np.repeat(P_a, 8, axis=0),
         np.repeat(P_b, 8, axis=0),
-        (pixels_a[:, None] + steps[:, 0]).reshape(-1, 2),
-        (pixels_b[:, None] + steps[:, 1]).reshape(-1, 2),
+        (pixels_a[:, None] + by_a).reshape(-1, 2),
+        (pixels_b[:, None] + by_b).reshape(-1, 2),
     )
     return moved.reshape(-1, 2, 2, 2, 3)
 

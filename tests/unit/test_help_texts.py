@@ -31,7 +31,7 @@ PLAIN_WORDS = """
     folder folders form format formats frozen gestures glossary grid guess guide header headers
     heads health heat help histograms history hit home hooks idempotency identity if image images
     import imports in info init insight items jaccard json key keys known konva last latest lazy
-    least leftovers legend lesson lessons letter licence limits list listing live locks look loupe
+    least leftovers legend lens lesson lessons letter licence limits list listing live locks look loupe
     main map markdown marks match matches matrix meant membership menu merge metrics migrate mini missing
     model models modules name names navigation neighbours nested notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages

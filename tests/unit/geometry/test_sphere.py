@@ -1,5 +1,6 @@
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -84,3 +85,70 @@ class TestTightBox:
     def test_a_ball_around_the_camera_has_no_outline(self):
         with pytest.raises(DegenerateGeometryError):
             tight_box(camera(), PLACE, 0.2)
+
+
+class TestThroughAWideLens:
+    """Judged by points all over the sphere, each sent through cv2.fisheye."""
+
+    K = (0.021, -0.017, 0.006, -0.0011)
+    VIEW = Camera(
+        np.eye(3), np.zeros(3), (640.0, 630.0), (959.5, 539.5), 2.0, np.array(K), lens="fisheye"
+    )
+    FAR = 14.0
+    OFF_AXIS = pytest.mark.parametrize("degrees", [0.0, 25.0, 50.0, 70.0, 80.0, 86.0])
+
+    def place(self, degrees: float, around: float = 0.7) -> np.ndarray:
+        angle = np.radians(degrees)
+        aside = np.sin(angle) * np.array([np.cos(around), np.sin(around)])
+        return self.FAR * np.append(aside, np.cos(angle))
+
+    def outline(self, center: np.ndarray) -> np.ndarray:
+        """Bounds of 40,000 points of the sphere: left, top, right, bottom."""
+        random = np.random.default_rng(1).normal(size=(40_000, 3))
+        points = center + BALL / 2 * random / np.linalg.norm(random, axis=1, keepdims=True)
+        pixels, _ = cv2.fisheye.projectPoints(
+            points[:, None], np.zeros(3), np.zeros(3), self.VIEW.K, np.array(self.K),
+            alpha=2.0 / 640.0,
+        )  # fmt: skip
+        return np.concatenate([pixels[:, 0].min(axis=0), pixels[:, 0].max(axis=0)])
+
+    @OFF_AXIS
+    def test_the_tight_box_holds_the_whole_sphere_and_no_more(self, degrees):
+        center = self.place(degrees)
+        found, expected = tight_box(self.VIEW, center, BALL / 2), self.outline(center)
+        assert np.abs(found - expected).max() < 0.005 * (expected[2] - expected[0])
+
+    @OFF_AXIS
+    def test_the_optimal_diameter_is_the_mean_side_of_that_box(self, degrees):
+        center = self.place(degrees)
+        left, top, right, bottom = self.outline(center)
+        pixel = self.VIEW.project(center[None])[0]
+        diameter, off_ray = optimal_diameter(self.VIEW, pixel, center, BALL)
+        assert diameter == pytest.approx((right - left + bottom - top) / 2, rel=5e-3)
+        assert off_ray < 1e-6
+
+    @OFF_AXIS
+    def test_the_monocular_position_undoes_it(self, degrees):
+        center = self.place(degrees)
+        pixel = self.VIEW.project(center[None])[0]
+        diameter, _ = optimal_diameter(self.VIEW, pixel, center, BALL)
+        assert np.allclose(position_from_diameter(self.VIEW, pixel, diameter, BALL), center)
+
+    def test_on_the_axis_it_is_the_papers(self):
+        pinhole = replace(self.VIEW, lens="brown_conrady", distortion=np.zeros(12), skew=0.0,
+                          focal_length=(640.0, 640.0))  # fmt: skip
+        wide = replace(pinhole, lens="fisheye", distortion=np.array(self.K))
+        center, point = np.array([959.5, 539.5]), np.array([0.0, 0.0, self.FAR])
+        papers = optimal_diameter(pinhole, center, point, BALL)
+        assert optimal_diameter(wide, center, point, BALL) == pytest.approx(papers, rel=1e-12)
+
+    def test_a_ball_that_is_cut_by_the_edge_has_no_box(self):
+        folding = replace(self.VIEW, distortion=np.array([-0.12, 0.01, -0.02, 0.0]))
+        edge = np.degrees(np.arctan(folding.model.fold_radius(folding.distortion)))
+        assert np.isfinite(tight_box(folding, self.place(edge - 2.0), BALL / 2)).all()
+        with pytest.raises(DegenerateGeometryError, match="lens shows"):
+            tight_box(folding, self.place(edge - 0.2), BALL / 2)
+
+    def test_a_centre_beyond_the_edge_has_no_diameter(self):
+        with pytest.raises(DegenerateGeometryError, match="lens shows"):
+            optimal_diameter(self.VIEW, np.array([9000.0, 0.0]), self.place(50.0), BALL)
