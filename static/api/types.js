@@ -18,6 +18,8 @@
  * @property {number[]} [radial_distortion]
  * @property {number[]} [tangential_distortion]
  * @property {number[]} [thin_prism_distortion]
+ * @property {string} [lens] `brown_conrady`, `fisheye` or `arctan_polynomial`
+ * @property {number[] | null} [lens_coefficients]
  */
 
 /** @typedef {{x: number, y: number}} PointJson */

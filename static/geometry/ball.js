@@ -4,6 +4,7 @@
 import {
 	calibrationMatrix, idealToPixel, pitchToCamera, pixelToIdeal, rayThrough,
 } from './camera.js';
+import { bendJacobian } from './fisheye.js';
 import { cross, dot, norm, subtract, times } from './matrix.js';
 
 /** @import {Camera, ImagePoint, PitchPoint} from './camera.js' */
@@ -39,6 +40,8 @@ export function optimizedBall(camera, center, point, phi) {
 	const offset = subtract(point, camera.C);
 	const depth = dot(ray, offset) / dot(ray, ray);
 	if (depth <= 0) return null;
+	const distance = norm(subtract(offset, times(ray, depth)));
+	if (camera.wide) return { diameter: (phi * apparentScale(camera, ideal)) / (depth * norm(ray)), distance };
 	// With skew, "vertical in the image" leans in normalised coordinates.
 	const lean = -camera.skew / camera.focal[0];
 	const half = phi / depth / 2 / Math.hypot(lean, 1);
@@ -46,7 +49,25 @@ export function optimizedBall(camera, center, point, phi) {
 	const lower = idealToPixel(camera, [ideal[0] + half * lean, ideal[1] + half]);
 	if (!upper || !lower) return null;
 	const diameter = Math.hypot(lower.x - upper.x, lower.y - upper.y);
-	return { diameter, distance: norm(subtract(offset, times(ray, depth))) };
+	return { diameter, distance };
+}
+
+/**
+ * Mean of width and height of a small sphere's image through a wide lens, pixels for each radian that it fills.
+ *
+ * @param {Camera} camera @param {[number, number]} ideal normalised coordinates of the centre
+ * @returns {number}
+ */
+function apparentScale(camera, [x, y]) {
+	if (!camera.wide) return NaN;
+	const [uu, uv, vu, vv] = bendJacobian([x, y], camera.wide);
+	// Derivative of the ideal coordinates by a point at distance 1; its null space is the ray.
+	const reach = Math.hypot(x, y, 1);
+	const [ax, ay] = camera.focal;
+	const [first, second] = [[ax * uu + camera.skew * vu, ax * uv + camera.skew * vv], [ay * vu, ay * vv]];
+	/** @param {number[]} row */
+	const length = ([p, q]) => Math.hypot(p, q, p * x + q * y) * reach;
+	return (length(first) + length(second)) / 2;
 }
 
 /**
@@ -89,7 +110,11 @@ export function ballOutline(camera, point, phi, count = 48) {
 export function exactBox(camera, point, phi) {
 	const center = pitchToCamera(camera, point);
 	if (center[2] <= phi / 2) return null;
-	if (camera.distorted) return boundsOf(ballOutline(camera, point, phi, 64));
+	if (camera.distorted) {
+		const outline = ballOutline(camera, point, phi, 64);
+		// What a wide lens shows in part has no box; other lenses keep the part that is seen.
+		return camera.wide && outline.length < 64 ? null : boundsOf(outline);
+	}
 	const K = calibrationMatrix(camera);
 	const [left, right] = bounds(K[0], center, (phi * phi) / 4);
 	const [top, bottom] = bounds(K[1], center, (phi * phi) / 4);

@@ -7,9 +7,11 @@
  */
 
 import { distort, foldRadius, undistort } from './distortion.js';
+import { bend, profileOf, unbend } from './fisheye.js';
 import { apply, multiply, subtract, transpose } from './matrix.js';
 
 /** @import {CameraJson} from '../api/types.js' */
+/** @import {Profile} from './fisheye.js' */
 
 /** @typedef {{x: number, y: number}} ImagePoint   image pixels */
 /** @typedef {[number, number, number]} PitchPoint   metres, z down */
@@ -21,7 +23,8 @@ import { apply, multiply, subtract, transpose } from './matrix.js';
  * @property {[number, number]} principal x0, y0, pixels
  * @property {number} skew pixels
  * @property {number[]} distortion OpenCV's 12 coefficients
- * @property {boolean} distorted whether any of them is not zero
+ * @property {boolean} distorted whether the lens distorts at all
+ * @property {Profile | null} [wide] of a lens for strong wide angle, in place of the coefficients
  * @property {number} fold ideal radius beyond which nothing is visible
  */
 
@@ -60,9 +63,10 @@ function aboutX(angle) {
  */
 export function cameraFromJson(json) {
 	const degrees = Math.PI / 180;
-	const [k1, k2, k3, k4, k5, k6] = json.radial_distortion ?? [0, 0, 0, 0, 0, 0];
-	const [p1, p2] = json.tangential_distortion ?? [0, 0];
-	const [s1, s2, s3, s4] = json.thin_prism_distortion ?? [0, 0, 0, 0];
+	const [k1 = 0, k2 = 0, k3 = 0, k4 = 0, k5 = 0, k6 = 0] = json.radial_distortion ?? [];
+	const [p1 = 0, p2 = 0] = json.tangential_distortion ?? [];
+	const [s1 = 0, s2 = 0, s3 = 0, s4 = 0] = json.thin_prism_distortion ?? [];
+	const wide = profileOf(json.lens, json.lens_coefficients);
 	const distortion = [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4];
 	return {
 		R: rotationFromPanTiltRoll(
@@ -73,8 +77,9 @@ export function cameraFromJson(json) {
 		principal: json.principal_point,
 		skew: json.skew ?? 0,
 		distortion,
-		distorted: distortion.some((value) => value !== 0),
-		fold: foldRadius(distortion),
+		distorted: wide !== null || distortion.some((value) => value !== 0),
+		wide,
+		fold: wide ? Math.tan(wide.widest) : foldRadius(distortion),
 	};
 }
 
@@ -127,6 +132,10 @@ export function project(camera, point) {
  */
 export function idealToPixel(camera, ideal) {
 	if (!camera.distorted) return unitToPixel(camera, ideal);
+	if (camera.wide) {
+		const bent = bend(ideal, camera.wide);
+		return bent && unitToPixel(camera, bent);
+	}
 	if (Math.hypot(ideal[0], ideal[1]) > camera.fold) return null;
 	return unitToPixel(camera, distort(ideal, camera.distortion));
 }
@@ -148,7 +157,8 @@ function unitToPixel(camera, [x, y]) {
 export function pixelToIdeal(camera, pixel) {
 	const y = (pixel.y - camera.principal[1]) / camera.focal[1];
 	const x = (pixel.x - camera.principal[0] - camera.skew * y) / camera.focal[0];
-	return camera.distorted ? undistort([x, y], camera.distortion) : [x, y];
+	if (!camera.distorted) return [x, y];
+	return camera.wide ? unbend([x, y], camera.wide) : undistort([x, y], camera.distortion);
 }
 
 /**

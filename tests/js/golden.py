@@ -17,6 +17,8 @@ from app.datasets.camera_json import camera_to_json
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.geometry.lens import ARCTAN_POLYNOMIAL as ARCTAN
+from app.geometry.lens import BROWN_CONRADY, FISHEYE, LENSES
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.geometry.sphere import optimal_diameter, tight_box
 from app.geometry.triangulation import parallax_angle, triangulate_pairs
@@ -30,6 +32,9 @@ FILE = Path(__file__).with_name("golden.json")
 SEED = 4
 DIAMETER = PAPER.ball_diameter_m
 FULL = (-0.21, 0.06, 0.0011, -0.0007, -0.004, 0.01, 0.002, 0.0, 0.0004, -0.0002, 0.0003, 0.0001)
+KANNALA_BRANDT = (0.021, -0.017, 0.006, -0.0011)
+# Of the order of a real one's, with the constant that its fit left.
+POLYNOMIAL = (-7.1e-4, 0.769, -0.119, 0.251, -0.408, 0.037, 0.268, -0.181, 0.037)
 
 
 def golden() -> dict[str, Any]:
@@ -52,8 +57,9 @@ def _camera(
     focal_length: tuple[float, float],
     skew: float = 0.0,
     distortion: tuple[float, ...] = (),
+    lens: str = BROWN_CONRADY,
 ) -> Camera:
-    coefficients = np.zeros(12)
+    coefficients = np.zeros(LENSES[lens].count)
     coefficients[: len(distortion)] = distortion
     return Camera(
         rotation=rotation_from_pan_tilt_roll(*np.radians(angles)),
@@ -62,11 +68,12 @@ def _camera(
         principal_point=(639.5, 359.5),
         skew=skew,
         distortion=coefficients,
+        lens=lens,
     )
 
 
 def _cameras() -> dict[str, Camera]:
-    """A pinhole, one with skew, two lenses of one term, and one with every term."""
+    """A pinhole, one with skew, two lenses of one term, one with every term, and two wide ones."""
     return {
         "pinhole": _camera((8.0, 78.0, 0.3), (1.5, 60.0, -12.0), (2100.0, 2100.0)),
         "skewed": _camera((-21.0, 80.0, -0.5), (-8.0, 55.0, -14.0), (1700.0, 1690.0), 2.5),
@@ -75,6 +82,12 @@ def _cameras() -> dict[str, Camera]:
         ),
         "barrel": _camera((-88.0, 84.0, 0.8), (74.0, 3.0, -7.0), (1300.0, 1300.0), 0.0, (-0.24,)),
         "full": _camera((168.0, 79.0, 0.4), (6.0, -52.0, -10.0), (1400.0, 1405.0), -1.2, FULL),
+        "fisheye": _camera(
+            (2.0, 62.0, 0.5), (-2.0, 41.0, -9.0), (420.0, 424.0), 0.7, KANNALA_BRANDT, FISHEYE
+        ),
+        "panorama": _camera(
+            (181.0, 66.0, -0.4), (3.0, -40.0, -12.0), (1280.0, 1280.0), 0.0, POLYNOMIAL, ARCTAN
+        ),
     }
 
 
@@ -108,6 +121,9 @@ def _triangulations(cameras: dict[str, Camera], points: FloatArray) -> list[dict
     names = list(cameras)
     for i, a in enumerate(names):
         for b in names[i + 1 :]:
+            # The file stays small: wide lenses meet each other and the pinhole.
+            if cameras[b].is_wide and not (cameras[a].is_wide or a == "pinhole"):
+                continue
             for point in points[:16]:
                 pixels = [cameras[name].project(point[None])[0] for name in (a, b)]
                 clicks = [pixel + random.normal(0.0, 2.0, 2) for pixel in pixels]

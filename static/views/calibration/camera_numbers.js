@@ -1,6 +1,8 @@
 // @ts-check
 /** A camera in the numbers that people judge it by, and what is odd about them. */
 
+import { profileOf, unbend } from '../../geometry/fisheye.js';
+
 /** @import {CalibrationJson, CameraJson, FindingJson, SolutionJson} from '../../api/types.js' */
 
 /** @typedef {{name: string, label: string, value: number | null, digits: number, unit: string, sigma: number | null}} CameraNumber */
@@ -27,14 +29,29 @@ export function cameraNumbers(calibration, width) {
 		row('y', 'y', y, 2, ' m'),
 		row('height', 'Height', z === null ? null : -z, 2, ' m'),
 		row('focal', 'Focal length', focal, 0, ' px'),
-		row('field', 'Field of view', focal ? fieldOf(focal, width) : null, 1, '°'),
-		row('k1', 'Distortion k1', camera ? k1Of(camera) : null, 3, ''),
+		row('field', 'Field of view', camera ? fieldOf(camera, width) : null, 1, '°'),
+		...(camera?.lens_coefficients ?? []).map((value, i) => row(`lens${i}`, lensTerm(camera, i), value, 4, '')),
+		...(camera?.lens_coefficients ? [] : [row('k1', 'Distortion k1', camera ? k1Of(camera) : null, 3, '')]),
 	];
 }
 
-/** Horizontal field of view, degrees. @param {number} focal @param {number} width pixels */
-function fieldOf(focal, width) {
-	return (360 / Math.PI) * Math.atan(width / (2 * focal));
+/**
+ * Horizontal field of view, degrees.
+ *
+ * @param {CameraJson} camera @param {number} width pixels
+ * @returns {number}
+ */
+function fieldOf(camera, width) {
+	const edge = width / (2 * camera.x_focal_length);
+	const profile = profileOf(camera.lens, camera.lens_coefficients);
+	if (!profile) return (360 / Math.PI) * Math.atan(edge);
+	const ideal = unbend([edge, 0], profile);
+	return (360 / Math.PI) * (ideal ? Math.atan(ideal[0]) : profile.widest);
+}
+
+/** @param {CameraJson | null} camera @param {number} place of a coefficient */
+function lensTerm(camera, place) {
+	return camera?.lens === 'fisheye' ? `Fisheye k${place + 1}` : `Arctan polynomial a${place}`;
 }
 
 /** @param {CameraJson} camera */

@@ -121,14 +121,30 @@ function cornersOf(camera, { width, height }) {
 }
 
 /**
- * The point of the pitch frame that a pixel shows at a depth.
+ * The point of the pitch frame that a pixel shows at a depth; through a wide lens, at that distance.
  *
  * @param {Camera} camera @param {ImagePoint} pixel @param {number} depth metres along the axis
  * @returns {PitchPoint}
  */
 export function seenAt(camera, pixel, depth) {
+	if (camera.wide) return seenAtDistance(camera, pixel, depth);
 	// Where distortion has no inverse the pinhole is near enough for a picture's edge.
 	const [x, y] = pixelToIdeal(camera, pixel) ?? pixelToIdeal({ ...camera, distorted: false }, pixel) ?? [0, 0];
 	const [dx, dy, dz] = apply(transpose(camera.R), [x, y, 1]);
 	return along(camera, [dx, dy, dz], depth);
+}
+
+/**
+ * What a wide lens shows at a pixel, at a distance: a plane in front of it would reach to the horizon.
+ *
+ * @param {Camera} camera @param {ImagePoint} pixel @param {number} distance metres
+ * @returns {PitchPoint} beyond the edge of what the lens shows, the nearest place that it does show
+ */
+function seenAtDistance(camera, pixel, distance) {
+	const [x, y] = camera.principal;
+	let ray = rayThrough(camera, pixel);
+	for (let share = 1; !ray; share -= 0.01) {
+		ray = rayThrough(camera, { x: x + share * (pixel.x - x), y: y + share * (pixel.y - y) });
+	}
+	return along(camera, ray, distance / Math.hypot(...ray));
 }
