@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.geometry.lens import ARCTAN_POLYNOMIAL, FISHEYE
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.frames import ImageSize
 
@@ -51,6 +53,28 @@ def looking(
         principal_point=((size.width - 1) / 2, (size.height - 1) / 2),
         distortion=np.array([k1, k1 * k1 / 2, *np.zeros(10)]),
     )
+
+
+WIDE_LENSES = {
+    FISHEYE: (0.021, -0.017, 0.006, -0.0011),
+    # Of the order of a real one's, with the constant that its fit left; the focal length is the
+    # width of the image.
+    ARCTAN_POLYNOMIAL: (-7.1e-4, 0.769, -0.119, 0.251, -0.408, 0.037, 0.268, -0.181, 0.037),
+}
+"""Coefficients of a lens of each kind that is no pinhole."""
+
+
+def wide(
+    position: Sequence[float],
+    target: Sequence[float],
+    lens: str = FISHEYE,
+    *,
+    focal: float = 400.0,
+    size: ImageSize = SIZE,
+) -> Camera:
+    """A level camera with a lens for strong wide angle."""
+    camera = looking(position, target, focal, size=size)
+    return replace(camera, lens=lens, distortion=np.array(WIDE_LENSES[lens]))
 
 
 def _level(place: FloatArray, target: FloatArray) -> FloatArray:

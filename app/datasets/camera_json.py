@@ -11,6 +11,7 @@ from app.datasets import fields
 from app.errors import DatasetFormatError, GeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.geometry.lens import BROWN_CONRADY, LENSES
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 
 MAX_DISAGREEMENT_DEGREES = 0.01
@@ -20,6 +21,8 @@ MAX_NUMBER = 1e7
 ROUNDING = 1e-10
 """Below, a matrix and its angles are the same rotation but for rounding."""
 
+LENS, LENS_COEFFICIENTS = "lens", "lens_coefficients"
+"""Ours: name and numbers of a lens that SoccerNet's arrays do not hold (``geometry.lens``)."""
 _ANGLES = ("pan_degrees", "tilt_degrees", "roll_degrees")
 _DISTORTION = (("radial_distortion", 6), ("tangential_distortion", 2), ("thin_prism_distortion", 4))
 
@@ -30,9 +33,9 @@ def camera_to_json(camera: Camera) -> dict[str, Any]:
     """The camera as SoccerNet spells it: angles, matrix and all three distortion arrays.
 
     Every number is a plain float, so that ``repr`` and JSON keep it exactly. ``skew`` is ours
-    and stands there only when it is not zero.
+    and stands there only when it is not zero. A wide lens has ``lens`` and ``lens_coefficients``
+    in place of the three arrays: whoever expects those must not take it for a pinhole.
     """
-    k1, k2, p1, p2, k3, k4, k5, k6, *prism = (float(value) for value in camera.distortion)
     pan, tilt, roll = camera.pan_tilt_roll_degrees
     value = {
         "pan_degrees": pan,
@@ -43,18 +46,28 @@ def camera_to_json(camera: Camera) -> dict[str, Any]:
         "principal_point": [float(item) for item in camera.principal_point],
         "position_meters": [float(item) for item in camera.position],
         "rotation_matrix": [[float(item) for item in row] for row in camera.rotation],
+        **_lens_to_json(camera),
+    }
+    return value | ({"skew": float(camera.skew)} if camera.skew else {})
+
+
+def _lens_to_json(camera: Camera) -> dict[str, Any]:
+    numbers = [float(value) for value in camera.distortion]
+    if camera.is_wide:
+        return {LENS: camera.lens, LENS_COEFFICIENTS: numbers}
+    k1, k2, p1, p2, k3, k4, k5, k6, *prism = numbers
+    return {
         "radial_distortion": [k1, k2, k3, k4, k5, k6],
         "tangential_distortion": [p1, p2],
         "thin_prism_distortion": prism,
     }
-    return value | ({"skew": float(camera.skew)} if camera.skew else {})
 
 
 def camera_from_json(value: Any, path: str, record: str | None = None) -> Camera:
     """The camera of a SoccerNet camera object.
 
     The angles are authoritative; ``rotation_matrix`` may be missing and must agree when it is
-    there. Missing distortion arrays are zero. The image size is not in the file and is not
+    there. Missing distortion arrays are zero; a ``lens`` takes their place. The image size is not in the file and is not
     inferred. A camera below the grass is a camera: judging it is the solver's part.
 
     Args:
@@ -69,8 +82,7 @@ def camera_from_json(value: Any, path: str, record: str | None = None) -> Camera
         raise DatasetFormatError(path, record, None, "is not a camera object")
     reader = _Fields(value, path, record)
     rotation = _rotation(reader)
-    radial, tangential, prism = (reader.distortion(name, count) for name, count in _DISTORTION)
-    k1, k2, k3, k4, k5, k6 = radial
+    lens, coefficients = _lens(reader)
     try:
         return Camera(
             rotation=rotation,
@@ -81,7 +93,8 @@ def camera_from_json(value: Any, path: str, record: str | None = None) -> Camera
             ),
             principal_point=reader.read("principal_point", _two),
             skew=reader.read("skew", fields.number) if "skew" in value else 0.0,
-            distortion=np.array([k1, k2, *tangential, k3, k4, k5, k6, *prism]),
+            distortion=np.array(coefficients),
+            lens=lens,
         )
     except GeometryError as error:
         raise DatasetFormatError(path, record, None, error.message) from error
@@ -108,6 +121,28 @@ class _Fields:
 
     def error(self, name: str, problem: str) -> DatasetFormatError:
         return DatasetFormatError(self.path, self.record, name, problem)
+
+
+def _lens(reader: _Fields) -> tuple[str, tuple[float, ...]]:
+    """Name of the lens and its coefficients, in the order that the camera has them."""
+    name = reader.value.get(LENS)
+    if name is None or name == BROWN_CONRADY:
+        if reader.value.get(LENS_COEFFICIENTS) is not None:
+            raise reader.error(LENS_COEFFICIENTS, f"need a {LENS} of {_lens_names()}")
+        radial, tangential, prism = (reader.distortion(*each) for each in _DISTORTION)
+        k1, k2, k3, k4, k5, k6 = radial
+        return BROWN_CONRADY, (k1, k2, *tangential, k3, k4, k5, k6, *prism)
+    if not isinstance(name, str) or name not in LENSES:
+        raise reader.error(LENS, f"is {str(name)[:40]!r}; lenses are {_lens_names()}")
+    for other, count in _DISTORTION:
+        if any(reader.distortion(other, count)):
+            raise reader.error(other, f"contradicts the lens {name}, which has none")
+    count = LENSES[name].count
+    return name, reader.read(LENS_COEFFICIENTS, lambda value: fields.numbers(value, count))
+
+
+def _lens_names() -> str:
+    return " or ".join(name for name in LENSES if name != BROWN_CONRADY)
 
 
 def _rotation(reader: _Fields) -> FloatArray:

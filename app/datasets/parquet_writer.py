@@ -252,6 +252,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("position_meters", LIST, _camera(lambda camera: camera.position.tolist())),
     ("rotation_matrix", LIST, _camera(lambda camera: camera.rotation.ravel().tolist())),
     ("distortion", LIST, _camera(lambda camera: camera.distortion.tolist())),
+    ("lens", TEXT, _camera(lambda camera: camera.lens)),
     ("jac_0.5", NUMBER, _jac(0)),
     ("jac_1", NUMBER, _jac(1)),
     ("jac_2", NUMBER, _jac(2)),

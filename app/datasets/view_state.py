@@ -190,11 +190,14 @@ class StateReader:
             size=size,
             shared=self.flag("shared", False),
             lines=self.lines(),
-            given=None if given is None else camera_from_json(given, self.path, self.record),
             calibration=calibration,
             flipped=self.flag("flipped", False),
-            given_covariance=self.covariance(),
         )
+        camera = None if given is None else camera_from_json(given, self.path, self.record)
+        try:
+            station = station.with_given(camera, self.covariance())
+        except InputError as error:
+            raise self.error("given_covariance", error.message) from error
         included = self.flag("included", True)
         why = None if included else self.left_out()
         return View(key, station, self.balls(), None, included, extras, why)

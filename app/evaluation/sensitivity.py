@@ -17,7 +17,6 @@ from app.evaluation.frame import Frame
 from app.evaluation.table import Cell, Column, Row, Table
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.geometry.distortion import distort_jacobian
 from app.geometry.sphere import position_from_diameter
 from app.soccer.frames import Box
 
@@ -105,9 +104,11 @@ def slopes(camera: Camera, box: Box, diameter_m: float) -> tuple[float, float]:
     """
     half = np.array([0.0, box.diameter / 2])
     center = np.array(box.center)
+    if camera.is_wide:
+        return _wide_slopes(camera, center, box.diameter, diameter_m)
     pixels = np.vstack([center, center + half, center - half])
     ideal = camera.pixel_to_ideal(pixels)
-    inverse = np.linalg.inv(distort_jacobian(ideal, camera.distortion)) @ np.linalg.inv(
+    inverse = np.linalg.inv(camera.model.jacobian(ideal, camera.distortion)) @ np.linalg.inv(
         camera.K[:2, :2]
     )
     apart = ideal[1] - ideal[2]
@@ -122,6 +123,19 @@ def slopes(camera: Camera, box: Box, diameter_m: float) -> tuple[float, float]:
     by_diameter = slope(np.zeros(2), inverse[1] @ down + inverse[2] @ down)
     by_shift = slope(inverse[0] @ along, (inverse[1] - inverse[2]) @ along)
     return by_diameter, by_shift
+
+
+def _wide_slopes(
+    camera: Camera, center: FloatArray, diameter: float, diameter_m: float
+) -> tuple[float, float]:
+    """``slopes`` through a wide lens: along the ray exactly, along a row by central differences."""
+
+    def place(shift: float) -> FloatArray:
+        moved = center + np.array([shift, 0.0])
+        return position_from_diameter(camera, moved, diameter, diameter_m)
+
+    away = float(np.linalg.norm(place(0.0) - camera.position))
+    return away / diameter, float(np.linalg.norm(place(0.5) - place(-0.5)))
 
 
 def sensitivity_figure(samples: Sequence[Sample]) -> Figure:

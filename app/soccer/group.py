@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from app.errors import InputError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import ImageSize
@@ -34,6 +35,14 @@ class Station:
     flipped: bool = False
     """The frames of this camera are mirrored; annotations and calibration are not."""
     given_covariance: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.given is not None and self.given.is_wide and self.given_covariance is not None:
+            raise InputError(
+                f"the covariance of camera {self.key} is that of a lens with one radial term, and"
+                f" its lens is {self.given.lens}",
+                hint="Leave the covariance out: the noise of given cameras stands in the policy.",
+            )
 
     def with_said(self, other: Station) -> Station:
         """This station with the lines and the camera that people or datasets gave another."""

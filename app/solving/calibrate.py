@@ -148,6 +148,8 @@ def calibration_key(station: Station, pitch: Pitch, policy: CalibrationPolicy) -
     parts.append([(marking, station.lines[marking]) for marking in sorted(station.lines)])
     if station.given is not None and station.calibration == "given":
         parts.append(station.given.parameters.tolist())
+        if station.given.is_wide:
+            parts.append(station.given.lens)
         if station.given_covariance is not None:
             parts.append(station.given_covariance)
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]

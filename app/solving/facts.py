@@ -245,7 +245,10 @@ def _moved(meetings: Sequence[Meeting]) -> FloatArray:
     if not meetings:
         return NOTHING.pair_moved
     a, b = [item.a for item in meetings], [item.b for item in meetings]
-    return moved_points(*lines_of_sight(a, b), STEP_PX)
+    slopes = None
+    if any(sight.camera.is_wide for sight in (*a, *b)):
+        slopes = np.array([s.ideal_slope for s in a]), np.array([s.ideal_slope for s in b])
+    return moved_points(*lines_of_sight(a, b), STEP_PX, slopes)
 
 
 def _rows(values: Sequence[Sequence[float] | FloatArray], width: int) -> FloatArray:

@@ -324,6 +324,11 @@ def _rays(
 
 def _require_adjustable(camera: RigCamera) -> None:
     """Refuse a camera that the parameters of a rig cannot hold."""
+    if camera.camera.is_wide:
+        raise InputError(
+            f"camera {camera.key} has a {camera.camera.lens} lens, which a rig does not adjust",
+            hint="One focal length and one radial term can be; leave this camera as it is.",
+        )
     grass = grass_in_view(camera)
     plain = camera.with_parameters(camera.parameters)
     if len(grass) == 0:

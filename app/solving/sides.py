@@ -14,6 +14,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.geometry.sphere import apparent_scale
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.plausible import is_plausible
@@ -183,10 +184,19 @@ def _misfit(sight: Sight, point: FloatArray, policy: Policy) -> float:
     place = float(offset @ np.linalg.solve(pixel_spread(sight, point, policy), offset))
     if not sight.diameter_px:
         return place
-    depth = float(sight.camera.pitch_to_camera(point[None])[0, 2])
-    expected = policy.ball_diameter_m * sight.camera.focal_length[1] / depth
+    expected = _expected_px(sight.camera, point, policy.ball_diameter_m)
     size = (np.log(sight.diameter_px / expected) - LOOSE) / SIZE_SIGMA
     return place + min(float(size) ** 2, WORST / 4)
+
+
+def _expected_px(camera: Camera, point: FloatArray, diameter_m: float) -> float:
+    """How large a ball at a point in front of a camera looks, pixels."""
+    in_camera = camera.pitch_to_camera(point[None])[0]
+    depth = float(in_camera[2])
+    if camera.is_wide:
+        scale = apparent_scale(camera, in_camera[:2] / depth)
+        return diameter_m * scale / float(np.linalg.norm(in_camera))
+    return diameter_m * camera.focal_length[1] / depth
 
 
 def _says_something(item: Meeting, pitch: Pitch, policy: Policy) -> bool:

@@ -57,6 +57,16 @@ class Sight:
         center: FloatArray = self.camera.undistort(np.array([self.center]))[0]
         return center
 
+    @cached_property
+    def ideal_slope(self) -> FloatArray:
+        """How far ``ideal_center`` moves with the centre, shape (2, 2).
+
+        One to one but through a wide lens: what other lenses add lies below the noise of a click.
+        """
+        if not self.camera.is_wide:
+            return np.eye(2)
+        return self.camera.undistort_jacobian(np.array(self.center))
+
     def tau_px(self, policy: Policy) -> float:
         """Largest reprojection error of a valid pair, pixels."""
         return policy.tau_percent / 100 * self.size.diagonal

@@ -16,6 +16,7 @@ import numpy as np
 
 from app.errors import EXAMINE, DamagedError, GeometryError, InputError
 from app.geometry.camera import Camera, camera_covariance
+from app.geometry.lens import BROWN_CONRADY
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -144,7 +145,11 @@ def ball_from_json(value: Mapping[str, Any]) -> BallAnnotation:
 
 
 def camera_to_json(camera: Camera) -> Json:
-    """Every number of the camera; the rotation as it is, not as angles."""
+    """Every number of the camera; the rotation as it is, not as angles.
+
+    ``lens`` stands there only where it is another than OpenCV's full model, so that digests of all
+    other cameras are what they always were.
+    """
     return {
         "rotation": camera.rotation.ravel().tolist(),
         "position": camera.position.tolist(),
@@ -152,6 +157,7 @@ def camera_to_json(camera: Camera) -> Json:
         "principal_point": [*map(float, camera.principal_point)],
         "skew": float(camera.skew),
         "distortion": camera.distortion.tolist(),
+        **({"lens": camera.lens} if camera.is_wide else {}),
     }
 
 
@@ -166,6 +172,7 @@ def camera_from_json(value: Mapping[str, Any]) -> Camera:
         principal_point=(x0, y0),
         skew=value["skew"],
         distortion=np.array(value["distortion"], dtype=float),
+        lens=value.get("lens", BROWN_CONRADY),
     )
 
 

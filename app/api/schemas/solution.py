@@ -12,6 +12,7 @@ from app.api.schemas.document import Document
 from app.api.schemas.identity_cache import IdentityCache
 from app.datasets.camera_json import camera_to_json
 from app.geometry.camera import Camera
+from app.geometry.lens import BROWN_CONRADY
 from app.review.editing.codec import edit_to_json
 from app.review.editing.fixes import offers
 from app.soccer.camera_sigma import camera_sigma
@@ -62,10 +63,20 @@ class CameraDocument(Document):
     y_focal_length: float
     principal_point: XY
     rotation_matrix: Annotated[list[list[float]] | None, Field(default=None)]
-    radial_distortion: list[float]
-    tangential_distortion: list[float]
-    thin_prism_distortion: list[float]
+    radial_distortion: list[float] = Field(
+        default=[], description="k1 .. k6; empty where `lens` names another model."
+    )
+    tangential_distortion: list[float] = Field(default=[])
+    thin_prism_distortion: list[float] = Field(default=[])
     skew: float = 0.0
+    lens: str = Field(
+        default=BROWN_CONRADY,
+        description="`brown_conrady` (OpenCV's full model), `fisheye` or `arctan_polynomial`.",
+    )
+    lens_coefficients: list[float] | None = Field(
+        default=None,
+        description="fisheye: k1 .. k4; arctan_polynomial: a0 .. a8; else null.",
+    )
 
 
 class MarkingDocument(Document):

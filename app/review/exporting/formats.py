@@ -22,6 +22,7 @@ from app.datasets.sn_calibration_writer import write_sn_calibration
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.datasets.soccernet_v3d_writer import write_soccernet_v3d
 from app.datasets.yolo_writer import write_yolo
+from app.errors import InputError
 from app.soccer.group import Group
 
 FORMATS: tuple[str, ...] = get_args(ExportFormat)
@@ -32,6 +33,8 @@ CONTENT = {
     "gamestate": ("images", "image"),
 }
 """What a format consists of: the name of its count, and the word for one."""
+WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
+"""Formats whose cameras are SoccerNet's: they have no place for a wide lens."""
 WITH_BOXES = ("soccernet-v3d", "coco", "yolo", "parquet")
 """Formats that hold the ball box that was chosen; all others have no place for it."""
 
@@ -58,7 +61,13 @@ class WriteOptions:
 def write_format(
     root: Path, records: Iterable[ExportRecord], options: WriteOptions
 ) -> dict[str, int]:
-    """Write a format's files below an existing folder; returns its counts."""
+    """Write a format's files below an existing folder; returns its counts.
+
+    Raises:
+        InputError: A group does not fit the format, or one of its cameras does not.
+    """
+    if options.format in WITHOUT_LENSES:
+        records = _with_plain_lenses(records, options.format)
     everything, boxes = options.everything, options.boxes
     counts = {"groups": 0}
     groups = _groups(records, counts)
@@ -97,6 +106,24 @@ def _groups(records: Iterable[ExportRecord], counts: dict[str, int]) -> Iterator
     for record in records:
         counts["groups"] += 1
         yield record.group
+
+
+def _with_plain_lenses(
+    records: Iterable[ExportRecord],
+    format: str,  # noqa: A002
+) -> Iterator[ExportRecord]:
+    """The records; a wide lens would be written as none, and be wrong by hundreds of pixels."""
+    for record in records:
+        for view in record.group.views:
+            # issia holds what was given, all others what was computed.
+            camera = view.station.given if format == "issia" else record.camera(view)
+            if camera is not None and camera.is_wide:
+                raise InputError(
+                    f"{format} has no place for the {camera.lens} lens of view {view.key} of group"
+                    f" {record.group.key}",
+                    hint="Export cameras, coco, parquet or touchline, which hold every lens.",
+                )
+        yield record
 
 
 def frame_layout(format: str) -> FrameName:  # noqa: A002

@@ -13,12 +13,14 @@ from app.datasets.cameras_writer import camera_text
 from app.errors import DatasetFormatError
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
+from tests.cameras import WIDE_LENSES, wide
 
 FINITE = st.floats(-1e6, 1e6)
 ANGLE = st.floats(-180, 180)
 FIELDS = (
     "pan_degrees", "x_focal_length", "principal_point", "position_meters", "rotation_matrix",
     "radial_distortion", "tangential_distortion", "thin_prism_distortion", "skew",
+    "lens", "lens_coefficients",
 )  # fmt: skip
 NUMBERS = st.floats() | st.integers() | st.booleans() | st.none() | st.text(max_size=5)
 JUNK = st.recursive(NUMBERS, lambda inner: st.lists(inner, max_size=6), max_leaves=12)
@@ -50,6 +52,16 @@ class TestCameraToJson:
         assert value["tangential_distortion"] == [1e-3, 2e-3]
         assert value["thin_prism_distortion"] == [1e-4, 2e-4, 3e-4, 4e-4]
         assert "skew" not in value
+
+    @pytest.mark.parametrize("lens", WIDE_LENSES)
+    def test_a_wide_lens_is_named_and_never_looks_like_a_pinhole(self, lens: str) -> None:
+        camera = wide((0.0, 60.0, -9.0), (0.0, 0.0, 0.0), lens)
+        value = json.loads(camera_text(camera))
+        assert value["lens"] == lens
+        assert tuple(value["lens_coefficients"]) == WIDE_LENSES[lens]
+        # A reader of SoccerNet's own fields finds none of them, rather than zeros.
+        assert not any("distortion" in name for name in value)
+        assert camera_from_json(value, "f") == camera
 
     def test_every_number_is_a_plain_float(self, camera: Camera) -> None:
         assert "np." not in repr(camera_to_json(camera))
@@ -142,6 +154,37 @@ class TestCameraFromJson:
             camera_from_json(value | changes, "f")
         except DatasetFormatError as error:
             assert error.field in changes
+
+    @pytest.mark.parametrize(
+        ("changes", "field", "problem"),
+        [
+            ({"lens": "bottle"}, "lens", "lenses are fisheye or arctan_polynomial"),
+            ({"lens": ["fisheye"]}, "lens", "lenses are"),
+            ({"lens": "fisheye"}, "lens_coefficients", "is missing"),
+            ({"lens": "fisheye", "lens_coefficients": [0.1] * 5}, "lens_coefficients", "not 4"),
+            ({"lens_coefficients": [0.1] * 4}, "lens_coefficients", "need a lens"),
+            (
+                {
+                    "lens": "fisheye",
+                    "lens_coefficients": [0.1] * 4,
+                    "radial_distortion": [0.1, 0, 0, 0, 0, 0],
+                },
+                "radial_distortion",
+                "contradicts the lens fisheye",
+            ),
+            ({"lens": "fisheye", "lens_coefficients": [-900, 0, 0, 0]}, None, "folds"),
+        ],
+    )
+    def test_a_lens_that_cannot_be_is_refused(
+        self, camera_json: dict[str, Any], changes: dict[str, Any], field: str, problem: str
+    ) -> None:
+        with pytest.raises(DatasetFormatError, match=problem) as error:
+            camera_from_json(camera_json | changes, "f")
+        assert error.value.field == field
+
+    def test_zeros_beside_a_lens_contradict_nothing(self, camera_json: dict[str, Any]) -> None:
+        value = {"lens": "fisheye", "lens_coefficients": [0.0] * 4, "radial_distortion": [0.0] * 6}
+        assert camera_from_json(camera_json | value, "f").lens == "fisheye"
 
     def test_something_else_is_no_camera(self) -> None:
         with pytest.raises(DatasetFormatError, match="not a camera object"):

@@ -9,7 +9,7 @@ from app.soccer.frames import ImagePoint
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.solving.rig import RigCamera, RigFrame, adjust, grass_in_view, make_rig
-from tests.cameras import EVERY_COEFFICIENT, SIZE
+from tests.cameras import EVERY_COEFFICIENT, SIZE, wide
 from tests.rigs import TRUTH, cameras, frames
 
 PITCH = Pitch()
@@ -79,6 +79,13 @@ class TestMakeRig:
         )
         odd[0] = RigCamera("cam1", SIZE, {}, bent)
         with pytest.raises(InputError, match="cam1 has terms"):
+            make_rig(odd, frames(), PITCH, PAPER)
+
+    def test_a_wide_lens_is_refused_by_name(self):
+        odd = cameras()
+        first = TRUTH["cam1"]
+        odd[0] = RigCamera("cam1", SIZE, {}, wide(first.position, (-8.0, 0.0, 0.0)))
+        with pytest.raises(InputError, match="cam1 has a fisheye lens"):
             make_rig(odd, frames(), PITCH, PAPER)
 
 

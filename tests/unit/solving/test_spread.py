@@ -24,7 +24,7 @@ from app.solving.spread import (
 )
 from app.solving.triangulate import Sight
 from app.solving.verdict import judge
-from tests.cameras import SIZE, looking
+from tests.cameras import SIZE, WIDE_LENSES, looking, wide
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 from tests.unit.solving.random_groups import random_policy, random_views
 
@@ -130,6 +130,28 @@ class TestMeanSpread:
         scattered = np.cov(np.mean(pairs, axis=0).T)
         found = self.covariance(*cameras, policy=policy)
         assert np.allclose(found, scattered, atol=0.08 * np.abs(scattered).max())
+
+    @pytest.mark.parametrize("lens", WIDE_LENSES)
+    def test_is_the_scatter_of_noisy_clicks_through_wide_lenses(self, lens):
+        policy = replace(PAPER, box_sigma_share=0.0, click_sigma_px=1.0)
+        focal = 400.0 if lens == "fisheye" else 600.0
+        # Both look past the ball, which lies far out in their pictures.
+        cameras = [
+            wide((30.0, 40.0, -9.0), (5.0, 22.0, 0.0), lens, focal=focal),
+            wide((60.0, -20.0, -9.0), (38.0, -33.0, 0.0), lens, focal=focal),
+        ]
+        ideal = [camera.pitch_to_camera(np.array([BALL]))[0] for camera in cameras]
+        assert min(np.hypot(x, y) / z for x, y, z in ideal) > np.tan(np.radians(50))
+        rng = np.random.default_rng(1)
+        sigma = SIZE.diagonal / CLICK_DIAGONAL
+        seen = [
+            camera.undistort(camera.project(np.array([BALL])) + rng.normal(0, sigma, (20_000, 2)))
+            for camera in cameras
+        ]
+        points = triangulate_pairs(*(np.stack([c.P] * 20_000) for c in cameras), *seen)
+        scattered = np.cov(points.T)
+        found = self.covariance(*cameras, policy=policy)
+        assert np.allclose(found, scattered, atol=0.06 * np.abs(scattered).max())
 
     def test_grows_with_the_square_of_what_given_cameras_add(self):
         plain, wide = (

@@ -8,12 +8,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.errors import InputError
+from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
-from app.soccer.frames import Box
+from app.soccer.frames import Box, ImageSize
+from app.soccer.group import Station
 from app.soccer.policy import PAPER, STRICT, CalibrationPolicy, Policy
 from app.store import codecs
+from app.store.digest import station_digest
+from tests.cameras import WIDE_LENSES, looking, wide
 
 COVARIANCE = tuple(np.outer(*2 * [np.arange(1, 9) / 7]).ravel().tolist())
+# Numbers that no processor computes: their digest is the same everywhere.
+EXACT = Camera(
+    rotation=np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    position=np.array([2.0, 60.0, -14.0]),
+    focal_length=(1400.0, 1405.0),
+    principal_point=(639.5, 359.5),
+    skew=-1.25,
+    distortion=np.arange(12) / 64,
+)
 FLOATS = st.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -35,6 +49,28 @@ class TestGroup:
         known = replace(station, given_covariance=COVARIANCE)
         value = json.loads(codecs.canonical(codecs.station_to_json(known)))
         assert codecs.station_from_json(value) == known
+
+    @pytest.mark.parametrize("lens", WIDE_LENSES)
+    def test_a_wide_lens_comes_back(self, group, lens) -> None:
+        given = wide((0.0, 60.0, -9.0), (0.0, 0.0, 0.0), lens)
+        station = replace(group.views[0].station, given=given)
+        value = json.loads(codecs.canonical(codecs.station_to_json(station)))
+        assert value["given"]["lens"] == lens
+        assert codecs.station_from_json(value) == station
+
+    def test_a_lens_that_every_format_holds_leaves_digests_as_they_were(self) -> None:
+        camera = looking((2.0, 60.0, -14.0), (0.0, 0.0, 0.0), 2000.0, bend=0.02)
+        assert "lens" not in codecs.camera_to_json(camera)
+        # Written before lenses had names.
+        sizes = Station("cam1", ImageSize(1280, 720), shared=True, given=EXACT)
+        assert station_digest(sizes) == "bdaa3b6b84da2dbac917c57d7be3b2b9"
+
+    def test_a_wide_lens_has_no_covariance_of_eight_parameters(self, group) -> None:
+        given = wide((0.0, 60.0, -9.0), (0.0, 0.0, 0.0))
+        station = replace(group.views[0].station, given=given)
+        value = codecs.station_to_json(station) | {"given_covariance": np.eye(8).ravel().tolist()}
+        with pytest.raises(InputError, match="lens is fisheye"):
+            codecs.station_from_json(value)
 
     @pytest.mark.parametrize(
         ("wrong", "why"),
