@@ -13,6 +13,8 @@ from app.evaluation.sensitivity import (
     slopes,
 )
 from app.geometry.sphere import position_from_diameter
+from app.soccer.frames import Box, ImagePoint
+from tests.cameras import WIDE_LENSES, wide
 from tests.unit.evaluation.conftest import DIAMETER
 
 POINTS = [(0.0, 0.0, -0.113), (9.0, -4.0, -3.0)]
@@ -33,6 +35,20 @@ class TestSlopes:
         by_size = np.linalg.norm(place(0, step) - place(0, -step)) / (2 * step)
         by_shift = np.linalg.norm(place(step, 0) - place(-step, 0)) / (2 * step)
         assert slopes(camera, box, DIAMETER) == pytest.approx((by_size, by_shift), rel=1e-5)
+
+    @pytest.mark.parametrize("lens", WIDE_LENSES)
+    def test_through_a_wide_lens_are_the_difference_quotients(self, lens: str) -> None:
+        camera = wide((0.0, 40.0, -9.0), (0.0, 10.0, 0.0), lens)
+        center = camera.project(np.array([[-30.0, 25.0, -1.0]]))[0]
+        box = Box.square(ImagePoint(*center.tolist()), 4.0)
+
+        def place(shift: float, more: float) -> np.ndarray:
+            moved = center + np.array([shift, 0.0])
+            return position_from_diameter(camera, moved, 4.0 + more, DIAMETER)
+
+        by_size = np.linalg.norm(place(0, 1e-4) - place(0, -1e-4)) / 2e-4
+        by_shift = np.linalg.norm(place(1e-4, 0) - place(-1e-4, 0)) / 2e-4
+        assert slopes(camera, box, DIAMETER) == pytest.approx((by_size, by_shift), rel=1e-3)
 
     def test_by_hand(self, make_frame) -> None:
         # 50 m away: one per cent of the size is half a metre; a pixel is 50 m / 2000.

@@ -1,18 +1,31 @@
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
+from app.geometry.sphere import tight_box
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.pitch import twin_marking
+from app.soccer.group import Station, View
+from app.soccer.pitch import Pitch, twin_marking
 from app.soccer.policy import PAPER, STRICT
 from app.soccer.solution import Calibration, MarkingFit, Suspect
+from app.solving.calibrate import calibrate_station
 from app.solving.calibration_findings import calibration_findings
 from app.solving.solve import solve, view_letter
 from tests.balls import BALL_M
-from tests.cameras import SIZE, looking
-from tests.unit.solving.conftest import BEHIND_GOAL, BEND, MAIN, OPPOSITE, given_view, group, view
+from tests.cameras import SIZE, looking, wide
+from tests.unit.solving.conftest import (
+    BEHIND_GOAL,
+    BEND,
+    MAIN,
+    OPPOSITE,
+    click,
+    given_view,
+    group,
+    view,
+)
 
 BALL = (38.0, 2.0, -1.4)
 TAU = 0.01 * SIZE.diagonal
@@ -49,6 +62,61 @@ class TestPoint:
         assert (best.ball.sigma_m, best.ball.views) == (best.best_ball.sigma_m, mean.ball.views)
         assert best.gates == mean.gates
         assert best.views[1].ball.error_px < mean.views[1].ball.error_px - 0.1
+
+
+class TestWideLenses:
+    """Static cameras with lenses that no pinhole comes near, the ball far from their axes."""
+
+    CAMERAS: ClassVar = {
+        "cam1": wide((10.0, 44.0, -11.0), (0.0, 12.0, 0.0), "fisheye"),
+        "cam2": wide((10.0, -30.0, -10.0), (0.0, 2.0, 0.0), "arctan_polynomial", focal=560.0),
+        "cam3": looking((70.0, 0.0, -9.0), (38.0, 2.0, 0.0), 1500.0),
+    }
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def solved(cls):
+        views = []
+        for key, camera in cls.CAMERAS.items():
+            left, top, right, bottom = tight_box(camera, np.array(BALL), BALL_M / 2).tolist()
+            box = Box(left, top, right - left, bottom - top)
+            station = Station(key, SIZE, given=camera)
+            views.append(View(key, station, (BallAnnotation(box=box),)))
+        return solve(group(*views), PAPER)
+
+    def test_the_ball_is_where_it_is(self, solved):
+        assert solved.passes
+        assert np.allclose(solved.ball.point, BALL, atol=0.02)
+        assert np.allclose(solved.best_ball.point, BALL, atol=0.02)
+        assert [one.included for one in solved.views] == [True] * 3
+
+    def test_lines_lie_on_the_curves_that_the_lens_makes_of_them(self):
+        for key in ("cam1", "cam2"):
+            camera = self.CAMERAS[key]
+            station = Station(key, SIZE, lines=click(camera), given=camera)
+            found = calibrate_station(station, Pitch(), PAPER.calibration)
+            clicked = [fit for fit in found.markings if fit.distances_px]
+            assert len(clicked) >= 5
+            assert all(fit.outcome == "tp" for fit in clicked)
+            # As far as a chord of 0.9 m is from the curve.
+            assert max(fit.largest_px for fit in clicked) < 0.6
+
+    def test_its_size_is_the_spheres(self, solved):
+        for one in solved.views:
+            assert one.ball.size_ratio == pytest.approx(1.0, abs=0.01)
+            assert one.ball.monocular_error_m < 0.6
+        assert not any(finding.kind == "ball_size" for finding in solved.findings)
+
+    def test_taken_for_a_pinhole_it_is_metres_off(self):
+        # What a format without a place for the lens would have made of it.
+        bare = {
+            key: replace(camera, lens="brown_conrady", distortion=np.zeros(12))
+            for key, camera in self.CAMERAS.items()
+        }
+        views = [given_view(key, camera, BALL) for key, camera in self.CAMERAS.items()]
+        wrong = [replace(one, station=replace(one.station, given=bare[one.key])) for one in views]
+        found = solve(group(*wrong), PAPER)
+        assert np.linalg.norm(np.array(found.ball.point) - BALL) > 1.0
 
 
 class TestSolve:

@@ -12,8 +12,9 @@ from app.api.schemas.solution import SolutionDocument
 from app.review.editing.codec import edit_from_json
 from app.soccer.group import Group
 from app.soccer.policy import PAPER
-from app.soccer.solution import Finding, Fix, Solution
+from app.soccer.solution import Calibration, Finding, Fix, Solution
 from app.solving.solve import solve
+from tests.cameras import WIDE_LENSES, wide
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +49,22 @@ class TestSolutionDocument:
         assert sigma.position_meters == pytest.approx((0.01, 0.01, 0.01))
         assert sigma.pan_degrees == pytest.approx(0.5729577951)
         assert documents[1].calibration.sigma is None
+
+    def test_a_wide_lens_is_named_with_its_coefficients(
+        self, solution: Solution, group: Group
+    ) -> None:
+        plain = SolutionDocument.of(solution, group).views[0].calibration.camera
+        assert plain is not None
+        assert (plain.lens, plain.lens_coefficients) == ("brown_conrady", None)
+        assert len(plain.radial_distortion) == 6
+        first = solution.views[0]
+        camera = wide((0.0, 60.0, -9.0), (0.0, 0.0, 0.0), "arctan_polynomial")
+        changed = replace(first, calibration=Calibration("given", camera))
+        document = SolutionDocument.of(replace(solution, views=(changed,)), group)
+        found = json.loads(document.model_dump_json())["views"][0]["calibration"]["camera"]
+        assert found["lens"] == "arctan_polynomial"
+        assert tuple(found["lens_coefficients"]) == WIDE_LENSES["arctan_polynomial"]
+        assert found["radial_distortion"] == []
 
     def test_the_document_fits_its_own_schema(self, solution: Solution, group: Group) -> None:
         text = SolutionDocument.of(solution, group).model_dump_json()
