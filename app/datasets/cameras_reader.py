@@ -1,4 +1,4 @@
-"""Cameras, read: one a file (``camera_00002.json``), or ISSIA's six in one."""
+"""Cameras, read: one a file (``camera_00002.json``), ISSIA's six in one, or SynLoc's images."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
 from app.datasets.camera_json import camera_from_json
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
+from app.datasets.synloc import camera_from_synloc, images_of, is_synloc
 from app.errors import DatasetFormatError
 from app.geometry.camera import Camera
 
@@ -25,8 +26,9 @@ def read_cameras(path: Path, report: Report, limits: Limits = DEFAULT_LIMITS) ->
     """Every camera below ``path``, by key.
 
     ``path`` is a folder or zip of ``camera_<stem>.json``, one such file, or a file with ISSIA's
-    ``{"cam1": {...}, ...}`` (also inside ``{"cameras": {...}}``, also double-encoded). The key
-    is the stem, with ``<league>/<season>/<match>/`` before it where the file lies that deep.
+    ``{"cam1": {...}, ...}`` (also inside ``{"cameras": {...}}``, also double-encoded), or a COCO
+    file of SynLoc, whose cameras are called like their images. The key is the stem, with
+    ``<league>/<season>/<match>/`` before it where the file lies that deep.
     """
     tree = open_tree(path, report, limits)
     if tree is None:
@@ -77,7 +79,8 @@ def _read_file(
     for record, item in several.items() if several is not None else ((None, value),):
         report.read += 1
         try:
-            cameras[record or key] = camera_from_json(item, shown, record)
+            read = camera_from_synloc if is_synloc(item) else camera_from_json
+            cameras[record or key] = read(item, shown, record)
         except DatasetFormatError as error:
             report.skip(error)
 
@@ -88,6 +91,8 @@ def _several(value: Any) -> dict[str, Any] | None:
         return None
     if isinstance(value.get("cameras"), dict):
         return dict(value["cameras"])
+    if (images := images_of(value)) is not None:
+        return images
     if not any(isinstance(item, dict) for item in value.values()):
         return None
     return {name: item for name, item in value.items() if not name.startswith("_")}

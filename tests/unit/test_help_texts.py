@@ -41,7 +41,7 @@ PLAIN_WORDS = """
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows shared sheet singular site smallest solve
     solving soundness source sources sphere spill spread squares stage staging standpoints starts
-    state statistics steps storage store stream submit summary surface swap tab table tables term
+    state statistics steps storage store stream submit summary surface swap synloc tab table tables term
     terminal text textures threshold ticks tools triangulate truth types undo undrawn unknown upload uploads
     v3 v3d video viewport viewports virtual wal walk warm what when words workspace write writer zip
 """
