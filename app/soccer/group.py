@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from app.errors import InputError
@@ -98,6 +99,19 @@ class View:
 
 
 @dataclass(frozen=True)
+class SharedPosition:
+    """Where the other pictures of a match put the camera of a view; pitch frame, metres.
+
+    Attributes:
+        mean: x, y and z.
+        sigma: Standard deviation of each.
+    """
+
+    mean: tuple[float, float, float]
+    sigma: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
 class Group:
     """Views of the same instant, ordered, the main camera first.
 
@@ -106,6 +120,8 @@ class Group:
         match: Key of the match or station set, which owns the pitch size.
         split: ``train``, ``test``, ``valid`` or empty.
         label: What people read: teams and time of play.
+        positions: What the match's other pictures say of where the camera of a view stands, by
+            the view's key, as it was accepted for the match.
     """
 
     key: str
@@ -114,6 +130,7 @@ class Group:
     pitch: Pitch = field(default_factory=Pitch)
     split: str = ""
     label: str = ""
+    positions: Mapping[str, SharedPosition] = field(default_factory=dict)
 
     def view(self, key: str) -> View | None:
         """The view of that key, or None."""

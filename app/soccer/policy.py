@@ -27,8 +27,9 @@ def _threshold(
     maximum: float | None = None,
     choices: tuple[float | str, ...] = (),
     later: bool = False,
+    told: bool = True,
 ) -> Any:
-    """A field of a policy with what ``Threshold`` says of it."""
+    """A field of a policy with what ``Threshold`` says of it; ``told``: in its ``repr``."""
     known = {
         "subject": subject,
         "label": label,
@@ -38,7 +39,7 @@ def _threshold(
         "choices": choices,
         "later": later,
     }
-    return field(default=default, metadata=known)
+    return field(default=default, metadata=known, repr=told)
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,11 @@ class CalibrationPolicy:
     """Standard deviation of that prior."""
     check_labels: bool = _threshold(True, CALIBRATION, "Leave out markings found mislabelled")
     """Leave out markings that are found mislabelled."""
+    share_position: bool = _threshold(
+        False, CALIBRATION, "Use the position that the match shares", later=True, told=False
+    )
+    """Where the main camera stands is known from the match's other pictures, where that was
+    accepted. Not in the ``repr``, which keys calibrations: they are keyed by the position itself."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +146,7 @@ class Policy:
     @cached_property
     def calibration_hash(self) -> str:
         """Digest of what a calibration depends on."""
-        return _digest(asdict(self.calibration))
+        return _digest(digested_calibration(self.calibration))
 
 
 def digested_values(policy: Policy) -> dict[str, Any]:
@@ -149,9 +155,20 @@ def digested_values(policy: Policy) -> dict[str, Any]:
     A threshold that came later counts only where it asks for something else than before it came:
     the hash of a policy, and of each version that was frozen with it, stays what it was.
     """
-    values = asdict(policy)
+    values = _asked(policy)
     del values["name"]
-    for item in fields(Policy):
+    values["calibration"] = digested_calibration(policy.calibration)
+    return values
+
+
+def digested_calibration(policy: CalibrationPolicy) -> dict[str, Any]:
+    """The same of its part for calibrations."""
+    return _asked(policy)
+
+
+def _asked(policy: Policy | CalibrationPolicy) -> dict[str, Any]:
+    values = asdict(policy)
+    for item in fields(policy):
         if item.metadata.get("later") and values[item.name] == item.default:
             del values[item.name]
     return values

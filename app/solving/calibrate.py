@@ -12,7 +12,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.resection import LOG_FOCAL, PARAMETERS, X, Z
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
-from app.soccer.group import Station
+from app.soccer.group import Group, SharedPosition, Station, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import GAMMAS_PERCENT, SOLVER_VERSION, Calibration, MarkingFit, Suspect
@@ -20,7 +20,13 @@ from app.solving.jaccard import jaccard, measure_markings, outcomes, project_mar
 from app.solving.labels import find_suspects
 from app.solving.observations import Observations, observe
 from app.solving.picture import find_picture
-from app.solving.resect import PositionPrior, Resection, ResectionProblem, measurement_count
+from app.solving.resect import (
+    MATCH_FREEDOM,
+    PositionPrior,
+    Resection,
+    ResectionProblem,
+    measurement_count,
+)
 
 MIN_MEASUREMENTS = 7
 """A camera with one focal length has seven unknowns; the distortion has a prior."""
@@ -102,12 +108,41 @@ def _found(problem: ResectionProblem, fit: Resection, observations: Observations
     )
 
 
-def calibrate_station(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> Calibration:
-    """Calibration of a station: the given camera where that counts, else from its lines."""
+def calibrate_station(
+    station: Station,
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+    shared: SharedPosition | None = None,
+) -> Calibration:
+    """Calibration of a station: the given camera where that counts, else from its lines.
+
+    ``shared`` is what other pictures of the match say of its position.
+    """
     if station.given is not None and station.calibration == "given":
         given = Calibration("given", station.given, covariance=station.given_covariance)
         return measure(given, station.lines, pitch, station.size)
-    return calibrate(station.lines, pitch, station.size, policy)
+    alone = calibrate(station.lines, pitch, station.size, policy)
+    if shared is None:
+        return alone
+    near = PositionPrior(np.array(shared.mean), np.array(shared.sigma), MATCH_FREEDOM)
+    return calibrate_near(alone, near, station.lines, pitch, station.size, policy)
+
+
+def calibrate_view(group: Group, view: View, policy: CalibrationPolicy) -> Calibration:
+    """Calibration of a view's station, near the position that its match shares with it."""
+    return calibrate_station(view.station, group.pitch, policy, _shared(group, view, policy))
+
+
+def view_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
+    """``calibration_key`` of what ``calibrate_view`` makes."""
+    return calibration_key(view.station, group.pitch, policy, _shared(group, view, policy))
+
+
+def _shared(group: Group, view: View, policy: CalibrationPolicy) -> SharedPosition | None:
+    """The position of a view's match as far as the policy wants it and the camera moves."""
+    if not policy.share_position or view.station.shared:
+        return None
+    return group.positions.get(view.key)
 
 
 def measure(calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize) -> Calibration:
@@ -142,7 +177,12 @@ def measure(calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSiz
     )
 
 
-def calibration_key(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> str:
+def calibration_key(
+    station: Station,
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+    shared: SharedPosition | None = None,
+) -> str:
     """Digest of all that ``calibrate_station`` reads: the same key, the same calibration."""
     parts: list[object] = [SOLVER_VERSION, station.size, pitch, policy]
     parts.append([(marking, station.lines[marking]) for marking in sorted(station.lines)])
@@ -152,6 +192,8 @@ def calibration_key(station: Station, pitch: Pitch, policy: CalibrationPolicy) -
             parts.append(station.given.lens)
         if station.given_covariance is not None:
             parts.append(station.given_covariance)
+    elif shared is not None:
+        parts.append(shared)
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 
 

@@ -26,7 +26,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_near
-from app.solving.resect import PositionPrior, is_main_position
+from app.solving.resect import MATCH_FREEDOM, PositionPrior, is_main_position
 
 WANDER_M = 0.1
 """Standard deviation of a camera's position, each axis, among frames that look the same way."""
@@ -44,7 +44,6 @@ SCATTER, GIVE_UP = 3.0, 12.0
 frames are not of one match."""
 LOOK_AHEAD = 3
 """So many frames on, one that agrees holds a run of frames together."""
-_FREEDOM = 4.0
 _ROUNDS = 6
 
 
@@ -76,6 +75,14 @@ def place_of(calibration: Calibration, size: ImageSize) -> Place | None:
     return Place(position, spread, float(parameters[PAN]))
 
 
+def pan_of(calibration: Calibration) -> float | None:
+    """Where a main camera looks, radians; None for other cameras."""
+    if calibration.camera is None or not is_main_position(calibration.camera.position):
+        return None
+    # The pan of a row of parameters does not depend on the size of the image.
+    return float(parameters_from_camera(calibration.camera, 1.0)[PAN])
+
+
 class Places:
     """Places of some frames, side by side, to take one out and look at the others."""
 
@@ -104,7 +111,7 @@ class Places:
         for _ in range(_ROUNDS):
             apart = positions - mean
             chi = np.einsum("ni,nij,nj->n", apart, inverses, apart)
-            weighted = ((_FREEDOM + 3) / (_FREEDOM + chi))[:, None, None] * inverses
+            weighted = ((MATCH_FREEDOM + 3) / (MATCH_FREEDOM + chi))[:, None, None] * inverses
             information = weighted.sum(axis=0)
             mean = np.linalg.solve(information, np.einsum("nij,nj->i", weighted, positions))
         scatter = float(np.median(chi))
@@ -113,7 +120,7 @@ class Places:
         # Frames that look the same way drift together: more of them do not say more of another way.
         variance = np.maximum(np.diag(np.linalg.inv(information)), drift.min()) + WANDER_M**2
         variance *= max(1.0, scatter / SCATTER)
-        return PositionPrior(mean, np.sqrt(variance), _FREEDOM)
+        return PositionPrior(mean, np.sqrt(variance), MATCH_FREEDOM)
 
 
 NO_PLACES = Places(())

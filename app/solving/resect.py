@@ -79,6 +79,8 @@ MAIN_SIGMA = np.array([np.radians(0.4), 2.0, 11.0, 4.5])
 """Roll (radians) and position (metres) of main cameras in real stadiums."""
 MAIN_FREEDOM = 10.0
 """Degrees of freedom of that prior's Student distribution: some stadiums are unlike the others."""
+MATCH_FREEDOM = 4.0
+"""The same of what other frames of a match say of the position."""
 MAIN_ROUNDS = 3
 POOR_PX = 8.0
 """A fit is poor when a point lies farther than this from its marking, at 960 x 540."""

@@ -25,7 +25,7 @@ from app.soccer.solution import (
 )
 from app.solving.ball_box import expect_ball, fit_ball
 from app.solving.best_ball import best_ball
-from app.solving.calibrate import calibrate_station, calibration_key
+from app.solving.calibrate import calibrate_view, view_key
 from app.solving.contradiction import chi_square_of, contradiction
 from app.solving.facts import Facts, facts_of
 from app.solving.findings import find
@@ -102,9 +102,9 @@ def view_letter(index: int) -> str:
 
 def _calibrated(view: View, group: Group, policy: Policy, known: dict[str, Calibration]) -> str:
     """Key of a view's calibration, which is known then."""
-    key = calibration_key(view.station, group.pitch, policy.calibration)
+    key = view_key(group, view, policy.calibration)
     if key not in known:
-        known[key] = calibrate_station(view.station, group.pitch, policy.calibration)
+        known[key] = calibrate_view(group, view, policy.calibration)
     return key
 
 

@@ -19,7 +19,7 @@ from app.geometry.camera import Camera, camera_covariance
 from app.geometry.lens import BROWN_CONRADY
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Media, SharedPosition, Station, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, Policy
 from app.soccer.reasons import LeftOut
@@ -326,17 +326,39 @@ def group_from_json(value: Mapping[str, Any]) -> Group:
         pitch=Pitch(*value["pitch"]),
         split=value["split"],
         label=value["label"],
+        positions=positions_from_json(value.get("positions")),
     )
 
 
+def positions_to_json(positions: Mapping[str, SharedPosition]) -> dict[str, Json]:
+    """Mean and sigma by view."""
+    return {
+        view: [[*map(float, at.mean)], [*map(float, at.sigma)]] for view, at in positions.items()
+    }
+
+
+def positions_from_json(value: Mapping[str, Any] | None) -> dict[str, SharedPosition]:
+    """Back from ``positions_to_json``; empty from None."""
+    return {
+        view: SharedPosition(tuple(mean), tuple(sigma))
+        for view, (mean, sigma) in (value or {}).items()
+    }
+
+
 def group_head_to_json(group: Group) -> dict[str, Json]:
-    """What a group is without its views."""
+    """What a group is without its views.
+
+    ``positions`` stand there only where there are any, so that digests of all other groups are
+    what they always were.
+    """
+    shared = positions_to_json(group.positions)
     return {
         "key": group.key,
         "match": group.match,
         "pitch": [float(group.pitch.length), float(group.pitch.width)],
         "split": group.split,
         "label": group.label,
+        **({"positions": shared} if shared else {}),
     }
 
 

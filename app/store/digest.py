@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
-from app.soccer.group import Group, Station, View
+from app.soccer.group import Group, SharedPosition, Station, View
 from app.soccer.pitch import Pitch
 from app.store.codecs import (
     Json,
     ball_to_json,
     canonical,
     group_head_to_json,
+    positions_to_json,
     station_to_json,
     view_to_json,
 )
@@ -39,18 +40,22 @@ def view_digest(view: View) -> str:
     return digest([view.key, view.included, [ball_to_json(ball) for ball in view.balls]])
 
 
-def inputs_hash(pitch: Pitch, views: Iterable[tuple[str, str]]) -> str:
+def inputs_hash(
+    pitch: Pitch, views: Iterable[tuple[str, str]], positions: Mapping[str, SharedPosition]
+) -> str:
     """Digest of what solving a group reads, from (view digest, station digest) in order of views.
 
     Made of digests, so that a station shared by a thousand groups costs a thousand short sums.
+    A group without shared positions keeps the digest that it always had.
     """
-    return digest([float(pitch.length), float(pitch.width), [list(pair) for pair in views]])
+    parts: list[Json] = [float(pitch.length), float(pitch.width), [list(pair) for pair in views]]
+    return digest([*parts, positions_to_json(positions)] if positions else parts)
 
 
 def group_inputs_hash(group: Group) -> str:
     """``inputs_hash`` of a group at hand."""
     pairs = ((view_digest(view), station_digest(view.station)) for view in group.views)
-    return inputs_hash(group.pitch, pairs)
+    return inputs_hash(group.pitch, pairs, group.positions)
 
 
 def source_hash(group: Group) -> str:

@@ -23,6 +23,7 @@ from app.store.codecs import (
     group_head_to_json,
     inflate,
     parse,
+    positions_from_json,
     station_from_json,
     station_to_json,
     view_from_json,
@@ -84,6 +85,7 @@ def thaw_group(said: Json, stations: Mapping[str, Json], frames: Frames | None =
         pitch=Pitch(*said["pitch"]),
         split=said["split"],
         label=said["label"],
+        positions=positions_from_json(said.get("positions")),
     )
 
 

@@ -51,6 +51,12 @@ def view_values(view: View, position: int) -> dict[str, Any]:
     }
 
 
+def positions_text(group: Group) -> str | None:
+    """The column of a group's shared positions; None where it has none."""
+    shared = codecs.positions_to_json(group.positions)
+    return codecs.canonical(shared) if shared else None
+
+
 def head_values(group: Group) -> dict[str, Any]:
     """Columns of a group that follow from its value."""
     return {
@@ -60,6 +66,7 @@ def head_values(group: Group) -> dict[str, Any]:
         "label": group.label,
         "pitch_length": group.pitch.length,
         "pitch_width": group.pitch.width,
+        "positions": positions_text(group),
         "inputs_hash": group_inputs_hash(group),
     }
 

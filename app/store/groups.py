@@ -16,14 +16,14 @@ from app.errors import NotFoundError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Media, SharedPosition, Station, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.reasons import LeftOut
 from app.store import codecs
 from app.store.datasets import policy_of
 from app.store.digest import inputs_hash, station_digest, view_digest
-from app.store.group_rows import NewRows, head_values, station_values, view_values
+from app.store.group_rows import NewRows, head_values, positions_text, station_values, view_values
 from app.store.models import (
     DatasetModel,
     GroupModel,
@@ -177,6 +177,7 @@ def _stored_group(
         pitch=Pitch(head.pitch_length, head.pitch_width),
         split=head.split,
         label=head.label,
+        positions={} if head.positions is None else _positions(head.positions),
     )
     return StoredGroup(
         id=head.id,
@@ -226,6 +227,11 @@ def stored_station(row: Any) -> StoredStation:
     return StoredStation(
         row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
     )
+
+
+def _positions(text: str) -> dict[str, SharedPosition]:
+    with codecs.as_written():
+        return codecs.positions_from_json(codecs.parse(text))
 
 
 def _left_out(text: str) -> LeftOut | None:
@@ -286,7 +292,7 @@ def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
         stored,
         revision=stored.revision + 1,
         changed=at,
-        inputs_hash=inputs_hash(group.pitch, pairs),
+        inputs_hash=inputs_hash(group.pitch, pairs, group.positions),
         group=group,
         stations=stations,
         view_digests=digests,
@@ -306,6 +312,7 @@ def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> 
     values = {name: getattr(after, name) for name in names}
     pitch = after.group.pitch
     values |= {"pitch_length": pitch.length, "pitch_width": pitch.width}
+    values["positions"] = positions_text(after.group)
     _update(session, GroupModel.__table__, after.id, values)
 
 
@@ -418,6 +425,7 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
             GroupModel.id,
             GroupModel.pitch_length,
             GroupModel.pitch_width,
+            GroupModel.positions,
             ViewModel.digest,
             StationModel.digest.label("station_digest"),
         )
@@ -426,15 +434,17 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
         .where(GroupModel.id.in_(group_ids))
         .order_by(GroupModel.id, ViewModel.position)
     )
-    pitches: dict[int, Pitch] = {}
+    heads: dict[int, Any] = {}
     pairs: dict[int, list[tuple[str, str]]] = {}
     for row in session.execute(statement):
-        pitches.setdefault(row.id, Pitch(row.pitch_length, row.pitch_width))
+        heads.setdefault(row.id, row)
         pairs.setdefault(row.id, []).append((row.digest, row.station_digest))
-    session.execute(
-        update(GroupModel),
-        [{"id": key, "inputs_hash": inputs_hash(pitches[key], pairs[key])} for key in pairs],
-    )
+    rows = []
+    for key, row in heads.items():
+        positions = {} if row.positions is None else _positions(row.positions)
+        pitch = Pitch(row.pitch_length, row.pitch_width)
+        rows.append({"id": key, "inputs_hash": inputs_hash(pitch, pairs[key], positions)})
+    session.execute(update(GroupModel), rows)
 
 
 def groups_of_station(session: Session, station_id: int) -> list[int]:

@@ -28,8 +28,8 @@ class Entry:
     """One thing that was said.
 
     ``kind`` is ``dataset``, ``policy``, ``station``, ``import``, ``camera``, ``spare``,
-    ``edit``, ``undo``, ``redo``, the same after ``station_``, ``pitch``, ``verdict``, or ``freeze``; ``body``
-    is JSON that suffices to do it again.
+    ``edit``, ``undo``, ``redo``, the same after ``station_``, ``pitch``, ``position``,
+    ``verdict``, or ``freeze``; ``body`` is JSON that suffices to do it again.
     """
 
     kind: str

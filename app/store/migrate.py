@@ -30,6 +30,7 @@ KNOWN_REVISIONS = (
     "0010",
     "0011",
     "0013",
+    "0016",
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]

@@ -63,7 +63,10 @@ class StationModel(Base):
 
 
 class GroupModel(Base):
-    """A group; ``source_hash`` is that of the whole group as the dataset last brought it."""
+    """A group; ``source_hash`` is that of the whole group as the dataset last brought it.
+
+    ``positions`` (JSON by view) is what its match says of where cameras stand.
+    """
 
     __tablename__ = "groups"
     __table_args__ = (
@@ -80,6 +83,7 @@ class GroupModel(Base):
     label: Mapped[str]
     pitch_length: Mapped[float]
     pitch_width: Mapped[float]
+    positions: Mapped[str | None]
     revision: Mapped[int]
     changed: Mapped[str]
     inputs_hash: Mapped[str]

@@ -14,6 +14,7 @@ from app.review.editing.edit import (
     SetCalibrationSource,
     SetLines,
     SetPitch,
+    SetPositions,
     SetStationCalibration,
     SetStationCamera,
     SetStationLines,
@@ -28,6 +29,8 @@ from app.store.codecs import (
     camera_to_json,
     covariance_from_json,
     covariance_to_json,
+    positions_from_json,
+    positions_to_json,
 )
 
 
@@ -48,6 +51,8 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
             return {"edit": "set_calibration", "view": view, "calibration": calibration}
         case SetPitch(length, width):
             return {"edit": "set_pitch", "length": float(length), "width": float(width)}
+        case SetPositions(positions):
+            return {"edit": "set_positions", "positions": positions_to_json(positions)}
         case SetStationLines(lines):
             return {"edit": "set_station_lines", "lines": _lines_to_json(lines)}
         case SetStationCalibration(calibration):
@@ -76,6 +81,8 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
             return SetCalibrationSource(value["view"], value["calibration"])
         case "set_pitch":
             return SetPitch(value["length"], value["width"])
+        case "set_positions":
+            return SetPositions(positions_from_json(value["positions"]))
     raise ValueError(f"the log holds an unknown edit: {value['edit']}")
 
 

@@ -14,7 +14,7 @@ from app.errors import InputError, NotFoundError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import ImagePoint
-from app.soccer.group import Group, Station, View
+from app.soccer.group import Group, SharedPosition, Station, View
 from app.soccer.pitch import Pitch, canonical_marking
 from app.soccer.reasons import left_out
 
@@ -235,6 +235,22 @@ class SetPitch:
     def inverse(self, group: Group) -> SetPitch:
         """The size as it was."""
         return SetPitch(group.pitch.length, group.pitch.width)
+
+
+@dataclass(frozen=True)
+class SetPositions:
+    """Say where the match's other pictures put the cameras of a group's views, by view."""
+
+    positions: Mapping[str, SharedPosition]
+
+    def apply(self, group: Group) -> Group:
+        """The group with these positions, for views that it has."""
+        known = {view: at for view, at in self.positions.items() if group.view(view) is not None}
+        return replace(group, positions=known)
+
+    def inverse(self, group: Group) -> SetPositions:
+        """The positions as they were."""
+        return SetPositions(group.positions)
 
 
 STATION_EDITS = (SetLines, SetCalibrationSource)

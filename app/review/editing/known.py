@@ -7,18 +7,14 @@ from collections.abc import Iterable
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import calibration_key
+from app.solving.calibrate import view_key
 from app.store.session import Session
 from app.store.solutions import read_calibrations
 
 
 def calibration_keys(groups: Iterable[Group], policy: Policy) -> set[str]:
     """Keys of the calibrations that groups need under a policy."""
-    return {
-        calibration_key(view.station, group.pitch, policy.calibration)
-        for group in groups
-        for view in group.views
-    }
+    return {view_key(group, view, policy.calibration) for group in groups for view in group.views}
 
 
 def known_calibrations(

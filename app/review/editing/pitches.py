@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from app.errors import GeometryError, InputError, NotFoundError
@@ -332,7 +332,8 @@ def _proposed(pitches: Sequence[Pitch], estimate: PitchEstimate) -> Pitch | None
 
 def _inputs(lines: str, policy: CalibrationPolicy) -> str:
     """Key of an estimate: all that it is computed from."""
-    return digest([SOLVER_VERSION, asdict(policy), lines])
+    # Where the camera stands has no part in it: every frame finds that for itself.
+    return digest([SOLVER_VERSION, asdict(replace(policy, share_position=False)), lines])
 
 
 def _task(

@@ -24,6 +24,7 @@ from app.store.codecs import (
     extras_to_json,
     pack,
     policy_from_json,
+    positions_from_json,
     station_from_json,
     view_from_json,
 )
@@ -31,6 +32,7 @@ from app.store.digest import station_digest, view_digest
 from app.store.group_rows import head_values, station_values, view_values
 from app.store.log import LogEntry, read_log, verify_chain
 from app.store.pitches import PITCH
+from app.store.positions import POSITION
 from app.store.projection import rewrite
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
@@ -158,6 +160,7 @@ def _head(value: Mapping[str, Any]) -> Group:
         pitch=Pitch(*value["pitch"]),
         split=value["split"],
         label=value["label"],
+        positions=positions_from_json(value.get("positions")),
     )
 
 
@@ -169,7 +172,7 @@ def _edit(ledger: Ledger, entry: LogEntry) -> None:
         item.view = without_station(after)
         if after.station != before.station:
             _save_station(ledger, record.dataset_id, item.station_id, after.station, None)
-    record.head = replace(record.head, pitch=changed.pitch)
+    record.head = replace(record.head, pitch=changed.pitch, positions=changed.positions)
     record.revision, record.changed = record.revision + 1, entry.at
 
 
@@ -301,6 +304,7 @@ _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
     "undo": _edit,
     "redo": _edit,
     PITCH: _edit,
+    POSITION: _edit,
     "station_edit": _station_edit,
     "station_undo": _station_edit,
     "station_redo": _station_edit,

@@ -9,6 +9,7 @@ are not carried: they lie elsewhere on each machine.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from app.datasets.manifest import Manifest, write_manifest
@@ -81,7 +82,8 @@ def carried_group(group: Group) -> dict[str, Json]:
         value = view_to_json(view, view.station.key if view.station.shared else None)
         del value["media"]
         views.append(value)
-    return {**group_head_to_json(group), "views": views}
+    # Where a match puts its cameras follows from its lines, there as here.
+    return {**group_head_to_json(replace(group, positions={})), "views": views}
 
 
 def _write_lines(path: Path, items: Iterator[Json]) -> int:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from app.progress import Progress
 from app.review.datasets.dataset import insert_dataset
+from app.review.editing.edit import SetPositions
 from app.review.editing.pitches import give_pitch
 from app.review.editing.shared_stations import SharedStations
 from app.review.editing.upstream import KIND, Kept, follow_group
@@ -249,6 +250,10 @@ def _follow(
     if (pitch := pitches.get(incoming.match)) is not None:
         # A person gave the match its pitch.
         followed = replace(followed, group=replace(followed.group, pitch=pitch))
+    if incoming.match == stored.group.match:
+        # What the match shares comes from its other pictures.
+        shared_here = SetPositions(stored.group.positions).apply(followed.group)
+        followed = replace(followed, group=shared_here)
     save_group(
         session, stored, followed.group, at=at, source=followed.base, digest=digest, shared=shared
     )

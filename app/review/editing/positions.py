@@ -1,0 +1,326 @@
+"""Positions: where a match's main camera stands, shared with each of its pictures.
+
+What a picture gets is what the match's other pictures say, so its own lines never count twice and
+an edit of them leaves it as it is. It is given when somebody asks for it and renewed when they ask
+again, as an entry of the log for each group; ``solve`` reads it like the size of the pitch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from app.errors import ConflictError, NotFoundError
+from app.progress import Progress
+from app.review.datasets.dataset import read_dataset
+from app.review.datasets.fan_out import fan_out
+from app.review.editing.codec import edit_from_json, edit_to_json
+from app.review.editing.edit import Edit, SetPositions
+from app.soccer.group import Group, SharedPosition, Station
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.soccer.solution import SOLVER_VERSION, Calibration
+from app.solving.calibrate import calibrate_station, calibration_key
+from app.solving.match_position import Place, Places, pan_of, place_of
+from app.store.clock import now
+from app.store.digest import digest
+from app.store.groups import next_revision, read_groups, save_revision
+from app.store.log import Entry, LogEntry, append
+from app.store.positions import POSITION, MatchPositions, last_positions, match_positions
+from app.store.queue import refresh_queue
+from app.store.session import Session, Store
+from app.store.solutions import read_calibrations
+
+_BATCH = 100
+_DIGITS = 4
+"""Of a metre: what lies below is no difference."""
+
+
+@dataclass(frozen=True)
+class PositionState:
+    """The shared position of one match.
+
+    Attributes:
+        groups: How many it has.
+        views: Pictures of the main camera that have lines.
+        shared: How many of them have a position.
+        mean: The mean of those, pitch frame, metres; None without any.
+        sigma_m: How far off it may be for one picture, the median over pictures and axes.
+        current: Whether the lines are those that it was estimated from; None where it never was.
+    """
+
+    match: str
+    groups: int
+    views: int
+    shared: int
+    mean: tuple[float, float, float] | None
+    sigma_m: float | None
+    current: bool | None
+
+    @property
+    def sentence(self) -> str:
+        """What people read of it."""
+        if self.current is None:
+            return f"none of {self.views} pictures of the main camera uses a shared position"
+        kept = f"{self.shared} of {self.views} pictures of the main camera use a shared position"
+        if self.mean is not None:
+            x, y, z = self.mean
+            kept += f", ({x:.1f}, {y:.1f}, {z:.1f}) m on average, sigma {self.sigma_m:.2f} m"
+        return kept if self.current else f"{kept}; lines have changed since: share it again"
+
+
+@dataclass(frozen=True)
+class DatasetPositions:
+    """The shared positions of a dataset's matches; ``used``: whether its policy uses them."""
+
+    dataset_id: int
+    dataset: str
+    used: bool
+    items: tuple[PositionState, ...]
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """The main camera of a group, and its calibration by its lines alone, where that is known."""
+
+    group_id: int
+    view: str
+    station: Station
+    pitch: Pitch
+    alone: Calibration | None
+
+
+@dataclass(frozen=True)
+class _Task:
+    match: str
+    inputs: str
+    pictures: tuple[_Picture, ...]
+    policy: CalibrationPolicy
+
+
+def get_positions(store: Store, dataset: str | int) -> DatasetPositions:
+    """What the matches of a dataset share.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        return _read(session, dataset)
+
+
+def share_positions(
+    store: Store,
+    dataset: str | int,
+    matches: Collection[str] | None = None,
+    *,
+    actor: str,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> DatasetPositions:
+    """Estimate where matches' main cameras stand, and give it to their groups; stale until solved.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        matches: By name; None: those whose lines are others than when it was shared last.
+        actor: Who wants it.
+        executor: Where matches are worked on; None: here.
+        progress: Called with matches done and in all; an error that it raises ends the run.
+
+    Raises:
+        ConflictError: The dataset's policy does not use shared positions.
+        NotFoundError: There is no such dataset or match.
+    """
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        policy = found.policy.calibration
+        require_used(found.name, policy)
+        chosen = _chosen(session, found.id, found.name, matches, policy)
+    tasks = (_task(store, item, policy) for item in chosen)
+    for done, (task, positions) in enumerate(fan_out(_estimate, tasks, executor), start=1):
+        edits = {group: SetPositions(at) for group, at in positions.items()}
+        with store.write() as session:
+            before = last_positions(session, found.id).get(task.match, [])
+            then = before[0].body["inputs"] if before else None
+            _give(session, found.id, edits, actor, task.inputs, then)
+        if progress is not None:
+            progress(done, len(chosen))
+    return get_positions(store, found.id)
+
+
+def require_used(dataset: str, policy: CalibrationPolicy) -> None:
+    """Refuse to share what nothing would use.
+
+    Raises:
+        ConflictError: The policy does not use shared positions.
+    """
+    if not policy.share_position:
+        raise ConflictError(
+            f'the policy of "{dataset}" does not use the position that a match shares',
+            hint="Set calibration.share_position to true in the policy first.",
+        )
+
+
+def take_back_positions(
+    store: Store, dataset: str | int, match: str, *, actor: str
+) -> DatasetPositions:
+    """Give a match the positions that it had before; once more brings the later ones again.
+
+    Raises:
+        ConflictError: None were shared.
+        NotFoundError: There is no such dataset or match.
+    """
+    with store.write() as session:
+        found = read_dataset(session, dataset)
+        _chosen(session, found.id, found.name, [match], found.policy.calibration)
+        entries = last_positions(session, found.id).get(match)
+        if not entries:
+            raise ConflictError(f"no position has been shared in {match}")
+        edits = {entry.group_id or 0: edit_from_json(entry.body["inverse"]) for entry in entries}
+        body = entries[0].body
+        _give(session, found.id, edits, actor, body["before"], body["inputs"])
+    return get_positions(store, found.id)
+
+
+def _give(
+    session: Session,
+    dataset_id: int,
+    edits: Mapping[int, Edit],
+    actor: str,
+    inputs: str | None,
+    before: str | None,
+) -> None:
+    """One entry for each group that changes, and for the first in any case: it says from what."""
+    ids, at = sorted(edits), now()
+    for start in range(0, len(ids), _BATCH):
+        entries, changed = [], []
+        for stored in read_groups(session, ids[start : start + _BATCH]).values():
+            edit = edits[stored.id]
+            group = edit.apply(stored.group)
+            if group == stored.group and stored.id != ids[0]:
+                continue
+            save_revision(session, stored, next_revision(stored, group, at))
+            body = {
+                "edit": edit_to_json(edit),
+                "inverse": edit_to_json(edit.inverse(stored.group)),
+                "inputs": inputs,
+                "before": before,
+            }
+            entries.append(Entry(POSITION, actor, at, body, dataset_id, stored.id))
+            changed.append(stored.id)
+        append(session, entries)
+        refresh_queue(session, changed)
+
+
+def _read(session: Session, dataset: str | int) -> DatasetPositions:
+    found = read_dataset(session, dataset)
+    policy, last = found.policy.calibration, last_positions(session, found.id)
+    items = tuple(
+        _state(item, last.get(item.match, []), policy)
+        for item in match_positions(session, found.id)
+        if item.views
+    )
+    return DatasetPositions(found.id, found.name, policy.share_position, items)
+
+
+def _state(
+    item: MatchPositions, last: Sequence[LogEntry], policy: CalibrationPolicy
+) -> PositionState:
+    then = last[0].body["inputs"] if last else None
+    x = y = z = sigma = 0.0
+    if item.positions:
+        x, y, z = np.mean([at.mean for at in item.positions], axis=0).tolist()
+        sigma = float(np.median([at.sigma for at in item.positions]))
+    return PositionState(
+        match=item.match,
+        groups=len(item.groups),
+        views=item.views,
+        shared=len(item.positions),
+        mean=(x, y, z) if item.positions else None,
+        sigma_m=sigma if item.positions else None,
+        current=None if then is None else then == _inputs(item, policy),
+    )
+
+
+def _inputs(item: MatchPositions, policy: CalibrationPolicy) -> str:
+    """Key of what is estimated: all that it is computed from."""
+    return digest([SOLVER_VERSION, asdict(policy), item.inputs])
+
+
+def _chosen(
+    session: Session,
+    dataset_id: int,
+    dataset: str,
+    matches: Collection[str] | None,
+    policy: CalibrationPolicy,
+) -> list[tuple[MatchPositions, str]]:
+    """Matches to share in, each with the key of what it will be shared from."""
+    known = {item.match: item for item in match_positions(session, dataset_id) if item.views}
+    for match in matches or ():
+        if match not in known:
+            raise NotFoundError(f'"{dataset}" has no match {match} with lines of a main camera')
+    if matches is not None:
+        return [(known[match], _inputs(known[match], policy)) for match in matches]
+    last = last_positions(session, dataset_id)
+    found = []
+    for match, item in known.items():
+        inputs = _inputs(item, policy)
+        if match not in last or last[match][0].body["inputs"] != inputs:
+            found.append((item, inputs))
+    return found
+
+
+def _task(store: Store, chosen: tuple[MatchPositions, str], policy: CalibrationPolicy) -> _Task:
+    item, inputs = chosen
+    pictures: list[_Picture] = []
+    with store.read() as session:
+        for start in range(0, len(item.groups), _BATCH):
+            stored = read_groups(session, item.groups[start : start + _BATCH], extras=False)
+            keys = {
+                number: calibration_key(it.group.views[0].station, it.group.pitch, policy)
+                for number, it in stored.items()
+            }
+            known = read_calibrations(session, keys.values())
+            pictures += (
+                _picture(number, it.group, known.get(keys[number])) for number, it in stored.items()
+            )
+    return _Task(item.match, inputs, tuple(pictures), policy)
+
+
+def _picture(group_id: int, group: Group, alone: Calibration | None) -> _Picture:
+    view = group.views[0]
+    return _Picture(group_id, view.key, view.station, group.pitch, alone)
+
+
+def _estimate(task: _Task) -> tuple[_Task, dict[int, dict[str, SharedPosition]]]:
+    """Positions by group and view; runs in a worker."""
+    found = list(_alone(task))
+    places = [place for _, _, place in found if place is not None]
+    every, row = Places(places), iter(range(len(places)))
+    positions: dict[int, dict[str, SharedPosition]] = {}
+    for picture, calibration, place in found:
+        others = every if place is None else every.without(next(row))
+        pan = pan_of(calibration)
+        near = None if pan is None else others.prior(pan)
+        at = {}
+        if near is not None:
+            at[picture.view] = SharedPosition(_rounded(near.mean), _rounded(near.sigma))
+        positions[picture.group_id] = at
+    # What was read travels back no farther than it must.
+    return replace(task, pictures=()), positions
+
+
+def _alone(task: _Task) -> Iterator[tuple[_Picture, Calibration, Place | None]]:
+    for picture in task.pictures:
+        alone = picture.alone or calibrate_station(picture.station, picture.pitch, task.policy)
+        # A given camera is not calibrated; what it says of its position is not the lines'.
+        by_lines = alone.source == "lines"
+        yield picture, alone, place_of(alone, picture.station.size) if by_lines else None
+
+
+def _rounded(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = np.round(values, _DIGITS).tolist()
+    return x, y, z
