@@ -10,7 +10,17 @@ from pydantic import Field
 from app.api.schemas.document import Document
 
 JobKind = Literal[
-    "solve", "import", "export", "freeze", "verify", "evaluate", "detect", "bulk", "practice", "rig"
+    "solve",
+    "import",
+    "export",
+    "freeze",
+    "verify",
+    "evaluate",
+    "detect",
+    "bulk",
+    "practice",
+    "rig",
+    "positions",
 ]
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 

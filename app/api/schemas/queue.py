@@ -16,7 +16,7 @@ from app.soccer.solution import Finding
 from app.store.log import LogEntry
 
 THUMBNAIL_WIDTH = 208
-TOLD_KINDS = frozenset({"edit", "undo", "redo", "verdict", "pitch"})
+TOLD_KINDS = frozenset({"edit", "undo", "redo", "verdict", "pitch", "position"})
 
 
 def thumbnail_address(view_id: int | None) -> str | None:
@@ -158,7 +158,7 @@ class LogEntryDocument(Document):
     actor: str
     kind: str
     body: dict[str, Any] | None = Field(
-        description="The edit, pitch or verdict as it was given; null for imports."
+        description="The edit, pitch, position or verdict as it was given; null for imports."
     )
 
     @staticmethod

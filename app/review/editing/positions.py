@@ -15,7 +15,7 @@ import numpy as np
 
 from app.errors import ConflictError, NotFoundError
 from app.progress import Progress
-from app.review.datasets.dataset import read_dataset
+from app.review.datasets.dataset import Dataset, read_dataset
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.codec import edit_from_json, edit_to_json
 from app.review.editing.edit import Edit, SetPositions
@@ -134,11 +134,10 @@ def share_positions(
         ConflictError: The dataset's policy does not use shared positions.
         NotFoundError: There is no such dataset or match.
     """
+    found = require_sharable(store, dataset, matches)
+    policy = found.policy.calibration
     with store.read() as session:
-        found = read_dataset(session, dataset)
-        policy = found.policy.calibration
-        require_used(found.name, policy)
-        chosen = _chosen(session, found.id, found.name, matches, policy)
+        chosen = _chosen(session, found, matches)
     tasks = (_task(store, item, policy) for item in chosen)
     for done, (task, positions) in enumerate(fan_out(_estimate, tasks, executor), start=1):
         edits = {group: SetPositions(at) for group, at in positions.items()}
@@ -151,17 +150,24 @@ def share_positions(
     return get_positions(store, found.id)
 
 
-def require_used(dataset: str, policy: CalibrationPolicy) -> None:
-    """Refuse to share what nothing would use.
+def require_sharable(
+    store: Store, dataset: str | int, matches: Collection[str] | None = None
+) -> Dataset:
+    """The dataset, unless nothing would use what is shared.
 
     Raises:
-        ConflictError: The policy does not use shared positions.
+        ConflictError: The dataset's policy does not use shared positions.
+        NotFoundError: There is no such dataset or match.
     """
-    if not policy.share_position:
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        _chosen(session, found, matches)
+    if not found.policy.calibration.share_position:
         raise ConflictError(
-            f'the policy of "{dataset}" does not use the position that a match shares',
+            f'the policy of "{found.name}" does not use the position that a match shares',
             hint="Set calibration.share_position to true in the policy first.",
         )
+    return found
 
 
 def take_back_positions(
@@ -175,7 +181,7 @@ def take_back_positions(
     """
     with store.write() as session:
         found = read_dataset(session, dataset)
-        _chosen(session, found.id, found.name, [match], found.policy.calibration)
+        _chosen(session, found, [match])
         entries = last_positions(session, found.id).get(match)
         if not entries:
             raise ConflictError(f"no position has been shared in {match}")
@@ -251,20 +257,17 @@ def _inputs(item: MatchPositions, policy: CalibrationPolicy) -> str:
 
 
 def _chosen(
-    session: Session,
-    dataset_id: int,
-    dataset: str,
-    matches: Collection[str] | None,
-    policy: CalibrationPolicy,
+    session: Session, dataset: Dataset, matches: Collection[str] | None
 ) -> list[tuple[MatchPositions, str]]:
     """Matches to share in, each with the key of what it will be shared from."""
-    known = {item.match: item for item in match_positions(session, dataset_id) if item.views}
+    policy = dataset.policy.calibration
+    known = {item.match: item for item in match_positions(session, dataset.id) if item.views}
     for match in matches or ():
         if match not in known:
-            raise NotFoundError(f'"{dataset}" has no match {match} with lines of a main camera')
+            raise NotFoundError(f'"{dataset.name}" has no match {match} with lines')
     if matches is not None:
         return [(known[match], _inputs(known[match], policy)) for match in matches]
-    last = last_positions(session, dataset_id)
+    last = last_positions(session, dataset.id)
     found = []
     for match, item in known.items():
         inputs = _inputs(item, policy)
@@ -303,7 +306,8 @@ def _estimate(task: _Task) -> tuple[_Task, dict[int, dict[str, SharedPosition]]]
     positions: dict[int, dict[str, SharedPosition]] = {}
     for picture, calibration, place in found:
         others = every if place is None else every.without(next(row))
-        pan = pan_of(calibration)
+        # A given camera is what it is.
+        pan = pan_of(calibration) if calibration.source == "lines" else None
         near = None if pan is None else others.prior(pan)
         at = {}
         if near is not None:
@@ -316,7 +320,6 @@ def _estimate(task: _Task) -> tuple[_Task, dict[int, dict[str, SharedPosition]]]
 def _alone(task: _Task) -> Iterator[tuple[_Picture, Calibration, Place | None]]:
     for picture in task.pictures:
         alone = picture.alone or calibrate_station(picture.station, picture.pitch, task.policy)
-        # A given camera is not calibrated; what it says of its position is not the lines'.
         by_lines = alone.source == "lines"
         yield picture, alone, place_of(alone, picture.station.size) if by_lines else None
 

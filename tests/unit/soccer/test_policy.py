@@ -28,6 +28,13 @@ class TestHash:
         assert (PAPER.hash, STRICT.hash) == ("b6b4891b3d9960d2", "172d8def1c011aaa")
         assert replace(PAPER, point="best").hash != PAPER.hash
         assert replace(PAPER, min_p_value=0.001).hash != PAPER.hash
+        sharing = replace(PAPER, calibration=CalibrationPolicy(share_position=True))
+        assert sharing.hash != PAPER.hash
+        assert sharing.calibration_hash != PAPER.calibration_hash
+
+    def test_sharing_positions_has_no_part_in_what_keys_calibrations(self):
+        """Those that were kept before it came stay known; the position itself keys the others."""
+        assert repr(CalibrationPolicy(share_position=True)) == repr(CalibrationPolicy())
 
     def test_tau_leaves_calibrations_alone(self):
         assert replace(PAPER, tau_percent=0.9).calibration_hash == PAPER.calibration_hash

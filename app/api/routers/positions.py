@@ -1,0 +1,62 @@
+"""Where the main camera of each match stands: shown, shared with its pictures, taken back."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath
+from app.api.jobs import ACCEPTED, job_answer
+from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply
+from app.api.schemas.job import JobDocument
+from app.api.schemas.positions import PositionsDocument, PositionsRequest
+from app.review.editing.positions import get_positions
+from app.review.jobs.positions import request_positions, take_positions_back
+
+router = APIRouter(prefix="/datasets/{dataset}/positions", tags=["datasets"])
+
+
+@router.get("", operation_id="listPositions", responses=responses(404))
+def list_positions(dataset: DatasetPath, store: AppStore) -> PositionsDocument:
+    """Where each match's main camera stands, as far as that is shared with its pictures."""
+    return PositionsDocument.model_validate(get_positions(store, dataset))
+
+
+@router.post(
+    "",
+    operation_id="sharePositions",
+    status_code=202,
+    response_model=JobDocument,
+    responses={**responses(404, 409, 413, 415), **ACCEPTED},
+)
+def share_positions(
+    dataset: DatasetPath,
+    request: PositionsRequest,
+    services: AppServices,
+    actor: Actor,
+    asked: AskedUnder,
+) -> Response:
+    """Estimate where main cameras stand and give each picture what its match's others say of it.
+
+    Their groups are solved again. An edit of lines never renews it; this does. 409 while the
+    policy does not use it.
+    """
+    reply = Reply(asked, job_answer)
+    job = request_positions(
+        services.jobs, services.store, dataset, request.match, actor=actor, keep=reply.keep
+    )
+    return reply.of(job)
+
+
+@router.delete("", operation_id="takePositionsBack", responses=responses(404, 409))
+def take_back_positions(
+    dataset: DatasetPath,
+    services: AppServices,
+    actor: Actor,
+    match: Annotated[str, Query(min_length=1, max_length=1000, description="Name of the match.")],
+) -> PositionsDocument:
+    """Give a match the positions that it had before they were shared last; a job solves it."""
+    found = take_positions_back(services.jobs, services.store, dataset, match, actor=actor)
+    return PositionsDocument.model_validate(found)

@@ -1,0 +1,64 @@
+"""Shared positions of matches over HTTP."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+SECONDS = 30
+POSITIONS = "/api/v1/datasets/broadcast/positions"
+POLICY = "/api/v1/datasets/broadcast/policy"
+
+
+@pytest.fixture
+def match(api: Any) -> str:
+    """The name of the dataset's match."""
+    (item,) = api.get(POSITIONS).json()["items"]
+    return str(item["match"])
+
+
+@pytest.fixture
+def sharing(app: Any, api: Any) -> None:
+    """The dataset's policy uses shared positions."""
+    body = {"values": {"calibration.share_position": True}}
+    answer = api.put(POLICY, json=body, headers={"If-Match": api.get(POLICY).headers["etag"]})
+    app.state.services.jobs.wait(answer.json()["id"], SECONDS)
+
+
+def test_before_it_is_shared_no_picture_uses_it(api) -> None:
+    answer = api.get(POSITIONS).json()
+    (item,) = answer["items"]
+    assert (answer["used"], item["shared"], item["current"], item["mean"]) == (False, 0, None, None)
+    assert "none of" in item["sentence"]
+
+
+def test_where_the_policy_does_not_use_it_it_is_refused(api) -> None:
+    answer = api.post(POSITIONS, json={})
+    assert answer.status_code == 409
+    assert "share_position" in answer.json()["hint"]
+
+
+def test_it_is_shared_by_a_job_told_in_the_history_and_taken_back(app, api, sharing, match) -> None:
+    answer = api.post(POSITIONS, json={"match": match})
+    job = answer.json()
+    assert (answer.status_code, job["kind"]) == (202, "positions")
+    done = app.state.services.jobs.wait(job["id"], SECONDS)
+    assert done.state == "done"
+    (item,) = api.get(POSITIONS).json()["items"]
+    assert (item["shared"], item["current"]) == (done.result["shared"], True)
+    *_, last = api.get("/api/v1/groups/1/history").json()["items"]
+    assert (last["kind"], last["body"]["edit"]["edit"]) == ("position", "set_positions")
+    back = api.delete(POSITIONS, params={"match": match})
+    assert back.status_code == 200
+    assert back.json()["items"][0]["current"] is None
+
+
+@pytest.mark.parametrize("method", ("post", "delete"))
+def test_an_unknown_match_is_404(api, sharing, method) -> None:
+    how = {"json": {"match": "nowhere"}} if method == "post" else {"params": {"match": "nowhere"}}
+    assert getattr(api, method)(POSITIONS, **how).status_code == 404
+
+
+def test_what_was_never_shared_cannot_be_taken_back(api, match) -> None:
+    assert api.delete(POSITIONS, params={"match": match}).status_code == 409

@@ -1,0 +1,70 @@
+"""Shared positions on the command line."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.cli import main
+from app.config import Settings
+from app.review.importing.ingest import ingest
+from app.review.policies.policy import change_policy
+from app.store.session import Store
+from tests.unit.review.editing.test_positions import MATCH, SHARING, match
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Run the command in a home with a match as the datasets ``demo`` and, by the paper, ``paper``."""
+    for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
+    store = Store.open(Settings(home=tmp_path / "home"))
+    for dataset in ("demo", "paper"):
+        ingest(store, dataset, match(), source="files", actor="ann")
+    change_policy(store, "demo", SHARING, if_match=None, actor="ann")
+    store.close()
+
+    def command(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["touchline", "positions", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return command
+
+
+class TestPositions:
+    def test_shows_shares_and_takes_back(self, run: Run) -> None:
+        code, out, _ = run("--dataset", "demo")
+        assert (code, out) == (
+            0,
+            f"{MATCH}: none of 6 pictures of the main camera uses a shared position\n",
+        )
+        (shared,) = json.loads(run("--dataset", "demo", "--share", "--workers", "1", "--json")[1])
+        assert (shared["shared"], shared["current"]) == (6, True)
+        assert "6 of 6 pictures" in run("--dataset", "demo")[1]
+        (back,) = json.loads(run("--dataset", "demo", "--undo", "--match", MATCH, "--json")[1])
+        assert (back["shared"], back["current"]) == (0, None)
+
+    @pytest.mark.parametrize(
+        ("words", "code", "sentence"),
+        [
+            (("paper", "--share"), 1, "calibration.share_position"),
+            (("demo", "--share", "--match", "final"), 1, "has no match final"),
+            (("demo", "--undo"), 2, "--undo needs --match"),
+            (("demo", "--undo", "--match", MATCH), 1, "no position has been shared"),
+            (("demo", "--undo", "--share"), 2, "one at a time"),
+        ],
+    )
+    def test_what_cannot_be_is_said(self, run: Run, words, code: int, sentence: str) -> None:
+        found, _, err = run("--dataset", *words)
+        assert (found, sentence in err) == (code, True)

@@ -1,0 +1,214 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from app.errors import ConflictError, NotFoundError
+from app.review.editing.edit import SetLines
+from app.review.editing.ledger import read_ledger
+from app.review.editing.pitches import change_pitches
+from app.review.editing.positions import get_positions, share_positions, take_back_positions
+from app.review.editing.recompute import solve_dataset, stale_groups
+from app.review.editing.replay import rebuild, replay
+from app.review.editing.submit import history, load, submit, undo
+from app.review.importing.ingest import ingest
+from app.review.policies.policy import change_policy
+from app.review.versions.freeze import FreezeRequest, freeze
+from app.review.versions.verify import verify
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import ImagePoint
+from app.soccer.group import Group, Station, View
+from app.soccer.pitch import Pitch
+from app.soccer.policy import PAPER, CalibrationPolicy
+from tests.cameras import SIZE, looking
+from tests.unit.solving.conftest import BEND, click
+
+MATCH = "a_match"
+STAND = (1.0, 62.0, -16.0)
+SHARING = replace(PAPER, name="sharing", calibration=CalibrationPolicy(share_position=True))
+
+
+@cache
+def match() -> tuple[Group, ...]:
+    """Six groups of a match; the main camera stands where it stands, a replay stands elsewhere."""
+    groups = []
+    for number in range(6):
+        target = (-20.0 + 8.0 * number, -4.0, 0.0)
+        views = []
+        for name, stand in (("", STAND), ("_1", (30.0, 55.0, -9.0))):
+            camera = looking(stand, target, 1200.0, bend=BEND)
+            key = f"{MATCH}/{number}{name}.png"
+            station = Station(key, SIZE, lines=click(camera, 1.0, number, Pitch()))
+            at = ImagePoint(*camera.project(np.array([[*target[:2], -1.0]]))[0].tolist())
+            ball = BallAnnotation(point=at)
+            views.append(View(f"{number}{name}.png", station, (ball,)))
+        groups.append(Group(f"{MATCH}/{number}.png", tuple(views), match=MATCH))
+    return tuple(groups)
+
+
+@pytest.fixture
+def shared(store, once):
+    """The match, its positions shared, and solved."""
+
+    def fill():
+        ingest(store, "demo", match(), source="files", actor="ann")
+        solve_dataset(store, "demo")
+        change_policy(store, "demo", SHARING, if_match=None, actor="ann")
+        share_positions(store, "demo", actor="ann")
+        solve_dataset(store, "demo")
+
+    once("shared positions", fill)
+    return store
+
+
+def state(store):
+    (item,) = get_positions(store, "demo").items
+    return item
+
+
+def stand(store, number):
+    return load(store, number).solution.views[0].calibration.camera.position
+
+
+def keys(store):
+    """Which calibration the main camera of each group has."""
+    solved = [load(store, number).solution.views[0] for number in range(1, 7)]
+    return [view.calibration_key for view in solved]
+
+
+def draw(store, number):
+    """Edit the lines of a group's main camera."""
+    at = load(store, number)
+    view = at.group.views[0].key
+    edit = SetLines(view, {"Circle central": None, "Middle line": None})
+    return submit(store, number, edit, if_match=at.etag, actor="ann")
+
+
+class TestSharePositions:
+    def test_is_refused_where_the_policy_would_not_use_it(self, store):
+        ingest(store, "demo", match(), source="files", actor="ann")
+        with pytest.raises(ConflictError, match="does not use"):
+            share_positions(store, "demo", actor="ann")
+
+    def test_each_picture_of_the_main_camera_gets_what_the_others_say(self, shared):
+        item = state(shared)
+        assert (item.groups, item.views, item.shared, item.current) == (6, 6, 6, True)
+        assert np.linalg.norm(np.subtract(item.mean, STAND)) < 0.5
+        for number in range(1, 7):
+            group = load(shared, number).group
+            assert list(group.positions) == [group.views[0].key]
+
+    def test_its_own_lines_have_no_part_in_it(self, shared):
+        (before,) = load(shared, 1).group.positions.values()
+        draw(shared, 1)
+        share_positions(shared, "demo", [MATCH], actor="ann")
+        (after,) = load(shared, 1).group.positions.values()
+        # They say where it looks, and frames that look the same way count more.
+        assert after.mean == pytest.approx(before.mean, abs=0.02)
+
+    def test_cameras_stand_closer_together(self, shared):
+        apart = [np.linalg.norm(stand(shared, number) - STAND) for number in range(1, 7)]
+        change_policy(shared, "demo", PAPER, if_match=None, actor="ann")
+        solve_dataset(shared, "demo")
+        alone = [np.linalg.norm(stand(shared, number) - STAND) for number in range(1, 7)]
+        assert np.mean(apart) < 0.9 * np.mean(alone)
+
+    def test_another_policy_than_one_that_shares_gives_what_was_before(self, shared, store):
+        replay_view = load(shared, 1).solution.views[1].calibration_key
+        with_position = load(shared, 1).solution.views[0].calibration_key
+        change_policy(shared, "demo", PAPER, if_match=None, actor="ann")
+        solve_dataset(shared, "demo")
+        after = load(shared, 1).solution.views
+        assert after[1].calibration_key == replay_view
+        assert after[0].calibration_key != with_position
+
+    def test_an_edit_solves_its_group_at_once_and_no_other(self, shared):
+        draw(shared, 1)
+        assert load(shared, 1).solution is not None
+        assert stale_groups(shared, "demo") == []
+        assert state(shared).current is False
+        assert "share it again" in state(shared).sentence
+
+    def test_it_is_renewed_when_somebody_asks_and_the_others_follow(self, shared):
+        draw(shared, 1)
+        share_positions(shared, "demo", actor="ben")
+        assert state(shared).current is True
+        assert {2, 3, 4, 5, 6} <= set(stale_groups(shared, "demo"))
+
+    def test_what_is_current_is_left_alone(self, shared):
+        share_positions(shared, "demo", actor="ann")
+        assert [entry.kind for entry in history(shared, 1)] == ["import", "position"]
+
+    def test_another_size_of_the_pitch_makes_it_old(self, shared):
+        change_pitches(shared, "demo", {MATCH: Pitch(103.0, 66.0)}, if_match=None, actor="ann")
+        assert state(shared).current is False
+
+    def test_too_few_pictures_share_nothing(self, store):
+        ingest(store, "demo", match()[:3], source="files", actor="ann")
+        change_policy(store, "demo", SHARING, if_match=None, actor="ann")
+        share_positions(store, "demo", actor="ann")
+        assert (state(store).shared, state(store).current) == (0, True)
+
+    def test_an_unknown_match_is_refused(self, shared):
+        with pytest.raises(NotFoundError, match="no match nowhere"):
+            share_positions(shared, "demo", ["nowhere"], actor="ann")
+
+    def test_the_log_tells_it_again(self, shared):
+        with shared.read() as session:
+            assert replay(session) == read_ledger(session)
+        before = [load(shared, number).stored for number in (1, 4)]
+        rebuild(shared)
+        assert [load(shared, number).stored for number in (1, 4)] == before
+
+    def test_undo_of_a_group_takes_back_its_own_edits_alone(self, shared):
+        draw(shared, 1)
+        positions = load(shared, 1).group.positions
+        after = undo(shared, 1, if_match=load(shared, 1).etag, actor="ann")
+        assert after.group.positions == positions
+        assert state(shared).current is True
+
+    def test_an_import_keeps_it(self, shared):
+        first, *_ = match()
+        changed = replace(first, label="the source says more of it now")
+        ingest(shared, "demo", (changed,), source="files", actor="ann")
+        assert load(shared, 1).group.label == changed.label
+        assert len(load(shared, 1).group.positions) == 1
+        with shared.read() as session:
+            assert replay(session) == read_ledger(session)
+
+    def test_an_import_into_another_match_leaves_it_behind(self, shared):
+        first, *_ = match()
+        ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
+        assert load(shared, 1).group.positions == {}
+
+    def test_a_version_holds_it_and_is_verified_bit_for_bit(self, shared):
+        version = freeze(shared, "demo", FreezeRequest("one", groups="passing"), actor="ann")
+        take_back_positions(shared, "demo", MATCH, actor="ann")
+        report = verify(shared, version.id)
+        assert (report.ok, report.groups) == (True, 6)
+
+
+class TestTakeBackPositions:
+    def test_cameras_are_again_what_their_lines_alone_make_them(self, shared):
+        shared_keys = keys(shared)
+        take_back_positions(shared, "demo", MATCH, actor="ann")
+        assert (state(shared).shared, state(shared).current) == (0, None)
+        solve_dataset(shared, "demo")
+        alone = keys(shared)
+        change_policy(shared, "demo", PAPER, if_match=None, actor="ann")
+        assert keys(shared) == alone != shared_keys
+
+    def test_once_more_brings_it_again(self, shared):
+        positions = load(shared, 1).group.positions
+        take_back_positions(shared, "demo", MATCH, actor="ann")
+        take_back_positions(shared, "demo", MATCH, actor="ann")
+        assert load(shared, 1).group.positions == positions
+        assert state(shared).current is True
+
+    def test_where_nothing_was_shared_it_is_refused(self, store):
+        ingest(store, "demo", match(), source="files", actor="ann")
+        with pytest.raises(ConflictError, match="no position"):
+            take_back_positions(store, "demo", MATCH, actor="ann")
