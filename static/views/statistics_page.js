@@ -15,6 +15,7 @@ import { HeatMap } from './heat_map.js';
 import { NoiseCard } from './noise_card.js';
 import { Loading, Trouble } from './page_frame.js';
 import { Pitches } from './pitches.js';
+import { Positions } from './positions.js';
 import { QueryBox } from './query_box.js';
 import { seriesColour, Spread } from './spread.js';
 
@@ -85,7 +86,8 @@ function StatisticsOf({ one }) {
 			<${Body} found=${found.value} dataset=${one.name} q=${q} />
 			<h2 class="statistics__whole">Of the whole dataset</h2>
 			<${NoiseCard} dataset=${one.id} />
-			<${Pitches} dataset=${one.id} />` : found.error ? null : html`<${Loading} what="statistics" />`}
+			<${Pitches} dataset=${one.id} />
+			<${Positions} dataset=${one.id} />` : found.error ? null : html`<${Loading} what="statistics" />`}
 	`;
 }
 

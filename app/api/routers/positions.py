@@ -50,13 +50,19 @@ def share_positions(
     return reply.of(job)
 
 
-@router.delete("", operation_id="takePositionsBack", responses=responses(404, 409))
+@router.delete(
+    "",
+    operation_id="takePositionsBack",
+    status_code=202,
+    response_model=JobDocument,
+    responses={**responses(404, 409), **ACCEPTED},
+)
 def take_back_positions(
     dataset: DatasetPath,
     services: AppServices,
     actor: Actor,
     match: Annotated[str, Query(min_length=1, max_length=1000, description="Name of the match.")],
-) -> PositionsDocument:
-    """Give a match the positions that it had before they were shared last; a job solves it."""
-    found = take_positions_back(services.jobs, services.store, dataset, match, actor=actor)
-    return PositionsDocument.model_validate(found)
+) -> Response:
+    """Give a match the positions that it had before they were shared last; the job solves it."""
+    job = take_positions_back(services.jobs, services.store, dataset, match, actor=actor)
+    return job_answer(job)

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from app.review.editing.positions import (
-    DatasetPositions,
-    require_sharable,
-    share_positions,
-    take_back_positions,
-)
+from app.review.editing.positions import require_sharable, share_positions, take_back_positions
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import request_solve
@@ -47,15 +42,14 @@ def request_positions(
 
 def take_positions_back(
     jobs: Jobs, store: Store, dataset: str | int, match: str, *, actor: str
-) -> DatasetPositions:
+) -> Job:
     """Take shared positions of a match back, and solve its dataset, soon.
 
     Raises:
         ConflictError, NotFoundError: As ``editing.positions.take_back_positions`` does.
     """
     found = take_back_positions(store, dataset, match, actor=actor)
-    request_solve(jobs, store, found.dataset_id, actor=actor)
-    return found
+    return request_solve(jobs, store, found.dataset_id, actor=actor)
 
 
 def _work(jobs: Jobs, store: Store, dataset_id: int, matches: list[str] | None, actor: str) -> Work:

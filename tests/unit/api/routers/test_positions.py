@@ -50,8 +50,8 @@ def test_it_is_shared_by_a_job_told_in_the_history_and_taken_back(app, api, shar
     *_, last = api.get("/api/v1/groups/1/history").json()["items"]
     assert (last["kind"], last["body"]["edit"]["edit"]) == ("position", "set_positions")
     back = api.delete(POSITIONS, params={"match": match})
-    assert back.status_code == 200
-    assert back.json()["items"][0]["current"] is None
+    assert (back.status_code, back.json()["kind"]) == (202, "solve")
+    assert api.get(POSITIONS).json()["items"][0]["current"] is None
 
 
 @pytest.mark.parametrize("method", ("post", "delete"))
