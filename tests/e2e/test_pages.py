@@ -426,3 +426,39 @@ class TestPitchSizes:
         back.press("Enter")
         expect(row.get_by_role("cell").first).to_have_text("103 × 66 m", timeout=MINUTE)
         expect(heading).to_be_focused()
+
+
+@pytest.fixture
+def sharing_policy(server: str) -> Iterator[None]:
+    """The sample is judged by a policy that uses the positions that matches share."""
+    path = f"{server}/api/v1/datasets/sample/policy"
+
+    def use(share: bool) -> None:
+        answer = httpx.get(path)
+        body = {"values": {"calibration.share_position": share}}
+        job = httpx.put(path, json=body, headers={"If-Match": answer.headers["etag"]})
+        assert job.is_success, job.text
+        state = f"{server}/api/v1/jobs/{job.json()['id']}"
+        while httpx.get(state).json()["state"] not in JOB_IS_OVER:
+            sleep(0.1)
+
+    use(True)
+    yield
+    use(False)
+
+
+class TestMainCameras:
+    def test_their_position_is_shared_and_taken_back_by_keyboard(
+        self, open_page: OpenPage, sharing_policy: None
+    ) -> None:
+        page = open_page("/datasets/sample/statistics")
+        card = page.get_by_role("region", name="Main cameras")
+        row = card.locator("tbody tr").first
+        expect(row).to_contain_text("none of", timeout=MINUTE)
+        row.get_by_role("button", name="Share").press("Enter")
+        expect(row).to_contain_text("use a shared position", timeout=MINUTE)
+        expect(card.get_by_role("heading")).to_be_focused()
+        back = row.get_by_role("button", name="Take back")
+        expect(back).to_have_attribute("aria-disabled", "false", timeout=MINUTE)
+        back.press("Enter")
+        expect(row).to_contain_text("none of", timeout=MINUTE)
