@@ -21,10 +21,10 @@ from app.solving.labels import find_suspects
 from app.solving.observations import Observations, observe
 from app.solving.picture import find_picture
 from app.solving.resect import (
-    MATCH_FREEDOM,
     PositionPrior,
     Resection,
     ResectionProblem,
+    match_prior,
     measurement_count,
 )
 
@@ -124,7 +124,7 @@ def calibrate_station(
     alone = calibrate(station.lines, pitch, station.size, policy)
     if shared is None:
         return alone
-    near = PositionPrior(np.array(shared.mean), np.array(shared.sigma), MATCH_FREEDOM)
+    near = match_prior(np.array(shared.mean), np.array(shared.sigma))
     return calibrate_near(alone, near, station.lines, pitch, station.size, policy)
 
 

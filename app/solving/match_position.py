@@ -26,7 +26,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_near
-from app.solving.resect import MATCH_FREEDOM, PositionPrior, is_main_position
+from app.solving.resect import MATCH_FREEDOM, PositionPrior, is_main_position, match_prior
 
 WANDER_M = 0.1
 """Standard deviation of a camera's position, each axis, among frames that look the same way."""
@@ -120,7 +120,7 @@ class Places:
         # Frames that look the same way drift together: more of them do not say more of another way.
         variance = np.maximum(np.diag(np.linalg.inv(information)), drift.min()) + WANDER_M**2
         variance *= max(1.0, scatter / SCATTER)
-        return PositionPrior(mean, np.sqrt(variance), MATCH_FREEDOM)
+        return match_prior(mean, np.sqrt(variance))
 
 
 NO_PLACES = Places(())

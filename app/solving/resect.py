@@ -27,7 +27,6 @@ from app.geometry.resection import (
     ROLL,
     Prior,
     X,
-    Y,
     Z,
     camera_from_parameters,
     distances,
@@ -79,8 +78,9 @@ MAIN_SIGMA = np.array([np.radians(0.4), 2.0, 11.0, 4.5])
 """Roll (radians) and position (metres) of main cameras in real stadiums."""
 MAIN_FREEDOM = 10.0
 """Degrees of freedom of that prior's Student distribution: some stadiums are unlike the others."""
-MATCH_FREEDOM = 4.0
-"""The same of what other frames of a match say of the position."""
+MATCH_FREEDOM, MATCH_CLICKS = 4.0, 4.0
+"""The same of what other frames of a match say of the position. Clicks on one marking, and what the
+lens differs from its model, err together: against other frames so many of them count as one."""
 MAIN_ROUNDS = 3
 POOR_PX = 8.0
 """A fit is poor when a point lies farther than this from its marking, at 960 x 540."""
@@ -100,15 +100,22 @@ class PositionPrior:
         mean: Pitch frame, metres, shape (3,).
         sigma: Metres, shape (3,).
         freedom: Degrees of freedom: the fewer, the more it gives way.
+        clicks: How many clicks of the frame count as one against it.
     """
 
     mean: FloatArray
     sigma: FloatArray
     freedom: float
+    clicks: float = 1.0
 
 
 STADIUM = PositionPrior(MAIN_MEAN[1:], MAIN_SIGMA[1:], MAIN_FREEDOM)
 """What is known of any main camera."""
+
+
+def match_prior(mean: FloatArray, sigma: FloatArray) -> PositionPrior:
+    """What the other frames of a match say of a main camera's position, metres, shapes (3,)."""
+    return PositionPrior(mean, sigma, MATCH_FREEDOM, MATCH_CLICKS)
 
 
 @dataclass(frozen=True)
@@ -328,7 +335,8 @@ class ResectionProblem:
         prior.mean[ROLL : Z + 1] = [MAIN_MEAN[0], *near.mean]
         prior.sigma[ROLL : Z + 1] = sigma * np.sqrt(1 + (offset / sigma) ** 2 / freedom)
         # The cost counts pixels as if a click's standard deviation were one.
-        prior.sigma[[ROLL, X, Y, Z, KAPPA]] /= np.sqrt(variance)
+        prior.sigma[[ROLL, KAPPA]] /= np.sqrt(variance)
+        prior.sigma[X : Z + 1] /= np.sqrt(variance * near.clicks)
         return prior
 
 

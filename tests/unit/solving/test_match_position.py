@@ -12,7 +12,7 @@ from app.solving.match_position import (
     place_of,
     share_position,
 )
-from app.solving.resect import PositionPrior
+from app.solving.resect import PositionPrior, match_prior
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, PITCH, click
 
@@ -120,6 +120,19 @@ class TestSharePosition:
             alone.append(np.linalg.norm(found.camera.position - STAND))
             shared.append(np.linalg.norm(both.camera.position - STAND))
         assert np.mean(shared) < 0.5 * np.mean(alone)
+
+    def test_clicks_that_err_together_count_less_against_the_others(self):
+        lines = frame(38.0, 1700.0)
+        alone = calibrate(lines, PITCH, SIZE, POLICY)
+        near = alone.camera.position + np.array([0.0, 1.0, -0.2])
+        apart = []
+        for prior in (
+            PositionPrior(near, np.full(3, 0.2), 4.0),
+            match_prior(near, np.full(3, 0.2)),
+        ):
+            found = calibrate_near(alone, prior, lines, PITCH, SIZE, POLICY)
+            apart.append(np.linalg.norm(found.camera.position - near))
+        assert apart[1] < 0.9 * apart[0]
 
     def test_the_wrong_match_harms_no_frame_whose_lines_contradict_it(self):
         wrong = others(np.array([-2.0, 85.0, -21.0]))
