@@ -62,7 +62,8 @@ def calibrate(
     if policy.check_labels:
         fit, observations, suspects = find_suspects(problem, observations, fit)
     fit = problem.refine_main(fit, observations)
-    found = replace(_found(problem, fit, observations), suspects=suspects)
+    picture = find_picture(problem, fit.parameters, observations)
+    found = replace(_found(problem, fit, observations), suspects=suspects, picture=picture)
     return measure(found, lines, pitch, size)
 
 
@@ -89,7 +90,9 @@ def calibrate_near(
     shared = problem.refine_near(fit, observations, near)
     if shared is fit:
         return alone
-    found = replace(_found(problem, shared, observations), suspects=alone.suspects)
+    found = _found(problem, shared, observations)
+    # Whether the picture was stretched or cropped its own lines say, to the camera that fits them.
+    found = replace(found, suspects=alone.suspects, picture=alone.picture)
     return measure(found, lines, pitch, size)
 
 
@@ -104,7 +107,6 @@ def _found(problem: ResectionProblem, fit: Resection, observations: Observations
         problem.camera(fit.parameters),
         covariance=tuple(spread.ravel().tolist()) if np.isfinite(spread).all() else None,
         unobservable=_unobservable(spread),
-        picture=find_picture(problem, fit.parameters, observations),
     )
 
 
