@@ -166,6 +166,10 @@ class Attack:
         if case.operation.path.endswith("/pitches") and case.method == "PATCH":
             match = load(self.store, 1).group.match
             case.body = {"match": match, "length": 105.0, "width": 68.0}
+        if case.operation.path.endswith("/positions") and case.method == "POST":
+            case.body = {}
+        if case.operation.path.endswith("/positions") and case.method == "DELETE":
+            case.query["match"] = load(self.store, 1).group.match
         if case.operation.path.endswith("/exports"):
             case.body = {"dataset": "small", "format": "cameras", "all": True}
 

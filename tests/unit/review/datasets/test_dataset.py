@@ -52,7 +52,7 @@ class TestSavePolicy:
         def refuse(*_):
             raise AssertionError("calibrated again")
 
-        monkeypatch.setattr("app.solving.solve.calibrate_station", refuse)
+        monkeypatch.setattr("app.solving.solve.calibrate_view", refuse)
         change_policy(store, "demo", STRICT, if_match=None, actor="ann")
         assert solve_dataset(store, "demo").failed == []
 

@@ -94,7 +94,7 @@ class TestSolveDataset:
         def refuse(*_):
             raise AssertionError("calibrated in a task")
 
-        monkeypatch.setattr("app.solving.solve.calibrate_station", refuse)
+        monkeypatch.setattr("app.solving.solve.calibrate_view", refuse)
         assert solve_dataset(store, "demo").failed == []
         with store.read() as session:
             count = session.execute(text("SELECT count(*) FROM calibration")).scalar_one()

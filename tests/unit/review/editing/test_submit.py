@@ -176,7 +176,7 @@ class TestSubmit:
         def refuse(*_):
             raise AssertionError("calibrated again")
 
-        monkeypatch.setattr("app.solving.solve.calibrate_station", refuse)
+        monkeypatch.setattr("app.solving.solve.calibrate_view", refuse)
         after = change(store, state, SetBall("7.png", BALL))
         undo(store, state.id, if_match=after.etag, actor="ann")
 

@@ -14,7 +14,7 @@ from app.review.policies.policy import change_policy, read_policy
 from app.review.policies.text import policy_with
 from app.review.queue.listing import list_groups
 from app.soccer.policy import PAPER, STRICT
-from app.solving import calibrate, solve
+from app.solving import calibrate
 from app.store.models import CalibrationModel, LogModel, SolutionModel
 from app.store.session import Store
 
@@ -36,7 +36,7 @@ def calibrations(monkeypatch: pytest.MonkeyPatch) -> list[object]:
         made.append(arguments)
         return plain(*arguments, **options)
 
-    for module in (solve, recompute):
+    for module in (calibrate, recompute):
         monkeypatch.setattr(module, "calibrate_station", counted)
     return made
 
