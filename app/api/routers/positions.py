@@ -11,7 +11,7 @@ from app.api.jobs import ACCEPTED, job_answer
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply
 from app.api.schemas.job import JobDocument
-from app.api.schemas.positions import PositionsDocument, PositionsRequest
+from app.api.schemas.positions import PositionsRequest, SharedPositionsDocument
 from app.review.editing.positions import get_positions
 from app.review.jobs.positions import request_positions, take_positions_back
 
@@ -19,9 +19,9 @@ router = APIRouter(prefix="/datasets/{dataset}/positions", tags=["datasets"])
 
 
 @router.get("", operation_id="listPositions", responses=responses(404))
-def list_positions(dataset: DatasetPath, store: AppStore) -> PositionsDocument:
+def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocument:
     """Where each match's main camera stands, as far as that is shared with its pictures."""
-    return PositionsDocument.model_validate(get_positions(store, dataset))
+    return SharedPositionsDocument.model_validate(get_positions(store, dataset))
 
 
 @router.post(

@@ -26,7 +26,7 @@ class MatchPositionDocument(Document):
     sentence: str = Field(description="All that in words.")
 
 
-class PositionsDocument(Document):
+class SharedPositionsDocument(Document):
     """The shared positions of a dataset's matches, by name of the match."""
 
     used: bool = Field(description="Whether the policy uses them: `calibration.share_position`.")
