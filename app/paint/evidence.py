@@ -17,7 +17,7 @@ import numpy.typing as npt
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import Camera
 from app.geometry.resection import parameters_from_camera
-from app.paint.profile_kernels import find_stripes
+from app.paint.profile_kernels import drop_strays, find_stripes
 from app.paint.trace_kernels import trace_markings
 from app.soccer.frames import Box
 from app.soccer.pitch import MARKINGS, Pitch
@@ -35,6 +35,15 @@ LEAST_STRENGTH, LEAST_IN_NOISE = 6.0, 4.0
 """What stands out: grey levels, and standard deviations of the noise."""
 LEAST_NOISE = 0.5
 """Grey levels, so that a drawn picture is not taken for free of error."""
+THINNEST_PX = 0.2
+"""Paint that is thinner in the picture is not seen; what is found there is something else."""
+FULL_PX = 2.6
+"""Paint of that width is as bright as paint is; thinner paint is mixed with the grass."""
+PALER, BRIGHTER, BRIGHTER_BY = 0.3, 2.0, 8.0
+"""How much paler than the paint of the picture a stripe may be for its width, and how much
+brighter (times, and grey levels more)."""
+AROUND, APART_PX, CONFIRMED = 5, 1.0, 0.5
+"""Of the places around, this share must show paint within so many pixels of the same offset."""
 SIGMA_FLOOR_PX = 0.04
 """No place is trusted to be better known: blades, wear and the picture's compression."""
 
@@ -152,7 +161,8 @@ def trace(reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SP
         reading.half_diagonal, reading.width, reading.height, spacing_px,
         places, pixels, normals, widths, marking, rows,
     )  # fmt: skip
-    found = np.flatnonzero(_on_field(reading.hidden, pixels[:count]))
+    seen = _on_field(reading.hidden, pixels[:count]) & (widths[:count] >= THINNEST_PX)
+    found = np.flatnonzero(seen)
     return Traced(
         places[found], pixels[found], normals[found], widths[found], marking[found], rows[found]
     )
@@ -171,10 +181,23 @@ def seek(reading: Reading, traced: Traced, window_px: float) -> Evidence:
         reading.level, reading.image, reading.hidden, traced.pixels, traced.normals,
         traced.widths, window_px, reading.noise, least, offsets, sigmas, strengths,
     )  # fmt: skip
+    offsets[~_bright_as_paint(strengths, traced.widths)] = np.nan
+    drop_strays(offsets, traced.marking, AROUND, APART_PX, CONFIRMED)
     kept = np.flatnonzero(np.isfinite(offsets))
     seen = Traced(*(getattr(traced, name)[kept] for name in Traced.__dataclass_fields__))
     sigma = np.hypot(sigmas[kept], SIGMA_FLOOR_PX)
     return Evidence(seen, offsets[kept], sigma, strengths[kept], count)
+
+
+def _bright_as_paint(strengths: FloatArray, widths: FloatArray) -> BoolArray:
+    """Which stripes are about as bright as the paint of this picture is at their width."""
+    full = np.minimum(widths / FULL_PX, 1.0)
+    found = strengths > 0
+    if not found.any():
+        return found
+    paint = float(np.median(strengths[found] / full[found]))
+    bright: BoolArray = strengths <= BRIGHTER * paint * full + BRIGHTER_BY
+    return bright & (strengths >= PALER * paint * full)
 
 
 def _on_field(hidden: npt.NDArray[np.uint8], pixels: FloatArray) -> BoolArray:

@@ -156,3 +156,30 @@ def _measure(profile, peak, half, side, width, noise, n, offsets, sigmas, streng
     slope_left, slope_right = rise / STEP, fall / STEP
     sigmas[n] = 0.5 * noise * np.sqrt(1.0 / slope_left**2 + 1.0 / slope_right**2)
     strengths[n] = top - max(low, high)
+
+
+@compiled
+def drop_strays(offsets, marking, around, apart, share):
+    """Sets to NaN what its neighbours along the marking do not confirm.
+
+    Args:
+        offsets: Of all places, NaN where nothing was found, shape (N,).
+        marking: Of each place, shape (N,), increasing.
+        around: How many places to either side are neighbours.
+        apart: How far the offset of a neighbour may differ, pixels.
+        share: Least share of the places around that must have paint at such an offset.
+    """
+    confirmed = np.zeros(len(offsets), np.bool_)
+    for n in range(len(offsets)):
+        if np.isnan(offsets[n]):
+            continue
+        asked, agree = 0, 0
+        for i in range(max(n - around, 0), min(n + around + 1, len(offsets))):
+            if marking[i] == marking[n]:
+                asked += 1
+                if abs(offsets[i] - offsets[n]) <= apart:
+                    agree += 1
+        confirmed[n] = agree >= share * asked
+    for n in range(len(offsets)):
+        if not confirmed[n]:
+            offsets[n] = np.nan

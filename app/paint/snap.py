@@ -17,9 +17,9 @@ from app.geometry.camera import Camera
 from app.geometry.resection import (
     PARAMETERS,
     ROLL,
+    Prior,
     X,
     Z,
-    Prior,
     camera_from_parameters,
     parameters_from_camera,
 )
