@@ -44,6 +44,8 @@ PALER, BRIGHTER, BRIGHTER_BY = 0.3, 2.0, 8.0
 brighter (times, and grey levels more)."""
 AROUND, APART_PX, CONFIRMED = 5, 1.0, 0.5
 """Of the places around, this share must show paint within so many pixels of the same offset."""
+UNSURE_PX = 0.2
+"""Where noise alone makes sigma this large, blades of grass double it: they are no white noise."""
 SIGMA_FLOOR_PX = 0.04
 """No place is trusted to be better known: blades, wear and the picture's compression."""
 
@@ -168,24 +170,26 @@ def trace(reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SP
     )
 
 
-def seek(reading: Reading, traced: Traced, window_px: float) -> Evidence:
+def seek(reading: Reading, traced: Traced, window_px: float | FloatArray) -> Evidence:
     """Paint across each place, sought up to a distance.
 
     Args:
-        window_px: To either side.
+        window_px: To either side, for all places or for each, shape (N,).
     """
     count = len(traced.pixels)
     offsets, sigmas, strengths = np.empty(count), np.empty(count), np.empty(count)
+    windows = np.ascontiguousarray(np.broadcast_to(np.asarray(window_px, np.float64), count))
     least = max(LEAST_STRENGTH, LEAST_IN_NOISE * reading.noise)
     find_stripes(
         reading.level, reading.image, reading.hidden, traced.pixels, traced.normals,
-        traced.widths, window_px, reading.noise, least, offsets, sigmas, strengths,
+        traced.widths, windows, reading.noise, least, offsets, sigmas, strengths,
     )  # fmt: skip
     offsets[~_bright_as_paint(strengths, traced.widths)] = np.nan
     drop_strays(offsets, traced.marking, AROUND, APART_PX, CONFIRMED)
     kept = np.flatnonzero(np.isfinite(offsets))
     seen = Traced(*(getattr(traced, name)[kept] for name in Traced.__dataclass_fields__))
     sigma = np.hypot(sigmas[kept], SIGMA_FLOOR_PX)
+    sigma *= 1 + (sigma / UNSURE_PX) ** 2
     return Evidence(seen, offsets[kept], sigma, strengths[kept], count)
 
 

@@ -17,7 +17,7 @@ from app.geometry.least_squares import require_determined
 from app.paint.evidence import Evidence
 from app.solving.line_noise import line_noise
 
-SHARE = 0.02
+SHARE = 0.05
 """Of a point's variance, what the points of a marking are expected to have in common."""
 EXPECTED, LEAST = 1.0, 0.5
 """Standard deviation of a residual in units of its sigma: expected, and never below."""
@@ -77,6 +77,7 @@ def paint_noise(
     weighted = rows * weights[:, None]
     sums = np.zeros((int(traced.marking.max()) + 1, rows.shape[1]))
     np.add.at(sums, traced.marking, weighted)
-    meat = (1 - noise.share) * (weighted.T @ weighted) + noise.share * (sums.T @ sums)
+    share = max(noise.share, SHARE)
+    meat = (1 - share) * (weighted.T @ weighted) + share * (sums.T @ sums)
     covariance = bread @ (noise.variance * meat + known) @ bread
-    return PaintNoise(noise.variance, noise.share, 0.5 * (covariance + covariance.T))
+    return PaintNoise(noise.variance, share, 0.5 * (covariance + covariance.T))

@@ -31,7 +31,7 @@ CLOSE = 0.35
 
 @compiled
 def find_stripes(
-    level, image, hidden, pixels, normals, widths, window, noise, least, offsets, sigmas, strengths
+    level, image, hidden, pixels, normals, widths, windows, noise, least, offsets, sigmas, strengths
 ):
     """Writes where across each place the paint lies.
 
@@ -42,7 +42,7 @@ def find_stripes(
         pixels: Where the paint is expected, shape (N, 2).
         normals: Unit normals, shape (N, 2).
         widths: Of the paint, pixels, shape (N,).
-        window: How far to either side it is sought, pixels.
+        windows: How far to either side it is sought, pixels, shape (N,).
         noise: Standard deviation of the brightness, grey levels.
         least: Least strength, grey levels.
         offsets: Result: from the pixel along the normal, pixels; NaN where there is none, (N,).
@@ -53,6 +53,7 @@ def find_stripes(
     for n in range(len(pixels)):
         offsets[n], sigmas[n], strengths[n] = np.nan, np.nan, 0.0
         side = max(SIDE_PX, 0.5 * widths[n] + BEYOND_PX)
+        window = windows[n]
         reach = window + side + 1.0
         half = int(reach / STEP) + 1
         if 2 * half + 1 > LONGEST:

@@ -47,6 +47,10 @@ LEAST_POINTS, LEAST_MARKINGS = 24, 3
 """Fewer points of paint, or markings with some, determine no camera."""
 LEAST_ON_MARKING = 4
 DAMPING = 1e-4
+START_SIGMAS, START_PX = 4.0, 2.0
+"""A start that is known is not sought farther off than so many of its sigmas, and pixels more."""
+LEAST_UNIT = 0.6
+"""Windows do not shrink below this share of theirs in small pictures: blur is in pixels."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +155,9 @@ class _Rounds:
     ):
         self._reading, self._start, self._pitch, self._problem = reading, start, pitch, problem
         self.first = parameters_from_camera(start, reading.half_diagonal)
-        self._information = None if covariance is None else np.linalg.pinv(covariance)
+        self._covariance = covariance
+        self._information = None if covariance is None else _inverse(covariance)
+        self._unit = max(problem.unit, LEAST_UNIT)
 
     def camera(self, parameters: FloatArray) -> Camera:
         return camera_from_parameters(
@@ -160,7 +166,13 @@ class _Rounds:
 
     def seek(self, parameters: FloatArray, window: float) -> Evidence:
         traced = trace(self._reading, self.camera(parameters), self._pitch)
-        return seek(self._reading, traced, window * max(self._problem.unit, 0.6))
+        window *= self._unit
+        if self._covariance is None:
+            return seek(self._reading, traced, window)
+        rows = traced.jacobian
+        sigma = np.sqrt(np.maximum(((rows @ self._covariance) * rows).sum(axis=1), 0.0))
+        known = START_SIGMAS * sigma + START_PX * self._unit
+        return seek(self._reading, traced, np.minimum(window, known))
 
     def step(self, parameters: FloatArray, evidence: Evidence, strict: bool) -> FloatArray:
         """Towards the paint: reweighted least squares on the offsets, made linear here."""
@@ -182,11 +194,10 @@ class _Rounds:
         return np.asarray(moved)
 
     def _robust(self, rest: FloatArray, sigmas: FloatArray, strict: bool) -> FloatArray:
-        unit = max(self._problem.unit, 0.6)
         if not strict:
-            weights: FloatArray = 1 / np.sqrt(1 + (rest / (ROBUST_PX * unit)) ** 2)
+            weights: FloatArray = 1 / np.sqrt(1 + (rest / (ROBUST_PX * self._unit)) ** 2)
             return weights
-        scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * unit)
+        scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * self._unit)
         return np.asarray((1 + (rest / scale) ** 2) ** -2.0)
 
     def noise(self, parameters: FloatArray, evidence: Evidence) -> PaintNoise | None:
@@ -221,3 +232,9 @@ def _moved(start: Camera, camera: Camera, evidence: Evidence) -> float:
     apart = np.hypot(*(camera.project(places) - start.project(places)).T)
     known = apart[np.isfinite(apart)]
     return float(np.median(known)) if len(known) else 0.0
+
+
+def _inverse(covariance: FloatArray) -> FloatArray:
+    scale = np.sqrt(np.diag(covariance))
+    inverse: FloatArray = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
+    return inverse / np.outer(scale, scale)
