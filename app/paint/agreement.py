@@ -66,21 +66,24 @@ def agreement(
     """
     lines = find_line_like(np.asarray(paint, np.uint8), field) if paint.ndim == 3 else paint
     height, width = field.shape
-    near = NEAR_PX * width / REFERENCE_WIDTH
     columns, rows = _marked(camera, field, pitch or Pitch())
-    distance = cv2.distanceTransform(
-        np.logical_not(lines).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3
-    )
-    supported = distance[rows, columns] <= max(near, 1.5)
-    model = np.ones((height, width), np.uint8)
-    model[rows, columns] = 0
-    from_model = cv2.distanceTransform(model, cv2.DIST_L2, cv2.DIST_MASK_3)
-    explained = from_model[lines.astype(np.bool_)] <= max(near, 1.5) + SPACING_PX / 2
+    near = max(NEAR_PX * width / REFERENCE_WIDTH, 1.5)
+    supported = _widened(lines.astype(np.uint8), near)[rows, columns] > 0
+    model = np.zeros((height, width), np.uint8)
+    model[rows, columns] = 1
+    explained = _widened(model, near + SPACING_PX / 2)[lines.astype(np.bool_)] > 0
     return Agreement(
         supported=float(supported.mean()) if len(supported) else 0.0,
         explained=float(explained.mean()) if len(explained) else 0.0,
         points=len(supported),
     )
+
+
+def _widened(mask: npt.NDArray[np.uint8], radius: float) -> npt.NDArray[np.uint8]:
+    """A mask (0 and 1) and all that lies within a radius of it, pixels."""
+    size = 2 * round(radius) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    return np.asarray(cv2.dilate(mask, disc))
 
 
 def _marked(

@@ -36,7 +36,7 @@ from app.solving.resect import (
     is_main_position,
 )
 
-WINDOWS = (10.0, 9.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 3.0)
+WINDOWS = (10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 3.0)
 """Pixels at 960 x 540 that paint is sought to either side, round by round."""
 ROBUST_PX = 1.0
 """Scale of the soft-L1 loss of the first rounds, at 960 x 540."""
@@ -183,7 +183,7 @@ class _Rounds:
             information = information + self._information
             pull = pull + self._information @ (self.first - parameters)
         jacobian, offsets = evidence.traced.jacobian, evidence.offsets
-        base = marking_weights(evidence.traced.marking) / evidence.sigmas**2
+        base = marking_weights(evidence.traced.marking, evidence.sigmas) / evidence.sigmas**2
         moved = np.zeros(PARAMETERS)
         for _ in range(INNER_STEPS):
             rest = offsets - jacobian @ moved
@@ -203,7 +203,14 @@ class _Rounds:
     def noise(self, parameters: FloatArray, evidence: Evidence) -> PaintNoise | None:
         prior = self.prior(parameters)
         robust = self._robust(evidence.offsets, evidence.sigmas, strict=True)
-        return paint_noise(evidence, robust, prior.sigma**-2.0, self._information)
+        return paint_noise(
+            evidence,
+            robust,
+            prior.sigma**-2.0,
+            np.array(self._start.principal_point),
+            self._reading.half_diagonal,
+            self._information,
+        )
 
     def prior(self, parameters: FloatArray) -> Prior:
         """The calibrator's: main cameras stand where main cameras stand, others anywhere."""
