@@ -35,7 +35,7 @@ LEAST_STRENGTH, LEAST_IN_NOISE = 6.0, 4.0
 """What stands out: grey levels, and standard deviations of the noise."""
 LEAST_NOISE = 0.5
 """Grey levels, so that a drawn picture is not taken for free of error."""
-THINNEST_PX = 0.2
+THINNEST_PX = 0.25
 """Paint that is thinner in the picture is not seen; what is found there is something else."""
 FULL_PX = 2.6
 """Paint of that width is as bright as paint is; thinner paint is mixed with the grass."""
@@ -101,6 +101,8 @@ class Traced:
     widths: FloatArray
     marking: IntArray
     jacobian: FloatArray
+    visible: int
+    """Places on the field in all, those too thin to be seen too."""
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,11 @@ class Evidence:
     sigmas: FloatArray
     strengths: FloatArray
     sought: int
+
+    @property
+    def share(self) -> float:
+        """Of the visible places of markings, how many show paint."""
+        return len(self.offsets) / max(self.traced.visible, 1)
 
     @property
     def pixels(self) -> FloatArray:
@@ -163,10 +170,16 @@ def trace(reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SP
         reading.half_diagonal, reading.width, reading.height, spacing_px,
         places, pixels, normals, widths, marking, rows,
     )  # fmt: skip
-    seen = _on_field(reading.hidden, pixels[:count]) & (widths[:count] >= THINNEST_PX)
-    found = np.flatnonzero(seen)
+    on_field = _on_field(reading.hidden, pixels[:count])
+    found = np.flatnonzero(on_field & (widths[:count] >= THINNEST_PX))
     return Traced(
-        places[found], pixels[found], normals[found], widths[found], marking[found], rows[found]
+        places[found],
+        pixels[found],
+        normals[found],
+        widths[found],
+        marking[found],
+        rows[found],
+        int(on_field.sum()),
     )
 
 
@@ -187,7 +200,15 @@ def seek(reading: Reading, traced: Traced, window_px: float | FloatArray) -> Evi
     offsets[~_bright_as_paint(strengths, traced.widths)] = np.nan
     drop_strays(offsets, traced.marking, AROUND, APART_PX, CONFIRMED)
     kept = np.flatnonzero(np.isfinite(offsets))
-    seen = Traced(*(getattr(traced, name)[kept] for name in Traced.__dataclass_fields__))
+    seen = Traced(
+        traced.places[kept],
+        traced.pixels[kept],
+        traced.normals[kept],
+        traced.widths[kept],
+        traced.marking[kept],
+        traced.jacobian[kept],
+        traced.visible,
+    )
     sigma = np.hypot(sigmas[kept], SIGMA_FLOOR_PX)
     sigma *= 1 + (sigma / UNSURE_PX) ** 2
     return Evidence(seen, offsets[kept], sigma, strengths[kept], count)

@@ -21,7 +21,7 @@ SHARE = 0.05
 """Of a point's variance, what the points of a marking have in common when they are weighed."""
 THIN_SHARE, THIN_SIGMA_PX = 0.5, 0.4
 """Of a line so thin that its sigma is this large, so much more: what is beside it moves all of it."""
-LEAST_SHARE = 0.2
+LEAST_SHARE = 0.25
 """What they have in common at least when the covariance is told: worn edges, blades and the
 picture's compression move paint by pieces, which the residuals of one picture hide."""
 LENS = 0.0006

@@ -46,6 +46,13 @@ INNER_STEPS = 4
 LEAST_POINTS, LEAST_MARKINGS = 24, 3
 """Fewer points of paint, or markings with some, determine no camera."""
 LEAST_ON_MARKING = 4
+LEAST_SEEN = 0.2
+"""Of the visible markings: where less shows paint, chance decides what the rest is."""
+WORST_PX, MOST_SURPRISING, KEPT_SHARE = 0.6, 40.0, 0.9
+"""Paint disagrees where it does not lie on the markings in the end (median, at 960 x 540), where
+the camera moved beyond what its clicks allow (squared sigmas of eight parameters; by chance 26
+once in a thousand), or where fewer places show paint than before."""
+NO_PAINT, PAINT_DISAGREES = "no_paint", "paint_disagrees"
 DAMPING = 1e-4
 START_SIGMAS, START_PX = 4.0, 2.0
 """A start that is known is not sought farther off than so many of its sigmas, and pixels more."""
@@ -58,13 +65,14 @@ class Snapped:
     """A camera after snapping.
 
     Attributes:
-        camera: On the paint; the start where there is too little of it.
+        camera: On the paint; the start where ``reason`` says why.
         evidence: The paint at the end, marking by marking.
         error_px: Median distance of the paint to its marking, pixels; None without paint.
         covariance: Of the camera's parameters (``geometry.resection``), shape (8, 8); None where
             the paint does not determine them.
-        moved_px: Median distance that the visible markings moved, pixels.
-        reason: ``no_paint`` where too little is seen; None where the camera is determined.
+        moved_px: Median distance that the visible markings moved, or would have, pixels.
+        reason: ``no_paint`` where too little is seen, ``paint_disagrees`` where it contradicts
+            the start or itself; None where the camera is the paint's.
     """
 
     camera: Camera
@@ -124,22 +132,27 @@ def snap_reading(
     for index, window in enumerate(windows):
         evidence = rounds.seek(parameters, window)
         if not _suffices(evidence):
-            return _without_paint(start, evidence)
+            return _kept(start, evidence, NO_PAINT)
         strict = index >= len(windows) - STRICT_ROUNDS
         parameters = parameters + rounds.step(parameters, evidence, strict)
+        if not np.isfinite(parameters).all():
+            return _kept(start, evidence, PAINT_DISAGREES)
     evidence = rounds.seek(parameters, windows[-1])
-    if not _suffices(evidence) or not np.isfinite(parameters).all():
-        return _without_paint(start, evidence)
-    camera = rounds.camera(parameters)
+    if not _suffices(evidence) or evidence.share < LEAST_SEEN:
+        return _kept(start, evidence, NO_PAINT)
     noise = rounds.noise(parameters, evidence)
-    return Snapped(
-        camera,
-        evidence,
-        error_px=float(np.median(np.abs(evidence.offsets))),
-        covariance=None if noise is None else noise.parameters,
-        moved_px=_moved(start, camera, evidence),
-        reason=None if noise is not None else "no_paint",
-    )
+    if noise is None:
+        return _kept(start, evidence, NO_PAINT)
+    camera, before = rounds.camera(parameters), rounds.seek(rounds.first, windows[-1])
+    error, moved = float(np.median(np.abs(evidence.offsets))), _moved(start, camera, evidence)
+    if (
+        error > rounds.unit * WORST_PX
+        or moved > rounds.unit * (windows[0] if start_covariance is None else np.inf)
+        or rounds.surprise(parameters) > MOST_SURPRISING
+        or evidence.share < KEPT_SHARE * before.share
+    ):
+        return _kept(start, evidence, PAINT_DISAGREES, error, moved)
+    return Snapped(camera, evidence, error, noise.parameters, moved, None)
 
 
 class _Rounds:
@@ -157,7 +170,7 @@ class _Rounds:
         self.first = parameters_from_camera(start, reading.half_diagonal)
         self._covariance = covariance
         self._information = None if covariance is None else _inverse(covariance)
-        self._unit = max(problem.unit, LEAST_UNIT)
+        self.unit = max(problem.unit, LEAST_UNIT)
 
     def camera(self, parameters: FloatArray) -> Camera:
         return camera_from_parameters(
@@ -166,12 +179,12 @@ class _Rounds:
 
     def seek(self, parameters: FloatArray, window: float) -> Evidence:
         traced = trace(self._reading, self.camera(parameters), self._pitch)
-        window *= self._unit
+        window *= self.unit
         if self._covariance is None:
             return seek(self._reading, traced, window)
         rows = traced.jacobian
         sigma = np.sqrt(np.maximum(((rows @ self._covariance) * rows).sum(axis=1), 0.0))
-        known = START_SIGMAS * sigma + START_PX * self._unit
+        known = START_SIGMAS * sigma + START_PX * self.unit
         return seek(self._reading, traced, np.minimum(window, known))
 
     def step(self, parameters: FloatArray, evidence: Evidence, strict: bool) -> FloatArray:
@@ -195,10 +208,17 @@ class _Rounds:
 
     def _robust(self, rest: FloatArray, sigmas: FloatArray, strict: bool) -> FloatArray:
         if not strict:
-            weights: FloatArray = 1 / np.sqrt(1 + (rest / (ROBUST_PX * self._unit)) ** 2)
+            weights: FloatArray = 1 / np.sqrt(1 + (rest / (ROBUST_PX * self.unit)) ** 2)
             return weights
-        scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * self._unit)
+        scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * self.unit)
         return np.asarray((1 + (rest / scale) ** 2) ** -2.0)
+
+    def surprise(self, parameters: FloatArray) -> float:
+        """Squared distance from the start in its own sigmas; 0 where nothing is known of it."""
+        if self._information is None:
+            return 0.0
+        moved = parameters - self.first
+        return float(moved @ self._information @ moved)
 
     def noise(self, parameters: FloatArray, evidence: Evidence) -> PaintNoise | None:
         prior = self.prior(parameters)
@@ -230,8 +250,15 @@ def _suffices(evidence: Evidence) -> bool:
     return len(evidence.offsets) >= LEAST_POINTS and markings >= LEAST_MARKINGS
 
 
-def _without_paint(start: Camera, evidence: Evidence) -> Snapped:
-    return Snapped(start, evidence, None, None, 0.0, "no_paint")
+def _kept(
+    start: Camera,
+    evidence: Evidence,
+    reason: str,
+    error: float | None = None,
+    moved: float = 0.0,
+) -> Snapped:
+    """The start, with why it was kept and what snapping would have done."""
+    return Snapped(start, evidence, error, None, moved, reason)
 
 
 def _moved(start: Camera, camera: Camera, evidence: Evidence) -> float:
