@@ -20,6 +20,7 @@ from app.geometry.resection import parameters_from_camera
 from app.paint.profile_kernels import drop_strays, find_stripes
 from app.paint.trace_kernels import trace_markings
 from app.soccer.frames import Box
+from app.soccer.paint_evidence import PaintEvidence, PaintPoint
 from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.observations import pitch_curves
 
@@ -245,3 +246,14 @@ def _noise(level: FloatImage, field: BoolArray) -> float:
 @lru_cache(maxsize=1)
 def painted_markings() -> BoolArray:
     return np.array([name in PAINTED for name in MARKINGS])
+
+
+def to_paint_evidence(evidence: Evidence) -> PaintEvidence:
+    """The evidence as a value that is kept."""
+    rows = np.column_stack([evidence.pixels, evidence.sigmas])
+    marking = evidence.traced.marking
+    points = {
+        MARKINGS[index]: tuple(PaintPoint(*row) for row in rows[marking == index].tolist())
+        for index in np.unique(marking)
+    }
+    return PaintEvidence({name: points[name] for name in sorted(points)})

@@ -73,6 +73,7 @@ class Snapped:
         moved_px: Median distance that the visible markings moved, or would have, pixels.
         reason: ``no_paint`` where too little is seen, ``paint_disagrees`` where it contradicts
             the start or itself; None where the camera is the paint's.
+        size: Height and width of the picture, pixels.
     """
 
     camera: Camera
@@ -81,6 +82,7 @@ class Snapped:
     covariance: FloatArray | None
     moved_px: float
     reason: str | None
+    size: tuple[int, int]
 
     @property
     def points(self) -> int:
@@ -132,17 +134,17 @@ def snap_reading(
     for index, window in enumerate(windows):
         evidence = rounds.seek(parameters, window)
         if not _suffices(evidence):
-            return _kept(start, evidence, NO_PAINT)
+            return _kept(rounds, evidence, NO_PAINT)
         strict = index >= len(windows) - STRICT_ROUNDS
         parameters = parameters + rounds.step(parameters, evidence, strict)
         if not np.isfinite(parameters).all():
-            return _kept(start, evidence, PAINT_DISAGREES)
+            return _kept(rounds, evidence, PAINT_DISAGREES)
     evidence = rounds.seek(parameters, windows[-1])
     if not _suffices(evidence) or evidence.share < LEAST_SEEN:
-        return _kept(start, evidence, NO_PAINT)
+        return _kept(rounds, evidence, NO_PAINT)
     noise = rounds.noise(parameters, evidence)
     if noise is None:
-        return _kept(start, evidence, NO_PAINT)
+        return _kept(rounds, evidence, NO_PAINT)
     camera, before = rounds.camera(parameters), rounds.seek(rounds.first, windows[-1])
     error, moved = float(np.median(np.abs(evidence.offsets))), _moved(start, camera, evidence)
     if (
@@ -151,8 +153,8 @@ def snap_reading(
         or rounds.surprise(parameters) > MOST_SURPRISING
         or evidence.share < KEPT_SHARE * before.share
     ):
-        return _kept(start, evidence, PAINT_DISAGREES, error, moved)
-    return Snapped(camera, evidence, error, noise.parameters, moved, None)
+        return _kept(rounds, evidence, PAINT_DISAGREES, error, moved)
+    return Snapped(camera, evidence, error, noise.parameters, moved, None, rounds.size)
 
 
 class _Rounds:
@@ -166,15 +168,16 @@ class _Rounds:
         problem: ResectionProblem,
         covariance: FloatArray | None,
     ):
-        self._reading, self._start, self._pitch, self._problem = reading, start, pitch, problem
+        self._reading, self.start, self._pitch, self._problem = reading, start, pitch, problem
         self.first = parameters_from_camera(start, reading.half_diagonal)
         self._covariance = covariance
         self._information = None if covariance is None else _inverse(covariance)
+        self.size = reading.height, reading.width
         self.unit = max(problem.unit, LEAST_UNIT)
 
     def camera(self, parameters: FloatArray) -> Camera:
         return camera_from_parameters(
-            parameters, self._start.principal_point, self._reading.half_diagonal
+            parameters, self.start.principal_point, self._reading.half_diagonal
         )
 
     def seek(self, parameters: FloatArray, window: float) -> Evidence:
@@ -227,7 +230,7 @@ class _Rounds:
             evidence,
             robust,
             prior.sigma**-2.0,
-            np.array(self._start.principal_point),
+            np.array(self.start.principal_point),
             self._reading.half_diagonal,
             self._information,
         )
@@ -251,14 +254,14 @@ def _suffices(evidence: Evidence) -> bool:
 
 
 def _kept(
-    start: Camera,
+    rounds: _Rounds,
     evidence: Evidence,
     reason: str,
     error: float | None = None,
     moved: float = 0.0,
 ) -> Snapped:
     """The start, with why it was kept and what snapping would have done."""
-    return Snapped(start, evidence, error, None, moved, reason)
+    return Snapped(rounds.start, evidence, error, None, moved, reason, rounds.size)
 
 
 def _moved(start: Camera, camera: Camera, evidence: Evidence) -> float:
