@@ -146,7 +146,7 @@ def read_picture(image: Image, field: BoolArray, hidden: Sequence[Box] = ()) -> 
     image = np.ascontiguousarray(image)
     red, green, blue = cv2.split(image)
     least = cv2.min(red, cv2.min(green, blue)).astype(np.float32)
-    level = np.asarray(cv2.GaussianBlur(least, (0, 0), SMOOTH_PX), np.float32)
+    level = np.asarray(cv2.GaussianBlur(least, (5, 5), SMOOTH_PX), np.float32)
     covered = np.logical_not(field).astype(np.uint8)
     for box in hidden:
         left, top = max(int(np.floor(box.x)), 0), max(int(np.floor(box.y)), 0)

@@ -23,7 +23,7 @@ from app.geometry.resection import (
     camera_from_parameters,
     parameters_from_camera,
 )
-from app.paint.evidence import Evidence, Image, Reading, read_picture, seek, trace
+from app.paint.evidence import SPACING_PX, Evidence, Image, Reading, read_picture, seek, trace
 from app.paint.paint_noise import PaintNoise, marking_weights, paint_noise
 from app.soccer.frames import Box, ImageSize
 from app.soccer.pitch import Pitch
@@ -42,15 +42,17 @@ ROBUST_PX = 1.0
 """Scale of the soft-L1 loss of the first rounds, at 960 x 540."""
 STRICT_ROUNDS, STRICT_SIGMAS, STRICT_PX = 3, 4.0, 0.3
 """In the last rounds what lies farther off than so many sigmas, or pixels, counts little."""
+COARSE_PX = 8.0
+"""Pixels between the places of the first rounds."""
 INNER_STEPS = 4
 LEAST_POINTS, LEAST_MARKINGS = 24, 3
 """Fewer points of paint, or markings with some, determine no camera."""
 LEAST_ON_MARKING = 4
 LEAST_SEEN = 0.2
 """Of the visible markings: where less shows paint, chance decides what the rest is."""
-WORST_PX, MOST_SURPRISING, KEPT_SHARE = 0.6, 40.0, 0.9
+WORST_PX, MOST_SURPRISING, KEPT_SHARE = 0.6, 60.0, 0.9
 """Paint disagrees where it does not lie on the markings in the end (median, at 960 x 540), where
-the camera moved beyond what its clicks allow (squared sigmas of eight parameters; by chance 26
+the camera moved beyond what its clicks allow (squared sigmas of eight parameters: by chance 26
 once in a thousand), or where fewer places show paint than before."""
 NO_PAINT, PAINT_DISAGREES = "no_paint", "paint_disagrees"
 DAMPING = 1e-4
@@ -132,10 +134,10 @@ def snap_reading(
     rounds = _Rounds(reading, start, pitch, problem, start_covariance)
     parameters = rounds.first
     for index, window in enumerate(windows):
-        evidence = rounds.seek(parameters, window)
+        strict = index >= len(windows) - STRICT_ROUNDS
+        evidence = rounds.seek(parameters, window, SPACING_PX if strict else COARSE_PX)
         if not _suffices(evidence):
             return _kept(rounds, evidence, NO_PAINT)
-        strict = index >= len(windows) - STRICT_ROUNDS
         parameters = parameters + rounds.step(parameters, evidence, strict)
         if not np.isfinite(parameters).all():
             return _kept(rounds, evidence, PAINT_DISAGREES)
@@ -180,8 +182,10 @@ class _Rounds:
             parameters, self.start.principal_point, self._reading.half_diagonal
         )
 
-    def seek(self, parameters: FloatArray, window: float) -> Evidence:
-        traced = trace(self._reading, self.camera(parameters), self._pitch)
+    def seek(
+        self, parameters: FloatArray, window: float, spacing: float = SPACING_PX
+    ) -> Evidence:
+        traced = trace(self._reading, self.camera(parameters), self._pitch, spacing)
         window *= self.unit
         if self._covariance is None:
             return seek(self._reading, traced, window)
