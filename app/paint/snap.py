@@ -182,9 +182,7 @@ class _Rounds:
             parameters, self.start.principal_point, self._reading.half_diagonal
         )
 
-    def seek(
-        self, parameters: FloatArray, window: float, spacing: float = SPACING_PX
-    ) -> Evidence:
+    def seek(self, parameters: FloatArray, window: float, spacing: float = SPACING_PX) -> Evidence:
         traced = trace(self._reading, self.camera(parameters), self._pitch, spacing)
         window *= self.unit
         if self._covariance is None:
