@@ -70,12 +70,12 @@ class Reading:
     @property
     def width(self) -> int:
         """Pixels."""
-        return self.image.shape[1]
+        return int(self.image.shape[1])
 
     @property
     def height(self) -> int:
         """Pixels."""
-        return self.image.shape[0]
+        return int(self.image.shape[0])
 
     @property
     def half_diagonal(self) -> float:
@@ -240,7 +240,7 @@ def _noise(level: FloatImage, field: BoolArray) -> float:
     apart = np.abs(here - beside)[both]
     if not len(apart):
         return LEAST_NOISE
-    return max(float(np.median(apart)) / (0.6745 * np.sqrt(2)), LEAST_NOISE)
+    return max(float(np.median(apart) / (0.6745 * np.sqrt(2))), LEAST_NOISE)
 
 
 @lru_cache(maxsize=1)

@@ -14,6 +14,7 @@ from app.geometry.arrays import BoolArray
 from app.paint.grass_colour import grass_colour
 
 Image = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.uint8]
 
 WORK_WIDTH = 480
 """Pixels: the field has no fine detail, and a small picture is quick to sort."""
@@ -36,23 +37,24 @@ def field_of_play(image: Image) -> BoolArray:
     """
     height, width = image.shape[:2]
     small = _small(image)
-    grass = np.empty(small.shape[:2], np.uint8)
+    grass: Mask = np.empty(small.shape[:2], np.uint8)
     grass_colour(small, grass)
     # Lines and blades divide the grass, specks of green in the stands are none.
-    grass = cv2.morphologyEx(grass, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    grass = cv2.morphologyEx(grass, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+    grass = _morphed(grass, cv2.MORPH_OPEN, 3)
+    grass = _morphed(grass, cv2.MORPH_CLOSE, 5)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(grass, connectivity=4)
     areas = stats[1:count, cv2.CC_STAT_AREA]
     if not len(areas) or areas.max() < LEAST_SHARE * grass.size:
         return np.zeros((height, width), np.bool_)
     kept = np.flatnonzero(np.append(False, areas >= PIECE_SHARE * areas.max()))
-    chosen = np.isin(labels, kept).astype(np.uint8)
+    chosen: Mask = np.isin(labels, kept).astype(np.uint8)
     # A near line is broader than the kernel above.
-    chosen = cv2.morphologyEx(chosen, cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
+    chosen = _morphed(chosen, cv2.MORPH_CLOSE, 9)
     outlines, _ = cv2.findContours(chosen, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     cv2.drawContours(chosen, outlines, -1, 1, cv2.FILLED)
     if chosen.shape != (height, width):
-        chosen = cv2.resize(chosen, (width, height), interpolation=cv2.INTER_NEAREST)
+        size = (width, height)
+        chosen = np.asarray(cv2.resize(chosen, size, interpolation=cv2.INTER_NEAREST), np.uint8)
     return chosen.astype(np.bool_)
 
 
@@ -74,6 +76,10 @@ def why_no_field(image: Image, field: BoolArray) -> str | None:
     if float(levels.mean()) < DARK_LEVEL:
         return "the picture is too dark: no grass is seen"
     return "no field of play is seen: too little of the picture is grass"
+
+
+def _morphed(mask: Mask, operation: int, size: int) -> Mask:
+    return np.asarray(cv2.morphologyEx(mask, operation, np.ones((size, size), np.uint8)), np.uint8)
 
 
 def _small(image: Image) -> Image:

@@ -105,4 +105,5 @@ def _further_distortion(traced: Traced, principal: FloatArray, half: float) -> F
     """What a fifth-power distortion of one half diagonal moves each place along its normal."""
     radius = (traced.pixels - principal) / half
     outwards: FloatArray = (radius * traced.normals).sum(axis=1)
-    return half * (radius**2).sum(axis=1) ** 2 * outwards
+    moved: FloatArray = half * (radius**2).sum(axis=1) ** 2 * outwards
+    return moved

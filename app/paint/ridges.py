@@ -63,7 +63,8 @@ def _work_size(image: Image, field: BoolArray) -> tuple[Image, npt.NDArray[np.ui
         return np.ascontiguousarray(image), inside
     size = (WORK_WIDTH, max(round(height * WORK_WIDTH / width), 1))
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    return np.asarray(small), cv2.resize(inside, size, interpolation=cv2.INTER_NEAREST)
+    near = cv2.resize(inside, size, interpolation=cv2.INTER_NEAREST)
+    return np.asarray(small, np.uint8), np.asarray(near, np.uint8)
 
 
 def _scaled(places: npt.NDArray[np.int64], size: int, small: int) -> npt.NDArray[np.int64]:

@@ -202,14 +202,14 @@ class _Rounds:
             pull = pull + self._information @ (self.first - parameters)
         jacobian, offsets = evidence.traced.jacobian, evidence.offsets
         base = marking_weights(evidence.traced.marking, evidence.sigmas) / evidence.sigmas**2
-        moved = np.zeros(PARAMETERS)
+        moved: FloatArray = np.zeros(PARAMETERS)
         for _ in range(INNER_STEPS):
             rest = offsets - jacobian @ moved
             weight = base * self._robust(rest, evidence.sigmas, strict)
             normal = (jacobian * weight[:, None]).T @ jacobian + information
             normal[np.diag_indices(PARAMETERS)] *= 1 + DAMPING
-            moved = np.linalg.solve(normal, jacobian.T @ (weight * offsets) + pull)
-        return np.asarray(moved)
+            moved = np.asarray(np.linalg.solve(normal, jacobian.T @ (weight * offsets) + pull))
+        return moved
 
     def _robust(self, rest: FloatArray, sigmas: FloatArray, strict: bool) -> FloatArray:
         if not strict:
@@ -275,5 +275,5 @@ def _moved(start: Camera, camera: Camera, evidence: Evidence) -> float:
 
 def _inverse(covariance: FloatArray) -> FloatArray:
     scale = np.sqrt(np.diag(covariance))
-    inverse: FloatArray = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
-    return inverse / np.outer(scale, scale)
+    inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
+    return np.asarray(inverse / np.outer(scale, scale))

@@ -52,8 +52,8 @@ class TestFindStripes:
     def test_a_stripe_beyond_the_window_is_not_found(self):
         assert np.isnan(offsets(striped(110.0, 2.0), 100.0, 2.0)).all()
 
-    def test_a_shirt_is_broader_than_paint(self):
-        assert np.isnan(offsets(striped(100.0, 9.0), 100.0, 1.0)).all()
+    def test_what_is_broader_than_paint_is_there_is_none(self):
+        assert np.isnan(offsets(striped(100.0, 5.2), 100.0, 0.3)).all()
 
     def test_white_without_grass_beside_it_is_no_paint(self):
         image = striped(100.0, 2.0)
