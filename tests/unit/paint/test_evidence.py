@@ -23,7 +23,7 @@ def striped(middle: float, width: float, left: int = 60, right: int = 60) -> np.
     levels = seen.mean(axis=1)
     image = np.empty((100, 200, 3))
     image[:] = levels[:, None]
-    image[:, :, 1] += np.where(np.abs(np.arange(200) - middle) > width / 2 + 0.6, 60, 0)
+    image[:, :, 1] += np.where(np.abs(np.arange(200) - middle) > width / 2 + 0.3, 60, 0)
     return np.clip(np.round(image), 0, 255).astype(np.uint8)
 
 
@@ -53,7 +53,7 @@ class TestFindStripes:
         assert np.isnan(offsets(striped(110.0, 2.0), 100.0, 2.0)).all()
 
     def test_what_is_broader_than_paint_is_there_is_none(self):
-        assert np.isnan(offsets(striped(100.0, 4.4), 100.0, 0.3)).all()
+        assert np.isnan(offsets(striped(100.0, 5.0), 100.0, 0.3)).all()
 
     def test_white_without_grass_beside_it_is_no_paint(self):
         image = striped(100.0, 2.0)
