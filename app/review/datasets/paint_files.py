@@ -23,6 +23,7 @@ from app.durable import replace_file
 from app.errors import InputError, ReviewError
 from app.finite import json_text
 from app.geometry.camera import Camera
+from app.geometry.lens import BROWN_CONRADY
 from app.paint.agreement import agreement
 from app.paint.evidence import to_paint_evidence
 from app.paint.grass import field_of_play, why_no_field
@@ -182,6 +183,9 @@ def _snapped(picture: PictureFile, field: Any, clicked: Calibration) -> Snapped:
 def _agree_picture(picture: PictureFile, camera: Camera) -> dict[str, Any]:
     if picture.image is None:
         return _row(picture.stem, NOTHING, reason=picture.problem)
+    if camera.lens != BROWN_CONRADY:
+        other = "the paint is read with lenses of one radial term; this camera has another"
+        return _row(picture.stem, NOTHING, reason=other)
     began = time.thread_time()
     field = field_of_play(picture.image)
     reason = why_no_field(picture.image, field)
