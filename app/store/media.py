@@ -11,6 +11,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from app.config import Settings
 from app.durable import replace_file
@@ -143,6 +144,21 @@ def _source(media: Media, settings: Settings) -> bytes:
             return file.read(size)
     except OSError as error:
         raise StorageError(f"{path.name} cannot be read") from error
+
+
+def decode_picture(data: bytes, settings: Settings, name: str) -> npt.NDArray[np.uint8]:
+    """The pixels of a JPEG, PNG or WebP: red green blue, shape (H, W, 3).
+
+    Args:
+        data: Its bytes.
+        settings: Limits.
+        name: How a complaint calls it.
+
+    Raises:
+        ImageError: It is no image of these kinds, or damaged.
+        TooLargeError: It declares more pixels than the limits allow.
+    """
+    return np.ascontiguousarray(_pixels(data, settings, name)[:, :, ::-1])
 
 
 def _pixels(data: bytes, settings: Settings, name: str) -> Any:

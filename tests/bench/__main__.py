@@ -13,6 +13,7 @@ from tests.bench.ball import bench_ball
 from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
 from tests.bench.geometry import bench_geometry
+from tests.bench.paint import bench_paint
 from tests.bench.requests import bench_requests
 from tests.bench.truth import bench_truth
 
@@ -30,6 +31,7 @@ def main() -> None:
         bench_calibration(REAL_DATA)
     else:
         print(f"\nCalibration on real lines: no data in {REAL_DATA}, left out")
+    bench_paint(REAL_DATA)
     bench_requests()
     bench_browser()
 

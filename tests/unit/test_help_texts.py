@@ -28,10 +28,11 @@ PLAIN_WORDS = """
     detect diagram dialog diff doctor document documents drags drawing durable editor empty encode
     encoded engine environment estimator etags evaluate event events exact examination export
     exports facets facts failures fan faults fields figure figures files finite first fixes fixture
-    folder folders form format formats frozen gestures glossary grid guess guide header headers
+    folder folders form format formats frozen gestures glossary grass grid guess guide header headers
     heads health heat help histograms history hit home hooks idempotency identity if image images
     import imports in info init insight items jaccard json key keys known konva last latest lazy
     least leftovers legend lens lesson lessons letter licence limits list listing live locks look loupe
+    kernels profile trace
     main map markdown marks match matches matrix meant membership menu merge metrics migrate mini missing
     model models modules name names navigation neighbours nested notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages

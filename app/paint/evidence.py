@@ -1,0 +1,259 @@
+"""Evidence: paint that is seen along the projected markings of a camera.
+
+Every few pixels along a marking its paint is looked for across it; what is found has a place to
+a fraction of a pixel, a standard deviation and a strength (docs/paint.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.geometry.camera import Camera
+from app.geometry.resection import parameters_from_camera
+from app.paint.profile_kernels import drop_strays, find_stripes
+from app.paint.trace_kernels import trace_markings
+from app.soccer.frames import Box
+from app.soccer.paint_evidence import PaintEvidence, PaintPoint
+from app.soccer.pitch import MARKINGS, Pitch
+from app.solving.observations import pitch_curves
+
+Image = npt.NDArray[np.uint8]
+FloatImage = npt.NDArray[np.float32]
+
+PAINTED = tuple(name for name in MARKINGS if not name.startswith("Goal"))
+"""Markings that are paint on grass; a goal is none."""
+SPACING_PX = 4.0
+MOST_PLACES = 4000
+SMOOTH_PX = 0.7
+LEAST_STRENGTH, LEAST_IN_NOISE = 6.0, 4.0
+"""What stands out: grey levels, and standard deviations of the noise."""
+LEAST_NOISE = 0.5
+"""Grey levels, so that a drawn picture is not taken for free of error."""
+THINNEST_PX = 0.25
+"""Paint that is thinner in the picture is not seen; what is found there is something else."""
+FULL_PX = 2.6
+"""Paint of that width is as bright as paint is; thinner paint is mixed with the grass."""
+PALER, BRIGHTER, BRIGHTER_BY = 0.3, 2.0, 8.0
+"""How much paler than the paint of the picture a stripe may be for its width, and how much
+brighter (times, and grey levels more)."""
+AROUND, APART_PX, CONFIRMED = 5, 1.0, 0.5
+"""Of the places around, this share must show paint within so many pixels of the same offset."""
+UNSURE_PX = 0.2
+"""Where noise alone makes sigma this large, blades of grass double it: they are no white noise."""
+SIGMA_FLOOR_PX = 0.04
+"""No place is trusted to be better known: blades, wear and the picture's compression."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A picture as paint is read from it.
+
+    Attributes:
+        image: Red green blue, shape (H, W, 3).
+        level: The least channel, smoothed, grey levels, shape (H, W).
+        hidden: 1 where nothing is believed: off the field, people, overlays; shape (H, W).
+        noise: Standard deviation of ``level`` on the grass, grey levels.
+    """
+
+    image: Image
+    level: FloatImage
+    hidden: npt.NDArray[np.uint8]
+    noise: float
+
+    @property
+    def width(self) -> int:
+        """Pixels."""
+        return int(self.image.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Pixels."""
+        return int(self.image.shape[0])
+
+    @property
+    def half_diagonal(self) -> float:
+        """Pixels, as ``geometry.resection`` wants it."""
+        return float(np.hypot(self.width, self.height)) / 2
+
+
+@dataclass(frozen=True)
+class Traced:
+    """Places along the projected markings of one camera, a few pixels apart.
+
+    Attributes:
+        places: Pitch frame, metres, shape (N, 3).
+        pixels: The middle of the paint there, shape (N, 2).
+        normals: Unit normals of the markings in the picture, shape (N, 2).
+        widths: Of the paint across, pixels, shape (N,).
+        marking: Index into ``MARKINGS``, shape (N,), increasing.
+        jacobian: Derivative along the normal by the camera's parameters, shape (N, 8).
+    """
+
+    places: FloatArray
+    pixels: FloatArray
+    normals: FloatArray
+    widths: FloatArray
+    marking: IntArray
+    jacobian: FloatArray
+    visible: int
+    """Places on the field in all, those too thin to be seen too."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Paint at the places of ``traced`` where some was seen.
+
+    Attributes:
+        traced: The places, those without paint left out.
+        offsets: From the expected place along the normal, pixels, shape (N,).
+        sigmas: Standard deviations of the offsets, pixels, shape (N,).
+        strengths: How much brighter than the grass beside it, grey levels, shape (N,).
+        sought: Places on the field at which paint was looked for.
+    """
+
+    traced: Traced
+    offsets: FloatArray
+    sigmas: FloatArray
+    strengths: FloatArray
+    sought: int
+
+    @property
+    def share(self) -> float:
+        """Of the visible places of markings, how many show paint."""
+        return len(self.offsets) / max(self.traced.visible, 1)
+
+    @property
+    def pixels(self) -> FloatArray:
+        """Where the paint is, pixels, shape (N, 2)."""
+        return self.traced.pixels + self.offsets[:, None] * self.traced.normals
+
+
+def read_picture(image: Image, field: BoolArray, hidden: Sequence[Box] = ()) -> Reading:
+    """A picture prepared for reading paint.
+
+    Args:
+        image: Red green blue, shape (H, W, 3).
+        field: The field of play, shape (H, W).
+        hidden: Boxes in which nothing is believed: people, the score, pixels.
+    """
+    image = np.ascontiguousarray(image)
+    red, green, blue = cv2.split(image)
+    least = cv2.min(red, cv2.min(green, blue)).astype(np.float32)
+    level = np.asarray(cv2.GaussianBlur(least, (5, 5), SMOOTH_PX), np.float32)
+    covered = np.logical_not(field).astype(np.uint8)
+    for box in hidden:
+        left, top = max(int(np.floor(box.x)), 0), max(int(np.floor(box.y)), 0)
+        right, bottom = int(np.ceil(box.x + box.width)), int(np.ceil(box.y + box.height))
+        covered[top : max(bottom, 0), left : max(right, 0)] = 1
+    return Reading(image, level, covered, _noise(level, field))
+
+
+def trace(reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SPACING_PX) -> Traced:
+    """Places along the markings as the camera shows them, on the field of play.
+
+    Args:
+        camera: Pixels of the picture; one focal length and one radial term count.
+    """
+    curves = pitch_curves(pitch)
+    parameters = parameters_from_camera(camera, reading.half_diagonal)
+    places, pixels, normals = (np.empty((MOST_PLACES, n)) for n in (3, 2, 2))
+    widths, marking = np.empty(MOST_PLACES), np.empty(MOST_PLACES, np.int64)
+    rows = np.empty((MOST_PLACES, 8))
+    count = trace_markings(
+        parameters, curves.kinds, curves.shapes, painted_markings(), np.array(camera.principal_point),
+        reading.half_diagonal, reading.width, reading.height, spacing_px,
+        places, pixels, normals, widths, marking, rows,
+    )  # fmt: skip
+    on_field = _on_field(reading.hidden, pixels[:count])
+    found = np.flatnonzero(on_field & (widths[:count] >= THINNEST_PX))
+    return Traced(
+        places[found],
+        pixels[found],
+        normals[found],
+        widths[found],
+        marking[found],
+        rows[found],
+        int(on_field.sum()),
+    )
+
+
+def seek(reading: Reading, traced: Traced, window_px: float | FloatArray) -> Evidence:
+    """Paint across each place, sought up to a distance.
+
+    Args:
+        window_px: To either side, for all places or for each, shape (N,).
+    """
+    count = len(traced.pixels)
+    offsets, sigmas, strengths = np.empty(count), np.empty(count), np.empty(count)
+    windows = np.ascontiguousarray(np.broadcast_to(np.asarray(window_px, np.float64), count))
+    least = max(LEAST_STRENGTH, LEAST_IN_NOISE * reading.noise)
+    find_stripes(
+        reading.level, reading.image, reading.hidden, traced.pixels, traced.normals,
+        traced.widths, windows, reading.noise, least, offsets, sigmas, strengths,
+    )  # fmt: skip
+    offsets[~_bright_as_paint(strengths, traced.widths)] = np.nan
+    drop_strays(offsets, traced.marking, AROUND, APART_PX, CONFIRMED)
+    kept = np.flatnonzero(np.isfinite(offsets))
+    seen = Traced(
+        traced.places[kept],
+        traced.pixels[kept],
+        traced.normals[kept],
+        traced.widths[kept],
+        traced.marking[kept],
+        traced.jacobian[kept],
+        traced.visible,
+    )
+    sigma = np.hypot(sigmas[kept], SIGMA_FLOOR_PX)
+    sigma *= 1 + (sigma / UNSURE_PX) ** 2
+    return Evidence(seen, offsets[kept], sigma, strengths[kept], count)
+
+
+def _bright_as_paint(strengths: FloatArray, widths: FloatArray) -> BoolArray:
+    """Which stripes are about as bright as the paint of this picture is at their width."""
+    full = np.minimum(widths / FULL_PX, 1.0)
+    found = strengths > 0
+    if not found.any():
+        return found
+    paint = float(np.median(strengths[found] / full[found]))
+    bright: BoolArray = strengths <= BRIGHTER * paint * full + BRIGHTER_BY
+    return bright & (strengths >= PALER * paint * full)
+
+
+def _on_field(hidden: npt.NDArray[np.uint8], pixels: FloatArray) -> BoolArray:
+    columns, rows = (pixels + 0.5).astype(np.int64).T
+    height, width = hidden.shape
+    seen: BoolArray = hidden[np.minimum(rows, height - 1), np.minimum(columns, width - 1)] == 0
+    return seen
+
+
+def _noise(level: FloatImage, field: BoolArray) -> float:
+    """From the median difference of pixels that are two apart."""
+    here, beside = level[::3, :-2:3], level[::3, 2::3]
+    both = field[::3, :-2:3] & field[::3, 2::3]
+    apart = np.abs(here - beside)[both]
+    if not len(apart):
+        return LEAST_NOISE
+    return max(float(np.median(apart) / (0.6745 * np.sqrt(2))), LEAST_NOISE)
+
+
+@lru_cache(maxsize=1)
+def painted_markings() -> BoolArray:
+    return np.array([name in PAINTED for name in MARKINGS])
+
+
+def to_paint_evidence(evidence: Evidence) -> PaintEvidence:
+    """The evidence as a value that is kept."""
+    rows = np.column_stack([evidence.pixels, evidence.sigmas])
+    marking = evidence.traced.marking
+    points = {
+        MARKINGS[index]: tuple(PaintPoint(*row) for row in rows[marking == index].tolist())
+        for index in np.unique(marking)
+    }
+    return PaintEvidence({name: points[name] for name in sorted(points)})

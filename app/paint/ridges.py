@@ -1,0 +1,102 @@
+"""Ridges: what looks like a painted line, in the whole picture, without any camera.
+
+A line is a ridge of brightness: strongly bent across, hardly along (the eigenvalues of the
+Hessian), with grass to both sides, long and thin.
+
+Source: Steger, "An unbiased detector of curvilinear structures".
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from app.geometry.arrays import BoolArray
+from app.paint.grass_colour import grass_colour
+from app.paint.ridge_kernels import ridge_strength, thin_ridges
+
+Image = npt.NDArray[np.uint8]
+
+WORK_WIDTH = 960
+"""Pixels: wider pictures are looked at in this width, where a line is a few pixels broad."""
+BLUR_PX = 1.2
+STRONGEST_PERCENT = 93.0
+"""Percentile of the strength on the field above which a ridge counts."""
+LEAST_STRENGTH = 1.0
+"""Grey levels per square pixel below which nothing is a ridge."""
+LEAST_LENGTH_PX = 22.0
+BROADEST_PX = 6.0
+"""Of what counts as a line, pixels of ``WORK_WIDTH``."""
+SIDE_PX = 5.0
+"""Where grass is looked for to both sides."""
+
+
+def line_like(image: Image, field: BoolArray) -> BoolArray:
+    """The thin pixels of everything on the field that looks like a painted line.
+
+    Args:
+        image: Red green blue, shape (H, W, 3).
+        field: The field of play, shape (H, W).
+
+    Returns:
+        Shape (H, W). In a picture wider than ``WORK_WIDTH`` the pixels do not touch: there is
+        one for each pixel of the smaller picture.
+    """
+    height, width = field.shape
+    if not field.any():
+        return np.zeros((height, width), np.bool_)
+    small, inside = _work_size(image, field)
+    thin = _thin_lines(small, inside, small.shape[1] / WORK_WIDTH)
+    if small.shape[:2] == (height, width):
+        return thin
+    rows, columns = np.nonzero(thin)
+    full = np.zeros((height, width), np.bool_)
+    full[_scaled(rows, height, len(small)), _scaled(columns, width, small.shape[1])] = True
+    return full
+
+
+def _work_size(image: Image, field: BoolArray) -> tuple[Image, npt.NDArray[np.uint8]]:
+    height, width = field.shape
+    inside = field.astype(np.uint8)
+    if width <= WORK_WIDTH:
+        return np.ascontiguousarray(image), inside
+    size = (WORK_WIDTH, max(round(height * WORK_WIDTH / width), 1))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    near = cv2.resize(inside, size, interpolation=cv2.INTER_NEAREST)
+    return np.asarray(small, np.uint8), np.asarray(near, np.uint8)
+
+
+def _scaled(places: npt.NDArray[np.int64], size: int, small: int) -> npt.NDArray[np.int64]:
+    """Pixels of the full picture at the centres of those of the small one."""
+    return np.asarray(((places + 0.5) * size / small).astype(np.int64))
+
+
+def _thin_lines(image: Image, inside: npt.NDArray[np.uint8], unit: float) -> BoolArray:
+    """As ``line_like``, for a picture in which lengths are ``unit`` times those above."""
+    grass = np.empty(inside.shape, np.uint8)
+    grass_colour(image, grass)
+    # Paint is bright in all channels; shirts and boards rarely are.
+    red, green, blue = cv2.split(image)
+    level = cv2.GaussianBlur(cv2.min(red, cv2.min(green, blue)).astype(np.float32), (0, 0), BLUR_PX)
+    strength = np.empty(inside.shape, np.float32)
+    across = np.empty(inside.shape, np.uint8)
+    side = max(SIDE_PX * unit, 3.0)
+    ridge_strength(level, grass, inside, side, strength, across)
+    limit = max(_percentile(strength, inside), LEAST_STRENGTH)
+    strong = (strength > limit).astype(np.uint8)
+    thin = np.empty(inside.shape, np.uint8)
+    thin_ridges(strength, across, strong, thin)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(strong, connectivity=8)
+    lengths = np.bincount(labels[thin > 0], minlength=count)
+    line = lengths >= LEAST_LENGTH_PX * unit
+    line &= stats[:, cv2.CC_STAT_AREA] <= np.maximum(BROADEST_PX * unit, 3.5) * lengths
+    line[0] = False
+    found: BoolArray = line[labels] & (thin > 0)
+    return found
+
+
+def _percentile(strength: npt.NDArray[np.float32], inside: npt.NDArray[np.uint8]) -> float:
+    """Of the strength on the field, from every third pixel."""
+    values = strength[::3, ::3][inside[::3, ::3] > 0]
+    return float(np.percentile(values, STRONGEST_PERCENT)) if len(values) else np.inf

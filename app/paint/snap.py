@@ -1,0 +1,279 @@
+"""Snap: a camera drawn onto the paint that its picture shows.
+
+The camera at hand says where each marking should be; paint is sought there, first far to either
+side and then ever closer, and the camera is moved onto what is found. Clicks, or any other
+start, say which line is which; the paint decides where it lies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.geometry.arrays import BoolArray, FloatArray
+from app.geometry.camera import Camera
+from app.geometry.resection import (
+    PARAMETERS,
+    ROLL,
+    Prior,
+    X,
+    Z,
+    camera_from_parameters,
+    parameters_from_camera,
+)
+from app.paint.evidence import SPACING_PX, Evidence, Image, Reading, read_picture, seek, trace
+from app.paint.paint_noise import PaintNoise, marking_weights, paint_noise
+from app.soccer.frames import Box, ImageSize
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.solving.resect import (
+    MAIN_FREEDOM,
+    MAIN_MEAN,
+    MAIN_SIGMA,
+    ResectionProblem,
+    is_main_position,
+)
+
+WINDOWS = (10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 3.0)
+"""Pixels at 960 x 540 that paint is sought to either side, round by round."""
+ROBUST_PX = 1.0
+"""Scale of the soft-L1 loss of the first rounds, at 960 x 540."""
+STRICT_ROUNDS, STRICT_SIGMAS, STRICT_PX = 3, 4.0, 0.3
+"""In the last rounds what lies farther off than so many sigmas, or pixels, counts little."""
+COARSE_PX = 8.0
+"""Pixels between the places of the first rounds."""
+INNER_STEPS = 4
+LEAST_POINTS, LEAST_MARKINGS = 24, 3
+"""Fewer points of paint, or markings with some, determine no camera."""
+LEAST_ON_MARKING = 4
+LEAST_SEEN = 0.2
+"""Of the visible markings: where less shows paint, chance decides what the rest is."""
+WORST_PX, MOST_SURPRISING, KEPT_SHARE = 0.6, 60.0, 0.9
+"""Paint disagrees where it does not lie on the markings in the end (median, at 960 x 540), where
+the camera moved beyond what its clicks allow (squared sigmas of eight parameters: by chance 26
+once in a thousand), or where fewer places show paint than before."""
+NO_PAINT, PAINT_DISAGREES = "no_paint", "paint_disagrees"
+DAMPING = 1e-4
+START_SIGMAS, START_PX = 4.0, 2.0
+"""A start that is known is not sought farther off than so many of its sigmas, and pixels more."""
+LEAST_UNIT = 0.6
+"""Windows do not shrink below this share of theirs in small pictures: blur is in pixels."""
+
+
+@dataclass(frozen=True)
+class Snapped:
+    """A camera after snapping.
+
+    Attributes:
+        camera: On the paint; the start where ``reason`` says why.
+        evidence: The paint at the end, marking by marking.
+        error_px: Median distance of the paint to its marking, pixels; None without paint.
+        covariance: Of the camera's parameters (``geometry.resection``), shape (8, 8); None where
+            the paint does not determine them.
+        moved_px: Median distance that the visible markings moved, or would have, pixels.
+        reason: ``no_paint`` where too little is seen, ``paint_disagrees`` where it contradicts
+            the start or itself; None where the camera is the paint's.
+        size: Height and width of the picture, pixels.
+    """
+
+    camera: Camera
+    evidence: Evidence
+    error_px: float | None
+    covariance: FloatArray | None
+    moved_px: float
+    reason: str | None
+    size: tuple[int, int]
+
+    @property
+    def points(self) -> int:
+        """How many places of paint hold the camera."""
+        return len(self.evidence.offsets)
+
+
+def snap(
+    image: Image,
+    field: BoolArray,
+    start: Camera,
+    pitch: Pitch | None = None,
+    *,
+    windows: Sequence[float] = WINDOWS,
+    hidden: Sequence[Box] = (),
+    policy: CalibrationPolicy | None = None,
+    start_covariance: FloatArray | None = None,
+) -> Snapped:
+    """The camera that the paint of a picture determines, near a start.
+
+    Args:
+        image: Red green blue, shape (H, W, 3).
+        field: The field of play (``grass.field_of_play``), shape (H, W).
+        start: A camera of the picture that is right to about the first window.
+        pitch: The pitch.
+        windows: How far to either side paint is sought, round by round, pixels at 960 x 540.
+        hidden: Boxes in which nothing is believed, pixels.
+        policy: Prior of the distortion.
+        start_covariance: How well the start is known, where it is known, shape (8, 8).
+    """
+    reading = read_picture(image, field, hidden)
+    return snap_reading(
+        reading, start, pitch or Pitch(), windows, policy or CalibrationPolicy(), start_covariance
+    )
+
+
+def snap_reading(
+    reading: Reading,
+    start: Camera,
+    pitch: Pitch,
+    windows: Sequence[float],
+    policy: CalibrationPolicy,
+    start_covariance: FloatArray | None = None,
+) -> Snapped:
+    """As ``snap``, for a picture that is prepared already."""
+    problem = ResectionProblem.of(ImageSize(reading.width, reading.height), policy)
+    rounds = _Rounds(reading, start, pitch, problem, start_covariance)
+    parameters = rounds.first
+    for index, window in enumerate(windows):
+        strict = index >= len(windows) - STRICT_ROUNDS
+        evidence = rounds.seek(parameters, window, SPACING_PX if strict else COARSE_PX)
+        if not _suffices(evidence):
+            return _kept(rounds, evidence, NO_PAINT)
+        parameters = parameters + rounds.step(parameters, evidence, strict)
+        if not np.isfinite(parameters).all():
+            return _kept(rounds, evidence, PAINT_DISAGREES)
+    evidence = rounds.seek(parameters, windows[-1])
+    if not _suffices(evidence) or evidence.share < LEAST_SEEN:
+        return _kept(rounds, evidence, NO_PAINT)
+    noise = rounds.noise(parameters, evidence)
+    if noise is None:
+        return _kept(rounds, evidence, NO_PAINT)
+    camera, before = rounds.camera(parameters), rounds.seek(rounds.first, windows[-1])
+    error, moved = float(np.median(np.abs(evidence.offsets))), _moved(start, camera, evidence)
+    if (
+        error > rounds.unit * WORST_PX
+        or moved > rounds.unit * (windows[0] if start_covariance is None else np.inf)
+        or rounds.surprise(parameters) > MOST_SURPRISING
+        or evidence.share < KEPT_SHARE * before.share
+    ):
+        return _kept(rounds, evidence, PAINT_DISAGREES, error, moved)
+    return Snapped(camera, evidence, error, noise.parameters, moved, None, rounds.size)
+
+
+class _Rounds:
+    """What all rounds of one snap share."""
+
+    def __init__(
+        self,
+        reading: Reading,
+        start: Camera,
+        pitch: Pitch,
+        problem: ResectionProblem,
+        covariance: FloatArray | None,
+    ):
+        self._reading, self.start, self._pitch, self._problem = reading, start, pitch, problem
+        self.first = parameters_from_camera(start, reading.half_diagonal)
+        self._covariance = covariance
+        self._information = None if covariance is None else _inverse(covariance)
+        self.size = reading.height, reading.width
+        self.unit = max(problem.unit, LEAST_UNIT)
+
+    def camera(self, parameters: FloatArray) -> Camera:
+        return camera_from_parameters(
+            parameters, self.start.principal_point, self._reading.half_diagonal
+        )
+
+    def seek(self, parameters: FloatArray, window: float, spacing: float = SPACING_PX) -> Evidence:
+        traced = trace(self._reading, self.camera(parameters), self._pitch, spacing)
+        window *= self.unit
+        if self._covariance is None:
+            return seek(self._reading, traced, window)
+        rows = traced.jacobian
+        sigma = np.sqrt(np.maximum(((rows @ self._covariance) * rows).sum(axis=1), 0.0))
+        known = START_SIGMAS * sigma + START_PX * self.unit
+        return seek(self._reading, traced, np.minimum(window, known))
+
+    def step(self, parameters: FloatArray, evidence: Evidence, strict: bool) -> FloatArray:
+        """Towards the paint: reweighted least squares on the offsets, made linear here."""
+        prior = self.prior(parameters)
+        information = np.diag(prior.sigma**-2.0)
+        pull = (prior.mean - parameters) * prior.sigma**-2.0
+        if self._information is not None:
+            information = information + self._information
+            pull = pull + self._information @ (self.first - parameters)
+        jacobian, offsets = evidence.traced.jacobian, evidence.offsets
+        base = marking_weights(evidence.traced.marking, evidence.sigmas) / evidence.sigmas**2
+        moved: FloatArray = np.zeros(PARAMETERS)
+        for _ in range(INNER_STEPS):
+            rest = offsets - jacobian @ moved
+            weight = base * self._robust(rest, evidence.sigmas, strict)
+            normal = (jacobian * weight[:, None]).T @ jacobian + information
+            normal[np.diag_indices(PARAMETERS)] *= 1 + DAMPING
+            moved = np.asarray(np.linalg.solve(normal, jacobian.T @ (weight * offsets) + pull))
+        return moved
+
+    def _robust(self, rest: FloatArray, sigmas: FloatArray, strict: bool) -> FloatArray:
+        if not strict:
+            weights: FloatArray = 1 / np.sqrt(1 + (rest / (ROBUST_PX * self.unit)) ** 2)
+            return weights
+        scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * self.unit)
+        return np.asarray((1 + (rest / scale) ** 2) ** -2.0)
+
+    def surprise(self, parameters: FloatArray) -> float:
+        """Squared distance from the start in its own sigmas; 0 where nothing is known of it."""
+        if self._information is None:
+            return 0.0
+        moved = parameters - self.first
+        return float(moved @ self._information @ moved)
+
+    def noise(self, parameters: FloatArray, evidence: Evidence) -> PaintNoise | None:
+        prior = self.prior(parameters)
+        robust = self._robust(evidence.offsets, evidence.sigmas, strict=True)
+        return paint_noise(
+            evidence,
+            robust,
+            prior.sigma**-2.0,
+            np.array(self.start.principal_point),
+            self._reading.half_diagonal,
+            self._information,
+        )
+
+    def prior(self, parameters: FloatArray) -> Prior:
+        """The calibrator's: main cameras stand where main cameras stand, others anywhere."""
+        prior = self._problem.prior()
+        if is_main_position(parameters[X : Z + 1]):
+            offset = parameters[ROLL : Z + 1] - MAIN_MEAN
+            prior.mean[ROLL : Z + 1] = MAIN_MEAN
+            prior.sigma[ROLL : Z + 1] = MAIN_SIGMA * np.sqrt(
+                1 + (offset / MAIN_SIGMA) ** 2 / MAIN_FREEDOM
+            )
+        return prior
+
+
+def _suffices(evidence: Evidence) -> bool:
+    counts = np.bincount(evidence.traced.marking)
+    markings = int((counts >= LEAST_ON_MARKING).sum())
+    return len(evidence.offsets) >= LEAST_POINTS and markings >= LEAST_MARKINGS
+
+
+def _kept(
+    rounds: _Rounds,
+    evidence: Evidence,
+    reason: str,
+    error: float | None = None,
+    moved: float = 0.0,
+) -> Snapped:
+    """The start, with why it was kept and what snapping would have done."""
+    return Snapped(rounds.start, evidence, error, None, moved, reason, rounds.size)
+
+
+def _moved(start: Camera, camera: Camera, evidence: Evidence) -> float:
+    places = evidence.traced.places
+    apart = np.hypot(*(camera.project(places) - start.project(places)).T)
+    known = apart[np.isfinite(apart)]
+    return float(np.median(known)) if len(known) else 0.0
+
+
+def _inverse(covariance: FloatArray) -> FloatArray:
+    scale = np.sqrt(np.diag(covariance))
+    inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
+    return np.asarray(inverse / np.outer(scale, scale))

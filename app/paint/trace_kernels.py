@@ -1,0 +1,165 @@
+"""Compiled kernel: places along the projected markings of a pitch, a few pixels apart.
+
+Shapes and units are those of ``evidence``, which is the door to this file.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from app.geometry.curve_residuals import (
+    NEAR,
+    projection_derivatives,
+    radial_growth,
+    to_camera,
+    turn,
+    unpack,
+)
+
+compiled = njit(cache=True, nogil=True, error_model="numpy")
+
+SEGMENT = 0
+STEP_M, ARC_STEP_M = 0.7, 0.35
+"""Metres between the places that are projected first."""
+PAINT_WIDTH_M = 0.12
+
+
+@compiled
+def trace_markings(
+    parameters, kinds, shapes, chosen, principal, half_diagonal, width, height, spacing,
+    places, pixels, normals, widths, marking, rows,
+):  # fmt: skip
+    """Writes places along the markings that lie in the picture; returns how many.
+
+    Args:
+        parameters: The camera, see ``geometry.resection``, shape (8,).
+        kinds: Of the curves, shape (M,); ``shapes``: shape (M, 6).
+        chosen: Which curves are followed, shape (M,).
+        principal: Principal point, pixels, shape (2,).
+        spacing: Between places, pixels.
+        places: Result, pitch frame, shape (N, 3).
+        pixels: Result: middle of the paint as seen, shape (N, 2).
+        normals: Result: unit normal of the marking in the picture, shape (N, 2).
+        widths: Result: of the paint across, pixels, shape (N,).
+        marking: Result: index of the curve, shape (N,).
+        rows: Result: derivative of the place along the normal by the parameters, shape (N, 8).
+    """
+    camera = unpack(parameters, half_diagonal)
+    derivatives = np.empty((2, 8))
+    place = np.empty(6)
+    count = 0
+    for m in range(len(kinds)):
+        if not chosen[m]:
+            continue
+        shape = shapes[m]
+        if kinds[m] == SEGMENT:
+            length = np.sqrt((shape[3] - shape[0]) ** 2 + (shape[4] - shape[1]) ** 2)
+            steps = int(length / STEP_M) + 1
+        else:
+            steps = int(shape[2] * (shape[4] - shape[3]) / ARC_STEP_M) + 1
+        carried = 0.5 * spacing
+        last_x, last_y, was_seen = 0.0, 0.0, False
+        for k in range(steps + 1):
+            at_share(kinds[m], shape, k / steps, place)
+            x, y, seen = _pixel(camera, principal, place)
+            # Far outside nothing is followed; the margin keeps steps that enter the picture.
+            seen = seen and -width < x < 2 * width and -height < y < 2 * height
+            if seen and was_seen:
+                apart = np.sqrt((x - last_x) ** 2 + (y - last_y) ** 2)
+                at = spacing - carried
+                while at <= apart:
+                    share = (k - 1 + at / apart) / steps
+                    at_share(kinds[m], shape, share, place)
+                    if _write(
+                        camera, principal, place, width, height, m, count, derivatives,
+                        places, pixels, normals, widths, marking, rows,
+                    ):  # fmt: skip
+                        count += 1
+                        if count == len(places):
+                            return count
+                    at += spacing
+                carried = apart - (at - spacing)
+            elif seen:
+                carried = 0.5 * spacing
+            last_x, last_y, was_seen = x, y, seen
+    return count
+
+
+@compiled
+def at_share(kind, shape, share, place):
+    """Writes the place of a curve at a share of its length, and the direction along it."""
+    if kind == SEGMENT:
+        for i in range(3):
+            along = shape[3 + i] - shape[i]
+            place[i], place[3 + i] = shape[i] + share * along, along
+        return
+    angle = shape[3] + share * (shape[4] - shape[3])
+    sine, cosine = np.sin(angle), np.cos(angle)
+    place[0], place[1], place[2] = shape[0] + shape[2] * cosine, shape[1] + shape[2] * sine, 0.0
+    place[3], place[4], place[5] = -shape[2] * sine, shape[2] * cosine, 0.0
+
+
+@compiled
+def _pixel(camera, principal, place):
+    x, y, z = to_camera(camera, place[0], place[1], place[2])
+    if z < NEAR:
+        return 0.0, 0.0, False
+    px, py = camera[12] * x / z, camera[12] * y / z
+    growth = radial_growth(camera[13] * (px * px + py * py))
+    return principal[0] + px * growth, principal[1] + py * growth, True
+
+
+@compiled
+def _direction(camera, place, vx, vy):
+    """How a step on the grass looks in the picture, pixels a metre."""
+    ux, uy, uz = to_camera(camera, place[0], place[1], place[2])
+    wx, wy, wz = turn(camera, vx, vy, 0.0)
+    focal, kappa = camera[12], camera[13]
+    nx, ny = ux / uz, uy / uz
+    px, py = focal * nx, focal * ny
+    ix, iy = focal * (wx - nx * wz) / uz, focal * (wy - ny * wz) / uz
+    rho2 = px * px + py * py
+    growth, bend = radial_growth(kappa * rho2), 2 * kappa * (1 + kappa * rho2)
+    inward = bend * (px * ix + py * iy)
+    return ix * growth + px * inward, iy * growth + py * inward
+
+
+@compiled
+def _write(
+    camera, principal, place, width, height, m, n, derivatives,
+    places, pixels, normals, widths, marking, rows,
+):  # fmt: skip
+    """Writes one place; False where it lies outside the picture."""
+    x, y, seen = _pixel(camera, principal, place)
+    if not (seen and 0 <= x <= width - 1 and 0 <= y <= height - 1):
+        return False
+    length = np.sqrt(place[3] ** 2 + place[4] ** 2)
+    tx, ty = place[3] / length, place[4] / length
+    gx, gy = _direction(camera, place, tx, ty)
+    size = np.sqrt(gx * gx + gy * gy)
+    if size < 1e-9:
+        return False
+    nx, ny = -gy / size, gx / size
+    half = 0.5 * PAINT_WIDTH_M
+    left, right = np.empty(6), np.empty(6)
+    left[:], right[:] = place, place
+    left[0], left[1] = place[0] - half * ty, place[1] + half * tx
+    right[0], right[1] = place[0] + half * ty, place[1] - half * tx
+    lx, ly, left_seen = _pixel(camera, principal, left)
+    rx, ry, right_seen = _pixel(camera, principal, right)
+    if not (left_seen and right_seen):
+        return False
+    across = abs(nx * (lx - rx) + ny * (ly - ry))
+    # The middle between both edges as seen is not quite the image of the middle.
+    middle = nx * (0.5 * (lx + rx) - x) + ny * (0.5 * (ly + ry) - y)
+    dx, dy, dz = place[0] - camera[9], place[1] - camera[10], place[2] - camera[11]
+    projection_derivatives(camera, dx, dy, dz, derivatives)
+    places[n, 0], places[n, 1], places[n, 2] = place[0], place[1], place[2]
+    pixels[n, 0], pixels[n, 1] = x + middle * nx, y + middle * ny
+    normals[n, 0], normals[n, 1] = nx, ny
+    widths[n] = across
+    marking[n] = m
+    for k in range(8):
+        rows[n, k] = nx * derivatives[0, k] + ny * derivatives[1, k]
+    return True

@@ -1,0 +1,248 @@
+"""Paint files: cameras of picture files drawn onto the paint, and measured by it; no database."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from app.config import Settings
+from app.datasets.archive import Limits, open_tree, resolve_inside
+from app.datasets.cameras_reader import read_cameras
+from app.datasets.cameras_writer import write_cameras
+from app.datasets.json_text import read_json
+from app.datasets.report import Report
+from app.datasets.sn_calibration import LineFile
+from app.datasets.sn_calibration_reader import lines_from_json
+from app.datasets.sn_calibration_writer import write_line_files
+from app.durable import replace_file
+from app.errors import InputError, ReviewError
+from app.finite import json_text
+from app.geometry.camera import Camera
+from app.geometry.lens import BROWN_CONRADY
+from app.paint.agreement import agreement
+from app.paint.evidence import to_paint_evidence
+from app.paint.grass import field_of_play, why_no_field
+from app.paint.ridges import line_like
+from app.paint.snap import Snapped, snap
+from app.progress import Progress
+from app.review.datasets.picture_files import PictureFile, read_pictures
+from app.soccer.annotation import Lines, make_lines
+from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.soccer.solution import Calibration
+from app.solving.calibrate import calibrate
+
+SNAPPED, KEPT, NOTHING = "snapped", "kept", "nothing"
+"""Outcomes: the camera is the paint's; the clicks' camera stays; there is none."""
+SENTENCES = {
+    "no_paint": "too little paint is seen: the camera of the clicks stays",
+    "paint_disagrees": "the paint and the clicks disagree: the camera of the clicks stays",
+}
+POINTS_PER_MARKING = 12
+"""Snapped points that a line file gets of each marking; the rest says nothing more."""
+
+
+def snap_files(
+    lines: Path,
+    images: Sequence[Path],
+    out: Path,
+    *,
+    settings: Settings,
+    progress: Progress | None = None,
+) -> list[dict[str, Any]]:
+    """Cameras from clicks and paint: ``camera_<stem>.json``, ``lines/<stem>.json``, ``snap.json``.
+
+    Args:
+        lines: Folder or zip of line files; normalised by the size of each picture, or in pixels.
+        images: Folders, zips or files; those without a line file are passed over.
+        out: Folder, made when missing.
+        settings: Limits of pictures.
+        progress: Called with frames done.
+
+    Returns:
+        The rows of ``snap.json``.
+
+    Raises:
+        InputError: No picture has a line file, or ``out`` cannot be written.
+    """
+    report = Report()
+    values = _line_values(lines, settings, report)
+    rows: list[dict[str, Any]] = []
+    for picture in read_pictures(images, settings, report):
+        value = values.get(picture.stem, values.get(PurePosixPath(picture.stem).name))
+        if value is None:
+            continue
+        row, camera, snapped = _snap_picture(picture, value, report)
+        _keep(out, picture.stem, camera, snapped)
+        rows.append(row)
+        if progress is not None:
+            progress(len(rows))
+    if not rows:
+        raise _nothing(report, f"no picture has a line file of its name in {lines}")
+    _write(out / "snap.json", rows)
+    return rows
+
+
+def agree_files(
+    cameras: Path, images: Sequence[Path], *, settings: Settings, progress: Progress | None = None
+) -> list[dict[str, Any]]:
+    """How well cameras and the paint of their pictures agree, a row for each picture.
+
+    Args:
+        cameras: Folder or zip of ``camera_<stem>.json``, or one such file.
+        images: Folders, zips or files; those without a camera are passed over.
+        settings: Limits of pictures.
+        progress: Called with frames done.
+
+    Raises:
+        InputError: No picture has a camera.
+    """
+    report = Report()
+    found = read_cameras(cameras, report)
+    rows: list[dict[str, Any]] = []
+    for picture in read_pictures(images, settings, report):
+        camera = found.get(picture.stem, found.get(PurePosixPath(picture.stem).name))
+        if camera is None:
+            continue
+        rows.append(_agree_picture(picture, camera))
+        if progress is not None:
+            progress(len(rows))
+    if not rows:
+        raise _nothing(report, f"no picture has a camera of its name in {cameras}")
+    return rows
+
+
+def _line_values(lines: Path, settings: Settings, report: Report) -> dict[str, Any]:
+    """What the line files hold, by stem with folders and, where it is the only one, without."""
+    tree = open_tree(lines, report, Limits.of(settings))
+    if tree is None:
+        raise _nothing(report, f"{lines} holds no line files")
+    values: dict[str, Any] = {}
+    with closing(tree):
+        for name in tree.names():
+            place = PurePosixPath(name)
+            if place.suffix.lower() != ".json":
+                continue
+            try:
+                value = read_json(tree.read_bytes(name), tree.shown(name))
+            except ReviewError:
+                value = None
+            values[str(place.with_suffix(""))] = value
+            values.setdefault(place.stem, value)
+    return values
+
+
+def _snap_picture(
+    picture: PictureFile, value: Any, report: Report
+) -> tuple[dict[str, Any], Camera | None, Snapped | None]:
+    if picture.image is None:
+        return _row(picture.stem, NOTHING, reason=picture.problem), None, None
+    height, width = picture.image.shape[:2]
+    size = ImageSize(width, height)
+    try:
+        lines, _ = lines_from_json(value, size, picture.stem, report)
+    except ReviewError as error:
+        return _row(picture.stem, NOTHING, reason=error.message), None, None
+    began = time.thread_time()
+    clicked = calibrate(lines, Pitch(), size, CalibrationPolicy())
+    if clicked.camera is None:
+        return _row(picture.stem, NOTHING, reason=clicked.reason), None, None
+    field = field_of_play(picture.image)
+    reason = why_no_field(picture.image, field)
+    if reason is not None:
+        return _row(picture.stem, KEPT, reason=f"no_paint: {reason}"), clicked.camera, None
+    snapped = _snapped(picture, field, clicked)
+    spent = 1000 * (time.thread_time() - began)
+    seen = agreement(snapped.camera, field, line_like(picture.image, field))
+    row = _row(
+        picture.stem,
+        KEPT if snapped.reason else SNAPPED,
+        supported=seen.supported,
+        explained=seen.explained,
+        points=snapped.points,
+        error_px=snapped.error_px,
+        ms=spent,
+        moved_px=snapped.moved_px,
+        reason=f"{snapped.reason}: {SENTENCES[snapped.reason]}" if snapped.reason else None,
+    )
+    return row, snapped.camera, snapped if snapped.reason is None else None
+
+
+def _snapped(picture: PictureFile, field: Any, clicked: Calibration) -> Snapped:
+    assert picture.image is not None and clicked.camera is not None
+    known = None if clicked.covariance is None else np.reshape(clicked.covariance, (8, 8))
+    return snap(picture.image, field, clicked.camera, start_covariance=known)
+
+
+def _agree_picture(picture: PictureFile, camera: Camera) -> dict[str, Any]:
+    if picture.image is None:
+        return _row(picture.stem, NOTHING, reason=picture.problem)
+    if camera.lens != BROWN_CONRADY:
+        other = "the paint is read with lenses of one radial term; this camera has another"
+        return _row(picture.stem, NOTHING, reason=other)
+    began = time.thread_time()
+    field = field_of_play(picture.image)
+    reason = why_no_field(picture.image, field)
+    if reason is not None:
+        return _row(picture.stem, NOTHING, reason=reason)
+    seen = agreement(camera, field, line_like(picture.image, field))
+    return _row(
+        picture.stem,
+        "measured",
+        supported=seen.supported,
+        explained=seen.explained,
+        points=seen.points,
+        ms=1000 * (time.thread_time() - began),
+    )
+
+
+def _row(frame: str, outcome: str, **known: Any) -> dict[str, Any]:
+    names = ("supported", "explained", "points", "error_px", "runner_up", "ms", "moved_px")
+    empty: Mapping[str, Any] = dict.fromkeys((*names, "reason"))
+    return {"frame": frame, "outcome": outcome, **empty, **known}
+
+
+def _keep(out: Path, stem: str, camera: Camera | None, snapped: Snapped | None) -> None:
+    """Write the camera of a frame and the points that were snapped."""
+    if camera is None:
+        return
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        write_cameras(out, {stem: camera})
+        if snapped is not None:
+            (out / "lines").mkdir(exist_ok=True)
+            height, width = snapped.size
+            resolve_inside(out, f"lines/{stem}.json")
+            file = LineFile(stem, ImageSize(width, height), _snapped_lines(snapped))
+            write_line_files(out / "lines", [file])
+    except OSError as error:
+        raise InputError(f"{out} cannot hold the cameras ({error.strerror})") from error
+
+
+def _snapped_lines(snapped: Snapped) -> Lines:
+    """Some places of paint of each marking, spread along it."""
+    lines = {}
+    for marking, points in to_paint_evidence(snapped.evidence).points.items():
+        count = min(len(points), POINTS_PER_MARKING)
+        chosen = np.unique(np.linspace(0, len(points) - 1, count).round().astype(int))
+        lines[marking] = [ImagePoint(points[i].x, points[i].y) for i in chosen.tolist()]
+    return make_lines(lines)
+
+
+def _write(path: Path, rows: list[dict[str, Any]]) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        text = json_text(rows, indent=1) + "\n"
+        replace_file(path, text.encode(), durable=False, private=False)
+    except OSError as error:
+        raise InputError(f"{path.parent} cannot be written ({error.strerror})") from error
+
+
+def _nothing(report: Report, sentence: str) -> ReviewError:
+    return report.problems[0] if report.problems else InputError(sentence)

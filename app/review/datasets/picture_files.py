@@ -1,0 +1,65 @@
+"""Picture files: pictures from folders, zips and files, decoded where they can take nobody down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+import numpy.typing as npt
+
+from app.child import Child, ChildEnded
+from app.config import Settings
+from app.datasets.archive import Limits, open_tree
+from app.datasets.frame_names import IMAGE_SUFFIXES
+from app.datasets.report import Report
+from app.errors import ReviewError
+from app.store.frames import ALLOWANCE
+from app.store.media import decode_picture
+
+
+@dataclass(frozen=True)
+class PictureFile:
+    """One picture, or why there is none.
+
+    Attributes:
+        stem: Name of the frame, with its folders where it lies in some.
+        image: Red green blue, shape (H, W, 3); None where ``problem`` says why.
+        problem: A sentence.
+    """
+
+    stem: str
+    image: npt.NDArray[np.uint8] | None
+    problem: str | None = None
+
+
+def read_pictures(
+    sources: Sequence[Path], settings: Settings, report: Report
+) -> Iterator[PictureFile]:
+    """Every picture of some folders, zips and files, in the order of their names.
+
+    Each is decoded in a process with limits; one that cannot be is told, and the next one read.
+
+    Args:
+        report: Hears what could not be opened at all.
+    """
+    with closing(Child(ALLOWANCE)) as child:
+        for source in sources:
+            tree = open_tree(source, report, Limits.of(settings))
+            if tree is None:
+                continue
+            with closing(tree):
+                for name in tree.names():
+                    if PurePosixPath(name).suffix.lower() not in IMAGE_SUFFIXES:
+                        continue
+                    stem = str(PurePosixPath(name).with_suffix(""))
+                    try:
+                        data = tree.read_bytes(name)
+                        image = child.run(decode_picture, data, settings, PurePosixPath(name).name)
+                        yield PictureFile(stem, image)
+                    except ReviewError as error:
+                        yield PictureFile(stem, None, error.message)
+                    except ChildEnded as error:
+                        yield PictureFile(stem, None, f"{PurePosixPath(name).name} {error}")

@@ -1,0 +1,40 @@
+"""The figure of docs/paint.md: ``python -m tests.bench.paint_figure OUT.jpg``."""
+
+from __future__ import annotations
+
+import sys
+
+import cv2
+import numpy as np
+
+from app.paint.evidence import read_picture, seek, trace
+from app.paint.grass import field_of_play
+from app.paint.ridges import line_like
+from app.sample.render import render
+from app.soccer.pitch import Pitch
+from tests.scenes import make_scenes
+
+SEED = 1
+BLUE, ORANGE = (255, 169, 90), (67, 159, 255)
+
+
+def main(out: str) -> None:
+    """Draw line-like paint, and the evidence at the true camera, on a rendered frame."""
+    scene = make_scenes(3, SEED, faults=False)[0]
+    key = scene.group.views[0].key
+    image = render(scene, key).copy()
+    picture = np.ascontiguousarray(image[:, :, ::-1])
+    field = field_of_play(picture)
+    truth = scene.truth.view(key)
+    assert truth is not None
+    reading = read_picture(picture, field)
+    evidence = seek(reading, trace(reading, truth.camera, Pitch(), 14.0), 3.0)
+    image[~field] //= 2
+    image[cv2.dilate(line_like(picture, field).astype(np.uint8), np.ones((2, 2))) > 0] = ORANGE
+    for x, y in evidence.pixels:
+        cv2.circle(image, (round(float(x)), round(float(y))), 4, BLUE, 1, cv2.LINE_AA)
+    cv2.imwrite(out, image, [cv2.IMWRITE_JPEG_QUALITY, 80])
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,32 @@
+"""Snap on real broadcast frames; skipped where they are not."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from app.config import Settings
+from app.review.datasets.paint_files import agree_files, snap_files
+
+DATA = Path(
+    os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data")
+) / "broadcast"  # fmt: skip
+
+pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real frames in {DATA}")
+
+
+def test_real_stills_are_snapped_or_say_why_not(tmp_path):
+    rows = snap_files(DATA / "lines", [DATA / "stills"], tmp_path, settings=Settings())
+    assert len(rows) >= 15
+    snapped = [row for row in rows if row["outcome"] == "snapped"]
+    assert len(snapped) >= 0.7 * len(rows)
+    assert all(row["error_px"] < 0.8 and row["supported"] > 0.6 for row in snapped)
+    assert all(row["reason"] for row in rows if row["outcome"] != "snapped")
+
+
+def test_cameras_of_real_stills_agree_with_no_picture_of_something_else(tmp_path):
+    snap_files(DATA / "lines", [DATA / "stills"], tmp_path, settings=Settings())
+    rows = agree_files(tmp_path, [DATA / "stills"], settings=Settings())
+    assert all(row["supported"] * row["explained"] > 0.2 for row in rows if row["supported"])

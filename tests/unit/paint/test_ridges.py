@@ -1,0 +1,42 @@
+"""Ridges: line-like paint of a whole picture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.paint.ridges import line_like
+from tests.unit.paint.test_grass import CROWD, GRASS, picture
+
+
+def noisy(image: np.ndarray) -> np.ndarray:
+    noise = np.random.default_rng(5).normal(0, 2, image.shape[:2])[..., None]
+    return np.clip(image + noise, 0, 255).astype(np.uint8)
+
+
+class TestLineLike:
+    def test_a_painted_line_becomes_its_thin_crest(self):
+        image = picture(GRASS, 300, 960)
+        image[149:152, 100:700] = 225
+        found = line_like(noisy(image), np.ones((300, 960), np.bool_))
+        assert found[150, 110:690].mean() > 0.95
+        assert found[:, 200:600].sum(axis=0).max() <= 2
+
+    def test_the_edge_of_a_board_and_a_shirt_are_no_lines(self):
+        image = picture(GRASS, 300, 960)
+        image[:100] = CROWD
+        image[96:100] = 235
+        image[180:200, 300:312] = 235
+        found = line_like(noisy(image), np.ones((300, 960), np.bool_))
+        assert not found[:110].any()
+        assert not found[170:210, 290:322].any()
+
+    def test_nothing_is_found_where_no_field_is(self):
+        image = noisy(picture(GRASS, 90, 160))
+        assert not line_like(image, np.zeros((90, 160), np.bool_)).any()
+
+    def test_pixels_of_a_large_picture_lie_on_its_line(self):
+        image = picture(GRASS, 1080, 1920)
+        image[600:606] = 225
+        rows = np.nonzero(line_like(noisy(image), np.ones((1080, 1920), np.bool_)))[0]
+        assert len(rows) > 800
+        assert np.percentile(np.abs(rows - 602.5), 95) <= 2.5

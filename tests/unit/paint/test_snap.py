@@ -1,0 +1,70 @@
+"""Snap: the camera goes onto the paint, or stays with a reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.geometry.camera import Camera
+from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.paint.snap import NO_PAINT, PAINT_DISAGREES, snap
+from tests.unit.paint.test_grass import GRASS, picture
+
+
+def panned(camera: Camera, px: float) -> Camera:
+    pan, tilt, roll = np.radians(camera.pan_tilt_roll_degrees)
+    turned = rotation_from_pan_tilt_roll(pan + px / camera.focal_length[0], tilt, roll)
+    return replace(camera, rotation=turned)
+
+
+def field_error(camera: Camera, truth: Camera) -> float:
+    x, y = np.meshgrid(np.arange(-52.0, 53, 4), np.arange(-34.0, 35, 4))
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    true = truth.project(points)
+    seen = (true[:, 0] > 0) & (true[:, 0] < 1279) & (true[:, 1] > 0) & (true[:, 1] < 719)
+    return float(np.median(np.hypot(*(camera.project(points) - true)[seen].T)))
+
+
+class TestSnap:
+    def test_clicks_become_four_times_better_and_their_truth_stays_inside_the_covariance(
+        self, rendered
+    ):
+        camera = rendered.clicked.camera
+        known = np.reshape(rendered.clicked.covariance, (8, 8))
+        found = snap(rendered.image, rendered.field, camera, start_covariance=known)
+        assert found.reason is None
+        before, after = (field_error(one, rendered.truth) for one in (camera, found.camera))
+        assert after < 0.12 and after < before / 2
+        off = found.camera.position - rendered.truth.position
+        assert off @ np.linalg.solve(found.covariance[3:6, 3:6], off) < 16.3
+        assert found.covariance.trace() < known.trace()
+
+    def test_eight_pixels_off_it_comes_back(self, rendered):
+        found = snap(rendered.image, rendered.field, panned(rendered.truth, 8.0))
+        assert found.reason is None
+        assert field_error(found.camera, rendered.truth) < 0.12
+        assert found.moved_px == pytest.approx(8.0, abs=1.0)
+
+    def test_from_the_wrong_paint_it_stays_where_it_was_and_says_so(self, rendered):
+        start = panned(rendered.truth, 60.0)
+        found = snap(rendered.image, rendered.field, start)
+        assert found.reason in (NO_PAINT, PAINT_DISAGREES)
+        assert found.camera is start and found.covariance is None
+
+    def test_a_start_that_is_surely_elsewhere_is_not_overruled(self, rendered):
+        start = panned(rendered.truth, 6.0)
+        sure = np.diag(np.array([1e-5, 1e-5, 1e-5, 0.01, 0.01, 0.01, 1e-4, 1e-3]) ** 2)
+        found = snap(rendered.image, rendered.field, start, start_covariance=sure)
+        assert found.reason is not None and found.camera is start
+
+    def test_without_paint_the_start_stays(self, rendered):
+        image = picture(GRASS, 720, 1280)
+        found = snap(image, np.ones((720, 1280), np.bool_), rendered.truth)
+        assert found.reason == NO_PAINT and found.error_px is None
+
+    def test_the_same_picture_gives_the_same_bits(self, rendered):
+        start = panned(rendered.truth, 3.0)
+        first, second = (snap(rendered.image, rendered.field, start) for _ in range(2))
+        assert first.camera == second.camera
