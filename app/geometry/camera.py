@@ -107,7 +107,7 @@ class Camera:
     @cached_property
     def _coefficients(self) -> list[float]:
         """Of the distortion, as plain numbers: the way of one point costs less so."""
-        return self.distortion.tolist()
+        return [*map(float, self.distortion)]
 
     @cached_property
     def _fold(self) -> float:
