@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import socket
 import sys
 import time
@@ -13,7 +14,15 @@ from unittest.mock import Mock
 
 import pytest
 
-from app.api.server import ACCEPTED_AT_ONCE, SWITCH_SECONDS, Server, is_local, listen, make_server
+from app.api.server import (
+    ACCEPTED_AT_ONCE,
+    SWITCH_SECONDS,
+    Server,
+    is_local,
+    listen,
+    make_server,
+    settle,
+)
 from app.errors import InputError
 
 
@@ -43,6 +52,15 @@ class TestListen:
     def test_an_address_of_another_machine_is_a_sentence(self) -> None:
         with pytest.raises(InputError, match="cannot be used"), listen("192.0.2.1", 0):
             pass
+
+
+class TestSettle:
+    def test_what_is_there_for_good_is_not_collected_again(self) -> None:
+        try:
+            settle()
+            assert gc.get_freeze_count() > len(gc.get_objects())
+        finally:
+            gc.unfreeze()
 
 
 @pytest.fixture
