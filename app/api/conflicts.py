@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from pydantic import BaseModel
 
@@ -23,6 +21,4 @@ def current_state(load: Callable[[], BaseModel]) -> Iterator[None]:
     try:
         yield
     except StaleRevisionError as error:
-        # By way of JSON: a number without end travels as null there.
-        document: dict[str, Any] = json.loads(load().model_dump_json())
-        raise StaleStateError(error, document) from error
+        raise StaleStateError(error, load().model_dump_json()) from error

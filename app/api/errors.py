@@ -56,10 +56,10 @@ class StaleStateError(ReviewError):
     """A ``StaleRevisionError`` together with the state as it is now.
 
     Args:
-        current: The document that a reader would get now.
+        current: The document that a reader would get now, as JSON text.
     """
 
-    def __init__(self, error: StaleRevisionError, current: dict[str, Any]):
+    def __init__(self, error: StaleRevisionError, current: str):
         super().__init__(error.message, hint=error.hint)
         self.current = current
         self.etag = error.current_etag
@@ -99,17 +99,17 @@ async def _review_error(request: Request, error: Exception) -> Response:
         hint=error.hint,
         pointer=error.pointer,
         station=error.station if isinstance(error, SharedStationError) else None,
-        current=error.current if isinstance(error, StaleStateError) else None,
     )
     headers = {"Retry-After": RETRY_SECONDS} if status in (503, 507) else {}
+    current = None
     if isinstance(error, StaleStateError):
-        headers["ETag"] = error.etag
+        headers["ETag"], current = error.etag, error.current
     if isinstance(error, DamagedError):
         request.app.state.services.store.note_damage(error)
     if status >= 500:
         cause = str(error.__cause__ or "").partition("\n")[0]
         log.error("request refused", instance=problem.instance, error=str(error), cause=cause)
-    return problem_response(problem, headers)
+    return problem_response(problem, headers, current)
 
 
 async def _validation_error(request: Request, error: Exception) -> Response:

@@ -46,7 +46,6 @@ def make_problem(
     pointer: str | None = None,
     errors: list[FieldProblem] | None = None,
     station: int | None = None,
-    current: Any = None,
     instance: str | None = None,
 ) -> Problem:
     """A problem of that status, its kind and title filled in."""
@@ -61,16 +60,24 @@ def make_problem(
         instance=instance or new_instance(),
         errors=errors,
         station=station,
-        current=current,
     )
 
 
-def problem_response(problem: Problem, headers: Mapping[str, str] | None = None) -> Response:
-    """The answer that carries a problem; members that do not apply are left out."""
+def problem_response(
+    problem: Problem, headers: Mapping[str, str] | None = None, current: str | None = None
+) -> Response:
+    """The answer that carries a problem; members that do not apply are left out.
+
+    ``current`` is its member of that name as JSON text: the event loop does not write a whole
+    group once more.
+    """
     optional = {"errors", "station", "current"}
     absent = {name for name in optional if getattr(problem, name) is None}
+    body = problem.model_dump_json(exclude=absent)
+    if current is not None:
+        body = f'{body[:-1]},"current":{current}}}'
     return Response(
-        problem.model_dump_json(exclude=absent),
+        body,
         status_code=problem.status,
         media_type=MEDIA_TYPE,
         headers={"Cache-Control": "no-store", **(headers or {})},

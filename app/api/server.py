@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 import errno
+import gc
 import ipaddress
 import socket
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import Thread
 
 import uvicorn
 from fastapi import FastAPI
 
 from app.api.connections import Connection
 from app.errors import InputError
+from app.solving.warm import warm_up
+
+WAITING = 256
+"""Connections that may wait to be accepted."""
+ACCEPTED_AT_ONCE = 8
+"""Connections that are accepted before those that are open are looked after again: who comes with
+five hundred at once makes nobody wait for all of them."""
+SWITCH_SECONDS = 0.001
+"""How long a thread that solves may keep the others waiting: a reader takes its turn a dozen times
+for one answer, and Python's own 5 ms add up."""
 
 
 def is_local(host: str) -> bool:
@@ -53,7 +66,7 @@ def _bind(host: str, port: int) -> socket.socket:
     try:
         server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         server.bind((host, port))
-        server.listen(256)
+        server.listen(WAITING)
     except OSError:
         server.close()
         raise
@@ -62,6 +75,22 @@ def _bind(host: str, port: int) -> socket.socket:
 
 def run(app: FastAPI, server: socket.socket) -> None:
     """Serve until the process is told to stop."""
+    Thread(target=settle, daemon=True).start()
+    make_server(app).run(sockets=[server])
+
+
+def settle() -> None:
+    """Load the solver, and then count what is there among what stays.
+
+    A full collection would walk through all of it: 0.12 s in which nobody is answered, each time.
+    """
+    warm_up()
+    gc.collect()
+    gc.freeze()
+
+
+def make_server(app: FastAPI) -> Server:
+    """What serves an application."""
     config = uvicorn.Config(
         app,
         http=Connection,
@@ -74,16 +103,24 @@ def run(app: FastAPI, server: socket.socket) -> None:
         proxy_headers=False,
         timeout_keep_alive=30,
         timeout_graceful_shutdown=10,
+        backlog=ACCEPTED_AT_ONCE,
     )
-    Server(config, app).run(sockets=[server])
+    return Server(config, app)
 
 
 class Server(uvicorn.Server):
-    """Ends what has no end of its own before it waits for all answers to be sent."""
+    """Looks after everybody in turn, and stops what has no end of its own before it waits for the rest."""
 
     def __init__(self, config: uvicorn.Config, app: FastAPI):
         super().__init__(config)
         self._app = app
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start, with room for more connections to wait than are accepted at a time."""
+        sys.setswitchinterval(SWITCH_SECONDS)
+        await super().startup(sockets)
+        for listening in sockets or []:
+            listening.listen(WAITING)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop; open event streams and uploads end at once."""

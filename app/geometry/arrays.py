@@ -37,10 +37,11 @@ def require_shape(array: FloatArray, shape: tuple[int | None, ...], name: str) -
     """
     array = np.asarray(array, dtype=np.float64)
     found = array.shape
-    # Called for every point of every camera: most shapes are equal as they stand.
-    if found != shape and (
-        len(found) != len(shape)
-        or any(w is not None and w != got for w, got in zip(shape, found, strict=True))
+    # Called for every point of every camera: most are right at first sight, or all but their length.
+    if found == shape or (found and shape[0] is None and found[1:] == shape[1:]):
+        return array
+    if len(found) != len(shape) or any(
+        w is not None and w != got for w, got in zip(shape, found, strict=True)
     ):
         raise ShapeError(f"{name} has shape {array.shape}, needs {shape}")
     return array

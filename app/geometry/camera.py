@@ -104,6 +104,16 @@ class Camera:
         matrix.setflags(write=False)
         return matrix
 
+    @cached_property
+    def _coefficients(self) -> list[float]:
+        """Of the distortion, as plain numbers: the way of one point costs less so."""
+        return [*map(float, self.distortion)]
+
+    @cached_property
+    def _fold(self) -> float:
+        """``fold_radius`` of the lens."""
+        return self.model.fold_radius(self.distortion)
+
     @property
     def P(self) -> FloatArray:
         """Projection matrix K R [I | -C] without distortion, shape (3, 4)."""
@@ -142,8 +152,7 @@ class Camera:
         ideal = in_camera[:, :2] / safe[:, None]
         if self.distorts:
             if not folded:
-                edge = self.model.fold_radius(self.distortion)
-                visible &= np.hypot(ideal[:, 0], ideal[:, 1]) <= edge
+                visible &= np.hypot(ideal[:, 0], ideal[:, 1]) <= self._fold
             ideal = self.model.distort(np.where(visible[:, None], ideal, 0.0), self.distortion)
         pixels = self._unit_to_pixel(ideal)
         pixels[~visible] = np.nan
@@ -156,9 +165,9 @@ class Camera:
             return np.nan, np.nan
         x, y = x / depth, y / depth
         if self.distorts:
-            if not (folded or np.hypot(x, y) <= self.model.fold_radius(self.distortion)):
+            if not (folded or np.hypot(x, y) <= self._fold):
                 return np.nan, np.nan
-            x, y = self.model.distort_point(x, y, self.distortion.tolist())
+            x, y = self.model.distort_point(x, y, self._coefficients)
         (ax, ay), (x0, y0) = self.focal_length, self.principal_point
         return ax * x + self.skew * y + x0, ay * y + y0
 

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 
 # Strict IEEE arithmetic, so that the same input gives the same bits; division by zero gives
-# infinity, as in numpy.
-compiled = njit(cache=True, error_model="numpy")
+# infinity, as in numpy. Without the interpreter's lock: others are answered meanwhile.
+compiled = njit(cache=True, error_model="numpy", nogil=True)
 
 SEGMENT = 0
 NEAR = 0.3

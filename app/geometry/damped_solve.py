@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def solve_damped(gradient, information, damping, step):
     """Writes the step of each start, by Cholesky decomposition.
 

@@ -9,7 +9,7 @@ _SWEEPS = 30
 _ORTHOGONAL = 1e-15
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def smallest_singular_vectors(matrices, vectors):
     """Writes for each matrix the unit vector that it shortens most.
 
@@ -45,7 +45,7 @@ def smallest_singular_vectors(matrices, vectors):
             vectors[n, i] = V[i, best]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _turn(A, V, p, q):
     """Make columns p and q of A orthogonal; returns how far they were from it."""
     pp = qq = pq = 0.0

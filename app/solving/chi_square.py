@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.geometry.arrays import BoolArray, FloatArray, IntArray, cross
 from app.soccer.policy import Policy
 from app.solving.facts import Facts
 from app.solving.spread import pixel_spreads
@@ -121,8 +121,9 @@ def _weights(facts: Facts, views: IntArray, point: FloatArray, policy: Policy) -
 def _solved(matrix: FloatArray, pull: FloatArray) -> FloatArray:
     """Solutions of 3 x 3 systems by cofactors, NaN where one has none, shape (G, 3)."""
     a, b, c = matrix.transpose(1, 0, 2)
-    columns = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-1)
-    solution: FloatArray = _times(columns, pull) / _dot(a, np.cross(b, c))[:, None]
+    first = cross(b, c)
+    columns = np.stack([first, cross(c, a), cross(a, b)], axis=-1)
+    solution: FloatArray = _times(columns, pull) / _dot(a, first)[:, None]
     return solution
 
 

@@ -100,15 +100,16 @@ def _others(sight: Sight, sights: Sequence[Sight]) -> list[Sight]:
 def _swap(
     sight: Sight, others: Sequence[Sight], first: Sight | None, pitch: Pitch, policy: Policy
 ) -> Swap | None:
-    labelled = _meetings(sight, others, policy)
     turned = _meetings(_turn(sight), others, policy)
-    if not turned:
-        return None
     after = _best_error(turned, pitch, policy)
+    # So it is with nearly every view that is labelled as it should be: nothing more is asked.
+    if after >= 1:
+        return None
+    labelled = _meetings(sight, others, policy)
     costs = _costs(sight, turned, True, pitch, policy)
     better = _weighed(_costs(sight, labelled, False, pitch, policy), labelled, first)
     better -= _weighed(costs, turned, first)
-    if after >= 1 or min(costs) > MAX_COST or better < CLEARLY:
+    if min(costs) > MAX_COST or better < CLEARLY:
         return None
     before, tau = _best_error(labelled, pitch, policy), sight.tau_px(policy)
     return Swap(

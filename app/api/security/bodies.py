@@ -66,12 +66,20 @@ def read_json(body: bytes) -> Any:
 
 def _require_flat(body: bytes) -> None:
     """Count brackets before anything is made of them, on text that may not be JSON."""
-    brackets = _STRINGS.sub(b"", body).translate(None, _NO_BRACKETS)
+    brackets = _without_strings(body).translate(None, _NO_BRACKETS)
     steps = _STEPS[np.frombuffer(brackets, np.uint8)]
     if np.cumsum(steps).max(initial=0) > MAX_DEPTH:
         raise BodyError(400, f"the body is nested more than {MAX_DEPTH} levels deep")
     if np.count_nonzero(steps > 0) > MAX_CONTAINERS:
         raise BodyError(400, f"the body holds more than {MAX_CONTAINERS} lists and objects")
+
+
+def _without_strings(body: bytes) -> bytes:
+    """What stands outside of quotes."""
+    if b"\\" in body:
+        return _STRINGS.sub(b"", body)
+    # Every other part lies between quotes: five times as quick, and while it lasts nobody is answered.
+    return b"".join(body.split(b'"')[::2])
 
 
 def _refuse_constant(name: str) -> NoReturn:

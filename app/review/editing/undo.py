@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.errors import ConflictError
@@ -64,15 +64,28 @@ def next_step(session: Session, stacks: Stacks, kind: str, where: str) -> Json:
 
 def read_stacks(session: Session, group_ids: Sequence[int]) -> Mapping[int, Stacks]:
     """The stacks of each group."""
-    stacks = dict.fromkeys(group_ids, Stacks())
+    steps: dict[int, list[tuple[str, int]]] = {number: [] for number in group_ids}
     for row in group_steps(session, group_ids, GROUP_KINDS):
-        stacks[row.group_id] = stacks[row.group_id].then(GROUP_KINDS[row.kind], row.id)
-    return stacks
+        steps[row.group_id].append((GROUP_KINDS[row.kind], row.id))
+    return {number: _stacks_of(taken) for number, taken in steps.items()}
 
 
 def read_station_stacks(session: Session, station_id: int) -> Stacks:
     """The stacks of a shared station."""
-    stacks = Stacks()
-    for row in station_steps(session, station_id, STATION_KINDS):
-        stacks = stacks.then(STATION_KINDS[row.kind], row.id)
-    return stacks
+    rows = station_steps(session, station_id, STATION_KINDS)
+    return _stacks_of((STATION_KINDS[row.kind], row.id) for row in rows)
+
+
+def _stacks_of(steps: Iterable[tuple[str, int]]) -> Stacks:
+    """The stacks after all steps (kind, id of the entry): ``Stacks.then`` of each, in one go."""
+    done: list[int] = []
+    undone: list[int] = []
+    for kind, log_id in steps:
+        if kind == "undo":
+            undone.append(done.pop())
+        elif kind == "redo":
+            done.append(undone.pop())
+        else:
+            done.append(log_id)
+            undone.clear()
+    return Stacks(tuple(done), tuple(undone))

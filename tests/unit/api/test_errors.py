@@ -58,7 +58,7 @@ CASES: list[tuple[ReviewError, int]] = [
     (ConflictError("x"), 409),
     (SharedStationError("cam3", 7, "cam3"), 409),
     (STALE, 412),
-    (StaleStateError(STALE, {}), 412),
+    (StaleStateError(STALE, "{}"), 412),
     (PreconditionRequiredError("x"), 428),
     (DegenerateGeometryError("x"), 422),
     (StorageError("x"), 503),

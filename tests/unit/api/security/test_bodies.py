@@ -12,10 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.api.security.bodies import (
+    _STRINGS,
     MAX_CONTAINERS,
     MAX_DEPTH,
     BodyError,
     JsonBodies,
+    _without_strings,
     read_json,
     require_json_type,
 )
@@ -28,6 +30,16 @@ def refusal(body: bytes) -> str:
         read_json(body)
     assert caught.value.status == 400
     return caught.value.detail
+
+
+class TestWithoutStrings:
+    @settings(deadline=None, derandomize=True)
+    @given(st.text('"[]{},:ab').map(str.encode))
+    def test_the_quick_way_leaves_what_the_pattern_leaves(self, body: bytes) -> None:
+        assert _without_strings(body) == _STRINGS.sub(b"", body)
+
+    def test_a_bracket_behind_an_escaped_quote_is_text(self) -> None:
+        assert _without_strings(rb'{"a\"[": 1}') == b"{: 1}"
 
 
 class TestReadJson:

@@ -1,0 +1,17 @@
+"""Kernels: what is compiled leaves the interpreter to others while it runs."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import pytest
+from numba.core.dispatcher import Dispatcher
+
+from app.geometry import curve_residuals, damped_solve, smallest_singular
+
+
+@pytest.mark.parametrize("module", [curve_residuals, damped_solve, smallest_singular])
+def test_who_solves_keeps_nobody_from_being_answered(module: ModuleType) -> None:
+    kernels = [item for item in vars(module).values() if isinstance(item, Dispatcher)]
+    assert kernels
+    assert all(item.targetoptions.get("nogil") for item in kernels)
