@@ -36,9 +36,7 @@ PIECE = 400
 
 
 @pytest.fixture(scope="module")
-def states(
-    solved_issia: Path, tmp_path_factory: pytest.TempPathFactory
-) -> dict[str, GroupState]:
+def states(solved_issia: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, GroupState]:
     """Every group with its solution, by its frame."""
     store = Store.open(Settings(home=copy_home(solved_issia, tmp_path_factory)))
     found = get_dataset(store, "issia")
