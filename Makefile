@@ -38,7 +38,9 @@ run: setup
 PROCESSES = $(shell n=$$(( $$(getconf _NPROCESSORS_ONLN) + 1 )); echo $$(( n < 8 ? n : 8 )))
 PYTEST = $(BIN)/python -m pytest --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder
 
+# What numba compiles is compiled before: every process would do it anew, until one has saved it.
 test: setup chromium
+	@$(BIN)/python -m tests.compiled
 	@$(MAKE) --no-print-directory -j2 test-python test-browser
 	@echo "Every test has passed."
 

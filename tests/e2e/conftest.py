@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
-from tests.e2e.homes import build_film, build_sample, build_season, copy_home, once_for_all
+from tests.e2e.homes import build_film, build_sample, build_season
 from tests.e2e.install_chromium import ADVICE, find_chromium
 from tests.e2e.screen import Screen, passing
 from tests.e2e.service import ROOT, serving
 from tests.e2e.windows import TIMEOUT_MS, Windows
+from tests.homes import copy_home, once_for_all
 
 CONTEXTS = 4
 """3D contexts that the browser keeps at a time."""

@@ -12,9 +12,9 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
 from tests.e2e.film import write_film
-from tests.e2e.homes import copy_home
 from tests.e2e.screen import Screen, withdraw_verdict
 from tests.e2e.service import run_touchline, serving
+from tests.homes import copy_home
 
 MINUTE = 60_000
 FRAME = 110

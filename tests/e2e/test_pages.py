@@ -17,7 +17,6 @@ from tests.e2e.test_access import (
     BEYOND_ITS_FRAME,
     NESTED_SCROLLERS,
     SIZES,
-    serious,
     serious_in_both,
     soon,
 )
@@ -45,15 +44,14 @@ MINUTE = 60_000
 JOB_IS_OVER = {"done", "failed", "cancelled"}
 
 
-@pytest.mark.parametrize("scheme", ["dark", "light"])
 class TestEveryPage:
-    def test_is_usable_by_everybody_and_fits(self, open_page: OpenPage, scheme: str) -> None:
-        page = open_page("/datasets", scheme=scheme)
+    def test_is_usable_by_everybody_and_fits(self, open_page: OpenPage) -> None:
+        page = open_page("/datasets")
         for path, waited in PAGES.items():
             page.goto(path)
             page.wait_for_selector(waited, timeout=MINUTE)
-            found = {"axe": serious(page)}
-            for width, height in SIZES if scheme == "dark" else []:
+            found = {"axe": serious_in_both(page)}
+            for width, height in SIZES:
                 page.set_viewport_size({"width": width, "height": height})
                 found[f"too wide at {width}"] = soon(page, TOO_WIDE)
                 found[f"scrolls twice at {width}"] = soon(page, NESTED_SCROLLERS)

@@ -22,7 +22,9 @@ import pytest
 
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.sample.scene import Scene
+from app.soccer.group import Group
 from tests.e2e.service import run_touchline
+from tests.homes import copy_home, once_for_all
 from tests.scenes import make_scenes
 
 COMMAND = "from app.cli import main; main()"
@@ -38,33 +40,45 @@ class Raw:
 
 
 @pytest.fixture(scope="session")
-def scenes() -> list[Scene]:
-    """Four groups without planted faults."""
-    return make_scenes(groups=4, seed=3, faults=False)
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Files and a home that has them, made once: ``tree``, ``spoiled``, ``home``."""
+    return once_for_all(tmp_path_factory, "integration", fill)
+
+
+def fill(folder: Path) -> None:
+    """Four sound groups and one with spoiled frames, and a home with both; the sound are solved."""
+    scenes = make_scenes(groups=4, seed=3, faults=False)
+    write_tree(folder / "tree", scenes)
+    write_spoiled(folder / "spoiled", scenes[0].group)
+    run_touchline(
+        folder / "home",
+        f"import soccernet-v3 {folder / 'tree'} --dataset small",
+        f"import soccernet-v3 {folder / 'spoiled'} --dataset spoiled",
+        "solve --dataset small --workers 1",
+    )
 
 
 @pytest.fixture(scope="session")
-def tree(tmp_path_factory: pytest.TempPathFactory, scenes: list[Scene]) -> Path:
-    """The scenes in SoccerNet-v3 layout, a Frames-v3.zip for each match."""
-    root = tmp_path_factory.mktemp("soccernet")
+def tree(filled: Path) -> Path:
+    """Four groups without planted faults, in SoccerNet-v3 layout; nobody changes them."""
+    return filled / "tree"
+
+
+def write_tree(root: Path, scenes: list[Scene]) -> None:
+    """Scenes in SoccerNet-v3 layout, a Frames-v3.zip for each match."""
     write_soccernet_v3(root, [scene.group for scene in scenes])
     for scene in scenes:
         path = root / scene.group.match / "Frames-v3.zip"
         with zipfile.ZipFile(path, "a") as frames:
             for index, view in enumerate(scene.group.views):
                 frames.writestr(view.key, picture(index, view.size.width, view.size.height))
-    return root
 
 
-@pytest.fixture(scope="session")
-def spoiled_tree(tmp_path_factory: pytest.TempPathFactory, scenes: list[Scene]) -> Path:
+def write_spoiled(root: Path, group: Group) -> None:
     """One group: its first frame is no image, its second a bomb."""
-    root = tmp_path_factory.mktemp("spoiled")
-    group = scenes[0].group
     write_soccernet_v3(root, [group])
     for view, content in zip(group.views, (b"GIF89a<script>", bomb(16_000)), strict=False):
         (root / group.match / view.key).write_bytes(content)
-    return root
 
 
 def picture(shade: int, width: int, height: int) -> bytes:
@@ -90,10 +104,10 @@ def bomb(side: int) -> bytes:
 
 @pytest.fixture(scope="session")
 def touchline(
-    tmp_path_factory: pytest.TempPathFactory,
+    filled: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Run a command of the command line in the home of this session."""
-    home = tmp_path_factory.mktemp("home")
+    """Run a command of the command line in the home of this process."""
+    home = copy_home(filled, tmp_path_factory)
 
     def run(*arguments: object) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-c", COMMAND, *map(str, arguments)]
@@ -110,14 +124,8 @@ def environment(home: Path) -> dict[str, str]:
 
 
 @pytest.fixture(scope="session")
-def address(touchline, tree: Path, spoiled_tree: Path) -> Iterator[str]:
+def address(touchline) -> Iterator[str]:
     """Address of a server over a home with the datasets ``small`` (solved) and ``spoiled``."""
-    run_touchline(
-        touchline.home,
-        f"import soccernet-v3 {tree} --dataset small",
-        f"import soccernet-v3 {spoiled_tree} --dataset spoiled",
-        "solve --dataset small --workers 1",
-    )
     log = Path(touchline.home) / "server.log"
     with log.open("w") as file:
         server = subprocess.Popen(

@@ -183,7 +183,9 @@ class TestInstallation:
     def test_shows_a_group_in_a_browser_which_finds_every_module(
         self, installed: Installation, dist: Path
     ) -> None:
-        installed.run("sample", "--groups", "2", "--no-faults", "--dataset", "sample")
+        installed.run(
+            "sample", "--groups", "2", "--no-faults", "--dataset", "sample", "--workers", "1"
+        )
         assert (installed.work / ".local/share/touchline/touchline.db").is_file()
         chromium = find_chromium()
         assert chromium, ADVICE

@@ -10,15 +10,16 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
-from app.datasets.issia_reader import IssiaOptions, open_issia
-from app.datasets.report import Report
+from app.review.datasets.dataset import get_dataset
 from app.review.editing.recompute import solve_dataset
+from app.review.editing.state import GroupState, read_states
 from app.review.exporting.export import export
 from app.review.importing.ingest import ingest
+from app.review.queue.listing import list_ids
 from app.soccer.policy import PAPER
 from app.soccer.solution import Solution
-from app.solving.solve import solve
 from app.store.session import Store
+from tests.homes import copy_home
 
 DATA = (
     Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -30,20 +31,31 @@ IMPOSSIBLE = (1492, 1493, 1494, 1495)
 REPAIRED = (423, 1763, 2045, 3013, 3017)
 
 
-@pytest.fixture(scope="module")
-def groups():
-    return list(open_issia(DATA, IssiaOptions(), Report()).groups())
+PIECE = 400
+"""Groups that are read at a time."""
 
 
 @pytest.fixture(scope="module")
-def solutions(groups) -> dict[str, Solution]:
-    known = {}
-    solved = {}
-    for group in groups:
-        solution = solve(group, PAPER, known)
-        known |= {view.calibration_key: view.calibration for view in solution.views}
-        solved[group.key] = solution
-    return solved
+def states(solved_issia: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, GroupState]:
+    """Every group with its solution, by its frame."""
+    store = Store.open(Settings(home=copy_home(solved_issia, tmp_path_factory)))
+    found = get_dataset(store, "issia")
+    assert found.policy == PAPER
+    ids = list_ids(store, found.id).ids
+    with store.read() as session:
+        pieces = [read_states(session, ids[at : at + PIECE]) for at in range(0, len(ids), PIECE)]
+    store.close()
+    return {state.key: state for piece in pieces for state in piece}
+
+
+@pytest.fixture(scope="module")
+def groups(states):
+    return [state.group for state in states.values()]
+
+
+@pytest.fixture(scope="module")
+def solutions(states) -> dict[str, Solution]:
+    return {key: state.solution for key, state in states.items()}
 
 
 class TestSolve:

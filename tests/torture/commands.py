@@ -78,7 +78,7 @@ def torture(
     shutil.rmtree(folder, ignore_errors=True)
     tree = folder / "tree"
     calm, killed = folder / "calm", folder / "killed"
-    run_touchline(calm, "migrate", f"sample --groups {groups} --labels-only {tree}")
+    run_touchline(calm, "migrate", f"sample --workers 1 --groups {groups} --labels-only {tree}")
     shutil.copytree(calm, killed)
     report, chance = Report(), random.Random(seed)
     for command in commands:

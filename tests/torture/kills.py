@@ -48,7 +48,7 @@ class Report:
 def prepare(home: Path, folder: Path, *, clients: int, groups: int) -> None:
     """A home with a solved dataset for each client."""
     tree = folder / "tree"
-    lines = ["migrate", f"sample --groups {groups} --labels-only {tree}"]
+    lines = ["migrate", f"sample --workers 1 --groups {groups} --labels-only {tree}"]
     for number in range(clients):
         lines += [
             f"import soccernet-v3 {tree} --dataset client{number}",

@@ -1,0 +1,34 @@
+"""Real data, solved once for all files that ask for it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from app.config import Settings
+from app.datasets.issia_reader import IssiaOptions, open_issia
+from app.datasets.report import Report
+from app.review.editing.recompute import solve_dataset
+from app.review.importing.ingest import ingest
+from app.store.session import Store
+from tests.homes import once_for_all
+
+DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
+ISSIA = DATA / "issia"
+
+
+@pytest.fixture(scope="session")
+def solved_issia(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder whose ``home`` has the whole ISSIA set, solved, as the dataset ``issia``."""
+    return once_for_all(tmp_path_factory, "issia", build_issia)
+
+
+def build_issia(folder: Path) -> None:
+    """Read and solve all of it."""
+    store = Store.open(Settings(home=folder / "home"))
+    groups = open_issia(ISSIA, IssiaOptions(), Report()).groups()
+    ingest(store, "issia", groups, source="x", actor="ann")
+    solve_dataset(store, "issia")
+    store.close()
