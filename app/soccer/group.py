@@ -9,6 +9,7 @@ from app.errors import InputError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import ImageSize
+from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.reasons import LeftOut
 
@@ -25,6 +26,8 @@ class Station:
         calibration: Which one counts when both exist: ``given`` or ``lines``.
         given_covariance: Of the given camera's parameters (``geometry.resection``), 8 x 8, row by
             row; None where nothing is known of it.
+        picture: What was done to its pictures since they were taken; None: nothing. The camera
+            that is found from its lines follows.
     """
 
     key: str
@@ -36,6 +39,7 @@ class Station:
     flipped: bool = False
     """The frames of this camera are mirrored; annotations and calibration are not."""
     given_covariance: tuple[float, ...] | None = None
+    picture: PictureGeometry | None = None
 
     def __post_init__(self) -> None:
         if self.given is not None and self.given.is_wide and self.given_covariance is not None:
@@ -46,13 +50,14 @@ class Station:
             )
 
     def with_said(self, other: Station) -> Station:
-        """This station with the lines and the camera that people or datasets gave another."""
+        """This station with the lines, the camera and the picture that were said of another."""
         return replace(
             self,
             lines=other.lines,
             given=other.given,
             given_covariance=other.given_covariance,
             calibration=other.calibration,
+            picture=other.picture,
         )
 
     def with_given(

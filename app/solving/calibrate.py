@@ -9,10 +9,12 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
 from app.geometry.resection import LOG_FOCAL, PARAMETERS, X, Z
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, SharedPosition, Station, View
+from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import GAMMAS_PERCENT, SOLVER_VERSION, Calibration, MarkingFit, Suspect
@@ -20,6 +22,7 @@ from app.solving.jaccard import jaccard, measure_markings, outcomes, project_mar
 from app.solving.labels import find_suspects
 from app.solving.observations import Observations, observe
 from app.solving.picture import find_picture
+from app.solving.picture_fit import PictureProblem, estimate_picture, warp_of
 from app.solving.resect import (
     PositionPrior,
     Resection,
@@ -96,6 +99,65 @@ def calibrate_near(
     return measure(found, lines, pitch, size)
 
 
+def calibrate_picture(
+    lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy, picture: PictureGeometry
+) -> Calibration:
+    """``calibrate`` of a picture that was stretched or cropped since it was taken.
+
+    The lines are taken back to the picture as it was, where that is exactly known or as they say
+    themselves, and the camera is put into the picture as it is. Its covariance knows what is not
+    known of the picture.
+
+    Args:
+        picture: What was done to it.
+    """
+    problem = ResectionProblem.of(size, policy)
+    observations = observe(lines, pitch, size)
+    if measurement_count(observations) < MIN_MEASUREMENTS:
+        return calibrate(lines, pitch, size, policy)
+    try:
+        found = estimate_picture(problem, observations, picture)
+        alone = calibrate(found.undone(lines, size), pitch, size, policy)
+        left_out = [suspect.marking for suspect in alone.suspects]
+        if left_out:
+            observations = observations.without(*left_out)
+            found = estimate_picture(problem, observations, picture)
+            alone = calibrate(found.undone(lines, size), pitch, size, policy)
+    except DegenerateGeometryError as error:
+        return Calibration("lines", None, reason=error.message)
+    if alone.camera is None:
+        return alone
+    spread = _picture_spread(problem, observations, picture, found, alone.camera)
+    return measure(
+        replace(
+            alone,
+            camera=found.done(alone.camera, size),
+            covariance=tuple(spread.ravel().tolist()) if np.isfinite(spread).all() else None,
+            unobservable=_unobservable(spread),
+            picture=None,
+        ),
+        lines,
+        pitch,
+        size,
+    )
+
+
+def _picture_spread(
+    problem: ResectionProblem,
+    observations: Observations,
+    prior: PictureGeometry,
+    found: PictureGeometry,
+    camera: Camera,
+) -> FloatArray:
+    """Covariance of a camera's parameters with what is not known of its picture, shape (8, 8)."""
+    search = PictureProblem.of(problem, observations, prior)
+    unknowns = np.append(problem.parameters(camera), warp_of(found))
+    try:
+        return search.carried(unknowns, search.covariance(unknowns))
+    except DegenerateGeometryError:
+        return np.full((PARAMETERS, PARAMETERS), np.inf)
+
+
 def _found(problem: ResectionProblem, fit: Resection, observations: Observations) -> Calibration:
     """The camera and how well the lines determine it; the priors count for nothing there."""
     try:
@@ -123,6 +185,8 @@ def calibrate_station(
     if station.given is not None and station.calibration == "given":
         given = Calibration("given", station.given, covariance=station.given_covariance)
         return measure(given, station.lines, pitch, station.size)
+    if station.picture is not None:
+        return calibrate_picture(station.lines, pitch, station.size, policy, station.picture)
     alone = calibrate(station.lines, pitch, station.size, policy)
     if shared is None:
         return alone
@@ -194,6 +258,8 @@ def calibration_key(
             parts.append(station.given.lens)
         if station.given_covariance is not None:
             parts.append(station.given_covariance)
+    elif station.picture is not None:
+        parts.append(station.picture)
     elif shared is not None:
         parts.append(shared)
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]

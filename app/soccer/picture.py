@@ -1,0 +1,82 @@
+"""Picture geometry: what was done to a picture between the camera and the annotator.
+
+A picture as it was taken has square pixels and its optical axis in the middle. A stretched one
+has wide or narrow pixels, a cropped one has its axis beside the middle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from app.errors import InputError
+from app.geometry.camera import Camera
+from app.soccer.annotation import Lines, make_lines
+from app.soccer.frames import ImageSize
+
+ASPECTS = (0.5, 2.0)
+MAX_SHIFT = 0.8
+
+
+@dataclass(frozen=True)
+class PictureGeometry:
+    """Aspect and principal point of a picture, with how well they are known.
+
+    Attributes:
+        aspect: Width of a pixel by its height: 1.05 is a picture stretched by 5 % in width.
+        shift: Of the optical axis from the middle of the picture, right and down, in half
+            diagonals.
+        sigma: Standard deviations of the aspect (as a share) and of both shifts; where they are
+            wide, the lines of the view itself say what the numbers are.
+
+    Example:
+        >>> PictureGeometry(4 / 3, (0.0, 0.0)).middle(ImageSize(1920, 1080))
+        (959.5, 539.5)
+    """
+
+    aspect: float = 1.0
+    shift: tuple[float, float] = (0.0, 0.0)
+    sigma: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        numbers = (self.aspect, *self.shift, *self.sigma)
+        if not all(map(math.isfinite, numbers)) or min(self.sigma) < 0:
+            raise InputError("the geometry of a picture has finite numbers, no sigma below zero")
+        if not ASPECTS[0] <= self.aspect <= ASPECTS[1]:
+            raise InputError(f"the aspect of a pixel lies from {ASPECTS[0]:g} to {ASPECTS[1]:g}")
+        if max(map(abs, self.shift)) > MAX_SHIFT:
+            raise InputError(f"the axis lies within {MAX_SHIFT:g} half diagonals of the middle")
+
+    def middle(self, size: ImageSize) -> tuple[float, float]:
+        """Where the optical axis is in a picture of that size, pixels."""
+        half = size.diagonal / 2
+        right, down = self.shift
+        return (size.width - 1) / 2 + right * half, (size.height - 1) / 2 + down * half
+
+    def undone(self, lines: Lines, size: ImageSize) -> Lines:
+        """Where the picture as it was taken, of the same size, shows annotated points.
+
+        Args:
+            lines: Points by marking, pixels of the picture as it is.
+            size: Of the picture.
+        """
+        x0, y0 = (size.width - 1) / 2, (size.height - 1) / 2
+        x1, y1 = self.middle(size)
+        return make_lines(
+            {
+                name: [(x0 + (x - x1) / self.aspect, y0 + y - y1) for x, y in points]
+                for name, points in lines.items()
+            }
+        )
+
+    def done(self, camera: Camera, size: ImageSize) -> Camera:
+        """The camera of the picture as it is, from that of the picture as it was taken.
+
+        Args:
+            camera: With square pixels and its principal point in the middle.
+            size: Of the picture.
+        """
+        x, y = camera.focal_length
+        return replace(
+            camera, focal_length=(x * self.aspect, y), principal_point=self.middle(size)
+        )

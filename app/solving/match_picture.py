@@ -1,0 +1,174 @@
+"""Match picture: aspect and principal point of pictures, estimated from many frames.
+
+What was done to the pictures of a match (or of one shot) was done to all of them alike. One frame
+seldom tells a stretched picture from another camera; many frames do. All cameras and the three
+numbers are adjusted together: what a frame says of them, whatever its camera, is what is left once
+its camera is eliminated (Schur complement), and these parts add up. A frame that contradicts the
+others counts for little.
+
+Source: Hartley & Zisserman, sec. A6.3 (partitioned normal equations); Lange, Little and Taylor
+(1989) for the weights of the Student distribution; White (1980) for the covariance, which counts
+frames and not clicks: the clicks of a frame err together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from app.errors import DegenerateGeometryError
+from app.geometry.arrays import FloatArray
+from app.geometry.resection import PARAMETERS
+from app.soccer.annotation import Lines
+from app.soccer.frames import ImageSize
+from app.soccer.picture import PictureGeometry
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.solving.observations import Observations, observe
+from app.solving.picture_fit import PictureProblem, picture_of, undo_warp
+from app.solving.resect import ResectionProblem, measurement_count
+
+MIN_FRAMES = 3
+MAX_FRAMES = 30
+"""More frames say little more; those with the most markings are taken."""
+MIN_MEASUREMENTS = 12
+"""Frames with fewer say nothing that they do not need for their camera."""
+PRIOR_SIGMA = np.array([0.12, 0.2, 0.2])
+"""Of the logarithm of the aspect, and of both shifts (half diagonals), before any frame is seen."""
+FRAME_SIGMA = np.array([0.006, 0.04, 0.04])
+"""What lens, pitch and annotator of one frame may add to the error of its own numbers."""
+CERTAIN_SIGMAS = 5.0
+LEAST = np.array([0.02, 0.06, 0.06])
+"""A picture was changed where one of its numbers is so many sigmas, and so much, from nothing."""
+_FREEDOM = 4.0
+_ROUNDS, _SETTLED = 10, 3e-4
+_LONGEST = np.array([0.15, 0.25, 0.25])
+
+
+@dataclass(frozen=True)
+class PictureFrame:
+    """Annotated points by marking, pixels of ``size``."""
+
+    lines: Lines
+    size: ImageSize
+    pitch: Pitch = field(default_factory=Pitch)
+
+
+@dataclass(frozen=True)
+class PictureEstimate:
+    """What many frames say of their pictures.
+
+    Attributes:
+        picture: The most likely numbers, and how well they are known.
+        frames: Number of frames that it rests on.
+    """
+
+    picture: PictureGeometry
+    frames: int
+
+    @property
+    def proposal(self) -> PictureGeometry | None:
+        """The picture to calibrate with; None where nothing certainly happened to it."""
+        size = np.abs([np.log(self.picture.aspect), *self.picture.shift])
+        certain = size > np.maximum(LEAST, CERTAIN_SIGMAS * np.array(self.picture.sigma))
+        return self.picture if certain.any() else None
+
+
+def estimate_match_picture(
+    frames: Sequence[PictureFrame], policy: CalibrationPolicy
+) -> PictureEstimate:
+    """The picture that explains the lines of many frames best.
+
+    Args:
+        frames: Of one match, or of one shot.
+        policy: How frames are calibrated.
+
+    Raises:
+        DegenerateGeometryError: Too few frames show enough markings.
+    """
+    seen = [_Seen.of(frames[index], policy) for index in choose_frames(frames)]
+    if len(seen) < MIN_FRAMES:
+        raise DegenerateGeometryError(
+            f"{len(seen)} frames show enough markings, a picture needs {MIN_FRAMES}"
+        )
+    warp, pull, told = _adjust(seen)
+    inverse = np.linalg.inv(told.sum(axis=0) + np.diag(PRIOR_SIGMA**-2))
+    between = inverse @ (pull.T @ pull) @ inverse * len(seen) / (len(seen) - 1)
+    sigma = np.sqrt(np.maximum(np.diag(inverse), np.diag(between)))
+    return PictureEstimate(picture_of(warp, tuple(sigma.tolist())), len(seen))
+
+
+def choose_frames(frames: Sequence[PictureFrame], most: int = MAX_FRAMES) -> list[int]:
+    """Indices of the frames with the most independent measurements, at most so many."""
+    rich = []
+    for index, frame in enumerate(frames):
+        count = measurement_count(observe(frame.lines, frame.pitch, frame.size))
+        if count >= MIN_MEASUREMENTS:
+            rich.append((-count, index))
+    return sorted(index for _, index in sorted(rich)[:most])
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A frame with its best camera so far, in the picture as it was taken."""
+
+    problem: ResectionProblem
+    observations: Observations
+    camera: FloatArray
+
+    @staticmethod
+    def of(frame: PictureFrame, policy: CalibrationPolicy) -> _Seen:
+        problem = ResectionProblem.of(frame.size, policy)
+        observations = observe(frame.lines, frame.pitch, frame.size)
+        return _Seen(problem, observations, problem.resect(observations).parameters)
+
+    def at(self, warp: FloatArray) -> _Seen:
+        """The frame with another picture, its camera refined."""
+        seen = undo_warp(self.problem, self.observations, warp)
+        return replace(self, camera=self.problem.refine(seen, self.camera[None]).parameters)
+
+    def share(self, warp: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What the frame says of the picture, shapes (3,) and (3, 3), its camera eliminated."""
+        search = PictureProblem(self.problem, self.observations, warp, np.full(3, np.inf))
+        unknowns = np.append(self.camera, warp)
+        apart, jacobian = search.rows(unknowns)
+        scale = self.problem.robust_scale_px * self.problem.unit
+        weighted = jacobian / np.sqrt(1 + (apart / scale) ** 2)[:, None]
+        gradient, information = weighted.T @ apart, weighted.T @ jacobian
+        prior = self.problem.prior()
+        gradient[:PARAMETERS] += (self.camera - prior.mean) / prior.sigma**2
+        information[range(PARAMETERS), range(PARAMETERS)] += prior.sigma**-2
+        camera, picture = slice(0, PARAMETERS), slice(PARAMETERS, None)
+        carried = np.linalg.solve(information[camera, camera], information[camera, picture])
+        variance = search.click_variance(unknowns)
+        pull = (gradient[picture] - carried.T @ gradient[camera]) / variance
+        told = (information[picture, picture] - information[picture, camera] @ carried) / variance
+        # Random effects: each frame's numbers are its own, about those of the match.
+        shrunk = np.linalg.inv(np.eye(3) + told @ np.diag(FRAME_SIGMA**2))
+        return shrunk @ pull, shrunk @ told
+
+
+def _adjust(seen: Sequence[_Seen]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The three numbers once they settle, and each frame's pull and information."""
+    warp = np.zeros(3)
+    for _ in range(_ROUNDS):
+        seen = [frame.at(warp) for frame in seen]
+        shares = [frame.share(warp) for frame in seen]
+        pull, told = (np.array(part) for part in zip(*shares, strict=True))
+        chi = np.array([_chi(one, all_) for one, all_ in zip(pull, told, strict=True)])
+        weight = (_FREEDOM + 3) / (_FREEDOM + chi)
+        pull, told = pull * weight[:, None], told * weight[:, None, None]
+        information = told.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)
+        step = -np.linalg.solve(information, pull.sum(axis=0) + warp / PRIOR_SIGMA**2)
+        step = np.clip(step, -_LONGEST, _LONGEST)
+        warp = warp + step
+        if np.abs(step).max() < _SETTLED:
+            break
+    return warp, pull, told
+
+
+def _chi(pull: FloatArray, told: FloatArray) -> float:
+    """How far one frame's own numbers lie from those of all, in its own sigmas, squared."""
+    return float(pull @ np.linalg.pinv(told, hermitian=True) @ pull)

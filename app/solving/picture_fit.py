@@ -1,0 +1,261 @@
+"""Picture fit: camera and picture together, eleven unknowns instead of eight.
+
+The first eight are those of ``geometry.resection`` for the picture as it was taken; then come the
+logarithm of the aspect and the shift of the axis (half diagonals, right and down). Residuals are
+those of the picture as it is: taken in the other one, a wider aspect would shrink them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.errors import DegenerateGeometryError
+from app.geometry.arrays import FloatArray
+from app.geometry.least_squares import levenberg_marquardt, require_determined
+from app.geometry.resection import (
+    KAPPA,
+    LOG_FOCAL,
+    PAN,
+    PARAMETERS,
+    ROLL,
+    TILT,
+    residuals,
+)
+from app.soccer.picture import ASPECTS, MAX_SHIFT, PictureGeometry
+from app.solving.line_noise import line_noise
+from app.solving.observations import Observations
+from app.solving.resect import CLICK_SIGMA_PX, MIN_CLICK_SIGMA_PX, WIDE, ResectionProblem
+
+WIDTH = PARAMETERS + 3
+OPEN = PictureGeometry(sigma=(0.3, 0.4, 0.4))
+"""Of a picture of which nothing is known but that something was done to it."""
+KNOWN_SIGMA = np.array([0.02, 0.1, 0.1])
+"""Numbers of a picture that are known to no better than this are asked of the view's own lines."""
+STARTS = np.array([[0, 0, 0], [0.25, 0, 0], [-0.25, 0, 0], [0, 0.35, 0], [0, -0.35, 0]])
+"""Pictures from which the fit begins: the logarithm of the aspect, and the shift."""
+_ROUNDS, _STEPS = 2, 30
+_PROBE_PX = 0.01
+_ROTATION_AND_LENS = [PAN, TILT, ROLL, LOG_FOCAL, KAPPA]
+
+
+def warp_of(picture: PictureGeometry) -> FloatArray:
+    """The three unknowns of a picture, shape (3,)."""
+    return np.array([np.log(picture.aspect), *picture.shift])
+
+
+def picture_of(warp: FloatArray, sigma: tuple[float, float, float]) -> PictureGeometry:
+    """Back from ``warp_of``; what no picture can be is cut off."""
+    stretch = float(np.clip(warp[0], *np.log(ASPECTS) * 0.999))
+    right, down = np.clip(warp[1:], -MAX_SHIFT, MAX_SHIFT).tolist()
+    return PictureGeometry(float(np.exp(stretch)), (right, down), sigma)
+
+
+def is_open(picture: PictureGeometry) -> bool:
+    """Whether the lines of the view are asked what the picture is."""
+    return bool((np.array(picture.sigma) > KNOWN_SIGMA).any())
+
+
+def undo_warp(
+    problem: ResectionProblem, observations: Observations, warp: FloatArray
+) -> Observations:
+    """The points where the picture as it was taken shows them."""
+    half = problem.size.diagonal / 2
+    pixels = observations.pixels - warp[1:] * half
+    pixels[:, 0] /= np.exp(warp[0])
+    return Observations(observations.curves, pixels, observations.marking)
+
+
+@dataclass(frozen=True)
+class PictureProblem:
+    """What fits of camera and picture to one view share.
+
+    Attributes:
+        problem: Of the image.
+        observations: Its points in the picture as it is.
+        mean: Of the prior of the picture's three numbers, shape (3,).
+        sigma: Their standard deviations, shape (3,).
+    """
+
+    problem: ResectionProblem
+    observations: Observations
+    mean: FloatArray
+    sigma: FloatArray
+
+    @staticmethod
+    def of(
+        problem: ResectionProblem, observations: Observations, picture: PictureGeometry
+    ) -> PictureProblem:
+        """With what is known of the picture as prior."""
+        sigma = np.maximum(np.array(picture.sigma), 1e-6)
+        return PictureProblem(problem, observations, warp_of(picture), sigma)
+
+    def rows(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Distance of each point to its marking in the picture as it is, and its derivatives.
+
+        Args:
+            unknowns: Shape (11,).
+
+        Returns:
+            Pixels, shapes (N,) and (N, 11).
+        """
+        camera, warp = unknowns[:PARAMETERS], unknowns[PARAMETERS:]
+        seen = undo_warp(self.problem, self.observations, warp)
+        half = self.problem.size.diagonal / 2
+        apart, by_camera = self._across(camera, seen, np.zeros(2), with_slopes=True)
+        aspect = np.exp(warp[0])
+        normal = np.empty((len(apart), 2))
+        for axis, unit in enumerate(np.eye(2) * _PROBE_PX):
+            ahead = self._across(camera, seen, unit)[0]
+            behind = self._across(camera, seen, -unit)[0]
+            normal[:, axis] = (ahead - behind) / (2 * _PROBE_PX)
+        # A line's normal turns and shrinks when the picture is stretched.
+        normal[:, 0] /= aspect
+        length = np.maximum(np.hypot(normal[:, 0], normal[:, 1]), 0.25)
+        normal /= length[:, None]
+        apart = apart / length
+        foot = self.observations.pixels[:, 0] - warp[1] * half - apart * normal[:, 0]
+        jacobian = np.column_stack(
+            [by_camera / length[:, None], -normal[:, 0] * foot, -half * normal]
+        )
+        return apart, jacobian
+
+    def fit(self, camera: FloatArray) -> FloatArray:
+        """The camera and picture that fit best, shape (11,).
+
+        Args:
+            camera: From which the search begins, shape (8,).
+        """
+        starts = []
+        for warp in STARTS if (self.sigma > KNOWN_SIGMA).any() else STARTS[:1]:
+            start = self.mean + warp * (self.sigma > KNOWN_SIGMA)
+            seen = undo_warp(self.problem, self.observations, start)
+            starts.append(np.append(self.problem.refine(seen, camera[None]).parameters, start))
+        best, variance = np.array(starts), (CLICK_SIGMA_PX * self.problem.unit) ** 2
+        for _ in range(_ROUNDS):
+            found = levenberg_marquardt(self._equations(variance), best, _STEPS)
+            best = found.parameters[np.argmin(found.cost)][None]
+            variance = self.click_variance(best[0])
+        unknowns: FloatArray = best[0]
+        return unknowns
+
+    def click_variance(self, unknowns: FloatArray) -> float:
+        """Variance of the clicks' distances, robustly, pixels squared."""
+        apart, _ = self.rows(unknowns)
+        scale = self._scale
+        robust = 2 * scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)
+        spare = max(len(apart) - WIDTH + 2, 1)
+        return max(float(robust.sum()) / spare, (MIN_CLICK_SIGMA_PX * self.problem.unit) ** 2)
+
+    def covariance(self, unknowns: FloatArray) -> FloatArray:
+        """Covariance of the unknowns, shape (11, 11); the camera's prior counts for nothing.
+
+        Raises:
+            DegenerateGeometryError: The lines leave a combination open.
+        """
+        apart, jacobian = self.rows(unknowns)
+        weight = (1 + (apart / (WIDE * self._scale)) ** 2) ** -0.25
+        spread = np.sqrt(self.click_variance(unknowns))
+        prior = np.zeros(WIDTH)
+        prior[KAPPA] = self.problem.distortion_sigma**-2
+        prior[PARAMETERS:] = self.sigma**-2
+        rows = jacobian * (weight / spread)[:, None]
+        require_determined(rows.T @ rows + np.diag(prior))
+        noise = line_noise(
+            apart * weight / spread,
+            rows,
+            self.observations.marking,
+            prior,
+            CLICK_SIGMA_PX * self.problem.unit / spread,
+            MIN_CLICK_SIGMA_PX * self.problem.unit / spread,
+        )
+        return noise.parameters
+
+    def carried(self, unknowns: FloatArray, covariance: FloatArray) -> FloatArray:
+        """Covariance of a camera's parameters that says for picture and camera where pixels lie.
+
+        What an uncertain axis does to pixels, another direction of view does as well: the
+        picture's part is carried by the rotation and the lens, never by the position, so that
+        both the position and the pixels get their own uncertainty.
+
+        Args:
+            unknowns: Shape (11,).
+            covariance: Theirs, shape (11, 11).
+
+        Returns:
+            Shape (8, 8).
+        """
+        _, jacobian = self.rows(unknowns)
+        lens = jacobian[:, _ROTATION_AND_LENS]
+        scale = np.sqrt((lens**2).sum(axis=0))
+        share = np.linalg.lstsq(lens / scale, jacobian[:, PARAMETERS:], rcond=1e-6)[0]
+        carry = np.zeros((PARAMETERS, WIDTH))
+        carry[:, :PARAMETERS] = np.eye(PARAMETERS)
+        carry[_ROTATION_AND_LENS, PARAMETERS:] = share / scale[:, None]
+        return carry @ covariance @ carry.T
+
+    @property
+    def _scale(self) -> float:
+        return self.problem.robust_scale_px * self.problem.unit
+
+    def _across(
+        self, camera: FloatArray, seen: Observations, moved: FloatArray, with_slopes: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """Distances of moved points across their markings, and derivatives by the camera."""
+        points = Observations(seen.curves, seen.pixels + moved, seen.marking)
+        offsets, jacobians = residuals(
+            camera, points.curves, points.sightings(), self.problem.size.diagonal / 2
+        )
+        return offsets[:, 0], jacobians[:, 0] if with_slopes else jacobians[:0, 0]
+
+    def _equations(self, variance: float):  # type: ignore[no-untyped-def]
+        camera = self.problem.prior()
+        mean = np.append(camera.mean, self.mean)
+        # The cost counts pixels, so a prior weighs as much as its clicks are noisy.
+        information = np.append(camera.sigma, self.sigma / np.sqrt(variance)) ** -2
+        information[KAPPA] *= variance
+
+        def one(unknowns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+            apart, jacobian = self.rows(unknowns)
+            scale = self._scale
+            root = np.sqrt(1 + (apart / scale) ** 2)
+            off = unknowns - mean
+            cost = float(scale**2 * (root - 1).sum() + 0.5 * (information * off**2).sum())
+            weighted = jacobian / root[:, None]
+            return (
+                cost,
+                weighted.T @ apart + information * off,
+                weighted.T @ jacobian + np.diag(information),
+            )
+
+        def equations(batch: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            costs, gradients, normals = zip(*map(one, batch), strict=True)
+            return np.array(costs), np.array(gradients), np.array(normals)
+
+        return equations
+
+
+def estimate_picture(
+    problem: ResectionProblem, observations: Observations, picture: PictureGeometry
+) -> PictureGeometry:
+    """What the lines of one view say of its picture, with what is known of it as prior.
+
+    Args:
+        problem: Of the image.
+        observations: Its points in the picture as it is.
+        picture: What is known; where that is exact enough it is the answer.
+
+    Raises:
+        DegenerateGeometryError: The lines do not determine the camera.
+    """
+    if not is_open(picture):
+        return picture
+    seen = undo_warp(problem, observations, warp_of(picture))
+    search = PictureProblem.of(problem, observations, picture)
+    unknowns = search.fit(problem.resect(seen).parameters)
+    spread = search.covariance(unknowns)
+    if not np.isfinite(spread).all():
+        raise DegenerateGeometryError("the lines do not determine the camera")
+    sigma = np.sqrt(np.diag(spread))[PARAMETERS:]
+    return picture_of(unknowns[PARAMETERS:], tuple(sigma.tolist()))
