@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.api.schemas.annotation import points_of
 from app.api.schemas.preview import PreviewRequest, ViewPreview
 from app.errors import InputError
-from app.review.editing.edit import Edit, IncludeView, SetBall, SetLines
+from app.review.editing.edit import Edit, IncludeView, SetBall, SetLines, SetPicture
 from app.soccer.group import Group
 
 
@@ -35,4 +35,6 @@ def _view_edits(key: str, change: ViewPreview) -> list[Edit]:
         edits.append(SetBall(key, None if change.ball is None else change.ball.ball()))
     if change.included is not None:
         edits.append(IncludeView(key, change.included))
+    if "picture" in change.model_fields_set:
+        edits.append(SetPicture(key, None if change.picture is None else change.picture.picture()))
     return edits

@@ -45,15 +45,21 @@ def calibrate(
             ".csv) names the match of each frame, auto guesses it from names and positions.",
         ),
     ] = None,
+    picture: Annotated[
+        str | None,
+        typer.Option(
+            metavar="auto|FILE",
+            help="The frames are of one match or shot whose pictures were stretched or cropped: "
+            "FILE (of touchline picture --json) says how, auto estimates it.",
+        ),
+    ] = None,
     workers: Workers = None,
     json_: Json = False,
 ) -> None:
     """Calibrate line files (folder or zip) to camera files; needs no dataset."""
     from app.review.datasets.batch import calibrate_files
 
-    named = None if matches in (None, "auto") else Path(str(matches))
-    if named is not None and not named.is_file():
-        raise typer.BadParameter(f'"{matches}" is neither auto nor a file', param_hint="--matches")
+    named, shape = _file(matches, "--matches"), _file(picture, "--picture")
     pool = process_pool(workers or read_settings().workers)
     with pool as executor, show_progress("Calibrating") as progress:
         result = calibrate_files(
@@ -64,10 +70,22 @@ def calibrate(
             with_leave_one_out=leave_one_out,
             matches=named,
             guess=matches == "auto",
+            picture=shape,
+            guess_picture=picture == "auto",
             executor=executor,
             progress=progress,
         )
     print_values(result, json_)
+
+
+def _file(text: str | None, option: str) -> Path | None:
+    """The file that an option names; None without the option and for ``auto``."""
+    if text in (None, "auto"):
+        return None
+    path = Path(str(text))
+    if not path.is_file():
+        raise typer.BadParameter(f'"{text}" is neither auto nor a file', param_hint=option)
+    return path
 
 
 @commands.command()

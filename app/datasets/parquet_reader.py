@@ -37,6 +37,7 @@ OPTIONAL = (
     "flipped",
     "calibration",
     "given_covariance",
+    "picture",
     "file_name",
 )
 _BATCH = 512
@@ -127,7 +128,7 @@ def _view(row: Mapping[str, Any], path: str, record: str) -> PlacedView:
         name: None
         if not isinstance(row.get(name), str)
         else read_json(row[name].encode(), path, record=f"{record}, {name}")
-        for name in ("lines", "balls", "given", "extras")
+        for name in ("lines", "balls", "given", "picture", "extras")
     }
     pitch = [row.get("pitch_length"), row.get("pitch_width")]
     split = row.get("group_split") or row.get("split") or ""

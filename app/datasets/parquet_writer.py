@@ -215,6 +215,11 @@ def _said_json(name: str) -> Getter:
     return lambda row: json_text(row.said[name])
 
 
+def _picture(row: Row) -> str | None:
+    said = row.said.get("picture")
+    return None if said is None else json_text(said)
+
+
 _SIDES = ("x", "y", "width", "height")
 PROVENANCE = ("dataset", "version", "policy", "policy_hash", "date")
 """Columns that are the same in every row of an export."""
@@ -291,6 +296,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("balls", TEXT, _said_json("balls")),
     ("given", TEXT, _said_json("given")),
     ("given_covariance", LIST, lambda row: row.said.get("given_covariance")),
+    ("picture", TEXT, lambda row: _picture(row)),
     ("extras", TEXT, lambda row: json_text(extras_to_json(row.view.extras))),
     *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
     ("solver_version", TEXT, lambda row: _solver(row)),

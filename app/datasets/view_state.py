@@ -19,6 +19,7 @@ from app.geometry.camera import camera_covariance
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
+from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
 from app.soccer.reasons import LeftOut, left_out
 
@@ -70,8 +71,18 @@ def view_to_json(view: View) -> dict[str, Any]:
         "calibration": station.calibration,
         "given": None if given is None else camera_to_json(given),
         **({} if covariance is None else {"given_covariance": [*map(float, covariance)]}),
+        **({} if station.picture is None else {"picture": picture_to_json(station.picture)}),
         "lines": lines_to_json(station.lines),
         "balls": [ball_to_json(ball) for ball in view.balls],
+    }
+
+
+def picture_to_json(picture: PictureGeometry) -> dict[str, Any]:
+    """``{"aspect": a, "shift": [right, down], "sigma": [aspect, right, down]}``."""
+    return {
+        "aspect": float(picture.aspect),
+        "shift": [*map(float, picture.shift)],
+        "sigma": [*map(float, picture.sigma)],
     }
 
 
@@ -192,6 +203,7 @@ class StateReader:
             lines=self.lines(),
             calibration=calibration,
             flipped=self.flag("flipped", False),
+            picture=self.picture(),
         )
         camera = None if given is None else camera_from_json(given, self.path, self.record)
         try:
@@ -213,6 +225,20 @@ class StateReader:
             return camera_covariance(fields.numbers(found, 64))
         except ValueError as error:
             raise self.error("given_covariance", str(error)) from error
+
+    def picture(self) -> PictureGeometry | None:
+        """What was done to the picture since it was taken; None where nothing was."""
+        found = self.value.get("picture")
+        if found is None:
+            return None
+        try:
+            value = fields.mapping(found)
+            aspect = fields.numbers([value.get("aspect")], 1)[0]
+            right, down = fields.numbers(value.get("shift"), 2)
+            sigma = fields.numbers(value.get("sigma"), 3)
+            return PictureGeometry(aspect, (right, down), (sigma[0], sigma[1], sigma[2]))
+        except (ValueError, InputError) as error:
+            raise self.error("picture", str(error)) from error
 
     def left_out(self) -> LeftOut | None:
         """Why a view was left out: ``{"reason": ..., "note": ...}``; None where nobody said."""

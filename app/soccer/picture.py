@@ -77,6 +77,8 @@ class PictureGeometry:
             size: Of the picture.
         """
         x, y = camera.focal_length
-        return replace(
-            camera, focal_length=(x * self.aspect, y), principal_point=self.middle(size)
-        )
+        return replace(camera, focal_length=(x * self.aspect, y), principal_point=self.middle(size))
+
+
+OPEN = PictureGeometry(sigma=(0.3, 0.4, 0.4))
+"""Of a picture of which nothing is known but that something was done to it: its lines say what."""

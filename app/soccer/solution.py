@@ -346,7 +346,7 @@ class Fix:
     """What a finding or a remedy proposes to do.
 
     ``action`` is ``relabel``, ``move_point``, ``drop_point``, ``drop_marking``, ``swap_sides``,
-    ``include_view``, ``exclude_view`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
+    ``include_view``, ``exclude_view``, ``free_picture`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
     say where a person should look and draw: what was computed there is no evidence for itself.
     """
 

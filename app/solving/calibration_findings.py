@@ -180,11 +180,12 @@ def _picture_geometry(
     yield Finding(
         "picture_geometry",
         f"The lines fit far better when {found}. The camera is found as if it were not, so its "
-        "place is doubtful. Import the picture as it was taken, or leave the view out.",
+        "place is doubtful. Solve it so, import the picture as it was taken, or leave the view "
+        "out.",
         view,
         number=number,
         threshold=threshold,
-        fix=None if view is None else Fix("exclude_view", view),
+        fix=None if view is None else Fix("free_picture", view),
     )
 
 

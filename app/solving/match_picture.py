@@ -70,10 +70,14 @@ class PictureEstimate:
 
     @property
     def proposal(self) -> PictureGeometry | None:
-        """The picture to calibrate with; None where nothing certainly happened to it."""
+        """The picture to calibrate frames with; None where nothing certainly happened to it.
+
+        One frame differs from all together by ``FRAME_SIGMA``, so it is known no better.
+        """
         size = np.abs([np.log(self.picture.aspect), *self.picture.shift])
         certain = size > np.maximum(LEAST, CERTAIN_SIGMAS * np.array(self.picture.sigma))
-        return self.picture if certain.any() else None
+        aspect, right, down = np.hypot(self.picture.sigma, FRAME_SIGMA).tolist()
+        return replace(self.picture, sigma=(aspect, right, down)) if certain.any() else None
 
 
 def estimate_match_picture(
@@ -96,8 +100,8 @@ def estimate_match_picture(
     warp, pull, told = _adjust(seen)
     inverse = np.linalg.inv(told.sum(axis=0) + np.diag(PRIOR_SIGMA**-2))
     between = inverse @ (pull.T @ pull) @ inverse * len(seen) / (len(seen) - 1)
-    sigma = np.sqrt(np.maximum(np.diag(inverse), np.diag(between)))
-    return PictureEstimate(picture_of(warp, tuple(sigma.tolist())), len(seen))
+    aspect, right, down = np.sqrt(np.maximum(np.diag(inverse), np.diag(between))).tolist()
+    return PictureEstimate(picture_of(warp, (aspect, right, down)), len(seen))
 
 
 def choose_frames(frames: Sequence[PictureFrame], most: int = MAX_FRAMES) -> list[int]:

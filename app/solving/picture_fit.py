@@ -29,8 +29,6 @@ from app.solving.observations import Observations
 from app.solving.resect import CLICK_SIGMA_PX, MIN_CLICK_SIGMA_PX, WIDE, ResectionProblem
 
 WIDTH = PARAMETERS + 3
-OPEN = PictureGeometry(sigma=(0.3, 0.4, 0.4))
-"""Of a picture of which nothing is known but that something was done to it."""
 KNOWN_SIGMA = np.array([0.02, 0.1, 0.1])
 """Numbers of a picture that are known to no better than this are asked of the view's own lines."""
 STARTS = np.array([[0, 0, 0], [0.25, 0, 0], [-0.25, 0, 0], [0, 0.35, 0], [0, -0.35, 0]])

@@ -20,6 +20,7 @@ from app.geometry.lens import BROWN_CONRADY
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, SharedPosition, Station, View
+from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, Policy
 from app.soccer.reasons import LeftOut
@@ -204,11 +205,30 @@ def _known_covariance(station: Station, name: str) -> dict[str, Json]:
     return {} if covariance is None else {name: covariance}
 
 
+def picture_to_json(picture: PictureGeometry | None) -> Json:
+    """``{"aspect": a, "shift": [x, y], "sigma": [a, x, y]}``, or None."""
+    if picture is None:
+        return None
+    return {
+        "aspect": float(picture.aspect),
+        "shift": [*map(float, picture.shift)],
+        "sigma": [*map(float, picture.sigma)],
+    }
+
+
+def picture_from_json(value: Mapping[str, Any] | None) -> PictureGeometry | None:
+    """Back from ``picture_to_json``."""
+    if value is None:
+        return None
+    (right, down), (aspect, x, y) = value["shift"], value["sigma"]
+    return PictureGeometry(value["aspect"], (right, down), (aspect, x, y))
+
+
 def station_to_json(station: Station) -> Json:
     """A station with everything that was said about it.
 
-    ``given_covariance`` stands there only where it is known, so that digests of all other
-    stations are what they always were.
+    ``given_covariance`` and ``picture`` stand there only where they say something, so that
+    digests of all other stations are what they always were.
     """
     return {
         "key": station.key,
@@ -219,6 +239,7 @@ def station_to_json(station: Station) -> Json:
         "calibration": station.calibration,
         "flipped": station.flipped,
         **_known_covariance(station, "given_covariance"),
+        **({} if station.picture is None else {"picture": picture_to_json(station.picture)}),
     }
 
 
@@ -240,6 +261,7 @@ def station_from_json(value: Mapping[str, Any]) -> Station:
         calibration=value["calibration"],
         flipped=value["flipped"],
         given_covariance=covariance_from_json(covariance),
+        picture=picture_from_json(value.get("picture")),
     )
 
 

@@ -24,11 +24,13 @@ def digest(value: Json) -> str:
 
 
 def station_digest(station: Station) -> str:
-    """Digest of size, lines, given camera and which of the two counts."""
+    """Digest of size, lines, given camera, which of the two counts, and the picture."""
     value = station_to_json(station)
     parts = [value["size"], value["lines"], value["given"], value["calibration"]]
     if station.given_covariance is not None:
         parts.append(value["given_covariance"])
+    if station.picture is not None:
+        parts.append(value["picture"])
     return digest(parts)
 
 

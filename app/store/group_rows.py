@@ -29,6 +29,9 @@ def station_values(station: Station) -> dict[str, Any]:
         "calibration": station.calibration,
         "lines": codecs.canonical(codecs.lines_to_json(station.lines)),
         "given": None if given is None else codecs.canonical(given),
+        "picture": None
+        if station.picture is None
+        else codecs.canonical(codecs.picture_to_json(station.picture)),
         "digest": station_digest(station),
     }
 

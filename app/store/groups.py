@@ -17,6 +17,7 @@ from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, SharedPosition, Station, View
+from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.reasons import LeftOut
@@ -223,6 +224,7 @@ def stored_station(row: Any) -> StoredStation:
         calibration=row.calibration,
         flipped=row.flipped,
         given_covariance=None if row.given is None else _covariance(row.given),
+        picture=None if row.picture is None else _picture(row.picture),
     )
     return StoredStation(
         row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
@@ -268,6 +270,12 @@ def _camera(text: str) -> Camera:
 def _covariance(text: str) -> tuple[float, ...] | None:
     with codecs.as_written():
         return codecs.covariance_from_json(codecs.parse(text).get("covariance"))
+
+
+@lru_cache(maxsize=256)
+def _picture(text: str) -> PictureGeometry | None:
+    with codecs.as_written():
+        return codecs.picture_from_json(codecs.parse(text))
 
 
 def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:

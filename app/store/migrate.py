@@ -31,6 +31,7 @@ KNOWN_REVISIONS = (
     "0011",
     "0013",
     "0016",
+    "0015",
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]

@@ -29,7 +29,7 @@ class DatasetModel(Base):
 
 
 class StationModel(Base):
-    """A camera: its lines (JSON), its given camera (JSON), and which of the two counts.
+    """A camera: its lines, its given camera and its picture (JSON), and which camera counts.
 
     ``digest`` is that of what solving reads; ``source_digest`` the same of what the dataset last
     brought, so a person edited the station exactly when the two differ.
@@ -57,6 +57,7 @@ class StationModel(Base):
     calibration: Mapped[str]
     lines: Mapped[str]
     given: Mapped[str | None]
+    picture: Mapped[str | None]
     revision: Mapped[int]
     digest: Mapped[str]
     source_digest: Mapped[str]

@@ -45,9 +45,11 @@
  * @property {boolean} shared
  * @property {string} calibration
  * @property {boolean} has_given
+ * @property {PictureJson | null} [picture]
  * @property {string} [etag]
  */
 
+/** @typedef {{aspect: number, shift: number[], sigma: number[]}} PictureJson   what was done to it: shift and its sigma in half diagonals */
 /** @typedef {{reason: string, note: string | null}} LeftOutJson */
 
 /**
@@ -162,6 +164,7 @@
 /**
  * @typedef {{edit: 'set_lines', view: string, lines: {[marking: string]: PairJson[] | null}}
  *   | {edit: 'set_balls', view: string, balls: BallJson[]}
+ *   | {edit: 'set_picture', view: string, picture: PictureJson | null}
  *   | {edit: 'include_view', view: string, included: boolean}} EditJson   as the history writes edits
  */
 /** @typedef {{label: string, edit: EditJson}} OfferJson   label: of its button */

@@ -78,6 +78,12 @@ function fieldsOf(theirs, { edit, verdict, base }) {
 			base: base?.balls, mine: edit.ball ? [edit.ball] : [], theirs: view.balls,
 		}];
 	}
+	if (edit.kind === 'picture') {
+		return [{
+			...about, key: `picture ${view.key}`, name: `Picture of ${view.letter}`, edit,
+			base: null, mine: edit.picture, theirs: view.station.picture ?? null,
+		}];
+	}
 	return Object.entries(edit.lines).map(([marking, points]) => ({
 		...about, key: `line ${view.key} ${marking}`, name: `${marking} of ${view.letter}`,
 		edit: { kind: 'lines', view: view.key, lines: { [marking]: points } },

@@ -3,12 +3,13 @@
 
 import { leftOutText } from './reasons.js';
 
-/** @import {BallJson, EditJson, GroupDocument, LeftOutJson, PointJson, ViewJson} from '../api/types.js' */
+/** @import {BallJson, EditJson, GroupDocument, LeftOutJson, PictureJson, PointJson, ViewJson} from '../api/types.js' */
 
 /** @typedef {{kind: 'lines', view: string, lines: Record<string, PointJson[] | null>}} LinesEdit */
 /** @typedef {{kind: 'ball', view: string, ball: BallJson | null, prediction?: {id: number, replace: boolean}}} BallEdit   prediction: that this ball is accepted from */
 /** @typedef {{kind: 'include', view: string, included: boolean, reason?: string | null, note?: string | null}} IncludeEdit   reason: why it is left out, one of REASONS */
-/** @typedef {LinesEdit | BallEdit | IncludeEdit} Edit */
+/** @typedef {{kind: 'picture', view: string, picture: PictureJson | null}} PictureEdit   what was done to the picture since it was taken */
+/** @typedef {LinesEdit | BallEdit | IncludeEdit | PictureEdit} Edit */
 
 /**
  * The group with the edit applied; its solution stays the old one.
@@ -27,6 +28,7 @@ export function applyEdit(group, edit) {
 function editView(view, edit) {
 	if (edit.kind === 'include') return { ...view, included: edit.included, left_out: leftOutBy(edit) };
 	if (edit.kind === 'ball') return { ...view, balls: edit.ball ? [edit.ball] : [] };
+	if (edit.kind === 'picture') return { ...view, station: { ...view.station, picture: edit.picture } };
 	const lines = { ...view.lines };
 	for (const [marking, points] of Object.entries(edit.lines)) {
 		if (points) lines[marking] = points;
@@ -46,6 +48,7 @@ export function requestOf(group, edit) {
 	if (edit.kind === 'include') {
 		return { path: `/views/${view.id}`, body: includeBody(edit), etag: group.etag };
 	}
+	if (edit.kind === 'picture') return { path: `/views/${view.id}`, body: { picture: edit.picture }, etag: group.etag };
 	if (edit.kind === 'ball' && edit.prediction) {
 		const { id, replace } = edit.prediction;
 		const path = `/views/${view.id}/predictions/${id}/accept?replace=${replace}`;
@@ -78,6 +81,7 @@ export function previewBody(edit) {
 	if (edit.kind === 'ball') {
 		return { views: { [edit.view]: { ball: edit.ball && ballBody(edit.ball) } } };
 	}
+	if (edit.kind === 'picture') return { views: { [edit.view]: { picture: edit.picture } } };
 	return { views: { [edit.view]: { included: edit.included } } };
 }
 
@@ -122,6 +126,7 @@ export function describe(group, edit) {
 	if (edit.kind === 'include') return `View ${letter} ${edit.included ? 'included' : leftOutText(leftOutBy(edit))}`;
 	if (edit.kind === 'ball' && edit.prediction) return `Ball of ${letter} accepted from ${edit.ball?.predicted_by}`;
 	if (edit.kind === 'ball') return `Ball of ${letter} changed`;
+	if (edit.kind === 'picture') return `Picture of ${letter} ${edit.picture ? 'taken as stretched or cropped' : 'taken as it is'}`;
 	const drawn = Object.keys(edit.lines).filter((marking) => edit.lines[marking]);
 	const markings = drawn.length ? drawn : Object.keys(edit.lines);
 	return `${markings.length > FEW ? `${markings.length} markings` : markings.join(', ')} of ${letter} changed`;
@@ -159,6 +164,7 @@ export function twinMarking(marking) {
 export function editOf(said) {
 	const { view } = said;
 	if (said.edit === 'include_view') return { kind: 'include', view, included: said.included };
+	if (said.edit === 'set_picture') return { kind: 'picture', view, picture: said.picture };
 	if (said.edit === 'set_balls') return { kind: 'ball', view, ball: said.balls[0] ?? null };
 	const lines = Object.entries(said.lines).map(([marking, points]) => [marking, points?.length ? points.map(([x, y]) => ({ x, y })) : null]);
 	return { kind: 'lines', view, lines: Object.fromEntries(lines) };

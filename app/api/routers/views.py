@@ -28,7 +28,14 @@ from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
 from app.child import ChildEnded
 from app.child_pool import PoolTask
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.review.editing.edit import Edit, IncludeView, SetBall, SetCalibrationSource, SetLines
+from app.review.editing.edit import (
+    Edit,
+    IncludeView,
+    SetBall,
+    SetCalibrationSource,
+    SetLines,
+    SetPicture,
+)
 from app.review.editing.places import FoundView, find_view
 from app.review.editing.submit import submit_view
 from app.soccer.group import Media
@@ -114,11 +121,14 @@ def patch_view(
     if_match: IfMatch,
     asked: AskedUnder,
 ) -> Response:
-    """Leave the view out of its group and say why, take it in again, or choose its calibration."""
+    """Leave the view out and say why, take it in again, choose its calibration, say its picture."""
 
     def edit(key: str) -> Edit:
         if "calibration" in change.model_fields_set:
             return SetCalibrationSource(key, change.calibration)
+        if "picture" in change.model_fields_set:
+            picture = change.picture
+            return SetPicture(key, None if picture is None else picture.picture())
         return IncludeView(key, change.included, change.reason, change.note)
 
     return _submit(store, view, edit, if_match, actor, asked)

@@ -46,6 +46,18 @@ class VerdictDocument(Document):
     override: str | None = Field(description="The gate that it was accepted against.")
 
 
+class PictureDocument(Document):
+    """What was done to a picture since it was taken; `sigma` is wide where its lines say it."""
+
+    aspect: float = Field(description="Width of a pixel by its height: 1.05 is stretched by 5 %.")
+    shift: tuple[float, float] = Field(
+        description="Of the optical axis from the middle, right and down, in half diagonals."
+    )
+    sigma: tuple[float, float, float] = Field(
+        description="Standard deviations of the aspect and of both shifts."
+    )
+
+
 class StationDocument(Document):
     """The camera station of a view; a shared one is a static camera."""
 
@@ -56,6 +68,9 @@ class StationDocument(Document):
         description="Which calibration counts when both exist."
     )
     has_given: bool
+    picture: PictureDocument | None = Field(
+        description="What was done to the picture, where somebody said that something was."
+    )
     etag: str = Field(description="For If-Match on `/stations/{id}/lines`.")
 
 
@@ -198,6 +213,9 @@ def _station(state: GroupState, view: View) -> StationDocument:
         "shared": station.shared,
         "calibration": station.calibration,
         "has_given": station.given is not None,
+        "picture": None
+        if station.picture is None
+        else PictureDocument.model_validate(station.picture),
         "etag": state.station_etags[station.key],
     }
     return StationDocument.model_construct(**values)

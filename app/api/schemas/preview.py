@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from app.api.schemas.annotation import BallEdit, LineEdits
 from app.api.schemas.document import Document
 from app.api.schemas.solution import SolutionDocument
+from app.api.schemas.view import PictureEdit
 
 
 class ViewPreview(BaseModel):
@@ -21,6 +22,10 @@ class ViewPreview(BaseModel):
         default=None, description="null: the view has no ball; absent: the ball stays as it is."
     )
     included: StrictBool | None = None
+    picture: PictureEdit | None = Field(
+        default=None,
+        description="null: as it was taken; absent: the picture stays what it is said to be.",
+    )
 
 
 class PreviewRequest(BaseModel):

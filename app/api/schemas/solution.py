@@ -290,7 +290,8 @@ class OfferDocument(Document):
 
     label: str = Field(description="What a button for it says.")
     edit: Annotated[dict[str, Any], BeforeValidator(_said)] = Field(
-        description="As the history writes edits: `set_lines`, `set_balls` or `include_view`."
+        description="As the history writes edits: `set_lines`, `set_balls`, "
+        "`set_picture` or `include_view`."
     )
 
 

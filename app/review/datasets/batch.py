@@ -26,8 +26,10 @@ from app.finite import json_text
 from app.geometry.camera import Camera
 from app.progress import Progress
 from app.review.datasets.matches import Share, read_matches, shares_of
+from app.review.datasets.pictures import as_taken, picture_for
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
+from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration, Finding
@@ -69,6 +71,8 @@ def calibrate_files(
     with_leave_one_out: bool = False,
     matches: Path | None = None,
     guess: bool = False,
+    picture: Path | None = None,
+    guess_picture: bool = False,
     executor: Executor,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
@@ -84,6 +88,8 @@ def calibrate_files(
         matches: File that names the match of each frame (``read_matches``): frames of a match
             share what they say of the main camera's position.
         guess: Without such a file: guess the matches from names and positions.
+        picture: File that says how all pictures were stretched or cropped (``read_picture``).
+        guess_picture: Without such a file: estimate that from all frames together.
         executor: Where the frames are calibrated.
         progress: Called with frames done and in all.
 
@@ -98,6 +104,11 @@ def calibrate_files(
     files = list(read_line_files(source, size, report))
     if not files:
         raise _nothing(source, report, "line files")
+    geometry: PictureGeometry | None = None
+    told: dict[str, Any] | None = None
+    if picture is not None or guess_picture:
+        geometry, told = picture_for(files, size, picture)
+        files = as_taken(files, geometry)
     named = None if matches is None else read_matches(matches)
     sharing = guess or named is not None
     policy = CalibrationPolicy(check_labels=labels == "checked")
@@ -128,9 +139,12 @@ def calibrate_files(
                 )
             )  # fmt: skip
         frames = gather(jobs, len(files))
+    frames = [_in_picture(frame, geometry, size) for frame in frames]
     summary = _summary(frames, report, time.perf_counter() - began)
     if sharing:
         summary["matches"] = groups
+    if told is not None:
+        summary["picture"] = told
     _write(out, frames, summary, with_leave_one_out)
     return summary
 
@@ -283,6 +297,16 @@ def _frame(
         alone=alone,
         place=place_of(calibration, size),
     )
+
+
+def _in_picture(
+    frame: CalibratedFrame, picture: PictureGeometry | None, size: ImageSize
+) -> CalibratedFrame:
+    """The frame with the camera of the picture as it is; it was found in the one that was taken."""
+    camera = frame.alone.camera
+    if picture is None or camera is None:
+        return frame
+    return replace(frame, camera=camera_text(picture.done(camera, size)))
 
 
 def _summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> dict[str, Any]:

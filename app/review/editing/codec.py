@@ -13,6 +13,7 @@ from app.review.editing.edit import (
     SetBalls,
     SetCalibrationSource,
     SetLines,
+    SetPicture,
     SetPitch,
     SetPositions,
     SetStationCalibration,
@@ -29,6 +30,8 @@ from app.store.codecs import (
     camera_to_json,
     covariance_from_json,
     covariance_to_json,
+    picture_from_json,
+    picture_to_json,
     positions_from_json,
     positions_to_json,
 )
@@ -49,6 +52,8 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
             return {"edit": "include_view", "view": view, "included": included, **why}
         case SetCalibrationSource(view, calibration):
             return {"edit": "set_calibration", "view": view, "calibration": calibration}
+        case SetPicture(view, picture):
+            return {"edit": "set_picture", "view": view, "picture": picture_to_json(picture)}
         case SetPitch(length, width):
             return {"edit": "set_pitch", "length": float(length), "width": float(width)}
         case SetPositions(positions):
@@ -79,6 +84,8 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
             return IncludeView(value["view"], value["included"], *why)
         case "set_calibration":
             return SetCalibrationSource(value["view"], value["calibration"])
+        case "set_picture":
+            return SetPicture(value["view"], picture_from_json(value["picture"]))
         case "set_pitch":
             return SetPitch(value["length"], value["width"])
         case "set_positions":

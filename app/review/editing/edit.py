@@ -15,6 +15,7 @@ from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, SharedPosition, Station, View
+from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
 from app.soccer.reasons import left_out
 
@@ -159,6 +160,26 @@ class SetCalibrationSource:
 
 
 @dataclass(frozen=True)
+class SetPicture:
+    """Say what was done to the picture of a view since it was taken; None: nothing.
+
+    Where its sigma is wide, the lines of the view say themselves how much.
+    """
+
+    view: str
+    picture: PictureGeometry | None
+
+    def apply(self, group: Group) -> Group:
+        """The group with this picture in the view."""
+        view = need_view(group, self.view)
+        return with_station(group, view, replace(view.station, picture=self.picture))
+
+    def inverse(self, group: Group) -> SetPicture:
+        """The picture as it was."""
+        return SetPicture(self.view, need_view(group, self.view).station.picture)
+
+
+@dataclass(frozen=True)
 class SetBalls:
     """Replace all balls of a view."""
 
@@ -253,7 +274,7 @@ class SetPositions:
         return SetPositions(group.positions)
 
 
-STATION_EDITS = (SetLines, SetCalibrationSource)
+STATION_EDITS = (SetLines, SetCalibrationSource, SetPicture)
 """Edits of a view that belong to its station when that is shared."""
 
 

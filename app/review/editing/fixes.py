@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from app.review.editing.edit import Edit, IncludeView, SetBall, SetLines
+from app.review.editing.edit import Edit, IncludeView, SetBall, SetLines, SetPicture
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View
+from app.soccer.picture import OPEN
 from app.soccer.pitch import twin_marking
 from app.soccer.solution import Fix
 
@@ -98,6 +99,11 @@ def _swap_sides(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None
     return SetLines(view.key, changes) if changes else None
 
 
+def _free_picture(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
+    """Its own lines say what was done to the picture; that of a static camera belongs to no view."""
+    return None if view.station.shared else SetPicture(view.key, OPEN)
+
+
 def _relabel(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
     lines = view.station.lines
     if fix.to is None or fix.marking is None or fix.marking not in lines:
@@ -153,6 +159,9 @@ _ACTIONS = {
     ),
     "pick_ball": _Action(
         0, "ball {number} was the one in play in {letter}", "Keep ball {number}", _pick_ball
+    ),
+    "free_picture": _Action(
+        1, "the picture of {letter} was stretched or cropped", "Solve it so", _free_picture
     ),
     "move_point": _Action(
         1,

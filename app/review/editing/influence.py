@@ -10,7 +10,7 @@ from app.soccer.group import Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import GAMMAS_PERCENT
-from app.solving.calibrate import calibrate
+from app.solving.calibrate import calibrate_station
 from app.solving.jaccard import jaccard, measure_markings, outcomes, project_markings
 
 
@@ -42,7 +42,8 @@ def influences(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> lis
         pitch: The pitch.
         policy: How lines become a camera.
     """
-    whole = calibrate(station.lines, pitch, station.size, policy)
+    station = replace(station, given=None, given_covariance=None)
+    whole = calibrate_station(station, pitch, policy)
     largest = {fit.marking: max(fit.distances_px) for fit in whole.markings if fit.distances_px}
     doubted = {suspect.marking for suspect in whole.suspects}
     # Wrong labels are known by now: they are left out of every refit and not sought again.
@@ -50,7 +51,7 @@ def influences(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> lis
     found = []
     for marking in station.lines:
         used = _without(station.lines, {marking, *doubted})
-        rest = calibrate(used, pitch, station.size, trusting).camera
+        rest = calibrate_station(replace(station, lines=used), pitch, trusting).camera
         jac, error = (None, None) if rest is None else _seen_by(rest, marking, station, pitch)
         found.append(Influence(marking, whole.jac, jac, largest.get(marking), error))
     return found

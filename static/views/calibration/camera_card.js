@@ -7,7 +7,7 @@ import { useState } from 'preact/hooks';
 import { chooseCalibration } from '../../api/calibration.js';
 import { ApiError } from '../../api/problem.js';
 import { fixed } from '../../lib/format.js';
-import { groupDocument, takeOver, unsaved } from '../../state/group.js';
+import { groupDocument, submit, takeOver, unsaved } from '../../state/group.js';
 import { announce, complain } from '../../state/notice.js';
 import { watchSolving } from '../../state/solving.js';
 import { cameraNumbers, oddities } from './camera_numbers.js';
@@ -58,6 +58,22 @@ function SourceChoice({ view }) {
 	`;
 }
 
+/** What a picture is of which nothing is known but that something was done to it. */
+const OPEN = { aspect: 1, shift: [0, 0], sigma: [0.3, 0.4, 0.4] };
+
+/** @param {{view: ViewJson}} props */
+function PictureChoice({ view }) {
+	const { shared, picture = null } = view.station;
+	if (shared) return null;
+	return html`
+		<button
+			class="button" type="button" aria-pressed=${picture !== null}
+			title=${picture ? 'Take it as the camera took it: square pixels, the axis in the middle' : 'Let its lines say how much'}
+			onClick=${() => submit({ kind: 'picture', view: view.key, picture: picture ? null : OPEN })}
+		>Stretched or cropped</button>
+	`;
+}
+
 /** @param {{picture: ViewPicture, solution: SolutionJson | null}} props */
 export function CameraCard({ picture, solution }) {
 	const { view, solved } = picture;
@@ -68,6 +84,7 @@ export function CameraCard({ picture, solution }) {
 			<h2>Camera<span class="card__aside" data-grade=${odd.length ? 'warn' : 'ok'}>${odd.length ? '! look at this' : '✓ plausible'}</span></h2>
 			<div class="editor__scroll" tabindex="0" role="group" aria-label="Camera in numbers">
 				<${SourceChoice} view=${view} />
+				<${PictureChoice} view=${view} />
 				<dl class="camera-card__numbers">
 					${cameraNumbers(calibration, view.width).map(({ name, label, value, digits, unit, sigma }) => html`
 						<div key=${name}>

@@ -32,7 +32,22 @@ export function cameraNumbers(calibration, width) {
 		row('field', 'Field of view', camera ? fieldOf(camera, width) : null, 1, '°'),
 		...(camera?.lens_coefficients ?? []).map((value, i) => row(`lens${i}`, lensTerm(camera, i), value, 4, '')),
 		...(camera?.lens_coefficients ? [] : [row('k1', 'Distortion k1', camera ? k1Of(camera) : null, 3, '')]),
+		...pictureNumbers(camera, width, row),
 	];
+}
+
+/**
+ * Aspect of the pixels and where the axis lies, for pictures that are not as they were taken.
+ *
+ * @param {CameraJson | null} camera @param {number} width
+ * @param {(name: string, label: string, value: number | null, digits: number, unit: string) => CameraNumber} row
+ */
+function pictureNumbers(camera, width, row) {
+	if (!camera) return [];
+	const wide = 100 * (camera.x_focal_length / camera.y_focal_length - 1);
+	const aside = (100 * (camera.principal_point[0] - (width - 1) / 2)) / width;
+	if (Math.abs(wide) < 0.1 && Math.abs(aside) < 0.1) return [];
+	return [row('wide', 'Pixels too wide', wide, 1, ' %'), row('aside', 'Axis right of the middle', aside, 1, ' %')];
 }
 
 /**

@@ -1,0 +1,176 @@
+"""Pictures: aspect and principal point that the frames of a match show together, and their change.
+
+A match's main cameras are filmed, cut and scaled alike, so what was done to one picture was done to
+all of them. The estimate reads the lines alone and does not depend on what is in use. Accepting it
+is an edit of each group, on its own undo stack like any other. Replays are left alone: each shot has
+its own geometry, and a finding of the view offers what its own lines say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+from app.errors import GeometryError
+from app.progress import Progress
+from app.review.datasets.dataset import read_dataset
+from app.review.datasets.fan_out import fan_out
+from app.review.editing.codec import edit_to_json
+from app.review.editing.edit import SetPicture
+from app.soccer.group import Group, View
+from app.soccer.picture import PictureGeometry
+from app.soccer.policy import CalibrationPolicy
+from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
+from app.store.clock import now
+from app.store.groups import next_revision, read_groups, save_revision
+from app.store.log import Entry, append
+from app.store.pitches import groups_of_match, match_pitches
+from app.store.queue import refresh_queue
+from app.store.session import Session, Store
+
+_BATCH = 100
+
+
+@dataclass(frozen=True)
+class PictureState:
+    """The main cameras' pictures of one match.
+
+    Attributes:
+        frames: How many of its main camera's frames have lines.
+        picture: The one in use, None as it was taken; the most frequent where they differ.
+        estimate: What the lines show; None where ``problem`` says why there is none.
+        proposed: The picture to use instead; None where what is in use agrees.
+    """
+
+    match: str
+    frames: int
+    picture: PictureGeometry | None
+    estimate: PictureEstimate | None
+    problem: str | None
+
+    @property
+    def proposed(self) -> PictureGeometry | None:
+        """What the lines certainly show and is not in use."""
+        found = None if self.estimate is None else self.estimate.proposal
+        return None if found == self.picture else found
+
+
+@dataclass(frozen=True)
+class _Task:
+    match: str
+    frames: tuple[PictureFrame, ...]
+    used: tuple[PictureGeometry | None, ...]
+    policy: CalibrationPolicy
+
+
+def estimate_pictures(
+    store: Store,
+    dataset: str | int,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> list[PictureState]:
+    """What the lines of each match's main cameras say of their pictures; saves nothing.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        executor: Where matches are worked on; None: here, one after the other.
+        progress: Called with matches done and in all.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        matches = [item.match for item in match_pitches(session, found.id)]
+    tasks = (_task(store, found.id, match, found.policy.calibration) for match in matches)
+    states = []
+    for state in fan_out(_estimate, tasks, executor):
+        states.append(state)
+        if progress is not None:
+            progress(len(states), len(matches))
+    return sorted(states, key=lambda state: state.match)
+
+
+def change_pictures(
+    store: Store,
+    dataset: str | int,
+    wanted: Mapping[str, PictureGeometry | None],
+    *,
+    actor: str,
+) -> int:
+    """Say what the main cameras' pictures of matches are; how many views that changed.
+
+    Their groups are stale until they are solved again. Each gets an edit that it can undo.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        wanted: Pictures by match; None: as they were taken.
+        actor: Who says so.
+    """
+    with store.write() as session:
+        found = read_dataset(session, dataset)
+        return sum(
+            _give(session, found.id, groups_of_match(session, found.id, match), picture, actor)
+            for match, picture in wanted.items()
+        )
+
+
+def _give(
+    session: Session,
+    dataset_id: int,
+    ids: Sequence[int],
+    picture: PictureGeometry | None,
+    actor: str,
+) -> int:
+    at, count = now(), 0
+    for start in range(0, len(ids), _BATCH):
+        entries, changed = [], []
+        for stored in read_groups(session, ids[start : start + _BATCH]).values():
+            view = _main_view(stored.group)
+            if view is None or view.station.picture == picture:
+                continue
+            edit = SetPicture(view.key, picture)
+            save_revision(session, stored, next_revision(stored, edit.apply(stored.group), at))
+            body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(stored.group))}
+            entries.append(Entry("edit", actor, at, body, dataset_id, stored.id))
+            changed.append(stored.id)
+        append(session, entries)
+        refresh_queue(session, changed)
+        count += len(changed)
+    return count
+
+
+def _main_view(group: Group) -> View | None:
+    """The main camera's view, which is the first; None where a static camera or no line is."""
+    view = next(iter(group.views), None)
+    return None if view is None or view.station.shared or not view.station.lines else view
+
+
+def _task(store: Store, dataset_id: int, match: str, policy: CalibrationPolicy) -> _Task:
+    seen = list(_main_views(store, dataset_id, match))
+    frames = tuple(PictureFrame(view.station.lines, view.size, at.pitch) for at, view in seen)
+    return _Task(match, frames, tuple(view.station.picture for _, view in seen), policy)
+
+
+def _main_views(store: Store, dataset_id: int, match: str) -> Iterator[tuple[Group, View]]:
+    with store.read() as session:
+        ids = groups_of_match(session, dataset_id, match)
+        for start in range(0, len(ids), _BATCH):
+            batch = read_groups(session, ids[start : start + _BATCH], extras=False)
+            for stored in batch.values():
+                view = _main_view(stored.group)
+                if view is not None:
+                    yield stored.group, view
+
+
+def _estimate(task: _Task) -> PictureState:
+    """Of one match; runs in a worker."""
+    used = max(set(task.used), key=task.used.count) if task.used else None
+    try:
+        found = estimate_match_picture(task.frames, task.policy)
+    except GeometryError as error:
+        return PictureState(task.match, len(task.frames), used, None, error.message)
+    return PictureState(task.match, len(task.frames), used, found, None)
