@@ -22,7 +22,7 @@ from app.solving.jaccard import jaccard, measure_markings, outcomes, project_mar
 from app.solving.labels import find_suspects
 from app.solving.observations import Observations, observe
 from app.solving.picture import find_picture
-from app.solving.picture_fit import PictureProblem, estimate_picture, warp_of
+from app.solving.picture_camera import PictureProblem, estimate_picture, warp_of
 from app.solving.resect import (
     PositionPrior,
     Resection,

@@ -27,7 +27,7 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.observations import Observations, observe
-from app.solving.picture_fit import PictureProblem, picture_of, undo_warp
+from app.solving.picture_camera import PictureProblem, picture_of, undo_warp
 from app.solving.resect import ResectionProblem, measurement_count
 
 MIN_FRAMES = 3

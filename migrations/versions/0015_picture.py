@@ -12,4 +12,4 @@ depends_on: str | Sequence[str] | None = None
 
 
 def upgrade() -> None:
-    op.add_column("station", sa.Column("picture", sa.Text()))
+    op.add_column("station", sa.Column("picture", sa.String()))

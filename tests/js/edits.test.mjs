@@ -99,6 +99,18 @@ describe('editOf', () => {
 			assert.deepEqual(requestOf(group, edit).body, { included });
 		}
 	});
+
+	it('takes a picture as stretched or cropped, and as it is again', () => {
+		const picture = { aspect: 1, shift: [0, 0], sigma: [0.3, 0.4, 0.4] };
+		for (const said of [picture, null]) {
+			const edit = editOf({ edit: 'set_picture', view: '7.png', picture: said });
+			const { path, body } = requestOf(group, edit);
+			assert.deepEqual([path, body], ['/views/31', { picture: said }]);
+			assert.deepEqual(applyEdit(group, edit).views[0].station.picture, said);
+			assert.deepEqual(previewBody(edit), { views: { '7.png': { picture: said } } });
+		}
+		assert.equal(describe_(group, editOf({ edit: 'set_picture', view: '7.png', picture })), 'Picture of A taken as stretched or cropped');
+	});
 });
 
 describe('sameTarget', () => {

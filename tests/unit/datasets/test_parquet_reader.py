@@ -16,6 +16,7 @@ from app.datasets.parquet_writer import write_parquet
 from app.datasets.report import Report
 from app.geometry.camera import Camera
 from app.soccer.group import Group
+from app.soccer.picture import PictureGeometry
 from app.soccer.reasons import LeftOut
 
 Solved = Callable[..., ExportRecord]
@@ -31,6 +32,7 @@ class TestReadParquet:
         groups = [soccer_group(), soccer_group("8.png", split="test", label="x")]
         why = LeftOut("other", "another match")
         known = replace(groups[0].views[0].station, given=camera, given_covariance=COVARIANCE)
+        known = replace(known, picture=PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5)))
         groups[0] = groups[0].with_view(replace(groups[0].views[0], station=known))
         groups[1] = groups[1].with_view(replace(groups[1].views[1], included=False, left_out=why))
         folder = tmp_path / "out"

@@ -19,6 +19,7 @@ from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
+from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.reasons import LeftOut
 
@@ -45,6 +46,7 @@ class TestStateReader:
             calibration="lines",
             flipped=True,
             shared=True,
+            picture=PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5)),
         )
         why = LeftOut("duplicate_view", "as camera 2")
         view = replace(group.views[0], balls=balls, included=False, station=station, left_out=why)
@@ -71,6 +73,9 @@ class TestStateReader:
             ("given_covariance", [1.0] * 63),
             ("given_covariance", [0.0] * 64),
             ("given_covariance", [1.0] * 64),
+            ("picture", [1.0]),
+            ("picture", {"aspect": 1.0, "shift": [0.0], "sigma": [0.0, 0.0, 0.0]}),
+            ("picture", {"aspect": 9.0, "shift": [0.0, 0.0], "sigma": [0.0, 0.0, 0.0]}),
         ],
     )
     def test_what_is_wrong_is_named(self, soccer_group: Make, name: str, value: Any) -> None:

@@ -7,6 +7,7 @@ import pytest
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, SharedPosition
+from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.store.codecs import group_from_json, group_to_json
 from app.store.digest import group_inputs_hash, source_hash, station_digest, view_digest
@@ -40,6 +41,7 @@ class TestInputsHash:
             lambda g, c: with_station(g, calibration="given"),
             lambda g, c: with_station(g, given_covariance=(0.5,) * 64),
             lambda g, c: replace(g, positions={g.views[0].key: NEAR}),
+            lambda g, c: with_station(g, picture=PictureGeometry(1.25)),
         ],
     )
     def test_changes_with_everything_that_solving_reads(self, group, camera, change) -> None:

@@ -43,6 +43,44 @@ def patch(api, document: dict[str, Any], what: str, body: Any, view: int = 0) ->
     return api.patch(path, content=json.dumps(body), headers=headers)
 
 
+class TestPicture:
+    def test_its_lines_say_what_was_done_and_the_edit_is_undone_like_others(
+        self, api, document
+    ) -> None:
+        before = document["solution"]["views"][0]["calibration"]["camera"]
+        after = patch(api, document, "", {"picture": {}}).json()
+        station = after["views"][0]["station"]
+        assert station["picture"] == {"aspect": 1.0, "shift": [0, 0], "sigma": [0.3, 0.4, 0.4]}
+        camera = after["solution"]["views"][0]["calibration"]["camera"]
+        assert camera["x_focal_length"] != camera["y_focal_length"]
+        back = api.post(
+            f"{API}/groups/{document['id']}/undo", headers={"If-Match": after["etag"]}
+        ).json()
+        assert back["views"][0]["station"]["picture"] is None
+        assert back["solution"]["views"][0]["calibration"]["camera"] == before
+
+    def test_a_what_if_saves_nothing(self, api, document) -> None:
+        key, group = document["views"][0]["key"], f"{API}/groups/{document['id']}"
+        body = {"views": {key: {"picture": {"aspect": 1.25, "sigma": [0, 0, 0]}}}}
+        camera = api.post(f"{group}/preview", json=body).json()["solution"]["views"][0]
+        camera = camera["calibration"]["camera"]
+        assert camera["x_focal_length"] == pytest.approx(1.25 * camera["y_focal_length"])
+        assert api.get(group).json()["etag"] == document["etag"]
+
+    @pytest.mark.parametrize(
+        "body",
+        [
+            {"picture": {"aspect": 3.0}},
+            {"picture": {"shift": [0.9, 0.0]}},
+            {"picture": {"sigma": [0.0, -1.0, 0.0]}},
+            {"picture": {"width": 1.0}},
+            {"picture": {}, "included": True},
+        ],
+    )
+    def test_what_no_picture_can_be_is_refused(self, api, document, body) -> None:
+        assert patch(api, document, "", body).status_code == 422
+
+
 class TestLines:
     def test_absent_markings_stay_and_null_deletes(self, api, document) -> None:
         lines = document["views"][0]["lines"]

@@ -12,12 +12,14 @@ from app.review.editing.edit import (
     SetBalls,
     SetCalibrationSource,
     SetLines,
+    SetPicture,
     SetStationCalibration,
     SetStationCamera,
     SetStationLines,
 )
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
+from app.soccer.picture import PictureGeometry
 from tests.cameras import EVERY_COEFFICIENT
 
 HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))
@@ -32,6 +34,8 @@ EDITS = [
     IncludeView("7_1.png", False, "not_same_instant"),
     IncludeView("7_1.png", False, "other", "another match"),
     SetCalibrationSource("7.png", "lines"),
+    SetPicture("7.png", PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5))),
+    SetPicture("7.png", None),
 ]
 STATION_EDITS = [
     SetStationLines({"Middle line": HERE, "Circle central": None}),

@@ -68,6 +68,7 @@ class TestOffers:
             (Fix("drop_marking", "a", MARKING), "Drop the line"),
             (Fix("include_view", "a"), "Use it again"),
             (Fix("exclude_view", "a"), "Leave it out"),
+            (Fix("free_picture", "a"), "Solve it so"),
         ],
     )
     def test_say_what_the_button_does(self, fix, label):

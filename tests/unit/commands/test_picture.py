@@ -1,0 +1,134 @@
+"""Pictures on the command line: of line files, of the matches of a dataset, and used to calibrate."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli import main
+from app.config import Settings
+from app.datasets.cameras_reader import read_cameras
+from app.datasets.report import Report
+from app.datasets.sn_calibration import LineFile
+from app.datasets.sn_calibration_writer import write_line_files
+from app.review.editing.submit import load
+from app.review.importing.ingest import ingest
+from app.soccer.group import Group, Station, View
+from app.soccer.picture import PictureGeometry
+from app.store.session import Store
+from tests.cameras import SIZE, looking
+from tests.unit.solving.conftest import BEND, click
+
+Run = Callable[..., tuple[int, str, str]]
+MATCH, TRUE = "cup", PictureGeometry(1.06)
+POSITION = (1.0, 62.0, -16.0)
+
+
+def frames() -> list[LineFile]:
+    """Four frames of one match whose pictures are 6 % too wide."""
+    files = []
+    for number in range(4):
+        camera = looking(POSITION, (-30.0 + 20.0 * number, -4.0, 0.0), 1300.0, bend=BEND)
+        files.append(LineFile(f"{number}", SIZE, click(TRUE.done(camera, SIZE), 0.7, number)))
+    return files
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Settings:
+    return Settings(home=tmp_path / "home")
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], home: Settings) -> Run:
+    """Run a command in a home with that match as the dataset ``demo``: exit code, stdout, stderr."""
+    for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("TOUCHLINE_HOME", str(home.home))
+    store = Store.open(home)
+    groups = [
+        Group(
+            f"{MATCH}/{file.stem}.png",
+            (View(f"{file.stem}.png", Station(f"{MATCH}/{file.stem}", SIZE, lines=file.lines)),),
+            match=MATCH,
+        )
+        for file in frames()
+    ]
+    ingest(store, "demo", groups, source="files", actor="ann")
+    store.close()
+
+    def command(*arguments: object) -> tuple[int, str, str]:
+        words = ["touchline", *map(str, arguments), "--workers", "1"]
+        monkeypatch.setattr(sys, "argv", words)
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return command
+
+
+class TestPicture:
+    def test_of_line_files_is_one_estimate_with_which_they_are_calibrated(
+        self, run: Run, tmp_path: Path
+    ) -> None:
+        lines, size = tmp_path / "lines", f"{SIZE.width}x{SIZE.height}"
+        write_line_files(lines, frames())
+        code, out, _ = run("picture", lines, "--size", size, "--json")
+        found = json.loads(out)
+        assert (code, found["frames"], found["changed"]) == (0, 4, True)
+        assert found["aspect"] == pytest.approx(1.06, abs=0.015)
+        (tmp_path / "picture.json").write_text(out)
+        for given in ("auto", tmp_path / "picture.json"):
+            code, out, _ = run(
+                "calibrate", lines, tmp_path / "out", "--size", size, "--picture", given, "--json"
+            )
+            assert json.loads(out)["picture"]["aspect"] == pytest.approx(found["aspect"])
+            for camera in read_cameras(tmp_path / "out", Report()).values():
+                assert camera.focal_length[0] > 1.04 * camera.focal_length[1]
+                assert np.linalg.norm(camera.position - POSITION) < 2.5
+
+    def test_of_a_dataset_is_proposed_accepted_and_taken_back(
+        self, run: Run, home: Settings
+    ) -> None:
+        code, out, _ = run("picture", "--dataset", "demo")
+        assert (code, "use it with --accept" in out) == (0, True)
+        (accepted,) = json.loads(run("picture", "--dataset", "demo", "--accept", "--json")[1])
+        assert accepted["changed"] is True
+        assert self.aspect(home) == pytest.approx(1.06, abs=0.015)
+        assert "nothing to change" in run("picture", "--dataset", "demo")[1]
+        run("picture", "--dataset", "demo", "--match", MATCH, "--as-taken")
+        assert self.aspect(home) is None
+
+    def aspect(self, home: Settings) -> float | None:
+        store = Store.open(home)
+        picture = load(store, 1).group.views[0].station.picture
+        store.close()
+        return None if picture is None else picture.aspect
+
+    @pytest.mark.parametrize(
+        ("words", "code", "sentence"),
+        [
+            (("--dataset", "demo", "--as-taken"), 2, "--as-taken needs --match"),
+            (("--dataset", "demo", "--match", "final"), 1, "has no match final"),
+            (("--dataset", "demo", "--match", MATCH, "--accept", "--as-taken"), 2, "contradict"),
+            (("--dataset", "nothing"), 1, "nothing"),
+            ((), 2, "give either line files or --dataset"),
+        ],
+    )
+    def test_what_cannot_be_is_said(self, run: Run, words, code: int, sentence: str) -> None:
+        found, _, err = run("picture", *words)
+        assert (found, sentence in err) == (code, True)
+
+    def test_a_file_of_something_else_is_refused(self, run: Run, tmp_path: Path) -> None:
+        write_line_files(tmp_path / "lines", frames())
+        (tmp_path / "other.json").write_text("[1]")
+        code, _, err = run(
+            "calibrate", tmp_path / "lines", tmp_path / "out", "--picture", tmp_path / "other.json"
+        )
+        assert (code, "is not what touchline picture --json writes" in err) == (1, True)
