@@ -236,6 +236,20 @@ class TestPointer:
         editor.press("Escape", "Control+Delete")
         editor.staged(0)
 
+    def test_a_picture_is_taken_as_stretched_or_cropped_and_as_it_is_again(
+        self, editor: Editor
+    ) -> None:
+        button = editor.page.get_by_role("button", name="Stretched or cropped")
+        wide = editor.page.locator('[data-number="wide"]')
+        expect(wide).to_have_count(0)
+        button.click()
+        expect(button).to_have_attribute("aria-pressed", "true")
+        until(editor.page, lambda: editor.view["station"]["picture"] is not None)
+        expect(wide).to_be_visible()
+        button.click()
+        until(editor.page, lambda: editor.view["station"]["picture"] is None)
+        expect(wide).to_have_count(0)
+
     def test_a_line_lights_up_on_both_sides(self, editor: Editor) -> None:
         marking = longest(editor.lines)
         row = editor.page.locator(f'tr[data-marking="{marking}"]')
