@@ -14,6 +14,7 @@ from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
 from tests.bench.geometry import bench_geometry
 from tests.bench.paint import bench_paint
+from tests.bench.pictures import bench_pictures
 from tests.bench.requests import bench_requests
 from tests.bench.truth import bench_truth
 
@@ -26,6 +27,7 @@ def main() -> None:
     """Run every benchmark; those on real data only where it is."""
     bench_ball()
     bench_truth()
+    bench_pictures()
     bench_geometry()
     if (REAL_DATA / "sn22-dev" / "lines.zip").is_file():
         bench_calibration(REAL_DATA)
