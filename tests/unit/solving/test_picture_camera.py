@@ -96,9 +96,11 @@ class TestCalibratePicture:
             lines["Big rect. right main"],
             lines["Small rect. right main"],
         )
-        found = calibrate_picture(make_lines(lines), PITCH, SIZE, POLICY, STRETCHED)
+        found = calibrate_picture(make_lines(lines), PITCH, SIZE, POLICY, OPEN)
         names = {suspect.marking for suspect in found.suspects}
-        assert names & {"Small rect. right main", "Big rect. right main"}
+        assert names == {"Small rect. right main", "Big rect. right main"}
+        width, height = found.camera.focal_length
+        assert width / height == pytest.approx(4 / 3, abs=0.02)
 
     def test_too_few_lines_say_so(self):
         few = dict(list(shown(STRETCHED).items())[:2])

@@ -46,6 +46,13 @@ STATION_EDITS = [
 ]
 
 
+class TestSetPicture:
+    def test_its_inverse_is_the_picture_before(self, make_group) -> None:
+        group = SetPicture("7.png", PictureGeometry(1.25)).apply(make_group())
+        edit = SetPicture("7.png", PictureGeometry(0.75))
+        assert edit.inverse(group).apply(edit.apply(group)) == group
+
+
 class TestApply:
     def test_lines_are_set_deleted_and_kept(self, make_group) -> None:
         group = make_group()
