@@ -4,11 +4,10 @@ What was done to the pictures of a match (or of one shot) was done to all of the
 seldom tells a stretched picture from another camera; many frames do. All cameras and the three
 numbers are adjusted together: what a frame says of them, whatever its camera, is what is left once
 its camera is eliminated (Schur complement), and these parts add up. A frame that contradicts the
-others counts for little.
+others fits badly, so its clicks count as noisy and it says little.
 
-Source: Hartley & Zisserman, sec. A6.3 (partitioned normal equations); Lange, Little and Taylor
-(1989) for the weights of the Student distribution; White (1980) for the covariance, which counts
-frames and not clicks: the clicks of a frame err together.
+Source: Hartley & Zisserman, sec. A6.3 (partitioned normal equations); White (1980) for the
+covariance, which counts frames and not clicks: the clicks of a frame err together.
 """
 
 from __future__ import annotations
@@ -42,7 +41,6 @@ FRAME_SIGMA = np.array([0.006, 0.04, 0.04])
 CERTAIN_SIGMAS = 5.0
 LEAST = np.array([0.02, 0.06, 0.06])
 """A picture was changed where one of its numbers is so many sigmas, and so much, from nothing."""
-_FREEDOM = 4.0
 _ROUNDS, _SETTLED = 10, 3e-4
 _LONGEST = np.array([0.15, 0.25, 0.25])
 
@@ -149,6 +147,9 @@ class _Seen:
         variance = search.click_variance(unknowns)
         pull = (gradient[picture] - carried.T @ gradient[camera]) / variance
         told = (information[picture, picture] - information[picture, camera] @ carried) / variance
+        # A frame that says nearly nothing may say a little less than nothing, by rounding.
+        values, vectors = np.linalg.eigh((told + told.T) / 2)
+        told = vectors * np.maximum(values, 0.0) @ vectors.T
         # Random effects: each frame's numbers are its own, about those of the match.
         shrunk = np.linalg.inv(np.eye(3) + told @ np.diag(FRAME_SIGMA**2))
         return shrunk @ pull, shrunk @ told
@@ -161,9 +162,6 @@ def _adjust(seen: Sequence[_Seen]) -> tuple[FloatArray, FloatArray, FloatArray]:
         seen = [frame.at(warp) for frame in seen]
         shares = [frame.share(warp) for frame in seen]
         pull, told = (np.array(part) for part in zip(*shares, strict=True))
-        chi = np.array([_chi(one, all_) for one, all_ in zip(pull, told, strict=True)])
-        weight = (_FREEDOM + 3) / (_FREEDOM + chi)
-        pull, told = pull * weight[:, None], told * weight[:, None, None]
         information = told.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)
         step = -np.linalg.solve(information, pull.sum(axis=0) + warp / PRIOR_SIGMA**2)
         step = np.clip(step, -_LONGEST, _LONGEST)
@@ -171,8 +169,3 @@ def _adjust(seen: Sequence[_Seen]) -> tuple[FloatArray, FloatArray, FloatArray]:
         if np.abs(step).max() < _SETTLED:
             break
     return warp, pull, told
-
-
-def _chi(pull: FloatArray, told: FloatArray) -> float:
-    """How far one frame's own numbers lie from those of all, in its own sigmas, squared."""
-    return float(pull @ np.linalg.pinv(told, hermitian=True) @ pull)

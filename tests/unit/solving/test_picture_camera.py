@@ -101,6 +101,7 @@ class TestCalibratePicture:
         assert names == {"Small rect. right main", "Big rect. right main"}
         width, height = found.camera.focal_length
         assert width / height == pytest.approx(4 / 3, abs=0.02)
+        assert found.position_sigma_m < 0.5
 
     def test_too_few_lines_say_so(self):
         few = dict(list(shown(STRETCHED).items())[:2])
