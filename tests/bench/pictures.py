@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.solving.match_picture import PictureFrame, estimate_match_picture
+from app.solving.match_picture import PictureFrame, choose_frames, estimate_match_picture
 from app.solving.picture_camera import warp_of
 from tests.bench.cases import SIZE, Case, _aimed, _clicks, _deformed, _shows_enough
 from tests.bench.table import print_table
@@ -61,16 +60,15 @@ def _match(case: Case, seed: int, count: int) -> list[PictureFrame]:
     """Frames of a main camera that turns and zooms, and shows enough each time."""
     rng = np.random.default_rng([seed, 7])
     place = np.array([rng.normal(0, 3), rng.uniform(50, 85), -rng.uniform(11, 24)])
-    cameras: list[Camera] = []
-    while len(cameras) < count:
+    frames: list[PictureFrame] = []
+    while len(frames) < count:
         target = np.array([rng.uniform(-48, 48), rng.uniform(-30, 30), -0.1])
         camera = _aimed(rng, place, target)
-        if _shows_enough(camera, case.pitch):
-            cameras.append(camera)
-    return [
-        PictureFrame(_clicks(rng, _deformed(camera, case), case), SIZE, Pitch())
-        for camera in cameras
-    ]
+        if not _shows_enough(camera, case.pitch):
+            continue
+        frame = PictureFrame(_clicks(rng, _deformed(camera, case), case), SIZE, Pitch())
+        frames += [frame] if choose_frames([frame]) else []
+    return frames
 
 
 if __name__ == "__main__":
