@@ -13,7 +13,6 @@ from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Station
-from app.soccer.frames import Box
 from app.soccer.picture import PictureGeometry
 from app.soccer.policy import PAPER, STRICT, CalibrationPolicy, Policy
 from app.store import codecs
@@ -73,6 +72,7 @@ class TestGroup:
         value = codecs.station_to_json(station) | {"given_covariance": np.eye(8).ravel().tolist()}
         with pytest.raises(InputError, match="lens is fisheye"):
             codecs.station_from_json(value)
+
     def test_a_picture_comes_back(self, group) -> None:
         station = group.views[0].station
         assert "picture" not in codecs.station_to_json(station)  # digests of those without one stay
