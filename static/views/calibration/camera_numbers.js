@@ -29,10 +29,10 @@ export function cameraNumbers(calibration, width) {
 		row('y', 'y', y, 2, ' m'),
 		row('height', 'Height', z === null ? null : -z, 2, ' m'),
 		row('focal', 'Focal length', focal, 0, ' px'),
+		...pictureNumbers(camera, width, row),
 		row('field', 'Field of view', camera ? fieldOf(camera, width) : null, 1, '°'),
 		...(camera?.lens_coefficients ?? []).map((value, i) => row(`lens${i}`, lensTerm(camera, i), value, 4, '')),
 		...(camera?.lens_coefficients ? [] : [row('k1', 'Distortion k1', camera ? k1Of(camera) : null, 3, '')]),
-		...pictureNumbers(camera, width, row),
 	];
 }
 
