@@ -144,9 +144,6 @@ def _real(folder: Path) -> Iterator[Tried]:
             found, processor, wall = _try(kind, image, [])
             right = _near_clicks(found, folder / "lines" / name, image) if name else None
             yield Tried(kind, found, right, processor, wall)
-    for path in sorted((folder / "nothing").iterdir()):
-        found, processor, wall = _try("nothing", _picture(path, 0), [])
-        yield Tried("nothing to calibrate", found, None, processor, wall)
 
 
 def _picture(path: Path, number: int) -> Image:
