@@ -30,7 +30,7 @@ KNOWN_REVISIONS = (
     "0010",
     "0011",
     "0013",
-    "0016",
+    "0014",
     "0015",
 )
 """Every revision that this version can migrate, oldest first."""

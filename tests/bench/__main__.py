@@ -15,6 +15,7 @@ from tests.bench.calibration import bench_calibration
 from tests.bench.geometry import bench_geometry
 from tests.bench.paint import bench_paint
 from tests.bench.pictures import bench_pictures
+from tests.bench.propose import bench_propose
 from tests.bench.requests import bench_requests
 from tests.bench.truth import bench_truth
 
@@ -34,6 +35,7 @@ def main() -> None:
     else:
         print(f"\nCalibration on real lines: no data in {REAL_DATA}, left out")
     bench_paint(REAL_DATA)
+    bench_propose(REAL_DATA)
     bench_requests()
     bench_browser()
 

@@ -19,6 +19,7 @@ from tests.docs.pages import (
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
+    candidate proposal propose scoring search straight
     3d accept action actions address adjust adjustments advice ahead anchor annotate answers app
     application archive archives arrays arrival ask axis backup bar bars batches best binned bodies
     bundle proposal

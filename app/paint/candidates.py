@@ -1,0 +1,116 @@
+"""Candidates: cameras that lay one marking of the pitch on one straight piece of paint.
+
+A camera whose place, focal length and level are given has two unknowns left, pan and tilt, and
+one line of paint that is taken for one marking determines both. So a fixed library of stands and
+focal lengths, times the pieces of paint, times the markings, holds a camera near the true one as
+soon as one piece is a marking.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+from app.paint.candidate_kernels import anchor_all
+from app.soccer.pitch import MARKINGS, Pitch, Segment
+
+FOCAL_STEP = 1.11
+"""Between neighbouring focal lengths of the library."""
+TILT_DEGREES = (35.0, 91.0)
+"""Broadcast cameras look down, or level."""
+SLACK_M = 4.0
+"""How far beyond the end of its marking a piece of paint may seem to reach."""
+
+
+@dataclass(frozen=True)
+class Library:
+    """Where cameras are looked for.
+
+    Attributes:
+        name: What people read.
+        stands: Positions in the pitch frame, metres, shape (S, 3).
+        focal_range: Shortest and longest focal length, in widths of the image.
+        position_sigma: How far from its stand a camera may be, metres, shape (3,).
+    """
+
+    name: str
+    stands: FloatArray
+    focal_range: tuple[float, float]
+    position_sigma: FloatArray
+
+    def focals(self, width: float) -> FloatArray:
+        """The focal lengths, pixels."""
+        low, high = self.focal_range
+        count = int(np.ceil(np.log(high / low) / np.log(FOCAL_STEP))) + 1
+        focals: FloatArray = np.geomspace(low, high, max(count, 1)) * width
+        return focals
+
+
+def _grid(*axes: tuple[float, ...]) -> FloatArray:
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+MAIN = Library(
+    "main stand",
+    _grid((-7.0, 7.0), (47.0, 57.0, 69.0, 84.0), (-9.0, -13.0, -18.0, -25.0)),
+    (0.6, 5.0),
+    np.array([6.0, 12.0, 6.0]),
+)
+"""Main cameras: near the middle line, on the side that is y > 0 by convention."""
+
+WIDE = Library(
+    "around the pitch",
+    np.vstack(
+        [
+            # Beside the penalty areas and towards the corners, high and low.
+            _grid(
+                (-52.0, -38.0, -24.0, 24.0, 38.0, 52.0), (44.0, 56.0, 74.0), (-6.0, -12.0, -20.0)
+            ),
+            # At the touchline.
+            _grid((-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0), (37.5,), (-2.0, -5.0)),
+            # Behind the goals.
+            _grid((-96.0, -78.0, -62.0, 62.0, 78.0, 96.0), (0.0, 14.0), (-5.0, -11.0, -20.0)),
+            _grid((-58.0, 58.0), (0.0, 8.0, 16.0), (-2.5,)),
+        ]
+    ),
+    (0.45, 3.6),
+    np.array([8.0, 10.0, 5.0]),
+)
+"""Replays: any side; the half turn of the pitch makes y >= 0 of every stand."""
+
+
+def candidates(pieces: FloatArray, library: Library, pitch: Pitch, width: float) -> FloatArray:
+    """The cameras of a library that lay a marking on one of the pieces.
+
+    Args:
+        pieces: Straight pieces of paint: their two ends relative to the principal point,
+            pixels without distortion, shape (L, 4).
+        library: Where cameras are looked for.
+        pitch: The pitch.
+        width: Of the image, pixels.
+
+    Returns:
+        Parameters of ``geometry.resection``, shape (N, 8); kappa is zero.
+    """
+    low, high = np.radians(TILT_DEGREES)
+    return np.asarray(
+        anchor_all(
+            np.ascontiguousarray(library.stands),
+            library.focals(width),
+            np.ascontiguousarray(pieces, dtype=np.float64),
+            straight_markings(pitch),
+            SLACK_M,
+            low,
+            high,
+        )
+    )
+
+
+def straight_markings(pitch: Pitch) -> FloatArray:
+    """Ends of the straight markings on the grass: x, y, x, y, metres, shape (M, 4)."""
+    shapes = (pitch.shapes[name] for name in MARKINGS if not name.startswith("Goal"))
+    return np.array(
+        [[*item.start[:2], *item.end[:2]] for item in shapes if isinstance(item, Segment)]
+    )

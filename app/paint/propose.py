@@ -1,0 +1,296 @@
+"""Propose: a camera for a frame that nobody has annotated, or the reason why there is none.
+
+The best cameras of the search are snapped onto the paint and ranked by how much of the visible
+markings has paint (supported) times how much of the paint has a marking (explained). Of the two
+cameras that the half turn of a pitch makes equal, the one with y > 0 is given: main cameras
+stand there by convention.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Literal
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from app.geometry.arrays import BoolArray, FloatArray
+from app.geometry.camera import Camera
+from app.paint.agreement import Agreement, agreement
+from app.paint.candidates import MAIN, WIDE, Library
+from app.paint.evidence import Reading, read_picture, trace
+from app.paint.grass import field_of_play, why_no_field
+from app.paint.ridges import line_like
+from app.paint.scoring import Picture
+from app.paint.search import SCOUTED, Shown, search, shown_by, shows_the_same
+from app.paint.snap import Snapped, snap_reading
+from app.paint.straight import straight_pieces
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import MARKINGS, Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.solving.observations import principal_point
+
+Image = npt.NDArray[np.uint8]
+Outcome = Literal["proposed", "unsure", "nothing"]
+
+WORK_WIDTH = 960
+LEAST_SIDE = 160
+"""Pixels: in a smaller picture lines are narrower than a pixel."""
+BORDER_PX = 4
+"""At the border of a picture ridges are no paint."""
+MOST_PIECES = 8
+SNAPPED = 12
+KNOWN, KNOWN_SNAPPED, KNOWN_SCOUTED = "known", 5, 250
+"""Where the match says where the camera stands, fewer are looked at."""
+WINDOWS = (16.0, 10.0, 6.0, 4.0, 3.0, 3.0)
+KNOWN_FOCAL, KNOWN_SIGMA = (0.5, 6.0), np.array([0.5, 0.5, 0.5])
+"""Widths of the picture, and metres: a tripod stays where it is."""
+SAME_STAND_M = 1.0
+VISIBLE_PX = 0.8
+"""Across: narrower paint may fade into the grass."""
+MARKING_PLACES = 12
+"""Places (``evidence.SPACING_PX`` apart) from which on the paint of a marking would be seen."""
+LEAST_WEAKEST = 0.25
+WELL_SUPPORTED, WELL_PAINTED = 0.75, 0.75
+"""Where less of the markings has paint, each that would be seen has to have it nearly whole."""
+LEAST_SUPPORTED, LEAST_SCORE, LEAST_LEAD, LEAST_SUM = 0.55, 0.30, 0.06, 0.52
+"""The less of the paint a camera explains, the farther all others have to lie behind it."""
+AIM_SIGMA, LENS_SIGMA = np.radians([3.0, 3.0, 1.0]), np.array([0.2, 0.01])
+"""Pan, tilt and roll; logarithm of the focal length and kappa: how far a start may be off."""
+SOLE_LEAD = 0.15
+"""What counts as lead where the search found no other camera."""
+LAST_WINDOWS = (5.0, 3.0, 3.0)
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What is proposed for a frame.
+
+    Attributes:
+        outcome: ``proposed``, ``unsure`` or ``nothing``.
+        reason: Why nothing is proposed; None where something is.
+        camera: The best camera, pixels of the frame; of an unsure one for looking at only.
+        agreement: Of that camera with the paint.
+        snapped: How that camera lies on the paint.
+        runner_up: How much less supported x explained the next best camera has that shows
+            something else; None where there is no other.
+    """
+
+    outcome: Outcome
+    reason: str | None
+    camera: Camera | None = None
+    agreement: Agreement | None = None
+    snapped: Snapped | None = None
+    runner_up: float | None = None
+    weakest: float | None = None
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame in the width in which it is searched."""
+
+    image: Image
+    field: BoolArray
+    paint: BoolArray
+    pieces: FloatArray
+    picture: Picture
+    reading: Reading
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A camera on the paint, and how well it agrees with all of it."""
+
+    snapped: Snapped
+    agreement: Agreement
+    weakest: float
+
+    @property
+    def is_contradicted(self) -> bool:
+        """Whether a marking that would be seen has no paint."""
+        return self.weakest < LEAST_WEAKEST
+
+    @property
+    def score(self) -> float:
+        """Supported x explained, and half of that where a marking is contradicted."""
+        return self.agreement.product * (0.5 if self.is_contradicted else 1.0)
+
+
+def propose(
+    image: Image,
+    pitch: Pitch | None = None,
+    known: Sequence[Camera] = (),
+    policy: CalibrationPolicy | None = None,
+) -> Proposal:
+    """A camera for a frame.
+
+    Args:
+        image: Red green blue, shape (H, W, 3).
+        pitch: The pitch.
+        known: Cameras of other frames of the match: it is looked for at their positions first.
+        policy: Prior of the distortion.
+    """
+    pitch, policy = pitch or Pitch(), policy or CalibrationPolicy()
+    frame = read_frame(image)
+    if isinstance(frame, str):
+        return Proposal("nothing", frame)
+    ranked: list[Ranked] = []
+    for library in _libraries(known):
+        ranked = merged(frame, ranked, rank(frame, library, pitch, policy))
+        if why_unsure(ranked) is None:
+            break
+    return _answer(image, frame, ranked, pitch, policy)
+
+
+def read_frame(image: Image) -> Frame | str:
+    """A frame ready to be searched, or why there is nothing to search for."""
+    height, width = image.shape[:2]
+    if min(height, width) < LEAST_SIDE:
+        return f"the picture is too small ({width} x {height} pixels): no line can be followed"
+    if width > WORK_WIDTH:
+        size = (WORK_WIDTH, max(round(height * WORK_WIDTH / width), 1))
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
+    field = field_of_play(image)
+    reason = why_no_field(image, field)
+    if reason is not None:
+        return reason
+    paint = line_like(image, field)
+    for border in (slice(0, BORDER_PX), slice(-BORDER_PX, None)):
+        paint[border] = paint[:, border] = False
+    pieces = straight_pieces(paint, MOST_PIECES)
+    if not len(pieces):
+        return "no straight line is seen on the grass"
+    center = principal_point(ImageSize(image.shape[1], image.shape[0]))
+    picture = Picture.of(paint, field, center)
+    return Frame(image, field, paint, pieces, picture, read_picture(image, field))
+
+
+def _libraries(known: Sequence[Camera]) -> list[Library]:
+    libraries = [MAIN, WIDE]
+    if known:
+        stands: list[FloatArray] = []
+        for camera in known:
+            if not any(np.linalg.norm(camera.position - stand) < SAME_STAND_M for stand in stands):
+                stands.append(camera.position)
+        libraries.insert(0, Library(KNOWN, np.array(stands), KNOWN_FOCAL, KNOWN_SIGMA))
+    return libraries
+
+
+def rank(frame: Frame, library: Library, pitch: Pitch, policy: CalibrationPolicy) -> list[Ranked]:
+    """The cameras of a library that lie on the paint of a frame, best first."""
+    most, scouted = (SNAPPED, SCOUTED) if library.name != KNOWN else (KNOWN_SNAPPED, KNOWN_SCOUTED)
+    found = search(frame.picture, frame.pieces, library, pitch, threads(), most, scouted)
+    if not found:
+        return []
+    snapped = threads().map(lambda item: _drawn(frame, item.camera, library, pitch, policy), found)
+    ranked = [
+        Ranked(
+            item,
+            agreement(item.camera, frame.field, frame.paint, pitch),
+            weakest_marking(frame.reading, item, pitch),
+        )
+        for item in snapped
+        if item.reason is None
+    ]
+    return merged(frame, [], ranked)
+
+
+def _drawn(
+    frame: Frame, start: Camera, library: Library, pitch: Pitch, policy: CalibrationPolicy
+) -> Snapped:
+    """A camera drawn onto the paint; where the paint leaves a number open or would move it far,
+    once more with what is known of cameras."""
+    alone = snap_reading(frame.reading, start, pitch, WINDOWS, policy)
+    if alone.reason is None:
+        return alone
+    sigma = np.concatenate([AIM_SIGMA, library.position_sigma, LENS_SIGMA])
+    return snap_reading(frame.reading, start, pitch, WINDOWS, policy, np.diag(sigma**2))
+
+
+def weakest_marking(reading: Reading, snapped: Snapped, pitch: Pitch) -> float:
+    """The lowest share of a marking's places that have paint; short markings do not count.
+
+    A camera that lays some markings on paint that is there by chance shows others where none is.
+    """
+    traced, paint = trace(reading, snapped.camera, pitch), snapped.evidence.traced
+    shown = np.bincount(traced.marking[traced.widths > VISIBLE_PX], minlength=len(MARKINGS))
+    seen = np.bincount(paint.marking[paint.widths > VISIBLE_PX], minlength=len(MARKINGS))
+    long = shown >= MARKING_PLACES
+    return float((seen[long] / shown[long]).min()) if long.any() else 1.0
+
+
+def merged(frame: Frame, one: Sequence[Ranked], other: Sequence[Ranked]) -> list[Ranked]:
+    """Both lists in one, best first, each camera once."""
+    kept: list[Ranked] = []
+    shown: list[Shown] = []
+    for item in sorted([*one, *other], key=lambda item: -item.score):
+        camera = item.snapped.camera
+        if not any(shows_the_same(old, camera, frame.picture) for old in shown):
+            kept.append(item)
+            shown.append(shown_by(camera, frame.picture))
+    return kept
+
+
+def runner_up(ranked: Sequence[Ranked]) -> float | None:
+    """How far the second camera lies behind the first, in supported x explained."""
+    if len(ranked) < 2:
+        return None
+    return ranked[0].score - ranked[1].score
+
+
+def why_unsure(ranked: Sequence[Ranked]) -> str | None:
+    """Why the best camera cannot be proposed; None where it can."""
+    if not ranked:
+        return "no camera was found that lies on the paint"
+    best, lead = ranked[0], runner_up(ranked)
+    if best.is_contradicted:
+        return "a marking that the best camera shows has no paint"
+    if best.agreement.supported < WELL_SUPPORTED and best.weakest < WELL_PAINTED:
+        return "much of the markings that the best camera shows has no paint"
+    if best.agreement.supported < LEAST_SUPPORTED:
+        return "much of the markings that the best camera shows has no paint"
+    lead = SOLE_LEAD if lead is None else lead
+    if lead < LEAST_LEAD:
+        return "another camera fits the paint nearly as well"
+    if best.score < LEAST_SCORE or best.score + lead < LEAST_SUM:
+        return "much of what looks like paint is no marking of the best camera"
+    return None
+
+
+def _answer(
+    image: Image, frame: Frame, ranked: list[Ranked], pitch: Pitch, policy: CalibrationPolicy
+) -> Proposal:
+    reason = why_unsure(ranked)
+    if not ranked:
+        return Proposal("unsure", reason)
+    best, lead = ranked[0], runner_up(ranked)
+    snapped = best.snapped
+    height, width = frame.field.shape
+    if image.shape[:2] != (height, width):
+        camera = snapped.camera.scaled(image.shape[1] / width, image.shape[0] / height)
+        field = cv2.resize(
+            frame.field.astype(np.uint8), image.shape[1::-1], interpolation=cv2.INTER_NEAREST
+        )
+        reading = read_picture(image, field.astype(np.bool_))
+        last = snap_reading(reading, camera, pitch, LAST_WINDOWS, policy)
+        snapped = last if last.reason is None else replace(snapped, camera=camera)
+    return Proposal(
+        "unsure" if reason else "proposed",
+        reason,
+        snapped.camera,
+        best.agreement,
+        snapped,
+        lead,
+        best.weakest,
+    )
+
+
+@cache
+def threads() -> Executor:
+    """Threads for the compiled kernels, which let go of the GIL."""
+    return ThreadPoolExecutor(os.cpu_count() or 1, "propose")
