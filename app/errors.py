@@ -132,12 +132,21 @@ class StaleRevisionError(ConflictError):
 
 
 class SharedStationError(ConflictError):
-    """Lines of a static camera are edited on its station, not on one of its views."""
+    """What belongs to a static camera is edited on its station, not on one of its views.
 
-    def __init__(self, view: str, station: int, station_key: str):
+    Args:
+        view: Key of the view.
+        station: Id of the station.
+        station_key: Its key.
+        what: What belongs to it: ``lines``, or ``picture``, which a static camera has none of.
+    """
+
+    def __init__(self, view: str, station: int, station_key: str, what: str = "lines"):
+        hint = f"Edit the lines of station {station} instead."
+        if what != "lines":
+            hint = "A static camera's picture is as it was taken: correct its given camera instead."
         super().__init__(
-            f"view {view} takes its lines from the static camera {station_key}",
-            hint=f"Edit the lines of station {station} instead.",
+            f"view {view} takes its {what} from the static camera {station_key}", hint=hint
         )
         self.station = station
 

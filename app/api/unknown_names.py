@@ -10,6 +10,7 @@ from typing import Any
 from fastapi import Request
 from fastapi.dependencies.utils import get_dependant, get_flat_params
 from fastapi.exceptions import RequestValidationError
+from fastapi.params import Query
 from fastapi.routing import APIRoute
 from pydantic import TypeAdapter
 
@@ -49,7 +50,8 @@ def _parameters(route: APIRoute) -> frozenset[str]:
 @lru_cache(maxsize=256)
 def _read_by(path: str, endpoint: Callable[..., Any]) -> frozenset[str]:
     dependant = get_dependant(path=path, call=endpoint)
-    return frozenset(parameter.alias for parameter in get_flat_params(dependant))
+    found = get_flat_params(dependant)
+    return frozenset(item.alias for item in found if isinstance(item.field_info, Query))
 
 
 def _fields(route: APIRoute) -> frozenset[str]:

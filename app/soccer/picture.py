@@ -16,6 +16,8 @@ from app.soccer.frames import ImageSize
 
 ASPECTS = (0.5, 2.0)
 MAX_SHIFT = 0.8
+KNOWN_SIGMA = 0.05
+"""Of an aspect or shift that frames of a match have shown together; one view shows less."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,11 @@ class PictureGeometry:
             raise InputError(f"the aspect of a pixel lies from {ASPECTS[0]:g} to {ASPECTS[1]:g}")
         if max(map(abs, self.shift)) > MAX_SHIFT:
             raise InputError(f"the axis lies within {MAX_SHIFT:g} half diagonals of the middle")
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the numbers themselves count, and not what the lines of the view say."""
+        return max(self.sigma) <= KNOWN_SIGMA
 
     def middle(self, size: ImageSize) -> tuple[float, float]:
         """Where the optical axis is in a picture of that size, pixels."""

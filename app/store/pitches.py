@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
-from app.store.codecs import lines_from_json, parse
+from app.store.codecs import lines_from_json, parse, picture_from_json
 from app.store.digest import digest
 from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, ImportFindingModel, LogModel, StationModel, ViewModel
@@ -83,11 +83,27 @@ def lines_digests(session: Session, dataset_id: int) -> dict[str, str]:
 
 
 def lines_of_match(session: Session, dataset_id: int, match: str) -> list[tuple[Lines, ImageSize]]:
-    """Lines and size of every camera that shows the pitch of a match."""
-    columns = (StationModel.id, StationModel.lines, StationModel.width, StationModel.height)
+    """Lines and size of every camera that shows the pitch of a match, as its picture was taken."""
+    columns = (
+        StationModel.id,
+        StationModel.lines,
+        StationModel.width,
+        StationModel.height,
+        StationModel.picture,
+    )
     statement = _cameras(*columns, dataset_id=dataset_id).where(GroupModel.match == match)
     rows = session.execute(statement.order_by(StationModel.id)).all()
-    return [(lines_from_json(parse(row.lines)), ImageSize(row.width, row.height)) for row in rows]
+    seen = (_as_taken(row) for row in rows)
+    return [item for item in seen if item is not None]
+
+
+def _as_taken(row: Any) -> tuple[Lines, ImageSize] | None:
+    """What a camera's lines are without what was done to its picture; None where nobody knows that."""
+    lines, size = lines_from_json(parse(row.lines)), ImageSize(row.width, row.height)
+    picture = None if row.picture is None else picture_from_json(parse(row.picture))
+    if picture is None:
+        return lines, size
+    return (picture.undone(lines, size), size) if picture.is_known else None
 
 
 def _cameras(*columns: Any, dataset_id: int) -> Any:

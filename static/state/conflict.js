@@ -81,7 +81,7 @@ function fieldsOf(theirs, { edit, verdict, base }) {
 	if (edit.kind === 'picture') {
 		return [{
 			...about, key: `picture ${view.key}`, name: `Picture of ${view.letter}`, edit,
-			base: null, mine: edit.picture, theirs: view.station.picture ?? null,
+			base: base?.picture ?? null, mine: edit.picture, theirs: view.station.picture ?? null,
 		}];
 	}
 	return Object.entries(edit.lines).map(([marking, points]) => ({

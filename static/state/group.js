@@ -185,8 +185,8 @@ export function submitTurn(verb) {
 
 /** What an edit or verdict found. @param {GroupDocument} at @param {string} key @returns {Base} */
 function baseOf(at, key) {
-	const { lines, balls, included, left_out } = viewOf(at, key);
-	return { lines, balls, included, left_out, verdict: at.verdict };
+	const { lines, balls, included, left_out, station } = viewOf(at, key);
+	return { lines, balls, included, left_out, picture: station.picture ?? null, verdict: at.verdict };
 }
 
 /**

@@ -13,7 +13,7 @@ import { idempotencyKey } from '../api/client.js';
 /** @import {Edit} from './edits.js' */
 
 /** @typedef {{state: string, reason: string | null, note: string | null}} Verdict */
-/** @typedef {{lines: Record<string, PointJson[] | null>, balls: BallJson[], included: boolean, left_out?: LeftOutJson | null, verdict: VerdictJson}} Base */
+/** @typedef {{lines: Record<string, PointJson[] | null>, balls: BallJson[], included: boolean, left_out?: LeftOutJson | null, picture?: unknown, verdict: VerdictJson}} Base */
 /**
  * @typedef {object} Item
  * @property {string} id idempotency key: sent twice it counts once

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.e2e.screen import Screen, rows, withdraw_verdict
 
@@ -76,21 +76,30 @@ class TestOutbox:
             return bool(screen.document()["views"][0]["balls"][0]["occluded"])
 
         before = occluded()
-        # The server hears of the edit, the page never of its answer.
-        page.route("**/api/v1/views/**", lambda route: route.fetch() and None)
+        sent: list[Route] = []
+
+        def lose_the_first(route: Route) -> None:
+            """The server hears of the edit, the page never of its answer."""
+            sent.append(route)
+            if len(sent) == 1:
+                route.fetch()
+            else:
+                route.continue_()
+
+        page.route("**/api/v1/views/**", lose_the_first)
         screen.press("1", "q")
         while occluded() == before:
             page.wait_for_timeout(50)
         present = page.request.get(f"/api/v1/groups/{chain[0]}")
         undo = {"If-Match": present.headers["etag"]}
         assert page.request.post(f"/api/v1/groups/{chain[0]}/undo", headers=undo).ok
-        page.unroute_all()
         page.reload()
         screen.saved()
         assert occluded() == before
         screen.press("1", "q")
         screen.saved()
         assert occluded() != before
+        page.unroute_all()
         leave_as_found(page, [], edited=chain[0])
 
     def test_an_unsent_edit_can_be_undone(self, open_page: OpenPage, console: Any) -> None:

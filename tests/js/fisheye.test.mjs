@@ -104,7 +104,7 @@ describe('what is drawn through a wide lens', () => {
 describe('cameraNumbers', () => {
 	it('name the terms of a wide lens, and its true field of view', () => {
 		const camera = golden.cameras.fisheye;
-		const rows = cameraNumbers({ camera }, 1280);
+		const rows = cameraNumbers({ camera }, { width: 1280, height: 720 });
 		assert.deepEqual(rows.slice(-4).map(({ label }) => label), ['Fisheye k1', 'Fisheye k2', 'Fisheye k3', 'Fisheye k4']);
 		const field = rows.find(({ name }) => name === 'field').value;
 		const [x] = pixelToIdeal(cameraFromJson({ ...camera, skew: 0 }), { x: camera.principal_point[0] + 640, y: camera.principal_point[1] });

@@ -36,9 +36,9 @@ class Lane:
 
 
 READS = Lane("reads", 16, 200)
-CHANGES = Lane("changes", 4, 100)
+CHANGES = Lane("changes", 8, 100)
 """One at a time is written; the others read, solve and encode meanwhile."""
-PREVIEWS = Lane("previews", 2, 100)
+PREVIEWS = Lane("previews", 4, 100)
 """Questions that are answered by solving and change nothing."""
 IMAGES = Lane("images", 6, 200)
 UPLOADS = Lane("uploads", 8, 8)

@@ -144,9 +144,12 @@ def _give(
 
 
 def _main_view(group: Group) -> View | None:
-    """The main camera's view, which is the first; None where a static camera or no line is."""
+    """The main camera's view, the first; None where it is static, given or without lines."""
     view = next(iter(group.views), None)
-    return None if view is None or view.station.shared or not view.station.lines else view
+    if view is None or view.station.shared or not view.station.lines:
+        return None
+    is_given = view.station.given is not None and view.station.calibration == "given"
+    return None if is_given else view
 
 
 def _task(store: Store, dataset_id: int, match: str, policy: CalibrationPolicy) -> _Task:

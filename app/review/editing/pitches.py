@@ -20,7 +20,7 @@ from app.review.editing.codec import edit_from_json, edit_to_json
 from app.review.editing.edit import SetPitch
 from app.review.editing.state import require_etag
 from app.soccer.pitch import Pitch
-from app.soccer.policy import CalibrationPolicy
+from app.soccer.policy import CalibrationPolicy, digested_calibration
 from app.soccer.solution import SOLVER_VERSION
 from app.solving.pitch_size import PitchEstimate, PitchFrame, estimate_pitch
 from app.store.answers import Keep, keep_nothing
@@ -333,7 +333,8 @@ def _proposed(pitches: Sequence[Pitch], estimate: PitchEstimate) -> Pitch | None
 def _inputs(lines: str, policy: CalibrationPolicy) -> str:
     """Key of an estimate: all that it is computed from."""
     # Where the camera stands has no part in it: every frame finds that for itself.
-    return digest([SOLVER_VERSION, asdict(replace(policy, share_position=False)), lines])
+    own = replace(policy, share_position=False)
+    return digest([SOLVER_VERSION, digested_calibration(own), lines])
 
 
 def _task(

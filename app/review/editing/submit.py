@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from app.errors import ConflictError, NotFoundError, SharedStationError
 from app.review.editing.codec import edit_from_json, edit_to_json
-from app.review.editing.edit import STATION_EDITS, Edit, need_view
+from app.review.editing.edit import STATION_EDITS, Edit, SetPicture, need_view
 from app.review.editing.etags import read_etags, read_head, require_said, require_unchanged
 from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points_in_all
@@ -226,7 +226,8 @@ def refuse_shared(stored: StoredGroup, edit: Edit) -> None:
         return
     station = need_view(stored.group, edit.view).station
     if station.shared:
-        raise SharedStationError(edit.view, stored.stations[edit.view].id, station.key)
+        what = "picture" if isinstance(edit, SetPicture) else "lines"
+        raise SharedStationError(edit.view, stored.stations[edit.view].id, station.key, what)
 
 
 def _change(

@@ -63,8 +63,9 @@ const OPEN = { aspect: 1, shift: [0, 0], sigma: [0.3, 0.4, 0.4] };
 
 /** @param {{view: ViewJson}} props */
 function PictureChoice({ view }) {
-	const { shared, picture = null } = view.station;
-	if (shared) return null;
+	const { shared, picture = null, has_given: given, calibration } = view.station;
+	// A given camera is what it is, whatever was done to the picture.
+	if (shared || (given && calibration === 'given')) return null;
 	return html`
 		<button
 			class="button" type="button" aria-pressed=${picture !== null}
@@ -86,7 +87,7 @@ export function CameraCard({ picture, solution }) {
 				<${SourceChoice} view=${view} />
 				<${PictureChoice} view=${view} />
 				<dl class="camera-card__numbers">
-					${cameraNumbers(calibration, view.width).map(({ name, label, value, digits, unit, sigma }) => html`
+					${cameraNumbers(calibration, view).map(({ name, label, value, digits, unit, sigma }) => html`
 						<div key=${name}>
 							<dt>${label}</dt>
 							<dd data-number=${name}>${fixed(value, digits, unit)}${sigma === null ? null : html`<small>±${fixed(sigma, digits === 0 ? 0 : Math.max(digits, 2))}</small>`}</dd>

@@ -11,10 +11,11 @@ import { profileOf, unbend } from '../../geometry/fisheye.js';
 const ABOUT_CAMERAS = new Set(['implausible_camera', 'under_constrained', 'picture_geometry', 'sides_swapped', 'view_disagrees']);
 
 /**
- * @param {CalibrationJson | null} calibration @param {number} width of the image, pixels
+ * @param {CalibrationJson | null} calibration @param {{width: number, height: number}} size of the image, pixels
  * @returns {CameraNumber[]}
  */
-export function cameraNumbers(calibration, width) {
+export function cameraNumbers(calibration, size) {
+	const { width } = size;
 	const camera = calibration?.camera ?? null;
 	const sigma = sigmaOf(calibration);
 	const focal = camera ? camera.x_focal_length : null;
@@ -29,7 +30,7 @@ export function cameraNumbers(calibration, width) {
 		row('y', 'y', y, 2, ' m'),
 		row('height', 'Height', z === null ? null : -z, 2, ' m'),
 		row('focal', 'Focal length', focal, 0, ' px'),
-		...pictureNumbers(camera, width, row),
+		...pictureNumbers(camera, size, row),
 		row('field', 'Field of view', camera ? fieldOf(camera, width) : null, 1, '°'),
 		...(camera?.lens_coefficients ?? []).map((value, i) => row(`lens${i}`, lensTerm(camera, i), value, 4, '')),
 		...(camera?.lens_coefficients ? [] : [row('k1', 'Distortion k1', camera ? k1Of(camera) : null, 3, '')]),
@@ -39,15 +40,20 @@ export function cameraNumbers(calibration, width) {
 /**
  * Aspect of the pixels and where the axis lies, for pictures that are not as they were taken.
  *
- * @param {CameraJson | null} camera @param {number} width
+ * @param {CameraJson | null} camera @param {{width: number, height: number}} size pixels
  * @param {(name: string, label: string, value: number | null, digits: number, unit: string) => CameraNumber} row
  */
-function pictureNumbers(camera, width, row) {
+function pictureNumbers(camera, { width, height }, row) {
 	if (!camera) return [];
 	const wide = 100 * (camera.x_focal_length / camera.y_focal_length - 1);
 	const aside = (100 * (camera.principal_point[0] - (width - 1) / 2)) / width;
-	if (Math.abs(wide) < 0.1 && Math.abs(aside) < 0.1) return [];
-	return [row('wide', 'Pixels too wide', wide, 1, ' %'), row('aside', 'Axis right of the middle', aside, 1, ' %')];
+	const below = (100 * (camera.principal_point[1] - (height - 1) / 2)) / height;
+	if ([wide, aside, below].every((share) => Math.abs(share) < 0.1)) return [];
+	return [
+		row('wide', 'Pixels too wide', wide, 1, ' %'),
+		row('aside', 'Axis right of the middle', aside, 1, ' %'),
+		row('below', 'Axis below the middle', below, 1, ' %'),
+	];
 }
 
 /**

@@ -16,6 +16,10 @@ class TestParameters:
             }
         ]
 
+    def test_a_name_of_the_path_is_none_of_the_query(self, api) -> None:
+        address = f"{API}/datasets/broadcast/versions"
+        assert api.get(address, params={"dataset": "static"}).status_code == 422
+
     def test_one_that_resembles_nothing_is_refused_too(self, api) -> None:
         answer = api.get(f"{API}/jobs", params={"zzz": "1"})
         assert answer.json()["detail"] == "/zzz: there is no such parameter"

@@ -23,7 +23,9 @@ from app.review.editing.replay import rebuild, replay
 from app.review.editing.submit import history, load, submit, undo
 from app.review.importing.ingest import ingest
 from app.review.queue.findings import finding_values
+from app.soccer.annotation import make_lines
 from app.soccer.group import Group, Station, View
+from app.soccer.picture import OPEN, PictureGeometry
 from app.soccer.pitch import Pitch
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEND, click
@@ -59,6 +61,20 @@ def solved(store, once):
 
     once("season", fill)
     return store
+
+
+def stretched(group, picture):
+    """A group whose picture was stretched in width, which its station knows."""
+    (view,) = group.views
+    middle = (SIZE.width - 1) / 2
+    lines = make_lines(
+        {
+            name: [(middle + (x - middle) * picture.aspect, y) for x, y in points]
+            for name, points in view.station.lines.items()
+        }
+    )
+    station = replace(view.station, lines=lines, picture=picture)
+    return replace(group, views=(replace(view, station=station),))
 
 
 def sizes(store):
@@ -103,6 +119,17 @@ class TestEstimatePitches:
         (item,) = estimate_pitches(store, "demo").items
         assert (item.estimate, item.proposed) == (None, None)
         assert "needs 5" in item.problem
+
+    def test_lines_are_read_as_the_picture_was_taken(self, store):
+        wide = PictureGeometry(1.05, (0.0, 0.0), (0.001, 0.001, 0.001))
+        groups = [stretched(group, wide) for group in season() if group.match == RIGHT]
+        open_ones = [stretched(group, OPEN) for group in season() if group.match == SMALL]
+        ingest(store, "demo", [*groups, *open_ones], source="files", actor="ann")
+        found = {item.match: item for item in estimate_pitches(store, "demo").items}
+        assert found[RIGHT].proposed is None
+        assert found[RIGHT].estimate.length == pytest.approx(105.0, abs=0.3)
+        # Of pictures that nobody knows enough about nothing is said.
+        assert "needs 5" in found[SMALL].problem
 
 
 class TestChangePitches:

@@ -18,7 +18,7 @@ from app.errors import (
 )
 from app.review.editing import state as state_module
 from app.review.editing import submit as submit_module
-from app.review.editing.edit import IncludeView, SetBall, SetBalls, SetLines
+from app.review.editing.edit import IncludeView, SetBall, SetBalls, SetLines, SetPicture
 from app.review.editing.solve_encoded import solve_encoded
 from app.review.editing.state import GroupState
 from app.review.editing.submit import history, load, preview, redo, solved, submit, undo
@@ -27,6 +27,7 @@ from app.review.queue.listing import list_groups
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
+from app.soccer.picture import OPEN
 from app.soccer.policy import STRICT
 from app.solving.solve import solve
 from app.store import solutions
@@ -171,6 +172,14 @@ class TestSubmit:
         assert caught.value.station == state.station_ids["cam1"]
         after = change(store, state, SetBall("cam1", None))
         assert after.group.view("cam1").balls == ()
+
+    def test_the_picture_of_a_shared_station_is_as_it_was_taken(
+        self, store, fill, make_static
+    ) -> None:
+        state = load(store, fill(make_static())[0])
+        with pytest.raises(SharedStationError, match="takes its picture from") as caught:
+            change(store, state, SetPicture("cam1", OPEN))
+        assert "given camera" in str(caught.value.hint)
 
     def test_a_moved_ball_calibrates_nothing(self, store, state, monkeypatch) -> None:
         def refuse(*_):
