@@ -68,7 +68,7 @@ function PictureChoice({ view }) {
 	if (shared || (given && calibration === 'given')) return null;
 	return html`
 		<button
-			class="button" type="button" aria-pressed=${picture !== null}
+			class="button button--small" type="button" aria-pressed=${picture !== null}
 			title=${picture ? 'Take it as the camera took it: square pixels, the axis in the middle' : 'Let its lines say how much'}
 			onClick=${() => submit({ kind: 'picture', view: view.key, picture: picture ? null : OPEN })}
 		>Stretched or cropped</button>
