@@ -31,8 +31,8 @@ def positions(
 ) -> None:
     """Show where each match's main camera stands, or share that with the pictures of the match.
 
-    Without --match it is shared where lines have changed since. The policy must say
-    calibration.share_position; `touchline solve` computes what follows.
+    Without --match it is shared where what it was estimated from has changed since. The policy
+    must say calibration.share_position; `touchline solve` computes what follows.
     """
     from app.review.editing.positions import get_positions, share_positions, take_back_positions
 

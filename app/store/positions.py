@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.soccer.group import SharedPosition
@@ -17,6 +18,7 @@ from app.store.models import GroupModel, LogModel, StationModel, ViewModel
 
 POSITION = "position"
 """Kind of the log's entries that say where a match puts cameras, one for each group."""
+_BATCH = 500
 
 
 @dataclass
@@ -77,20 +79,77 @@ def read_positions(text: str) -> Mapping[str, SharedPosition]:
         return positions_from_json(parse(text))
 
 
-def last_positions(session: Session, dataset_id: int) -> dict[str, list[LogEntry]]:
-    """The entries that gave the groups of each match their positions last, all of one time."""
+def position_inputs(
+    session: Session, dataset_id: int, match: str | None = None
+) -> dict[str, str | None]:
+    """What the positions of each match are estimated from, where any were ever given.
+
+    Args:
+        session: Any session.
+        dataset_id: Of the dataset.
+        match: This match alone; None: all.
+
+    Returns:
+        Keys by match; None for one whose first share was taken back.
+    """
+    rows = session.execute(
+        _given(
+            func.max(LogModel.id), GroupModel.match, dataset_id=dataset_id, match=match
+        ).group_by(GroupModel.match)
+    ).all()
+    newest = {entry.id: entry for entry in _read(session, [number for number, _ in rows])}
+    found: dict[str, str | None] = {}
+    for number, name in rows:
+        entry: LogEntry | None = newest[number]
+        if not _is_of(newest[number], name):
+            # Its group was given that in another match.
+            entry = next((of[0] for of in _times(session, dataset_id, name)), None)
+        if entry is not None:
+            found[name] = entry.body["inputs"]
+    return found
+
+
+def last_share(session: Session, dataset_id: int, match: str) -> list[LogEntry]:
+    """The entries of a match's newest share that was not taken back; none where there is none."""
+    taken_back = set()
+    for entries in _times(session, dataset_id, match):
+        first = entries[0]
+        if first.at in taken_back:
+            continue
+        if first.body["inputs"] is None:
+            break
+        if first.body.get("takes_back") is None:
+            return entries
+        taken_back.add(first.body["takes_back"])
+    return []
+
+
+def _times(session: Session, dataset_id: int, match: str) -> Iterator[list[LogEntry]]:
+    """The entries that groups were given while in a match, by time, the newest first."""
+    statement = _given(LogModel.id, LogModel.at, dataset_id=dataset_id, match=match)
+    rows = session.execute(statement.order_by(LogModel.id.desc())).all()
+    for _, of_time in groupby(rows, key=lambda row: row.at):
+        ids = sorted(row.id for row in of_time)
+        entries = [entry for entry in _read(session, ids) if _is_of(entry, match)]
+        if entries:
+            yield entries
+
+
+def _given(*columns: Any, dataset_id: int, match: str | None) -> Any:
+    """Columns of the entries about the groups of a match, or of all, as these are now."""
     statement = (
-        select(LogModel.id, LogModel.at, GroupModel.match)
+        select(*columns)
         .join(GroupModel, GroupModel.id == LogModel.group_id)
         .where(LogModel.kind == POSITION, GroupModel.dataset_id == dataset_id)
-        .order_by(LogModel.id.desc())
     )
-    newest: dict[str, str] = {}
-    matches: dict[int, str] = {}
-    for row in session.execute(statement):
-        if row.at == newest.setdefault(row.match, row.at):
-            matches[row.id] = row.match
-    entries: dict[str, list[LogEntry]] = {}
-    for entry in read_log(session, LogModel.id.in_(list(matches))):
-        entries.setdefault(matches[entry.id], []).append(entry)
-    return entries
+    return statement if match is None else statement.where(GroupModel.match == match)
+
+
+def _is_of(entry: LogEntry, match: str) -> bool:
+    """Whether the group was in the match then; the first entries did not say."""
+    return bool(entry.body.get("match", match) == match)
+
+
+def _read(session: Session, ids: Sequence[int]) -> Iterator[LogEntry]:
+    for start in range(0, len(ids), _BATCH):
+        yield from read_log(session, LogModel.id.in_(ids[start : start + _BATCH]))

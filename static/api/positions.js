@@ -10,10 +10,10 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {string} match
  * @property {number} groups
  * @property {number} views pictures of the main camera that have lines
- * @property {number} shared how many use what the others say of its position
+ * @property {number} shared how many have what the others say of its position
  * @property {[number, number, number] | null} mean pitch frame, metres
  * @property {number | null} sigma_m
- * @property {boolean | null} current whether the lines are those it was estimated from; null: it never was
+ * @property {boolean | null} current whether it would be estimated from the same now; null: nothing is shared
  * @property {string} sentence
  */
 
@@ -31,5 +31,5 @@ export function sharePositions(dataset, match) {
 
 /** Give a match what it had before. @param {number} dataset @param {string} match @returns {Promise<JobJson>} */
 export function takePositionsBack(dataset, match) {
-	return request(`/datasets/${dataset}/positions${queryText({ match })}`, { method: 'DELETE' });
+	return request(`/datasets/${dataset}/positions${queryText({ match })}`, { method: 'DELETE', key: idempotencyKey() });
 }

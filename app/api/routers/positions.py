@@ -61,8 +61,15 @@ def take_back_positions(
     dataset: DatasetPath,
     services: AppServices,
     actor: Actor,
+    asked: AskedUnder,
     match: Annotated[str, Query(min_length=1, max_length=1000, description="Name of the match.")],
 ) -> Response:
-    """Give a match the positions that it had before they were shared last; the job solves it."""
-    job = take_positions_back(services.jobs, services.store, dataset, match, actor=actor)
-    return job_answer(job)
+    """Give a match the positions that it had before they were shared last; the job solves it.
+
+    Once more takes back the share before that one; 409 when nothing is shared any more.
+    """
+    reply = Reply(asked, job_answer)
+    job = take_positions_back(
+        services.jobs, services.store, dataset, match, actor=actor, keep=reply.keep
+    )
+    return reply.of(job)

@@ -13,7 +13,7 @@ class MatchPositionDocument(Document):
     match: str
     groups: int
     views: int = Field(description="Pictures of the main camera that have lines.")
-    shared: int = Field(description="How many of them use what the others say of its position.")
+    shared: int = Field(description="How many of them have what the others say of its position.")
     mean: tuple[float, float, float] | None = Field(
         description="Where it stands on average, pitch frame, metres; null where none does."
     )
@@ -21,7 +21,7 @@ class MatchPositionDocument(Document):
         description="How far off it may be for one picture, each axis, the median of pictures."
     )
     current: bool | None = Field(
-        description="Whether the lines are those that it was estimated from; null: it never was."
+        description="Whether it would be estimated from the same now; null: nothing is shared."
     )
     sentence: str = Field(description="All that in words.")
 
@@ -42,5 +42,5 @@ class PositionsRequest(BaseModel):
         default=None,
         min_length=1,
         max_length=1000,
-        description="This match alone; null: all whose lines have changed since it was shared.",
+        description="This match alone; null: all where what it was estimated from has changed.",
     )

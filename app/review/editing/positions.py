@@ -7,9 +7,10 @@ again, as an entry of the log for each group; ``solve`` reads it like the size o
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -28,8 +29,14 @@ from app.solving.match_position import Place, Places, pan_of, place_of
 from app.store.clock import now
 from app.store.digest import digest
 from app.store.groups import next_revision, read_groups, save_revision
-from app.store.log import Entry, LogEntry, append
-from app.store.positions import POSITION, MatchPositions, last_positions, match_positions
+from app.store.log import Entry, append
+from app.store.positions import (
+    POSITION,
+    MatchPositions,
+    last_share,
+    match_positions,
+    position_inputs,
+)
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
 from app.store.solutions import read_calibrations
@@ -49,7 +56,8 @@ class PositionState:
         shared: How many of them have a position.
         mean: The mean of those, pitch frame, metres; None without any.
         sigma_m: How far off it may be for one picture, the median over pictures and axes.
-        current: Whether the lines are those that it was estimated from; None where it never was.
+        current: Whether it would be estimated from the same now; None where it never was.
+        used: Whether the policy uses it.
     """
 
     match: str
@@ -59,17 +67,23 @@ class PositionState:
     mean: tuple[float, float, float] | None
     sigma_m: float | None
     current: bool | None
+    used: bool
 
     @property
     def sentence(self) -> str:
         """What people read of it."""
         if self.current is None:
             return f"none of {self.views} pictures of the main camera uses a shared position"
-        kept = f"{self.shared} of {self.views} pictures of the main camera use a shared position"
+        verb = "use" if self.used else "keep"
+        kept = f"{self.shared} of {self.views} pictures of the main camera {verb} a shared position"
         if self.mean is not None:
             x, y, z = self.mean
             kept += f", ({x:.1f}, {y:.1f}, {z:.1f}) m on average, sigma {self.sigma_m:.2f} m"
-        return kept if self.current else f"{kept}; lines have changed since: share it again"
+        changed = "what it was estimated from has changed since"
+        if not self.used:
+            kept += "; the policy does not use it"
+            return kept if self.current else f"{kept}, and {changed}"
+        return kept if self.current else f"{kept}; {changed}: share it again"
 
 
 @dataclass(frozen=True)
@@ -125,7 +139,8 @@ def share_positions(
     Args:
         store: The database.
         dataset: Name or id.
-        matches: By name; None: those whose lines are others than when it was shared last.
+        matches: By name; None: those where what it is estimated from has changed since it was
+            shared last.
         actor: Who wants it.
         executor: Where matches are worked on; None: here.
         progress: Called with matches done and in all; an error that it raises ends the run.
@@ -142,9 +157,9 @@ def share_positions(
     for done, (task, positions) in enumerate(fan_out(_estimate, tasks, executor), start=1):
         edits = {group: SetPositions(at) for group, at in positions.items()}
         with store.write() as session:
-            before = last_positions(session, found.id).get(task.match, [])
-            then = before[0].body["inputs"] if before else None
-            _give(session, found.id, edits, actor, task.inputs, then)
+            then = position_inputs(session, found.id, task.match).get(task.match)
+            body = {"match": task.match, "inputs": task.inputs, "before": then}
+            _give(session, found.id, edits, actor, body)
         if progress is not None:
             progress(done, len(chosen))
     return get_positions(store, found.id)
@@ -173,49 +188,59 @@ def require_sharable(
 def take_back_positions(
     store: Store, dataset: str | int, match: str, *, actor: str
 ) -> DatasetPositions:
-    """Give a match the positions that it had before; once more brings the later ones again.
+    """Give a match the positions that it had before they were shared last.
+
+    Once more takes back the share before that one.
 
     Raises:
-        ConflictError: None were shared.
+        ConflictError: Nothing is shared, or all of it is taken back.
         NotFoundError: There is no such dataset or match.
     """
     with store.write() as session:
-        found = read_dataset(session, dataset)
-        _chosen(session, found, [match])
-        entries = last_positions(session, found.id).get(match)
-        if not entries:
-            raise ConflictError(f"no position has been shared in {match}")
-        edits = {entry.group_id or 0: edit_from_json(entry.body["inverse"]) for entry in entries}
-        body = entries[0].body
-        _give(session, found.id, edits, actor, body["before"], body["inputs"])
-    return get_positions(store, found.id)
+        apply_take_back(session, dataset, match, actor=actor)
+    return get_positions(store, dataset)
+
+
+def apply_take_back(session: Session, dataset: str | int, match: str, *, actor: str) -> None:
+    """``take_back_positions`` within a write session."""
+    found = read_dataset(session, dataset)
+    _chosen(session, found, [match])
+    entries = last_share(session, found.id, match)
+    if not entries:
+        raise ConflictError(f"nothing is shared in {match}")
+    edits = {entry.group_id or 0: edit_from_json(entry.body["inverse"]) for entry in entries}
+    share = entries[0]
+    body = {
+        "match": match,
+        "inputs": share.body["before"],
+        "before": share.body["inputs"],
+        "takes_back": share.at,
+    }
+    _give(session, found.id, edits, actor, body)
 
 
 def _give(
-    session: Session,
-    dataset_id: int,
-    edits: Mapping[int, Edit],
-    actor: str,
-    inputs: str | None,
-    before: str | None,
+    session: Session, dataset_id: int, edits: Mapping[int, Edit], actor: str, body: dict[str, Any]
 ) -> None:
-    """One entry for each group that changes, and for the first in any case: it says from what."""
+    """One entry for each group that changes, and for the first in any case: it says from what.
+
+    A group that has left the match of the body meanwhile is left alone.
+    """
     ids, at = sorted(edits), now()
     for start in range(0, len(ids), _BATCH):
         entries, changed = [], []
         for stored in read_groups(session, ids[start : start + _BATCH]).values():
             edit = edits[stored.id]
             group = edit.apply(stored.group)
-            if group == stored.group and stored.id != ids[0]:
+            is_same = group == stored.group and stored.id != ids[0]
+            if is_same or group.match != body["match"]:
                 continue
             save_revision(session, stored, next_revision(stored, group, at))
-            body = {
+            done = {
                 "edit": edit_to_json(edit),
                 "inverse": edit_to_json(edit.inverse(stored.group)),
-                "inputs": inputs,
-                "before": before,
             }
-            entries.append(Entry(POSITION, actor, at, body, dataset_id, stored.id))
+            entries.append(Entry(POSITION, actor, at, {**body, **done}, dataset_id, stored.id))
             changed.append(stored.id)
         append(session, entries)
         refresh_queue(session, changed)
@@ -223,19 +248,16 @@ def _give(
 
 def _read(session: Session, dataset: str | int) -> DatasetPositions:
     found = read_dataset(session, dataset)
-    policy, last = found.policy.calibration, last_positions(session, found.id)
+    policy, then = found.policy.calibration, position_inputs(session, found.id)
     items = tuple(
-        _state(item, last.get(item.match, []), policy)
+        _state(item, then.get(item.match), policy)
         for item in match_positions(session, found.id)
         if item.views
     )
     return DatasetPositions(found.id, found.name, policy.share_position, items)
 
 
-def _state(
-    item: MatchPositions, last: Sequence[LogEntry], policy: CalibrationPolicy
-) -> PositionState:
-    then = last[0].body["inputs"] if last else None
+def _state(item: MatchPositions, then: str | None, policy: CalibrationPolicy) -> PositionState:
     x = y = z = sigma = 0.0
     if item.positions:
         x, y, z = np.mean([at.mean for at in item.positions], axis=0).tolist()
@@ -248,12 +270,14 @@ def _state(
         mean=(x, y, z) if item.positions else None,
         sigma_m=sigma if item.positions else None,
         current=None if then is None else then == _inputs(item, policy),
+        used=policy.share_position,
     )
 
 
 def _inputs(item: MatchPositions, policy: CalibrationPolicy) -> str:
     """Key of what is estimated: all that it is computed from."""
-    return digest([SOLVER_VERSION, asdict(policy), item.inputs])
+    # Whether the policy uses it changes nothing of that.
+    return digest([SOLVER_VERSION, asdict(replace(policy, share_position=True)), item.inputs])
 
 
 def _chosen(
@@ -267,13 +291,9 @@ def _chosen(
             raise NotFoundError(f'"{dataset.name}" has no match {match} with lines')
     if matches is not None:
         return [(known[match], _inputs(known[match], policy)) for match in matches]
-    last = last_positions(session, dataset.id)
-    found = []
-    for match, item in known.items():
-        inputs = _inputs(item, policy)
-        if match not in last or last[match][0].body["inputs"] != inputs:
-            found.append((item, inputs))
-    return found
+    then = position_inputs(session, dataset.id)
+    keyed = [(item, _inputs(item, policy)) for item in known.values()]
+    return [(item, inputs) for item, inputs in keyed if then.get(item.match) != inputs]
 
 
 def _task(store: Store, chosen: tuple[MatchPositions, str], policy: CalibrationPolicy) -> _Task:
@@ -306,8 +326,7 @@ def _estimate(task: _Task) -> tuple[_Task, dict[int, dict[str, SharedPosition]]]
     positions: dict[int, dict[str, SharedPosition]] = {}
     for picture, calibration, place in found:
         others = every if place is None else every.without(next(row))
-        # A given camera is what it is.
-        pan = pan_of(calibration) if calibration.source == "lines" else None
+        pan = None if calibration is None else pan_of(calibration)
         near = None if pan is None else others.prior(pan)
         at = {}
         if near is not None:
@@ -317,11 +336,19 @@ def _estimate(task: _Task) -> tuple[_Task, dict[int, dict[str, SharedPosition]]]
     return replace(task, pictures=()), positions
 
 
-def _alone(task: _Task) -> Iterator[tuple[_Picture, Calibration, Place | None]]:
+def _alone(task: _Task) -> Iterator[tuple[_Picture, Calibration | None, Place | None]]:
+    """Pictures, calibrated; None where solving would take no position from others."""
     for picture in task.pictures:
-        alone = picture.alone or calibrate_station(picture.station, picture.pitch, task.policy)
-        by_lines = alone.source == "lines"
-        yield picture, alone, place_of(alone, picture.station.size) if by_lines else None
+        station = picture.station
+        # A stretched or cropped picture is solved by its own lines, and a given camera is what it is.
+        if station.picture is not None:
+            yield picture, None, None
+            continue
+        alone = picture.alone or calibrate_station(station, picture.pitch, task.policy)
+        if alone.source != "lines":
+            yield picture, None, None
+            continue
+        yield picture, alone, place_of(alone, station.size)
 
 
 def _rounded(values: np.ndarray) -> tuple[float, float, float]:

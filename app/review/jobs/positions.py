@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from app.review.editing.positions import require_sharable, share_positions, take_back_positions
+from contextlib import nullcontext
+
+from app.review.datasets.dataset import dataset_id
+from app.review.editing.positions import apply_take_back, require_sharable, share_positions
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import request_solve
-from app.store.answers import Keep, keep_nothing
+from app.store.answers import Keep, Kept, keep_nothing
 from app.store.codecs import Json
 from app.store.jobs import Job
-from app.store.session import Store
+from app.store.session import Session, Store
 
 KIND = "positions"
 
@@ -23,7 +26,7 @@ def request_positions(
     actor: str,
     keep: Keep[Job] = keep_nothing,
 ) -> Job:
-    """Share positions in a match, or wherever lines have changed since, soon.
+    """Share positions in a match, or wherever what it is estimated from has changed, soon.
 
     Raises:
         ConflictError, NotFoundError: As ``editing.positions.share_positions`` does, at once.
@@ -41,22 +44,42 @@ def request_positions(
 
 
 def take_positions_back(
-    jobs: Jobs, store: Store, dataset: str | int, match: str, *, actor: str
+    jobs: Jobs,
+    store: Store,
+    dataset: str | int,
+    match: str,
+    *,
+    actor: str,
+    keep: Keep[Job] = keep_nothing,
 ) -> Job:
     """Take shared positions of a match back, and solve its dataset, soon.
 
     Raises:
         ConflictError, NotFoundError: As ``editing.positions.take_back_positions`` does.
     """
-    found = take_back_positions(store, dataset, match, actor=actor)
-    return request_solve(jobs, store, found.dataset_id, actor=actor)
+    number = dataset_id(store, dataset)
+
+    def change(job: Job) -> Kept:
+        def write(session: Session) -> None:
+            apply_take_back(session, number, match, actor=actor)
+            keep(job)(session)
+
+        return write
+
+    return request_solve(jobs, store, number, actor=actor, keep=change)
 
 
-def _work(jobs: Jobs, store: Store, dataset_id: int, matches: list[str] | None, actor: str) -> Work:
+def _work(jobs: Jobs, store: Store, dataset: int, matches: list[str] | None, actor: str) -> Work:
     def work(progress: JobProgress) -> Json:
         told = counting(progress, "matches")
-        found = share_positions(store, dataset_id, matches, actor=actor, progress=told)
-        request_solve(jobs, store, dataset_id, actor=actor)
+        try:
+            with jobs.pool() if jobs.pool is not None else nullcontext() as executor:
+                found = share_positions(
+                    store, dataset, matches, actor=actor, executor=executor, progress=told
+                )
+        finally:
+            # What some matches were given before it ended is solved, however it ended.
+            request_solve(jobs, store, dataset, actor=actor)
         return {"matches": len(found.items), "shared": sum(item.shared for item in found.items)}
 
     return work

@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from app.errors import OverloadedError
+
 SECONDS = 30
 POSITIONS = "/api/v1/datasets/broadcast/positions"
 POLICY = "/api/v1/datasets/broadcast/policy"
@@ -62,3 +64,36 @@ def test_an_unknown_match_is_404(api, sharing, method) -> None:
 
 def test_what_was_never_shared_cannot_be_taken_back(api, match) -> None:
     assert api.delete(POSITIONS, params={"match": match}).status_code == 409
+
+
+@pytest.fixture
+def shared(app: Any, api: Any, sharing: None, match: str) -> str:
+    """The dataset's match, its position shared."""
+    job = api.post(POSITIONS, json={"match": match}).json()
+    app.state.services.jobs.wait(job["id"], SECONDS)
+    return match
+
+
+def test_a_take_back_that_is_sent_again_is_answered_as_the_first_time(api, shared) -> None:
+    how = {"params": {"match": shared}, "headers": {"Idempotency-Key": "one"}}
+    first = api.delete(POSITIONS, **how)
+    again = api.delete(POSITIONS, **how)
+    assert (again.status_code, again.content) == (202, first.content)
+    assert api.get(POSITIONS).json()["items"][0]["current"] is None
+
+
+def test_a_second_take_back_is_refused(api, shared) -> None:
+    assert api.delete(POSITIONS, params={"match": shared}).status_code == 202
+    answer = api.delete(POSITIONS, params={"match": shared})
+    assert (answer.status_code, "nothing is shared" in answer.json()["detail"]) == (409, True)
+
+
+def test_where_solving_cannot_be_asked_for_nothing_is_taken_back(
+    app, api, shared, monkeypatch
+) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
+        raise OverloadedError("no room")
+
+    monkeypatch.setattr(app.state.services.jobs, "submit", refuse)
+    assert api.delete(POSITIONS, params={"match": shared}).status_code == 503
+    assert api.get(POSITIONS).json()["items"][0]["current"] is True

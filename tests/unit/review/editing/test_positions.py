@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.errors import ConflictError, NotFoundError
-from app.review.editing.edit import SetLines
+from app.review.editing.edit import SetLines, SetPicture
 from app.review.editing.ledger import read_ledger
 from app.review.editing.pitches import change_pitches
 from app.review.editing.positions import get_positions, share_positions, take_back_positions
@@ -21,8 +21,10 @@ from app.review.versions.verify import verify
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
+from app.soccer.picture import OPEN
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, CalibrationPolicy
+from app.store import positions as positions_in_store
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEND, click
 
@@ -130,6 +132,7 @@ class TestSharePositions:
         assert load(shared, 1).solution is not None
         assert stale_groups(shared, "demo") == []
         assert state(shared).current is False
+        assert "what it was estimated from has changed" in state(shared).sentence
         assert "share it again" in state(shared).sentence
 
     def test_it_is_renewed_when_somebody_asks_and_the_others_follow(self, shared):
@@ -179,6 +182,57 @@ class TestSharePositions:
         with shared.read() as session:
             assert replay(session) == read_ledger(session)
 
+    def test_off_it_is_kept_not_used_and_as_current_as_before(self, shared):
+        change_policy(shared, "demo", PAPER, if_match=None, actor="ann")
+        assert state(shared).current is True
+        assert "keep a shared position" in state(shared).sentence
+        assert state(shared).sentence.endswith("the policy does not use it")
+        draw(shared, 1)
+        assert "does not use it, and what it was estimated from has" in state(shared).sentence
+
+    def test_a_view_whose_picture_was_changed_takes_no_part(self, shared):
+        edit = SetPicture(load(shared, 1).group.views[0].key, OPEN)
+        submit(shared, 1, edit, if_match=load(shared, 1).etag, actor="ann")
+        share_positions(shared, "demo", actor="ann")
+        assert load(shared, 1).group.positions == {}
+        assert (state(shared).shared, state(shared).current) == (5, True)
+
+    def test_looking_reads_one_entry_a_match_and_few_ids_at_once(self, shared, monkeypatch):
+        read, asked = [], []
+        whole = positions_in_store.read_log
+
+        def counting(session, *where):
+            asked.extend(len(item.right.value) for item in where)
+            for entry in whole(session, *where):
+                read.append(entry)
+                yield entry
+
+        monkeypatch.setattr(positions_in_store, "read_log", counting)
+        monkeypatch.setattr(positions_in_store, "_BATCH", 4)
+        assert state(shared).current is True
+        assert (len(read), asked) == (1, [1])
+        take_back_positions(shared, "demo", MATCH, actor="ann")
+        assert max(asked) == 4
+        assert state(shared).shared == 0
+
+    def test_a_group_that_comes_from_another_match_brings_nothing_said_there(self, shared):
+        first, *_ = match()
+        ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
+        assert {item.match: item.current for item in get_positions(shared, "demo").items} == {
+            MATCH: False,
+            "b": None,
+        }
+
+    def test_where_a_newer_group_came_from_elsewhere_its_own_share_counts(self, shared):
+        *_, fifth, sixth = match()
+        ingest(shared, "demo", (replace(fifth, match="b"),), source="files", actor="ann")
+        share_positions(shared, "demo", ["b"], actor="ann")
+        draw(shared, 1)
+        share_positions(shared, "demo", [MATCH], actor="ann")
+        ingest(shared, "demo", (replace(sixth, match="b"),), source="files", actor="ann")
+        (other,) = [item for item in get_positions(shared, "demo").items if item.match == "b"]
+        assert other.current is False
+
     def test_an_import_into_another_match_leaves_it_behind(self, shared):
         first, *_ = match()
         ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
@@ -201,14 +255,33 @@ class TestTakeBackPositions:
         change_policy(shared, "demo", PAPER, if_match=None, actor="ann")
         assert keys(shared) == alone != shared_keys
 
-    def test_once_more_brings_it_again(self, shared):
-        positions = load(shared, 1).group.positions
+    def test_a_take_back_is_not_taken_back(self, shared):
         take_back_positions(shared, "demo", MATCH, actor="ann")
+        with pytest.raises(ConflictError, match="nothing is shared"):
+            take_back_positions(shared, "demo", MATCH, actor="ann")
+        assert (state(shared).shared, state(shared).current) == (0, None)
+
+    def test_each_share_is_taken_back_once_the_newest_first(self, shared):
+        first = load(shared, 2).group.positions
+        draw(shared, 1)
+        share_positions(shared, "demo", actor="ann")
+        assert load(shared, 2).group.positions != first
         take_back_positions(shared, "demo", MATCH, actor="ann")
-        assert load(shared, 1).group.positions == positions
-        assert state(shared).current is True
+        assert (load(shared, 2).group.positions, state(shared).current) == (first, False)
+        take_back_positions(shared, "demo", MATCH, actor="ann")
+        assert (state(shared).shared, state(shared).current) == (0, None)
+        share_positions(shared, "demo", actor="ann")
+        take_back_positions(shared, "demo", MATCH, actor="ann")
+        with pytest.raises(ConflictError, match="nothing is shared"):
+            take_back_positions(shared, "demo", MATCH, actor="ann")
+
+    def test_what_a_group_had_in_another_match_is_not_taken_back(self, shared):
+        first, *_ = match()
+        ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
+        with pytest.raises(ConflictError, match="nothing is shared in b"):
+            take_back_positions(shared, "demo", "b", actor="ann")
 
     def test_where_nothing_was_shared_it_is_refused(self, store):
         ingest(store, "demo", match(), source="files", actor="ann")
-        with pytest.raises(ConflictError, match="no position"):
+        with pytest.raises(ConflictError, match="nothing is shared"):
             take_back_positions(store, "demo", MATCH, actor="ann")

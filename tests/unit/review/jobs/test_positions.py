@@ -1,0 +1,59 @@
+"""Sharing positions as a job: where it is computed, and what follows when it ends early."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import pytest
+
+from app.review.editing import positions as editing
+from app.review.importing.ingest import ingest
+from app.review.jobs.jobs import Jobs
+from app.review.jobs.positions import request_positions
+from app.review.policies.policy import change_policy
+from app.store.session import Store
+from tests.unit.review.editing.test_positions import SHARING, match
+
+SECONDS = 30
+
+
+@pytest.fixture
+def two(store: Store) -> Store:
+    """Two matches, and a policy that uses what they share."""
+    groups = [replace(group, match=f"{place % 2}") for place, group in enumerate(match())]
+    ingest(store, "demo", groups, source="files", actor="ann")
+    change_policy(store, "demo", SHARING, if_match=None, actor="ann")
+    return store
+
+
+def test_matches_are_worked_on_in_processes_of_their_own(two: Store) -> None:
+    pools: list[ThreadPoolExecutor] = []
+
+    def pool() -> ThreadPoolExecutor:
+        pools.append(ThreadPoolExecutor(1))
+        return pools[-1]
+
+    jobs = Jobs(two, pool=pool)
+    job = request_positions(jobs, two, "demo", None, actor="ann")
+    assert jobs.wait(job.id, SECONDS).state == "done"
+    assert len(pools) == 1
+    jobs.close()
+
+
+def test_what_was_written_before_it_failed_is_solved(
+    two: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = editing._estimate
+
+    def estimate(task):
+        if task.match == "1":
+            raise ValueError("odd")
+        return whole(task)
+
+    monkeypatch.setattr(editing, "_estimate", estimate)
+    jobs = Jobs(two)
+    job = request_positions(jobs, two, "demo", None, actor="ann")
+    assert jobs.wait(job.id, SECONDS).state == "failed"
+    assert [item.kind for item in jobs.find()] == ["solve", "positions"]
+    jobs.close()
