@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from app.errors import ConflictError, NotFoundError
+from app.review.editing import positions as editing
 from app.review.editing.edit import SetLines, SetPicture
 from app.review.editing.ledger import read_ledger
 from app.review.editing.pitches import change_pitches
@@ -232,6 +233,18 @@ class TestSharePositions:
         ingest(shared, "demo", (replace(sixth, match="b"),), source="files", actor="ann")
         (other,) = [item for item in get_positions(shared, "demo").items if item.match == "b"]
         assert other.current is False
+
+    def test_a_group_that_leaves_while_it_is_estimated_gets_nothing(self, shared, monkeypatch):
+        whole = editing._estimate
+        first, *_ = match()
+
+        def estimate(task):
+            ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
+            return whole(task)
+
+        monkeypatch.setattr(editing, "_estimate", estimate)
+        share_positions(shared, "demo", [MATCH], actor="ann")
+        assert load(shared, 1).group.positions == {}
 
     def test_an_import_into_another_match_leaves_it_behind(self, shared):
         first, *_ = match()
