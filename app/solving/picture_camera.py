@@ -65,6 +65,10 @@ def undo_warp(
     return Observations(observations.curves, pixels, observations.marking)
 
 
+_ABSURD_IS_INFINITE = np.errstate(over="ignore", invalid="ignore")
+"""A step that leads nowhere costs infinitely much and is not taken."""
+
+
 @dataclass(frozen=True)
 class PictureProblem:
     """What fits of camera and picture to one view share.
@@ -119,6 +123,7 @@ class PictureProblem:
         )
         return apart, jacobian
 
+    @_ABSURD_IS_INFINITE
     def fit(self, camera: FloatArray) -> FloatArray:
         """The camera and picture that fit best, shape (11,).
 
@@ -146,6 +151,7 @@ class PictureProblem:
         spare = max(len(apart) - WIDTH + 2, 1)
         return max(float(robust.sum()) / spare, (MIN_CLICK_SIGMA_PX * self.problem.unit) ** 2)
 
+    @_ABSURD_IS_INFINITE
     def covariance(self, unknowns: FloatArray) -> FloatArray:
         """Covariance of the unknowns, shape (11, 11); the camera's prior counts for nothing.
 
@@ -170,6 +176,7 @@ class PictureProblem:
         )
         return noise.parameters
 
+    @_ABSURD_IS_INFINITE
     def carried(self, unknowns: FloatArray, covariance: FloatArray) -> FloatArray:
         """Covariance of a camera's parameters that says for picture and camera where pixels lie.
 
