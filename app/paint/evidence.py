@@ -229,7 +229,7 @@ def _bright_as_paint(strengths: FloatArray, widths: FloatArray) -> BoolArray:
 def _on_field(hidden: npt.NDArray[np.uint8], pixels: FloatArray) -> BoolArray:
     columns, rows = (pixels + 0.5).astype(np.int64).T
     height, width = hidden.shape
-    seen: BoolArray = hidden[np.minimum(rows, height - 1), np.minimum(columns, width - 1)] == 0
+    seen: BoolArray = hidden[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)] == 0
     return seen
 
 

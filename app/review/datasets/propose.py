@@ -19,7 +19,7 @@ from app.finite import json_text
 from app.geometry.camera import Camera
 from app.paint.propose import Proposal, propose
 from app.progress import Progress
-from app.review.datasets.picture_files import PictureFile, read_pictures
+from app.review.datasets.picture_files import FrameNames, PictureFile, read_pictures
 from app.soccer.frames import ImageSize
 
 RESULT = "propose.json"
@@ -54,11 +54,9 @@ def propose_files(
     report = Report()
     cameras = _known(known)
     rows: list[dict[str, Any]] = []
-    seen: Counter[str] = Counter()
+    names = FrameNames()
     for picture in read_pictures(sources, settings, report):
-        seen[picture.stem] += 1
-        count = seen[picture.stem]
-        frame = picture.stem if count == 1 else f"{picture.stem}_{count}"
+        frame = names.name(picture.stem)
         rows.append(_propose_one(picture, frame, out, cameras, size))
         if progress is not None:
             progress(len(rows))
