@@ -21,7 +21,7 @@ from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import lines_from_json
 from app.datasets.sn_calibration_writer import write_line_files
 from app.durable import replace_file
-from app.errors import InputError, ReviewError
+from app.errors import GeometryError, InputError, ReviewError
 from app.finite import json_text
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
@@ -192,7 +192,11 @@ def _snap_picture(
     reason = why_no_field(picture.image, field)
     if reason is not None:
         return _row(frame, UNSURE, reason=f"no_paint: {reason}"), clicked.camera, None
-    snapped = _snapped(picture, field, clicked)
+    try:
+        snapped = _snapped(picture, field, clicked)
+    except (GeometryError, np.linalg.LinAlgError) as error:
+        broken = f"the paint cannot be solved ({error}): the camera of the clicks stays"
+        return _row(frame, UNSURE, reason=broken), clicked.camera, None
     spent = 1000 * (time.thread_time() - began)
     seen = agreement(snapped.camera, field, line_like(picture.image, field))
     row = _row(
