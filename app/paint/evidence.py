@@ -31,6 +31,8 @@ PAINTED = tuple(name for name in MARKINGS if not name.startswith("Goal"))
 """Markings that are paint on grass; a goal is none."""
 SPACING_PX = 4.0
 MOST_PLACES = 4000
+PLACES_WIDTH = 1920
+"""In a broader picture places lie farther apart, so that no marking is left out."""
 SMOOTH_PX = 0.7
 LEAST_STRENGTH, LEAST_IN_NOISE = 6.0, 4.0
 """What stands out: grey levels, and standard deviations of the noise."""
@@ -163,12 +165,13 @@ def trace(reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SP
     """
     curves = pitch_curves(pitch)
     parameters = parameters_from_camera(camera, reading.half_diagonal)
+    spacing = spacing_px * max(reading.width / PLACES_WIDTH, 1.0)
     places, pixels, normals = (np.empty((MOST_PLACES, n)) for n in (3, 2, 2))
     widths, marking = np.empty(MOST_PLACES), np.empty(MOST_PLACES, np.int64)
     rows = np.empty((MOST_PLACES, 8))
     count = trace_markings(
         parameters, curves.kinds, curves.shapes, painted_markings(), np.array(camera.principal_point),
-        reading.half_diagonal, reading.width, reading.height, spacing_px,
+        reading.half_diagonal, reading.width, reading.height, spacing,
         places, pixels, normals, widths, marking, rows,
     )  # fmt: skip
     on_field = _on_field(reading.hidden, pixels[:count])
@@ -229,7 +232,7 @@ def _bright_as_paint(strengths: FloatArray, widths: FloatArray) -> BoolArray:
 def _on_field(hidden: npt.NDArray[np.uint8], pixels: FloatArray) -> BoolArray:
     columns, rows = (pixels + 0.5).astype(np.int64).T
     height, width = hidden.shape
-    seen: BoolArray = hidden[np.minimum(rows, height - 1), np.minimum(columns, width - 1)] == 0
+    seen: BoolArray = hidden[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)] == 0
     return seen
 
 

@@ -66,7 +66,7 @@ def find_stripes(
             continue
         _measure(profile, peak, half, side, widths[n], noise, n, offsets, sigmas, strengths)
         if abs(offsets[n]) > window:
-            offsets[n] = np.nan
+            offsets[n], strengths[n] = np.nan, 0.0
 
 
 @compiled

@@ -278,7 +278,15 @@ def _answer(
         )
         reading = read_picture(image, field.astype(np.bool_))
         last = snap_reading(reading, camera, pitch, LAST_WINDOWS, policy)
-        snapped = last if last.reason is None else replace(snapped, camera=camera)
+        scaled = replace(
+            snapped,
+            camera=camera,
+            error_px=None
+            if snapped.error_px is None
+            else snapped.error_px * image.shape[1] / width,
+            size=(image.shape[0], image.shape[1]),
+        )
+        snapped = last if last.reason is None else scaled
     return Proposal(
         "unsure" if reason else "proposed",
         reason,

@@ -31,9 +31,11 @@ def nearest_place(camera, px, py, shapes, nearest, origin, cell, place):
     reach = -camera[11] / z
     x = camera[9] + reach * (camera[0] * u + camera[3] * v + camera[6])
     y = camera[10] + reach * (camera[1] * u + camera[4] * v + camera[7])
-    column, row = int((x - origin[0]) / cell), int((y - origin[1]) / cell)
-    if x < origin[0] or y < origin[1] or row >= nearest.shape[0] or column >= nearest.shape[1]:
+    across, down = (x - origin[0]) / cell, (y - origin[1]) / cell
+    # As floats: NaN and what is too large for an integer fail here.
+    if not (0 <= across < nearest.shape[1] and 0 <= down < nearest.shape[0]):
         return -1
+    column, row = int(across), int(down)
     shape = shapes[nearest[row, column]]
     place[2] = place[5] = 0.0
     if shape[0] == 1.0:
@@ -116,9 +118,9 @@ def unsupported(
             px, py = focal * a / c, focal * e / c
             growth = radial_growth(kappa * (px * px + py * py))
             x, y = px * growth + center[0], py * growth + center[1]
-            column, row = int(x + 0.5), int(y + 0.5)
-            if x < 0 or y < 0 or column >= width or row >= height:
+            if not (0 <= x < width - 0.5 and 0 <= y < height - 0.5):
                 continue
+            column, row = int(x + 0.5), int(y + 0.5)
             tx, ty = samples[n, 2], samples[n, 3]
             va, vb, vc = (
                 camera[0] * tx + camera[1] * ty,
@@ -188,7 +190,7 @@ def descend(H, g, parameters):
             for k in range(j):
                 value -= L[i, k] * L[j, k]
             if i == j:
-                if value <= 0:
+                if not value > 0:
                     return
                 L[i, i] = np.sqrt(value)
             else:

@@ -12,6 +12,8 @@ NEAR_PX = 2.5
 """Paint that lies so near a piece belongs to it, at 960 wide."""
 SHORTEST_PX = 45.0
 GAP_PX = 25
+LEAST_PIXELS = 3
+"""Fewer points have no direction."""
 
 
 def straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatArray:
@@ -31,11 +33,15 @@ def straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatArray:
     for _ in range(most):
         support = np.array([np.count_nonzero(free & _along(paint, end, unit)) for end in ends])
         best = int(np.argmax(support))
-        if support[best] < 0.6 * SHORTEST_PX * unit:
+        if support[best] < LEAST_PIXELS or support[best] < 0.6 * SHORTEST_PX * unit:
             break
         taken = free & _along(paint, ends[best], unit)
         for _ in range(2):
             taken = free & _grown(paint, _fitted(paint[taken]), unit)
+            if np.count_nonzero(taken) < LEAST_PIXELS:
+                break
+        if np.count_nonzero(taken) < LEAST_PIXELS:
+            break
         pieces.append(_fitted(paint[taken]))
         free &= ~taken
         ends = ends[support >= 0.4 * SHORTEST_PX * unit]

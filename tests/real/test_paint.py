@@ -20,10 +20,10 @@ pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real frames in {D
 def test_real_stills_are_snapped_or_say_why_not(tmp_path):
     rows = snap_files(DATA / "lines", [DATA / "stills"], tmp_path, settings=Settings())
     assert len(rows) >= 15
-    snapped = [row for row in rows if row["outcome"] == "snapped"]
+    snapped = [row for row in rows if row["outcome"] == "proposed"]
     assert len(snapped) >= 0.7 * len(rows)
     assert all(row["error_px"] < 0.8 and row["supported"] > 0.6 for row in snapped)
-    assert all(row["reason"] for row in rows if row["outcome"] != "snapped")
+    assert all(row["reason"] for row in rows if row["outcome"] != "proposed")
 
 
 def test_cameras_of_real_stills_agree_with_no_picture_of_something_else(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path, PurePosixPath
@@ -20,17 +21,18 @@ from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import lines_from_json
 from app.datasets.sn_calibration_writer import write_line_files
 from app.durable import replace_file
-from app.errors import InputError, ReviewError
+from app.errors import GeometryError, InputError, ReviewError
 from app.finite import json_text
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
 from app.paint.agreement import agreement
 from app.paint.evidence import to_paint_evidence
 from app.paint.grass import field_of_play, why_no_field
+from app.paint.propose import LEAST_SIDE
 from app.paint.ridges import line_like
 from app.paint.snap import Snapped, snap
 from app.progress import Progress
-from app.review.datasets.picture_files import PictureFile, read_pictures
+from app.review.datasets.picture_files import FrameNames, PictureFile, picture_stems, read_pictures
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.pitch import Pitch
@@ -38,7 +40,7 @@ from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
 
-SNAPPED, KEPT, NOTHING = "snapped", "kept", "nothing"
+PROPOSED, UNSURE, NOTHING = "proposed", "unsure", "nothing"
 """Outcomes: the camera is the paint's; the clicks' camera stays; there is none."""
 SENTENCES = {
     "no_paint": "too little paint is seen: the camera of the clicks stays",
@@ -73,13 +75,16 @@ def snap_files(
     """
     report = Report()
     values = _line_values(lines, settings, report)
+    match = _Match(values, images, settings)
     rows: list[dict[str, Any]] = []
+    names = FrameNames()
     for picture in read_pictures(images, settings, report):
-        value = values.get(picture.stem, values.get(PurePosixPath(picture.stem).name))
-        if value is None:
+        key = match.key(picture.stem)
+        if key is None:
             continue
-        row, camera, snapped = _snap_picture(picture, value, report)
-        _keep(out, picture.stem, camera, snapped)
+        frame = names.name(picture.stem)
+        row, camera, snapped = _snap_picture(picture, frame, values[key], report)
+        _keep(out, frame, camera, snapped)
         rows.append(row)
         if progress is not None:
             progress(len(rows))
@@ -105,12 +110,14 @@ def agree_files(
     """
     report = Report()
     found = read_cameras(cameras, report)
+    match = _Match(found, images, settings)
     rows: list[dict[str, Any]] = []
+    names = FrameNames()
     for picture in read_pictures(images, settings, report):
-        camera = found.get(picture.stem, found.get(PurePosixPath(picture.stem).name))
-        if camera is None:
+        key = match.key(picture.stem)
+        if key is None:
             continue
-        rows.append(_agree_picture(picture, camera))
+        rows.append(_agree_picture(picture, names.name(picture.stem), found[key]))
         if progress is not None:
             progress(len(rows))
     if not rows:
@@ -118,8 +125,32 @@ def agree_files(
     return rows
 
 
+class _Match:
+    """Which line file or camera belongs to a picture.
+
+    The one of its whole name; else the one of its bare stem, where that stem is unique among
+    the files and among the pictures: two folders with a ``1`` each are two frames.
+    """
+
+    def __init__(self, values: Mapping[str, Any], images: Sequence[Path], settings: Settings):
+        self._keys = set(values)
+        self._bare: dict[str, list[str]] = {}
+        for key in values:
+            self._bare.setdefault(PurePosixPath(key).name, []).append(key)
+        places = picture_stems(images, settings)
+        self._pictures = Counter(PurePosixPath(stem).name for stem in places)
+
+    def key(self, stem: str) -> str | None:
+        """The key of a picture's file; None where it has none."""
+        if stem in self._keys:
+            return stem
+        bare = PurePosixPath(stem).name
+        keys = self._bare.get(bare, [])
+        return keys[0] if len(keys) == 1 and self._pictures[bare] == 1 else None
+
+
 def _line_values(lines: Path, settings: Settings, report: Report) -> dict[str, Any]:
-    """What the line files hold, by stem with folders and, where it is the only one, without."""
+    """What the line files hold, by stem with folders; an error where it cannot be read."""
     tree = open_tree(lines, report, Limits.of(settings))
     if tree is None:
         raise _nothing(report, f"{lines} holds no line files")
@@ -131,38 +162,46 @@ def _line_values(lines: Path, settings: Settings, report: Report) -> dict[str, A
                 continue
             try:
                 value = read_json(tree.read_bytes(name), tree.shown(name))
-            except ReviewError:
-                value = None
+            except ReviewError as error:
+                value = error
             values[str(place.with_suffix(""))] = value
-            values.setdefault(place.stem, value)
     return values
 
 
 def _snap_picture(
-    picture: PictureFile, value: Any, report: Report
+    picture: PictureFile, frame: str, value: Any, report: Report
 ) -> tuple[dict[str, Any], Camera | None, Snapped | None]:
     if picture.image is None:
-        return _row(picture.stem, NOTHING, reason=picture.problem), None, None
+        return _row(frame, NOTHING, reason=picture.problem), None, None
+    if isinstance(value, ReviewError):
+        return _row(frame, NOTHING, reason=value.message), None, None
     height, width = picture.image.shape[:2]
+    if min(height, width) < LEAST_SIDE:
+        small = f"the picture is too small ({width} x {height} pixels): no line can be followed"
+        return _row(frame, NOTHING, reason=small), None, None
     size = ImageSize(width, height)
     try:
         lines, _ = lines_from_json(value, size, picture.stem, report)
     except ReviewError as error:
-        return _row(picture.stem, NOTHING, reason=error.message), None, None
+        return _row(frame, NOTHING, reason=error.message), None, None
     began = time.thread_time()
     clicked = calibrate(lines, Pitch(), size, CalibrationPolicy())
     if clicked.camera is None:
-        return _row(picture.stem, NOTHING, reason=clicked.reason), None, None
+        return _row(frame, NOTHING, reason=clicked.reason), None, None
     field = field_of_play(picture.image)
     reason = why_no_field(picture.image, field)
     if reason is not None:
-        return _row(picture.stem, KEPT, reason=f"no_paint: {reason}"), clicked.camera, None
-    snapped = _snapped(picture, field, clicked)
+        return _row(frame, UNSURE, reason=f"no_paint: {reason}"), clicked.camera, None
+    try:
+        snapped = _snapped(picture, field, clicked)
+    except (GeometryError, np.linalg.LinAlgError) as error:
+        broken = f"the paint cannot be solved ({error}): the camera of the clicks stays"
+        return _row(frame, UNSURE, reason=broken), clicked.camera, None
     spent = 1000 * (time.thread_time() - began)
     seen = agreement(snapped.camera, field, line_like(picture.image, field))
     row = _row(
-        picture.stem,
-        KEPT if snapped.reason else SNAPPED,
+        frame,
+        UNSURE if snapped.reason else PROPOSED,
         supported=seen.supported,
         explained=seen.explained,
         points=snapped.points,
@@ -180,20 +219,20 @@ def _snapped(picture: PictureFile, field: Any, clicked: Calibration) -> Snapped:
     return snap(picture.image, field, clicked.camera, start_covariance=known)
 
 
-def _agree_picture(picture: PictureFile, camera: Camera) -> dict[str, Any]:
+def _agree_picture(picture: PictureFile, frame: str, camera: Camera) -> dict[str, Any]:
     if picture.image is None:
-        return _row(picture.stem, NOTHING, reason=picture.problem)
+        return _row(frame, NOTHING, reason=picture.problem)
     if camera.lens != BROWN_CONRADY:
         other = "the paint is read with lenses of one radial term; this camera has another"
-        return _row(picture.stem, NOTHING, reason=other)
+        return _row(frame, NOTHING, reason=other)
     began = time.thread_time()
     field = field_of_play(picture.image)
     reason = why_no_field(picture.image, field)
     if reason is not None:
-        return _row(picture.stem, NOTHING, reason=reason)
+        return _row(frame, NOTHING, reason=reason)
     seen = agreement(camera, field, line_like(picture.image, field))
     return _row(
-        picture.stem,
+        frame,
         "measured",
         supported=seen.supported,
         explained=seen.explained,
@@ -205,20 +244,26 @@ def _agree_picture(picture: PictureFile, camera: Camera) -> dict[str, Any]:
 def _row(frame: str, outcome: str, **known: Any) -> dict[str, Any]:
     names = ("supported", "explained", "points", "error_px", "runner_up", "ms", "moved_px")
     empty: Mapping[str, Any] = dict.fromkeys((*names, "reason"))
-    return {"frame": frame, "outcome": outcome, **empty, **known}
+    return {"frame": frame, "outcome": outcome, **empty, "points": 0, **known}
 
 
 def _keep(out: Path, stem: str, camera: Camera | None, snapped: Snapped | None) -> None:
-    """Write the camera of a frame and the points that were snapped."""
-    if camera is None:
-        return
+    """Write the camera of a frame and the points that were snapped; what an earlier run left
+    there goes where there is nothing to write."""
+    place = PurePosixPath(stem)
+    old = resolve_inside(out, str(place.with_name(f"camera_{place.name}.json")))
+    old_lines = resolve_inside(out, f"lines/{stem}.json")
     try:
+        if snapped is None:
+            old_lines.unlink(missing_ok=True)
+        if camera is None:
+            old.unlink(missing_ok=True)
+            return
         out.mkdir(parents=True, exist_ok=True)
         write_cameras(out, {stem: camera})
         if snapped is not None:
             (out / "lines").mkdir(exist_ok=True)
             height, width = snapped.size
-            resolve_inside(out, f"lines/{stem}.json")
             file = LineFile(stem, ImageSize(width, height), _snapped_lines(snapped))
             write_line_files(out / "lines", [file])
     except OSError as error:

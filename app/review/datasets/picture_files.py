@@ -20,6 +20,22 @@ from app.store.frames import ALLOWANCE
 from app.store.media import decode_picture
 
 
+class FrameNames:
+    """Names of frames, none given twice: ``a.jpg`` and ``a.png`` are ``a`` and ``a_2``."""
+
+    def __init__(self) -> None:
+        self._given: set[str] = set()
+
+    def name(self, stem: str) -> str:
+        """The stem, or the stem and the first number that no frame has yet."""
+        frame, count = stem, 1
+        while frame in self._given:
+            count += 1
+            frame = f"{stem}_{count}"
+        self._given.add(frame)
+        return frame
+
+
 @dataclass(frozen=True)
 class PictureFile:
     """One picture, or why there is none.
@@ -63,3 +79,18 @@ def read_pictures(
                         yield PictureFile(stem, None, error.message)
                     except ChildEnded as error:
                         yield PictureFile(stem, None, f"{PurePosixPath(name).name} {error}")
+
+
+def picture_stems(sources: Sequence[Path], settings: Settings) -> list[str]:
+    """Stems of every picture of some folders, zips and files; nothing is decoded."""
+    stems: list[str] = []
+    for source in sources:
+        tree = open_tree(source, Report(), Limits.of(settings))
+        if tree is None:
+            continue
+        with closing(tree):
+            places = [PurePosixPath(name) for name in tree.names()]
+        stems += [
+            str(place.with_suffix("")) for place in places if place.suffix.lower() in IMAGE_SUFFIXES
+        ]
+    return stems

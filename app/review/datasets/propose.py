@@ -8,18 +8,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from app.config import Settings
 from app.datasets.archive import resolve_inside
 from app.datasets.cameras_reader import read_cameras
 from app.datasets.cameras_writer import camera_text
 from app.datasets.report import Report
 from app.durable import replace_file
-from app.errors import InputError
+from app.errors import GeometryError, InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
 from app.paint.propose import Proposal, propose
 from app.progress import Progress
-from app.review.datasets.picture_files import PictureFile, read_pictures
+from app.review.datasets.picture_files import FrameNames, PictureFile, read_pictures
 from app.soccer.frames import ImageSize
 
 RESULT = "propose.json"
@@ -54,11 +56,9 @@ def propose_files(
     report = Report()
     cameras = _known(known)
     rows: list[dict[str, Any]] = []
-    seen: Counter[str] = Counter()
+    names = FrameNames()
     for picture in read_pictures(sources, settings, report):
-        seen[picture.stem] += 1
-        count = seen[picture.stem]
-        frame = picture.stem if count == 1 else f"{picture.stem}_{count}"
+        frame = names.name(picture.stem)
         rows.append(_propose_one(picture, frame, out, cameras, size))
         if progress is not None:
             progress(len(rows))
@@ -86,7 +86,10 @@ def _propose_one(
     if picture.image is None:
         found = Proposal("nothing", picture.problem)
     else:
-        found = propose(picture.image, known=known)
+        try:
+            found = propose(picture.image, known=known)
+        except (GeometryError, np.linalg.LinAlgError) as error:
+            found = Proposal("nothing", f"the picture cannot be solved ({error})")
     milliseconds = 1000 * (time.perf_counter() - began)
     place = Path(frame)
     file = resolve_inside(out, str(place.with_name(f"camera_{place.name}.json")))

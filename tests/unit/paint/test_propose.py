@@ -63,7 +63,7 @@ class TestPropose:
         ("picture", "reason"),
         [
             (lawn(np.zeros((540, 960), np.bool_)), "no straight line"),
-            (np.zeros((540, 960, 3), np.uint8), ""),
+            (np.zeros((540, 960, 3), np.uint8), "no colours"),
             (np.full((540, 960, 3), 240, np.uint8), "white"),
             (lawn(drawn(TRUE, 3))[:100, :100], "too small"),
         ],

@@ -15,7 +15,7 @@ from app.errors import ImageError, NotFoundError, TooLargeError
 from app.soccer.group import Media
 from app.store import media as media_module
 from app.store.archives import Archives
-from app.store.media import content_type, frame_name, media_facts, read_frame
+from app.store.media import content_type, decode_picture, frame_name, media_facts, read_frame
 
 # Left half dark, right half bright: a flip is seen.
 PICTURE = np.concatenate(
@@ -359,3 +359,11 @@ class TestArchives:
             thread.join()
         assert wrong == []
         archives.close()
+
+
+def test_a_jpeg_that_is_cut_off_is_damaged_and_not_half_a_picture(settings) -> None:
+    noise = np.random.default_rng(1).integers(0, 255, (90, 160, 3), np.uint8)
+    whole = cv2.imencode(".jpg", noise)[1].tobytes()
+    assert decode_picture(whole, settings, "7.jpg").shape == (90, 160, 3)
+    with pytest.raises(ImageError, match="damaged"):
+        decode_picture(whole[: len(whole) * 6 // 10], settings, "7.jpg")

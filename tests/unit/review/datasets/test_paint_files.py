@@ -20,6 +20,7 @@ from app.datasets.sn_calibration_reader import read_line_files
 from app.datasets.sn_calibration_writer import write_line_files
 from app.errors import InputError
 from app.review.datasets.paint_files import agree_files, snap_files
+from app.review.datasets.picture_files import FrameNames
 from app.sample.render import render
 from app.soccer.frames import ImageSize
 from tests.scenes import make_scenes
@@ -67,11 +68,11 @@ class TestSnapFiles:
         rows = snap_files(folder / "lines", [folder / "images"], tmp_path, settings=Settings())
         by_frame = {row["frame"]: row for row in rows}
         assert {name: row["outcome"] for name, row in by_frame.items()} == {
-            "good": "snapped", "grey": "kept", "small": by_frame["small"]["outcome"],
-            "crowd": "kept", "cut": "nothing", "huge": "nothing",
+            "good": "proposed", "grey": "unsure", "small": "nothing",
+            "crowd": "unsure", "cut": "nothing", "huge": "nothing",
         }  # fmt: skip
         assert by_frame["good"]["error_px"] < 0.2 and by_frame["good"]["supported"] > 0.8
-        for name in ("grey", "crowd", "cut", "huge"):
+        for name in ("grey", "small", "crowd", "cut", "huge"):
             assert by_frame[name]["reason"], name
         assert json.loads((tmp_path / "snap.json").read_text()) == rows
         assert set(read_cameras(tmp_path, Report())) >= {"good", "grey", "crowd"}
@@ -79,6 +80,34 @@ class TestSnapFiles:
             f for f in read_line_files(tmp_path / "lines", SIZE, Report()) if f.stem == "good"
         )
         assert all(2 <= len(points) <= 12 for points in file.lines.values() if len(points) > 1)
+
+    def test_what_names_and_files_are_wrong_takes_no_picture_and_no_old_camera_along(
+        self, folder, tmp_path
+    ):
+        lines, images, out = tmp_path / "lines", tmp_path / "images", tmp_path / "out"
+        good = (folder / "images" / "good.png").read_bytes()
+        for place in ("a/1.png", "b/1.png", "broken.png"):
+            (images / place).parent.mkdir(parents=True, exist_ok=True)
+            (images / place).write_bytes(good)
+        (lines / "a").mkdir(parents=True)
+        (lines / "a" / "1.json").write_bytes((folder / "lines" / "good.json").read_bytes())
+        (lines / "broken.json").write_text("{")
+        (out / "lines").mkdir(parents=True)
+        (out / "camera_broken.json").write_text("of an earlier run")
+        (out / "lines" / "broken.json").write_text("of an earlier run")
+        rows = snap_files(lines, [images], out, settings=Settings())
+        assert {row["frame"]: row["outcome"] for row in rows} == {
+            "a/1": "proposed",
+            "broken": "nothing",
+        }
+        broken = next(row for row in rows if row["frame"] == "broken")
+        assert broken["reason"] and broken["points"] == 0
+        assert not (out / "camera_broken.json").exists()
+        assert not (out / "lines" / "broken.json").exists()
+
+    def test_invented_names_take_no_other_pictures_name(self):
+        names = FrameNames()
+        assert [names.name(stem) for stem in ("a", "a", "a_2")] == ["a", "a_2", "a_2_2"]
 
     def test_pictures_without_a_line_file_are_an_error_when_there_is_no_other(
         self, folder, tmp_path
@@ -122,5 +151,5 @@ class TestCommands:
         with pytest.raises(SystemExit) as ended:
             main()
         assert ended.value.code == 0
-        assert "good  snapped" in capsys.readouterr().out
+        assert "good  proposed" in capsys.readouterr().out
         assert (tmp_path / "out" / "camera_good.json").is_file()
