@@ -303,7 +303,7 @@ class TestStation:
         page.get_by_role("button", name="Adjust all static cameras").click()
         dialog.get_by_role("button", name="Propose").click()
         row = dialog.locator(f'tr[data-camera="{editor.key}"]')
-        expect(row).to_be_visible(timeout=30_000)
+        expect(row).to_be_visible(timeout=120_000)
         expect(dialog).to_contain_text("Rays pass each other")
         assert serious(page) == []
         # Somebody leaves a view out: that proposal is not saved any more, and a new one can be had.
@@ -316,12 +316,12 @@ class TestStation:
         )
         assert left.ok
         dialog.get_by_role("button", name="Save").click()
-        expect(dialog).to_contain_text("have changed since that proposal", timeout=30_000)
+        expect(dialog).to_contain_text("have changed since that proposal", timeout=120_000)
         expect(row).to_be_hidden()
         dialog.get_by_role("button", name="Propose").click()
-        expect(row).to_be_visible(timeout=30_000)
+        expect(row).to_be_visible(timeout=120_000)
         dialog.get_by_role("button", name="Save").click()
-        expect(dialog).to_be_hidden(timeout=30_000)
+        expect(dialog).to_be_hidden(timeout=120_000)
         station = page.request.get(f"{film}/api/v1/stations/{editor.view['station']['id']}").json()
         assert station["can_undo"]
 

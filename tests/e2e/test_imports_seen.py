@@ -9,6 +9,7 @@ from zipfile import ZipFile
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.e2e.screen import until
 from tests.e2e.service import delete_dataset
 from tests.e2e.test_access import serious_in_both
 
@@ -121,6 +122,9 @@ class TestGroupsWithoutAPicture:
         field.fill("seen in the video")
         page.keyboard.press("Enter")
         page.wait_for_function("address => location.href !== address", arg=address)
-        expect(page.locator(".save")).not_to_contain_text("Saving")
-        verdict = page.request.get(f"/api/v1/groups/{group}").json()["verdict"]
-        assert (verdict["state"], verdict["note"]) == ("accepted", "seen in the video")
+
+        def verdict() -> tuple[str, str]:
+            said = page.request.get(f"/api/v1/groups/{group}").json()["verdict"]
+            return said["state"], said["note"]
+
+        until(page, lambda: verdict() == ("accepted", "seen in the video"))
