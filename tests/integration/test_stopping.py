@@ -89,7 +89,7 @@ class TestStopping:
         self, server: subprocess.Popen[str], address: str, number: int
     ) -> None:
         body = {"dataset": "d", "format": "soccernet-v3", "source": {"folder": "data"}}
-        with httpx.Client(base_url=address, headers={"Origin": address}) as client:
+        with httpx.Client(base_url=address, headers={"Origin": address}, timeout=SECONDS) as client:
             job = client.post("/api/v1/imports", json=body).json()["id"]
             place = f"/api/v1/jobs/{job}"
             until(lambda: client.get(place).json()["state"] == "running")
