@@ -2,23 +2,17 @@
 /** How large each match's pitch is taken to be, what its lines show, and the size to accept. */
 
 import { html } from 'htm/preact';
-import { useEffect, useRef } from 'preact/hooks';
 
-import { listenToGroups } from '../api/events.js';
 import { getPitches, setPitch } from '../api/pitches.js';
 import { count } from '../lib/format.js';
-import { latest } from '../lib/latest.js';
 import { matchName } from '../lib/match_name.js';
 import { pitchSize, shownSize } from '../lib/pitch_size.js';
-import { useResource } from '../lib/resource.js';
 import { JobProgress } from './job_progress.js';
+import { useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
-import { useSavePolicy } from './save_policy.js';
 
 /** @import {MatchPitchJson, PitchSizeJson} from '../api/pitches.js' */
 
-/** What somebody else changed is shown after this many milliseconds at the latest. */
-const PAUSE = 3000;
 /** Changes of groups after which other sizes may be in use or shown by the lines. */
 const CONCERNED = ['pitch', 'import', 'solved'];
 
@@ -45,19 +39,8 @@ function MatchPitch({ one, busy, onSet }) {
 
 /** @param {{dataset: number}} props */
 export function Pitches({ dataset }) {
-	const { value, error, reload } = useResource((signal) => getPitches(dataset, signal), [dataset]);
-	useEffect(() => {
-		const reading = latest(PAUSE, async () => reload());
-		const stop = listenToGroups((/** @type {{kind: string}} */ { kind }) => { if (CONCERNED.includes(kind)) reading.run(null); }, () => reading.run(null));
-		return () => { stop(); reading.cancel(); };
-	}, [reload]);
-	const card = useRef(/** @type {HTMLElement | null} */ (null));
-	// The button that was pressed goes: whoever is still here, or nowhere, goes on from the heading.
-	const { job, busy, error: refused, send } = useSavePolicy(() => {
-		const at = document.activeElement;
-		if (!at || at === document.body || card.current?.contains(at)) card.current?.querySelector('h2')?.focus();
-		reload();
-	});
+	const { value, error, reload, card, saving } = useMatchCard(getPitches, dataset, CONCERNED);
+	const { job, busy, error: refused, send } = saving;
 	if (error) return html`<${Trouble} title="The pitches cannot be shown" error=${error} retry=${reload} />`;
 	if (!value?.items.length) return null;
 	const proposals = value.items.filter(({ proposed }) => proposed).length;

@@ -2,21 +2,15 @@
 /** Where each match's main camera stands: shared with its pictures, renewed, taken back. */
 
 import { html } from 'htm/preact';
-import { useEffect, useRef } from 'preact/hooks';
 
-import { listenToGroups } from '../api/events.js';
 import { getPositions, sharePositions, takePositionsBack } from '../api/positions.js';
-import { latest } from '../lib/latest.js';
 import { matchName } from '../lib/match_name.js';
-import { useResource } from '../lib/resource.js';
 import { JobProgress } from './job_progress.js';
+import { useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
-import { useSavePolicy } from './save_policy.js';
 
 /** @import {MatchPositionJson} from '../api/positions.js' */
 
-/** What somebody else changed is shown after this many milliseconds at the latest. */
-const PAUSE = 3000;
 /** Changes of groups after which positions may be others, or old. */
 const CONCERNED = ['position', 'pitch', 'import', 'edit', 'undo', 'redo'];
 
@@ -41,19 +35,8 @@ function MatchPosition({ one, used, busy, onShare, onBack }) {
 
 /** @param {{dataset: number}} props */
 export function Positions({ dataset }) {
-	const { value, error, reload } = useResource((signal) => getPositions(dataset, signal), [dataset]);
-	useEffect(() => {
-		const reading = latest(PAUSE, async () => reload());
-		const stop = listenToGroups((/** @type {{kind: string}} */ { kind }) => { if (CONCERNED.includes(kind)) reading.run(null); }, () => reading.run(null));
-		return () => { stop(); reading.cancel(); };
-	}, [reload]);
-	const card = useRef(/** @type {HTMLElement | null} */ (null));
-	// The button that was pressed goes: whoever is still here, or nowhere, goes on from the heading.
-	const { job, busy, error: refused, send } = useSavePolicy(() => {
-		const at = document.activeElement;
-		if (!at || at === document.body || card.current?.contains(at)) card.current?.querySelector('h2')?.focus();
-		reload();
-	});
+	const { value, error, reload, card, saving } = useMatchCard(getPositions, dataset, CONCERNED);
+	const { job, busy, error: refused, send } = saving;
 	if (error) return html`<${Trouble} title="The positions cannot be shown" error=${error} retry=${reload} />`;
 	const items = value?.items.filter(({ current }) => value.used || current !== null) ?? [];
 	if (!value || !items.length) return null;
