@@ -32,10 +32,10 @@ static/node_modules/.ready: static/package-lock.json .venv/ready
 run: setup
 	@$(BIN)/touchline serve --sample
 
-# Two halves side by side, each in one process more than there are cores: tests of servers and
-# browsers wait much of their time. Files in their order, so that the long ones (integration,
-# security) come first and no process is left with one at the end. Every line says which half speaks.
-PROCESSES = $(shell n=$$(( $$(getconf _NPROCESSORS_ONLN) + 1 )); echo $$(( n < 8 ? n : 8 )))
+# Two halves side by side, each in as many processes as there are cores: servers and browsers that
+# are tested are processes too. Files in their order, so that the long ones (integration, security)
+# come first and no process is left with one at the end. Every line says which half speaks.
+PROCESSES = $(shell n=$$(getconf _NPROCESSORS_ONLN); echo $$(( n < 2 ? 2 : n < 8 ? n : 8 )))
 PYTEST = $(BIN)/python -m pytest --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder
 
 # What numba compiles is compiled before: every process would do it anew, until one has saved it.

@@ -75,7 +75,7 @@ class Screen:
         self.page.evaluate(TWO_FRAMES)
         # The first edit of a server may have to wait for its compiled solver.
         patient = expect(self.page.locator('.save[data-unsaved="0"]'))
-        patient.to_contain_text("Saved", timeout=60_000)
+        patient.to_contain_text("Saved")
 
 
 def until(page: Page, happens: Callable[[], Any]) -> None:
@@ -84,6 +84,13 @@ def until(page: Page, happens: Callable[[], Any]) -> None:
     while not happens():
         assert monotonic() < end, "it did not happen in time"
         page.wait_for_timeout(50)
+
+
+def go_offline(page: Page) -> None:
+    """Cut the page off, and wait until its own requests feel it: the browser only promises."""
+    page.context.set_offline(True)
+    reached = "() => fetch('/healthz', { cache: 'no-store' }).then(() => true, () => false)"
+    until(page, lambda: not page.evaluate(reached))
 
 
 def rows(page: Page) -> list[Document]:

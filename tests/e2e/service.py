@@ -16,7 +16,7 @@ import httpx
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-START_SECONDS = 60.0
+START_SECONDS = 180.0
 COMMAND_SECONDS = 300
 SERVE = "from app.cli import main; main()"
 # One process for all of them: each would load the solver again.
@@ -59,7 +59,7 @@ def serving(home: Path) -> Iterator[str]:
             yield address
         finally:
             process.terminate()
-            process.wait(timeout=20)
+            process.wait(timeout=60)
 
 
 def delete_dataset(address: str, name: str) -> None:

@@ -46,7 +46,7 @@ def serious_in_both(page: Page) -> list[str]:
 def soon(page: Page, faults: str) -> list[str]:
     """What a script finds once the page has come to rest; the last of it, where it never does."""
     with suppress(Error):
-        page.wait_for_function(f"() => ({faults})().length === 0", timeout=5_000)
+        page.wait_for_function(f"() => ({faults})().length === 0")
     found: list[str] = page.evaluate(faults)
     return found
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.screen import Screen, rows
+from tests.e2e.screen import Screen, go_offline, rows
 from tests.e2e.test_access import fits, serious_in_both
 
 OpenPage = Callable[..., Page]
@@ -67,7 +67,7 @@ class TestStates:
         screen = Screen(page)
         screen.ready()
         included = screen.document()["views"][1]["included"]
-        page.context.set_offline(True)
+        go_offline(page)
         screen.press("Shift+2")
         expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
         fits(page)

@@ -85,9 +85,7 @@ class Editor:
 
     def saved(self) -> None:
         """Wait until the last write was answered."""
-        expect(self.page.locator('.save[data-unsaved="0"]')).to_contain_text(
-            "Saved", timeout=60_000
-        )
+        expect(self.page.locator('.save[data-unsaved="0"]')).to_contain_text("Saved")
 
     def to_screen(self, x: float, y: float) -> tuple[float, float]:
         """Where an image point stands in the window, while the image is shown whole."""
@@ -303,7 +301,7 @@ class TestStation:
         page.get_by_role("button", name="Adjust all static cameras").click()
         dialog.get_by_role("button", name="Propose").click()
         row = dialog.locator(f'tr[data-camera="{editor.key}"]')
-        expect(row).to_be_visible(timeout=120_000)
+        expect(row).to_be_visible()
         expect(dialog).to_contain_text("Rays pass each other")
         assert serious(page) == []
         # Somebody leaves a view out: that proposal is not saved any more, and a new one can be had.
@@ -316,12 +314,12 @@ class TestStation:
         )
         assert left.ok
         dialog.get_by_role("button", name="Save").click()
-        expect(dialog).to_contain_text("have changed since that proposal", timeout=120_000)
+        expect(dialog).to_contain_text("have changed since that proposal")
         expect(row).to_be_hidden()
         dialog.get_by_role("button", name="Propose").click()
-        expect(row).to_be_visible(timeout=120_000)
+        expect(row).to_be_visible()
         dialog.get_by_role("button", name="Save").click()
-        expect(dialog).to_be_hidden(timeout=120_000)
+        expect(dialog).to_be_hidden()
         station = page.request.get(f"{film}/api/v1/stations/{editor.view['station']['id']}").json()
         assert station["can_undo"]
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.e2e.screen import Document, Screen, interior_point, passing
+from tests.e2e.screen import Document, Screen, go_offline, interior_point, passing
 
 OpenPage = Callable[..., Page]
 GONE = ("ERR_INTERNET_DISCONNECTED", "ERR_NETWORK_CHANGED", "ERR_FAILED", "ERR_NETWORK_IO")
@@ -182,7 +182,7 @@ class TestConflict:
         mine, theirs = both
         view = mine.document()["views"][0]
         marking, index, point = interior_point(view)
-        mine.page.context.set_offline(True)
+        go_offline(mine.page)
         move_ball(mine, 8)
         mine.drag(mine.place(view, point["x"], point["y"]), 3, 15)
         expect(mine.page.locator(".save")).to_contain_text("2 changes wait")

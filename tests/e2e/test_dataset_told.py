@@ -41,5 +41,5 @@ def test_the_page_reads_again(open_page: OpenPage, path: str, ready: str, read: 
     page.wait_for_selector(ready)
     page.wait_for_function("() => window.stream")
     page.wait_for_timeout(1500)
-    with page.expect_request(lambda request: read in request.url, timeout=6000):
+    with page.expect_request(lambda request: read in request.url):
         page.evaluate(TELL)

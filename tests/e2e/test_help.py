@@ -239,7 +239,7 @@ class TestPractice:
         page.wait_for_selector('.image-panel[data-view="B"] .image-panel__stage[data-ready="true"]')
         page.keyboard.press("2")
         page.keyboard.press("m")
-        expect(card).to_contain_text("Right: the fault is mended.", timeout=60_000)
+        expect(card).to_contain_text("Right: the fault is mended.")
         page.keyboard.press("?")
         page.get_by_role("tab", name="Practice").click()
         expect(page.get_by_role("tabpanel")).to_contain_text("1 of 8 right")
@@ -251,7 +251,7 @@ class TestPractice:
         page.goto("/help/practice")
         page.get_by_role("button", name="Start again").click()
         card = page.get_by_role("region", name="Practice")
-        expect(card).to_contain_text("Lesson 1 of 8", timeout=60_000)
+        expect(card).to_contain_text("Lesson 1 of 8")
         first, second = page.request.get("/api/v1/practice").json()["lessons"][:2]
         held: list[Route] = []
         page.route(
@@ -276,7 +276,7 @@ class TestPractice:
         page.goto("/help/practice")
         page.get_by_role("button", name="Start again").click()
         card = page.get_by_role("region", name="Practice")
-        expect(card).to_contain_text("Lesson 1 of 8", timeout=60_000)
+        expect(card).to_contain_text("Lesson 1 of 8")
         assert int(page.url.split("/review/")[1]) not in {lesson["group"] for lesson in found}
         states = {
             lesson["state"] for lesson in page.request.get("/api/v1/practice").json()["lessons"]
@@ -296,9 +296,7 @@ class TestFiveKeys:
         page, _ = lessons
         page.goto("/help/practice")
         page.get_by_role("button", name="Start again").click()
-        expect(page.get_by_role("region", name="Practice")).to_contain_text(
-            "Lesson 1 of 8", timeout=60_000
-        )
+        expect(page.get_by_role("region", name="Practice")).to_contain_text("Lesson 1 of 8")
         for number, (lesson, scene) in enumerate(zip(LESSONS, make_practice(), strict=True), 1):
             screen = Screen(page)
             expect(page.get_by_role("region", name="Practice")).to_contain_text(f"Lesson {number} ")

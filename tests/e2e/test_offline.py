@@ -7,7 +7,7 @@ from typing import Any
 
 from playwright.sync_api import Page, Route, expect
 
-from tests.e2e.screen import Screen, rows, withdraw_verdict
+from tests.e2e.screen import Screen, go_offline, rows, withdraw_verdict
 
 OpenPage = Callable[..., Page]
 GONE = ("ERR_INTERNET_DISCONNECTED", "ERR_NETWORK_CHANGED", "ERR_FAILED", "ERR_NETWORK_IO")
@@ -37,7 +37,7 @@ class TestOutbox:
         screen, chain = at_last_groups(open_page, console)
         page = screen.page
         box = screen.document()["views"][0]["balls"][0]["box"]
-        page.context.set_offline(True)
+        go_offline(page)
         screen.press("i", "Shift+ArrowRight", "s")
         page.wait_for_url(f"**/review/{chain[1]}")
         expect(page.locator(".save")).to_contain_text("Offline · 2 changes wait")
@@ -106,7 +106,7 @@ class TestOutbox:
         screen, _ = at_last_groups(open_page, console)
         page = screen.page
         box = screen.document()["views"][0]["balls"][0]["box"]
-        page.context.set_offline(True)
+        go_offline(page)
         screen.press("i", "Shift+ArrowRight")
         expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
         screen.press("ArrowUp")

@@ -40,7 +40,6 @@ TOO_WIDE = """() => [document.documentElement, document.querySelector('.page__ma
   .map((element) => element.className || element.tagName)"""
 FOCUS_INSIDE = """() => document.activeElement === document.body
   || document.activeElement.closest('dialog[open], [popover]:popover-open') !== null"""
-MINUTE = 60_000
 JOB_IS_OVER = {"done", "failed", "cancelled"}
 
 
@@ -49,7 +48,7 @@ class TestEveryPage:
         page = open_page("/datasets")
         for path, waited in PAGES.items():
             page.goto(path)
-            page.wait_for_selector(waited, timeout=MINUTE)
+            page.wait_for_selector(waited)
             found = {"axe": serious_in_both(page)}
             for width, height in SIZES:
                 page.set_viewport_size({"width": width, "height": height})
@@ -142,7 +141,7 @@ class TestNavigation:
 
     def test_a_dataset_alone_is_its_yield(self, open_page: OpenPage) -> None:
         page = open_page("/datasets/sample")
-        expect(page.locator(".funnel")).to_be_visible(timeout=MINUTE)
+        expect(page.locator(".funnel")).to_be_visible()
 
 
 class TestDialogs:
@@ -191,7 +190,7 @@ class TestDialogs:
 class TestYield:
     def test_a_moved_slider_redraws_the_funnel_and_saves_nothing(self, open_page: OpenPage) -> None:
         page = open_page("/datasets/sample/yield")
-        page.wait_for_selector(".funnel", timeout=MINUTE)
+        page.wait_for_selector(".funnel")
         before = page.locator(".yield__difference").inner_text()
         slider = page.get_by_label("Share of field lines that fit, slider")
         slider.focus()
@@ -266,7 +265,7 @@ class TestLifeOfADataset:
         expect(delete).to_have_attribute("aria-disabled", "true")
         page.get_by_label("Type passing through to go on").fill("passing through")
         delete.click()
-        expect(card).to_have_count(0, timeout=MINUTE)
+        expect(card).to_have_count(0)
 
 
 def bring_in(page: Page, labels: Path) -> None:
@@ -275,18 +274,18 @@ def bring_in(page: Page, labels: Path) -> None:
     page.set_input_files("#import-file", labels)
     expect(page.get_by_text("is uploaded")).to_be_visible()
     page.get_by_role("button", name="Try it out").click()
-    expect(page.get_by_role("region", name="What would happen")).to_be_visible(timeout=MINUTE)
+    expect(page.get_by_role("region", name="What would happen")).to_be_visible()
     usable(page)
     page.get_by_role("button", name="Import", exact=True).click()
-    expect(page.get_by_role("region", name="What happened")).to_be_visible(timeout=MINUTE)
+    expect(page.get_by_role("region", name="What happened")).to_be_visible()
     page.goto("/jobs")
     expect(page.locator(".page__main")).to_contain_text("Import match.zip")
     # Solving follows the import by itself.
-    expect(page.locator(".meter")).to_have_count(0, timeout=MINUTE)
+    expect(page.locator(".meter")).to_have_count(0)
     page.goto("/datasets")
     card = page.get_by_role("region", name="passing through")
     expect(card).to_be_visible()
-    expect(card).not_to_contain_text("not solved", timeout=MINUTE)
+    expect(card).not_to_contain_text("not solved")
 
 
 def accept_all(page: Page) -> None:
@@ -296,7 +295,7 @@ def accept_all(page: Page) -> None:
     page.keyboard.press("b")
     page.locator("#bulk-note").fill("seen in the video")
     page.locator("dialog").get_by_role("button", name="Accept").click()
-    expect(page.locator(".bar")).to_contain_text("groups accepted", timeout=MINUTE)
+    expect(page.locator(".bar")).to_contain_text("groups accepted")
 
 
 def freeze_and_verify(page: Page) -> None:
@@ -306,9 +305,9 @@ def freeze_and_verify(page: Page) -> None:
     expect(page.locator(".bulk__outcome")).to_contain_text("groups enter")
     usable(page)
     page.get_by_role("button", name="Freeze", exact=True).click()
-    page.get_by_role("button", name="Done", exact=True).click(timeout=MINUTE)
+    page.get_by_role("button", name="Done", exact=True).click()
     page.get_by_role("button", name="Verify").click()
-    expect(page.locator(".verify")).to_contain_text("came out as they were", timeout=MINUTE)
+    expect(page.locator(".verify")).to_contain_text("came out as they were")
     usable(page)
 
 
@@ -320,10 +319,10 @@ def evaluate(page: Page, predictions: Path) -> None:
     expect(page.get_by_text("is uploaded")).to_be_visible()
     usable(page)
     page.get_by_role("button", name="Add predictions").click()
-    expect(page.locator(".prediction-set")).to_contain_text("detector", timeout=MINUTE)
+    expect(page.locator(".prediction-set")).to_contain_text("detector")
     page.get_by_role("button", name="Evaluate", exact=True).click()
-    expect(page.locator("#run-title")).to_have_text("detector", timeout=MINUTE)
-    expect(page.locator(".figure canvas").first).to_be_visible(timeout=MINUTE)
+    expect(page.locator("#run-title")).to_have_text("detector")
+    expect(page.locator(".figure canvas").first).to_be_visible()
     page.get_by_role("button", name="Frames", exact=True).click()
     expect(page.locator("#frames-title")).to_contain_text("Frames")
     expect(page.locator(".table a[href^='/review/']").first).to_be_visible()
@@ -336,7 +335,7 @@ class TestNoise:
         self, open_page: OpenPage, place: str
     ) -> None:
         card = open_page(f"/datasets/sample/{place}").get_by_label("Noise of the clicks")
-        expect(card).to_contain_text("Sigma of a point on a line", timeout=MINUTE)
+        expect(card).to_contain_text("Sigma of a point on a line")
         expect(card.get_by_role("row")).to_have_count(4)
 
     def test_the_button_says_what_it_changes_and_the_noise_is_asked_once_for_each_policy(
@@ -369,11 +368,11 @@ class TestNoise:
         page.route("**/api/v1/jobs/999", lambda route: route.fulfill(json={**job, "state": "done"}))
         page.goto("/datasets/sample/policy")
         card = page.get_by_label("Noise of the clicks")
-        expect(card).to_contain_text("sets “Of its diameter” to 0.08 (now 0.04)", timeout=MINUTE)
+        expect(card).to_contain_text("sets “Of its diameter” to 0.08 (now 0.04)")
         button = card.get_by_role("button", name="Use the estimates and solve")
         button.click()
         expect(button).to_have_attribute("aria-disabled", "true")
-        expect(button).to_have_attribute("aria-disabled", "false", timeout=MINUTE)
+        expect(button).to_have_attribute("aria-disabled", "false")
         page.wait_for_load_state("networkidle")
         assert asked == [1, 2]
 
@@ -410,19 +409,19 @@ class TestPitchSizes:
         card = page.get_by_role("region", name="Pitch sizes")
         heading = card.get_by_role("heading")
         row = card.locator("tbody tr").nth(which)
-        expect(row.get_by_role("cell").first).to_have_text("103 × 66 m", timeout=MINUTE)
+        expect(row.get_by_role("cell").first).to_have_text("103 × 66 m")
         expect(heading).to_contain_text("1 proposed")
         expect(card.get_by_role("columnheader").last).to_have_text("actions")
         name = row.get_by_role("rowheader").inner_text().split("\n")[0]
         use = row.get_by_role("button", name=f" for {name}").filter(has_text="Use ")
         size = use.inner_text().split("\n")[0].removeprefix("Use ").split(" for ")[0]
         use.press("Enter")
-        expect(row.get_by_role("cell").first).to_have_text(size, timeout=MINUTE)
+        expect(row.get_by_role("cell").first).to_have_text(size)
         expect(heading).to_be_focused()
         back = row.get_by_role("button", name=f"Take back for {name}")
-        expect(back).to_have_attribute("aria-disabled", "false", timeout=MINUTE)
+        expect(back).to_have_attribute("aria-disabled", "false")
         back.press("Enter")
-        expect(row.get_by_role("cell").first).to_have_text("103 × 66 m", timeout=MINUTE)
+        expect(row.get_by_role("cell").first).to_have_text("103 × 66 m")
         expect(heading).to_be_focused()
 
 
@@ -452,11 +451,11 @@ class TestMainCameras:
         page = open_page("/datasets/sample/statistics")
         card = page.get_by_role("region", name="Main cameras")
         row = card.locator("tbody tr").first
-        expect(row).to_contain_text("none of", timeout=MINUTE)
+        expect(row).to_contain_text("none of")
         row.get_by_role("button", name="Share").press("Enter")
-        expect(row).to_contain_text("use a shared position", timeout=MINUTE)
+        expect(row).to_contain_text("use a shared position")
         expect(card.get_by_role("heading")).to_be_focused()
         back = row.get_by_role("button", name="Take back")
-        expect(back).to_have_attribute("aria-disabled", "false", timeout=MINUTE)
+        expect(back).to_have_attribute("aria-disabled", "false")
         back.press("Enter")
-        expect(row).to_contain_text("none of", timeout=MINUTE)
+        expect(row).to_contain_text("none of")

@@ -16,7 +16,6 @@ from tests.e2e.test_access import serious_in_both
 OpenPage = Callable[..., Page]
 
 API = "/api/v1"
-MINUTE = 60_000
 COUNT_PREDICTED = """(() => {
   const canvas = [...document.querySelectorAll('.image-panel[data-view="A"] canvas')].at(-1);
   const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
@@ -207,9 +206,7 @@ class TestEvaluationPage:
         page.locator("#accept-score").fill("0.8")
         page.keyboard.press("Tab")
         page.get_by_role("button", name="Accept 1", exact=True).click()
-        expect(page.locator(".notice, .bars")).to_contain_text(
-            "1 view has a ball from detector", timeout=MINUTE
-        )
+        expect(page.locator(".notice, .bars")).to_contain_text("1 view has a ball from detector")
         assert predicted.document()["views"][0]["balls"][0]["predicted_by"] == "detector"
 
     def test_two_runs_are_compared_down_to_their_frames(self, predicted: Predicted) -> None:
@@ -237,6 +234,6 @@ def run(page: Page, name: str) -> int:
     page.locator("#run-predictions").select_option(label=name)
     page.locator("#run-against").select_option("all")
     page.get_by_role("button", name="Evaluate", exact=True).click()
-    page.wait_for_url("**/evaluation?run=*", timeout=MINUTE)
+    page.wait_for_url("**/evaluation?run=*")
     expect(page.locator("#run-title")).to_have_text(name)
     return int(page.url.rsplit("=", 1)[1])

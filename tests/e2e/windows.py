@@ -15,7 +15,8 @@ from urllib.parse import urlsplit
 from playwright.sync_api import Browser, BrowserContext, CDPSession, Error, Page
 
 SIZE = {"width": 1440, "height": 900}
-TIMEOUT_MS = 20_000
+TIMEOUT_MS = 120_000
+"""What a machine that does much else may take for anything a page waits for."""
 NOTHING_ON_ITS_WAY = """() => {
   const save = document.querySelector('.save[data-unsaved]');
   return !save || save.dataset.unsaved === '0' || ['away', 'failed'].includes(save.dataset.state);

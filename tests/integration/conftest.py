@@ -144,14 +144,14 @@ def address(touchline) -> Iterator[str]:
         yield line.split()[-1]
     finally:
         server.terminate()
-        server.communicate(timeout=20)
+        server.communicate(timeout=60)
     assert "Traceback" not in (errors := log.read_text()), errors
 
 
 @pytest.fixture(scope="session")
 def client(address: str) -> Iterator[httpx.Client]:
     """A client of the server."""
-    with httpx.Client(base_url=address, timeout=30) as client:
+    with httpx.Client(base_url=address, timeout=120) as client:
         yield client
 
 
@@ -163,7 +163,7 @@ def raw(address: str) -> Callable[..., Raw]:
     def send(
         method: str, target: str, headers: dict[str, str] | None = None, body: bytes | None = None
     ) -> Raw:
-        connection = http.client.HTTPConnection(where.hostname, where.port, timeout=20)
+        connection = http.client.HTTPConnection(where.hostname, where.port, timeout=120)
         try:
             sent = {"Host": where.netloc, **(headers or {})}
             connection.putrequest(method, target, skip_host=True, skip_accept_encoding=True)

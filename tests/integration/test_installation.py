@@ -95,7 +95,7 @@ class Installation:
             yield line.split()[-1]
         finally:
             server.terminate()
-            server.communicate(timeout=20)
+            server.communicate(timeout=60)
 
     @property
     def work(self) -> Path:

@@ -16,8 +16,7 @@ import httpx
 import pytest
 
 from tests.integration.conftest import COMMAND, environment
-
-SECONDS = 60
+from tests.waiting import SECONDS
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize(
     ("then", "what"),
-    [("time.sleep(60)", fuzz.STUCK), ("time.sleep(0.4); sys.exit(3)", f"{fuzz.CRASHED} (3)")],
+    [("time.sleep(600)", fuzz.STUCK), ("time.sleep(0.4); sys.exit(3)", f"{fuzz.CRASHED} (3)")],
     ids=["sticks", "crashes"],
 )
 def test_a_process_that_does_not_come_back_leaves_its_case(
@@ -38,7 +38,7 @@ def test_a_process_that_does_not_come_back_leaves_its_case(
     program = (sys.executable, "-ISc", LEAVES.format(text=text, then=then))
     start = time.monotonic()
     assert fuzz.supervise(0.3, [], 1, program, 0.5) == 1
-    assert time.monotonic() - start < 30
+    assert time.monotonic() - start < 300
     assert [Case.of(path.read_text()).found for path in corpus.iterdir()] == [what]
 
 
@@ -59,6 +59,6 @@ def test_the_case_of_one_process_is_not_taken_for_the_next_one_s(corpus: Path) -
     first = LEAVES.format(text=Case("text", {"a": b"b"}).text(), then=then)
     again = "import os, sys\nwords = sys.argv\nif os.path.exists(words[2] + '.seen'): sys.exit(4)\n"
     start = time.monotonic()
-    assert fuzz.supervise(20, [], 1, (sys.executable, "-ISc", again + first)) == 1
-    assert time.monotonic() - start < 15
+    assert fuzz.supervise(300, [], 1, (sys.executable, "-ISc", again + first)) == 1
+    assert time.monotonic() - start < 150
     assert len(list(corpus.iterdir())) == 1

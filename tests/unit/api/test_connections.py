@@ -16,10 +16,10 @@ from starlette.types import Receive, Scope, Send
 
 from app.api import connections
 from app.api.connections import Connection, connection_limit
+from tests.waiting import SECONDS
 
 HEAD = b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\n"
 LIMIT = 3
-WAIT = 20.0
 
 
 class Echo:
@@ -70,12 +70,12 @@ def port(echo: Echo, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     yield listening.getsockname()[1]
     echo.go_on.set()
     server.should_exit = True
-    thread.join(WAIT)
+    thread.join(SECONDS)
     listening.close()
 
 
 def connect(port: int) -> socket.socket:
-    return socket.create_connection(("127.0.0.1", port), timeout=WAIT)
+    return socket.create_connection(("127.0.0.1", port), timeout=SECONDS)
 
 
 def rest(client: socket.socket) -> bytes:
@@ -133,7 +133,7 @@ class TestDeadlines:
         with connect(port) as client:
             client.sendall(HEAD + b"x" * 100)
             assert_problem(rest(client), 408)
-        assert echo.disconnected.wait(WAIT)
+        assert echo.disconnected.wait(SECONDS)
 
     def test_a_body_that_comes_steadily_is_read_to_its_end(
         self, port: int, monkeypatch: pytest.MonkeyPatch

@@ -201,7 +201,7 @@ class TestTwins:
         def send(_: int) -> httpx.Response:
             headers = {"If-Match": etag, **KEY}
             return httpx.put(
-                f"{address}{VERDICT}", json={"state": "deferred"}, headers=headers, timeout=30
+                f"{address}{VERDICT}", json={"state": "deferred"}, headers=headers, timeout=120
             )
 
         with ThreadPoolExecutor(6) as pool:

@@ -16,8 +16,8 @@ from app.review.importing.ingest import ingest
 from app.review.jobs.jobs import Jobs
 from app.soccer.group import Media
 from app.store.frames import Picture
+from tests.waiting import SECONDS
 
-SECONDS = 30
 API = "/api/v1/exports"
 ORDER = {"dataset": "broadcast", "format": "cameras", "all": True}
 

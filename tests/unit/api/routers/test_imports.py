@@ -18,9 +18,9 @@ from app.soccer.group import Group
 from app.store.jobs import NewJob, insert_job, update_job
 from app.store.log import read_log
 from app.store.uploads import get_upload
+from tests.waiting import SECONDS
 
 API = "/api/v1/imports"
-SECONDS = 30
 
 
 @pytest.fixture

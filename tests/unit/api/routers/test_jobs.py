@@ -6,8 +6,8 @@ import threading
 from typing import Any
 
 from app.review.jobs.job_run import JobProgress
+from tests.waiting import SECONDS
 
-SECONDS = 20
 API = "/api/v1/jobs"
 
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-SECONDS = 30
+from tests.waiting import SECONDS
+
 PITCHES = "/api/v1/datasets/broadcast/pitches"
 
 

@@ -8,8 +8,8 @@ import pytest
 
 from app.review.policies.text import policy_to_yaml
 from app.soccer.policy import PAPER, STRICT
+from tests.waiting import SECONDS
 
-SECONDS = 30
 POLICY = "/api/v1/datasets/broadcast/policy"
 
 

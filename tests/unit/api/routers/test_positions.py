@@ -8,8 +8,8 @@ import pytest
 
 from app.api import idempotency
 from app.errors import OverloadedError
+from tests.waiting import SECONDS
 
-SECONDS = 30
 POSITIONS = "/api/v1/datasets/broadcast/positions"
 POLICY = "/api/v1/datasets/broadcast/policy"
 

@@ -9,9 +9,9 @@ import pytest
 from sqlalchemy import update
 
 from app.store.models import DatasetModel
+from tests.waiting import SECONDS
 
 Json = dict[str, Any]
-SECONDS = 60
 
 
 @pytest.fixture(autouse=True)

@@ -18,8 +18,7 @@ from app.review.importing.import_child import Outcome, import_apart
 from app.review.importing.sources import Source, import_source
 from app.soccer.group import Group
 from app.store.session import Store
-
-SECONDS = 60
+from tests.waiting import SECONDS
 
 
 def wanted() -> None:

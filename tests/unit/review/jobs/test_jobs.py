@@ -26,8 +26,7 @@ from app.review.jobs.jobs import Jobs
 from app.store.codecs import Json
 from app.store.jobs import Job, NewJob, insert_job
 from app.store.session import Session, Store
-
-SECONDS = 20
+from tests.waiting import SECONDS
 
 
 @pytest.fixture(autouse=True)

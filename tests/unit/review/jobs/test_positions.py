@@ -14,8 +14,7 @@ from app.review.jobs.positions import request_positions
 from app.review.policies.policy import change_policy
 from app.store.session import Store
 from tests.unit.review.editing.test_positions import SHARING, match
-
-SECONDS = 30
+from tests.waiting import SECONDS
 
 
 @pytest.fixture

@@ -17,8 +17,7 @@ from app.review.jobs.job_run import JobProgress
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import request_solve, resume_solving, solve_leftovers
 from app.store.session import Store
-
-SECONDS = 30
+from tests.waiting import SECONDS
 
 
 @pytest.fixture
