@@ -42,6 +42,7 @@ from app.api.routers import (
     timeline,
     uploads,
     versions,
+    view_paint,
     views,
     yields,
 )
@@ -60,6 +61,7 @@ PREFIX = "/api/v1"
 ROUTERS = (
     datasets,
     groups,
+    view_paint,
     views,
     stations,
     rig,

@@ -7,11 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from app.errors import InputError
+from app.soccer.annotation import Lines, make_lines
+from app.soccer.frames import ImagePoint
 from app.soccer.pitch import canonical_marking
 
 EXTRACTOR_VERSION = "1"
 """Raised by one whenever the same picture gives other evidence."""
+
+
+POINTS_PER_MARKING = 12
+"""Points that lines have of each marking of evidence; more say nothing more."""
 
 
 class PaintPoint(NamedTuple):
@@ -38,6 +46,15 @@ class PaintEvidence:
     def count(self) -> int:
         """Places in all."""
         return sum(map(len, self.points.values()))
+
+    def some_points(self, most: int = POINTS_PER_MARKING) -> Lines:
+        """At most so many places of each marking, spread along it."""
+        lines = {}
+        for marking, points in self.points.items():
+            chosen = np.linspace(0, len(points) - 1, min(len(points), most)).round().astype(int)
+            places = (points[index] for index in np.unique(chosen).tolist())
+            lines[marking] = [ImagePoint(place.x, place.y) for place in places]
+        return make_lines(lines)
 
 
 def evidence_to_json(evidence: PaintEvidence) -> dict[str, Any]:

@@ -9,10 +9,12 @@ from __future__ import annotations
 import hashlib
 import threading
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from app.child import Allowance, ChildEnded
-from app.child_pool import ChildPool, PoolTask
+from app.child_pool import ChildPool, Explain, PoolTask
 from app.config import Settings
 from app.errors import ImageError, ReviewError, TooLargeError
 from app.soccer.group import Media
@@ -107,7 +109,34 @@ class Frames:
         """End the processes."""
         self._pool.close()
 
+    def ask_of(
+        self, media: Media, flipped: bool, work: Callable[..., Any], *arguments: Any
+    ) -> PoolTask:
+        """Have a function called with a frame, ``work(media, flipped, settings, *arguments)``.
+
+        Its future may have the errors of ``decode_frame``.
+
+        Raises:
+            NotFoundError: The file is not there.
+            OverloadedError: Too many wait.
+        """
+        explain = self._explain(media)
+        return self._pool.submit(
+            work, media, flipped, self._settings, *arguments, explain=explain, bounded=True
+        )
+
     def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
+        return self._pool.submit(
+            make_picture,
+            media,
+            width,
+            flipped,
+            self._settings,
+            explain=self._explain(media),
+            bounded=bounded,
+        )
+
+    def _explain(self, media: Media) -> Explain:
         def explain(error: ChildEnded) -> ReviewError:
             kind = ImageError if error.reason == "crash" else TooLargeError
             refusal = kind(f"{frame_name(media)} {error}")
@@ -115,9 +144,7 @@ class Frames:
                 self._remember(media, refusal)
             return refusal
 
-        return self._pool.submit(
-            make_picture, media, width, flipped, self._settings, explain=explain, bounded=bounded
-        )
+        return explain
 
     def _remember(self, media: Media, refusal: ReviewError) -> None:
         with self._lock:

@@ -146,6 +146,24 @@ def _source(media: Media, settings: Settings) -> bytes:
         raise StorageError(f"{path.name} cannot be read") from error
 
 
+def decode_frame(media: Media, flipped: bool, settings: Settings) -> npt.NDArray[np.uint8]:
+    """The pixels of a view's frame as its annotations see it: red green blue, shape (H, W, 3).
+
+    Args:
+        media: Where it lies.
+        flipped: Turn the mirrored picture of this camera right.
+        settings: Limits.
+
+    Raises:
+        NotFoundError: The file, member or video frame is not there.
+        ImageError: It is no image of these kinds, or damaged.
+        TooLargeError: It is larger than the limits, in bytes or in declared pixels.
+    """
+    _require_contained(Path(media.path), settings)
+    picture = _decode(media, settings)
+    return np.ascontiguousarray((cv2.flip(picture, 1) if flipped else picture)[:, :, ::-1])
+
+
 def decode_picture(data: bytes, settings: Settings, name: str) -> npt.NDArray[np.uint8]:
     """The pixels of a JPEG, PNG or WebP: red green blue, shape (H, W, 3).
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
@@ -38,6 +39,7 @@ from app.review.editing.edit import (
 )
 from app.review.editing.places import FoundView, find_view
 from app.review.editing.submit import submit_view
+from app.review.editing.view_paint import NO_FRAME_HINT
 from app.soccer.group import Media
 from app.store.frames import Frames, Picture
 from app.store.neighbours import FARTHEST
@@ -53,9 +55,6 @@ LOOK_SECONDS = 0.25
 """Between two looks whether the client still waits."""
 CLIENT_GONE = 499
 """What the log calls the answer that nobody reads."""
-NO_FRAME_HINT = (
-    "The import's report says why; importing again after the files are mended attaches the frames."
-)
 NO_NEIGHBOURS = "This dataset has no frames before or after this one."
 IMAGES: Responses = {
     200: {
@@ -242,7 +241,7 @@ async def _picture(
     """
     if view.media is None:
         raise NotFoundError("this view has no frame that could be read", hint=NO_FRAME_HINT)
-    try:
+    with told_with_view(view.key):
         found = await to_thread.run_sync(frames.cached, view.media, width, view.flipped)
         if found is not None:
             return found
@@ -250,10 +249,17 @@ async def _picture(
             request, frames.ask(view.media, width, view.flipped)
         )
         return made
+
+
+@contextmanager
+def told_with_view(key: str) -> Iterator[None]:
+    """Say what is wrong with a frame with the view that it belongs to."""
+    try:
+        yield
     except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
         # The cause decides between a full disk and one that fails.
         cause = error.__cause__ or error
-        raise type(error)(f"view {view.key}: {error.message}", hint=error.hint) from cause
+        raise type(error)(f"view {key}: {error.message}", hint=error.hint) from cause
 
 
 async def while_wanted(request: Request, task: PoolTask) -> Any:

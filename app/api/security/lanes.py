@@ -50,7 +50,7 @@ THREADS = sum(lane.width for lane in LANES) + 6
 
 _API = re.compile(r"/api/v\d+/")
 _STREAM = re.compile(r"/events$")
-_IMAGE = re.compile(r"/(?:image|figures/[^/]+|views/[^/]+/neighbours)$")
+_IMAGE = re.compile(r"/(?:image|figures/[^/]+|views/[^/]+/(?:neighbours|paint|propose))$")
 _ZIP = re.compile(r"/exports/[^/]+/content$")
 _SOLVING = re.compile(r"/(?:preview|influence|remedies|yield|noise)$")
 _UPLOAD = re.compile(r"/uploads$")
@@ -62,10 +62,10 @@ def lane_of(method: str, path: str) -> Lane | None:
         return None
     if _SOLVING.search(path):
         return PREVIEWS
+    if _IMAGE.search(path):
+        return IMAGES
     if method in SAFE_METHODS:
-        if _ZIP.search(path):
-            return ZIPS
-        return IMAGES if _IMAGE.search(path) else READS
+        return ZIPS if _ZIP.search(path) else READS
     return UPLOADS if method == "POST" and _UPLOAD.search(path) else CHANGES
 
 

@@ -33,8 +33,7 @@ from app.paint.ridges import line_like
 from app.paint.snap import Snapped, snap
 from app.progress import Progress
 from app.review.datasets.picture_files import FrameNames, PictureFile, picture_stems, read_pictures
-from app.soccer.annotation import Lines, make_lines
-from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
@@ -46,8 +45,6 @@ SENTENCES = {
     "no_paint": "too little paint is seen: the camera of the clicks stays",
     "paint_disagrees": "the paint and the clicks disagree: the camera of the clicks stays",
 }
-POINTS_PER_MARKING = 12
-"""Snapped points that a line file gets of each marking; the rest says nothing more."""
 
 
 def snap_files(
@@ -264,20 +261,11 @@ def _keep(out: Path, stem: str, camera: Camera | None, snapped: Snapped | None) 
         if snapped is not None:
             (out / "lines").mkdir(exist_ok=True)
             height, width = snapped.size
-            file = LineFile(stem, ImageSize(width, height), _snapped_lines(snapped))
+            points = to_paint_evidence(snapped.evidence).some_points()
+            file = LineFile(stem, ImageSize(width, height), points)
             write_line_files(out / "lines", [file])
     except OSError as error:
         raise InputError(f"{out} cannot hold the cameras ({error.strerror})") from error
-
-
-def _snapped_lines(snapped: Snapped) -> Lines:
-    """Some places of paint of each marking, spread along it."""
-    lines = {}
-    for marking, points in to_paint_evidence(snapped.evidence).points.items():
-        count = min(len(points), POINTS_PER_MARKING)
-        chosen = np.unique(np.linspace(0, len(points) - 1, count).round().astype(int))
-        lines[marking] = [ImagePoint(points[i].x, points[i].y) for i in chosen.tolist()]
-    return make_lines(lines)
 
 
 def _write(path: Path, rows: list[dict[str, Any]]) -> None:

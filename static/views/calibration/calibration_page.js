@@ -17,6 +17,7 @@ import { editorAddress } from '../../state/editor_address.js';
 import { groupDocument, open, pending } from '../../state/group.js';
 import { queueAddress, reviewAddress } from '../../state/navigation.js';
 import { complain } from '../../state/notice.js';
+import { followPaint } from '../../state/paint.js';
 import { watchSolving } from '../../state/solving.js';
 import { NoticeBar } from '../bars.js';
 import { ConflictBar } from '../conflict_bar.js';
@@ -124,6 +125,7 @@ export function CalibrationPage() {
 	const wanted = page.value.page === 'calibration' ? page.value.group : null;
 	useEffect(() => { if (wanted !== null) enter(wanted); }, [wanted]);
 	useEffect(() => startAsking(), []);
+	useEffect(() => followPaint(), []);
 	useEffect(() => {
 		/** @param {BeforeUnloadEvent} event */
 		const ask = (event) => { if (changed.value) event.preventDefault(); };

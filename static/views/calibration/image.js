@@ -9,10 +9,12 @@ import Konva from '../../lib/konva.js';
 import { ImageStage } from '../../overlays/stage.js';
 import { changed, choice, hovered, lines, mode } from '../../state/calibration.js';
 import { loadImage } from '../../state/images.js';
+import { paint, paintShown } from '../../state/paint.js';
 import { fitPanel, panPanel, viewportOf, zoomPanel } from '../../state/viewports.js';
 import { gain, overlaysHidden, projections } from '../../state/workspace.js';
 import { PanelCaption } from '../panel_caption.js';
 import { drawEditorMarks } from './marks.js';
+import { PaintChip } from './paint_chip.js';
 import { panelKey } from './panel_key.js';
 import { attachEditor } from './pointer.js';
 
@@ -81,6 +83,7 @@ export function EditorImage({ picture, before }) {
 	useEffect(() => stage.current?.show(image), [image]);
 
 	const chosen = choice.value;
+	const seen = paintShown.value ? paint.value : null;
 	const saved = useMemo(() => (
 		changed.value ? (before?.markings ?? []).map(({ polyline }) => polyline.map(([x, y]) => ({ x, y }))) : []
 	), [changed.value, before]);
@@ -90,6 +93,7 @@ export function EditorImage({ picture, before }) {
 		drawn.resize(size.width, size.height);
 		drawn.marks = {
 			viewport, size: view, lines: lines.value, fits: picture.markings, saved, choice: chosen, hovered: hovered.value,
+			paint: seen,
 		};
 		drawn.draw({
 			picture, viewport, hidden: overlaysHidden.value, projections: projections.value, boxes: false,
@@ -98,7 +102,7 @@ export function EditorImage({ picture, before }) {
 		});
 	}, [
 		picture, viewport.scale, viewport.left, viewport.top, size.width, size.height, saved, chosen, hovered.value,
-		overlaysHidden.value, projections.value, gain.value,
+		overlaysHidden.value, projections.value, gain.value, seen,
 	]);
 
 	const drawing = mode.value === 'draw' && chosen;
@@ -107,6 +111,7 @@ export function EditorImage({ picture, before }) {
 			<div class="image-panel__stage" data-ready=${Boolean(image)} data-mode=${mode.value} ref=${ref}></div>
 			${view.image ? null : html`<p class="image-panel__missing">No frame · the lines can be edited</p>`}
 			<${PanelCaption} picture=${picture} />
+			<${PaintChip} />
 			${drawing ? html`<p class="editor__hint" role="status">Click to set points on <strong>${chosen.marking}</strong> · Esc when done</p>` : null}
 		</figure>
 	`;

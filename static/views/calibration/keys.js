@@ -8,6 +8,7 @@ import {
 import { group } from '../../state/group.js';
 import { reviewAddress } from '../../state/navigation.js';
 import { announce, dismiss, notice } from '../../state/notice.js';
+import { proposeFromPaint, snapToPaint, togglePaint } from '../../state/paint.js';
 import { fitPanel, isZoomed, zoomTo } from '../../state/viewports.js';
 import { cycleGain, gain, overlaysHidden, projections } from '../../state/workspace.js';
 import {
@@ -52,6 +53,12 @@ function goToView(index) {
 	else announce(`There is no view ${index + 1}.`);
 }
 
+/** Move the points of the marking in hand. */
+function snapMarking() {
+	if (choice.value) snapToPaint(choice.value.marking);
+	else announce('Choose a marking first.');
+}
+
 const hasPoint = () => choice.value !== null && choice.value.index !== null;
 /** Arrows scroll where something that scrolls has the focus. */
 const notScrolling = () => hasPoint() && !document.activeElement?.closest('.editor__scroll');
@@ -74,6 +81,10 @@ export const EDITOR_KEYS = [
 	{ keys: ['i'], label: 'Insert a point after the one in hand', group: 'Edit', run: insertPoint },
 	{ keys: ['r'], label: 'Relabel the marking', group: 'Edit', run: toggleRelabelling },
 	{ keys: ['m'], label: 'Swap sides', group: 'Edit', run: swapAllSides },
+	{ keys: ['k'], label: 'Move all points onto the paint', group: 'Edit', run: () => { snapToPaint(); } },
+	{ keys: ['Shift+k'], label: 'Move the marking’s points onto the paint', group: 'Edit', run: snapMarking },
+	{ keys: [], label: 'Drag a point along the paint', group: 'Edit', shown: '⇧ drag', run: () => {} },
+	{ keys: ['Shift+p'], label: 'Propose lines from the paint, where there are none', group: 'Edit', run: () => { proposeFromPaint(); } },
 	{ keys: ['Delete', 'Backspace'], label: 'Delete the point, or the marking', group: 'Edit', run: deleteChosen },
 	{ keys: ['Shift+Delete', 'Shift+Backspace'], label: 'Delete the marking', group: 'Edit', run: deleteMarking },
 	{ keys: [], label: 'Move by 1 px; Shift 5 px; Alt 0.1 px', group: 'Edit', shown: '← ↑ → ↓', run: () => {} },
@@ -89,6 +100,7 @@ export const EDITOR_KEYS = [
 	{ keys: ['0'], label: 'Whole image', group: 'View', run: () => { if (view.value) fitPanel(panelKey(view.value.letter)); } },
 	{ keys: ['h'], label: 'Hide or show everything drawn', group: 'View', run: () => { overlaysHidden.value = !overlaysHidden.value; } },
 	{ keys: ['p'], label: 'Projected lines', group: 'View', run: () => { projections.value = !projections.value; } },
+	{ keys: ['e'], label: 'Paint that the picture shows', group: 'View', run: togglePaint },
 	{ keys: ['w'], label: 'Residual whiskers × 1, 5, 20', group: 'View', run: () => { cycleGain(); announce(`Whiskers times ${gain.value}.`); } },
 	{ keys: ['Ctrl+s', 'Ctrl+Enter'], label: 'Save everything staged as one edit', group: 'Save', typing: true, run: save },
 	{ keys: ['Ctrl+z'], label: 'Undo: staged edits first', group: 'Save', run: undo },

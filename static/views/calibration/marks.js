@@ -4,8 +4,10 @@
 import { piecesOf } from '../../geometry/polyline.js';
 import { toScreen } from '../../geometry/viewport.js';
 import { colours } from '../../lib/colours.js';
+import { drawPaint } from '../../overlays/paint.js';
 import { strokeLine, strokeLines } from '../../overlays/pen.js';
 
+/** @import {PaintJson} from '../../api/paint.js' */
 /** @import {LinesJson} from '../../api/types.js' */
 /** @import {MarkingResiduals} from '../../geometry/residual.js' */
 /** @import {ImagePoint, Size, Viewport} from '../../geometry/viewport.js' */
@@ -20,13 +22,15 @@ import { strokeLine, strokeLines } from '../../overlays/pen.js';
  * @property {ImagePoint[][]} saved where the saved camera puts the markings; empty without changes
  * @property {Choice | null} choice
  * @property {string | null} hovered
+ * @property {PaintJson | null} paint null while it is not shown
  */
 
 const NUMBERS_UP_TO = 40;
 
 /** @param {CanvasRenderingContext2D} context @param {EditorMarks} marks */
 export function drawEditorMarks(context, marks) {
-	const { viewport, size, saved, hovered, choice } = marks;
+	const { viewport, size, saved, hovered, choice, paint } = marks;
+	if (paint) drawPaint(context, viewport, paint);
 	for (const polyline of saved) {
 		strokeLines(context, viewport, piecesOf(polyline, size), { colour: colours.value.unseen, width: 1.25, dash: [2, 5], halo: false });
 	}

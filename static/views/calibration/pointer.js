@@ -5,6 +5,7 @@ import { toImage } from '../../geometry/viewport.js';
 import { choice, held, hovered, lines, mode, stageLines } from '../../state/calibration.js';
 import { withAdded, withPoint } from '../../state/line_changes.js';
 import { announce } from '../../state/notice.js';
+import { drawnToPaint, fetchPaint } from '../../state/paint.js';
 import { choiceAt } from './hit.js';
 
 /** @import {LinesJson} from '../../api/types.js' */
@@ -87,15 +88,17 @@ export function attachEditor(element, panel) {
 		if (event.pointerId !== gesture.id) return;
 		gesture.moved ||= Math.hypot(place.x - gesture.start.x, place.y - gesture.start.y) >= CLICK;
 		if (!gesture.moved) return;
-		if (gesture.drag) drag(gesture.drag, place);
+		if (gesture.drag) drag(gesture.drag, place, event.shiftKey);
 		else panel.pan(place.x - gesture.last.x, place.y - gesture.last.y);
 		gesture.last = place;
 	}
 
-	/** @param {Drag} drag @param {ScreenPoint} place */
-	function drag({ marking, index, before, offset }, place) {
+	/** @param {Drag} drag @param {ScreenPoint} place @param {boolean} magnet whether the paint draws the point */
+	function drag({ marking, index, before, offset }, place, magnet) {
 		const { x, y } = toImage(panel.viewport(), place);
-		held.value = withPoint(before, marking, index, { x: x + offset.x, y: y + offset.y });
+		const free = { x: x + offset.x, y: y + offset.y };
+		if (magnet) fetchPaint();
+		held.value = withPoint(before, marking, index, magnet ? drawnToPaint(marking, free) : free);
 	}
 
 	/** @param {PointerEvent} event */

@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 
 import { fixed, pixels } from '../../lib/format.js';
+import { asking, proposeFromPaint, snapToPaint } from '../../state/paint.js';
 import { changed, changes, choice, discardStaged, lines, mode, redo, staging, undo } from '../../state/calibration.js';
 import { deleteChosen, deleteMarking, insertPoint, save, swapAllSides, toggleDrawing, toggleRelabelling } from './actions.js';
 
@@ -42,6 +43,9 @@ function Points({ picture }) {
 export function MarkingCard({ picture }) {
 	const chosen = choice.value;
 	const there = Boolean(chosen && lines.value[chosen.marking]);
+	const lined = Object.keys(lines.value).length > 0;
+	const frameless = picture.view.image ? null : 'This view has no frame';
+	const busy = asking.value ? 'The frame is being read' : null;
 	const none = chosen ? null : 'Choose a marking first';
 	const absent = there ? null : chosen ? 'This marking has no points yet' : 'Choose a marking first';
 	return html`
@@ -53,9 +57,12 @@ export function MarkingCard({ picture }) {
 				<${Action} label="Relabel" keys="R" run=${toggleRelabelling} off=${absent} pressed=${mode.value === 'relabel'} />
 				<${Action} label=${chosen?.index === null || !chosen ? 'Delete' : 'Delete point'} keys="Del" run=${deleteChosen} off=${absent} />
 				${chosen && chosen.index !== null ? html`<${Action} label="Delete marking" keys="⇧ Del" run=${deleteMarking} off=${absent} />` : null}
-				<${Action} label="Swap sides" keys="M" run=${swapAllSides} off=${Object.keys(lines.value).length ? null : 'There are no lines'} />
+				<${Action} label="Swap sides" keys="M" run=${swapAllSides} off=${lined ? null : 'There are no lines'} />
+				${lined
+					? html`<${Action} label=${asking.value ? 'Reading…' : 'Snap to paint'} keys="K" run=${() => { snapToPaint(); }} off=${frameless ?? busy} />`
+					: html`<${Action} label=${asking.value ? 'Looking…' : 'Propose lines'} keys="⇧ P" run=${() => { proposeFromPaint(); }} off=${frameless ?? busy} />`}
 			</div>
-			${chosen ? null : html`<p class="note">Click a line in the diagram, in the table or on the picture.</p>`}
+			${chosen ? null : html`<p class="note">${lined ? 'Click a line in the diagram, in the table or on the picture.' : 'Click a line in the diagram to draw it, or have lines proposed from the paint.'}</p>`}
 			<${Points} picture=${picture} />
 		</section>
 	`;

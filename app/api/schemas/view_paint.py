@@ -1,0 +1,92 @@
+"""Paint of a view as it travels: what its frame shows of the markings, and proposed lines."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.api.schemas.annotation import LineEdits, Point
+from app.api.schemas.document import Document
+from app.paint.view_paint import ViewPaint
+from app.paint.view_proposal import ViewProposal
+
+Share = float
+DIGITS = 3
+"""Of a pixel: what lies below is far less than any sigma."""
+
+
+class PaintRequest(BaseModel):
+    """Lines that are not saved yet; without any the paint is sought near those that are."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {},
+                {"lines": {"Middle line": [{"x": 640.5, "y": 120.0}, {"x": 655.0, "y": 700.0}]}},
+            ]
+        },
+    )
+
+    lines: LineEdits = Field(default_factory=dict)
+
+
+class PaintDocument(Document):
+    """What the frame of a view shows of the painted lines, pixels of the annotated size."""
+
+    outcome: Literal["snapped", "kept", "nothing"] = Field(
+        description="`snapped`: the paint places the camera; `kept`: it does not, `reason` says "
+        "why; `nothing`: nothing could be read."
+    )
+    reason: Literal["no_paint", "paint_disagrees"] | None
+    sentence: str = Field(description="The reason for people; empty where it is snapped.")
+    points: dict[str, list[tuple[float, float, float]]] = Field(
+        description="By marking, in their order along it: x, y and the standard deviation across."
+    )
+    line_like: list[tuple[float, float]] = Field(
+        description="Places of everything in the frame that looks like painted lines."
+    )
+    supported: Share | None = Field(description="Share of the visible markings that has paint.")
+    explained: Share | None = Field(description="Share of line-like paint that has a marking.")
+    error_px: float | None = Field(description="Median distance of the paint to its marking.")
+    moved_px: float | None = Field(
+        description="How far the markings moved onto the paint, or would have, in the median."
+    )
+
+    @classmethod
+    def of(cls, found: ViewPaint) -> PaintDocument:
+        """The document of what was read."""
+        points = {
+            name: [tuple(round(value, DIGITS) for value in place) for place in places]
+            for name, places in found.evidence.points.items()
+        }
+        line_like = [(round(x, 1), round(y, 1)) for x, y in found.line_like]
+        own = {**vars(found), "points": points, "line_like": line_like}
+        del own["evidence"]
+        return cls.model_validate(own)
+
+
+class ProposalDocument(Document):
+    """Lines for a view that has none, as its frame shows them; a prediction until saved."""
+
+    outcome: Literal["proposed", "unsure", "nothing"]
+    sentence: str = Field(description="Why nothing is proposed; empty where something is.")
+    lines: dict[str, list[Point]] = Field(
+        description="Points on the paint, pixels of the annotated size; none unless proposed."
+    )
+    supported: Share | None = Field(description="Share of the visible markings that has paint.")
+    explained: Share | None = Field(description="Share of line-like paint that has a marking.")
+    runner_up: float | None = Field(
+        description="How much less the next best camera agrees; null where there is no other."
+    )
+    error_px: float | None = Field(description="Median distance of the paint to its marking.")
+
+    @classmethod
+    def of(cls, found: ViewProposal) -> ProposalDocument:
+        """The document of a proposal."""
+        lines = {
+            name: [Point(x=point.x, y=point.y) for point in points]
+            for name, points in found.lines.items()
+        }
+        return cls.model_validate({**vars(found), "lines": lines})

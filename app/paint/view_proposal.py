@@ -1,0 +1,94 @@
+"""View proposal: lines for a view that nobody has annotated, in pixels of its annotations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from app.config import Settings
+from app.errors import GeometryError
+from app.geometry.camera import Camera
+from app.paint.evidence import Image
+from app.paint.picture_scale import PictureScale, why_unreadable
+from app.paint.propose import propose
+from app.soccer.annotation import Lines
+from app.soccer.frames import ImageSize
+from app.soccer.group import Media
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.store.media import decode_frame
+
+
+@dataclass(frozen=True)
+class ViewProposal:
+    """Lines for a view that has none, drawn onto its paint.
+
+    Attributes:
+        outcome: ``proposed``, ``unsure`` or ``nothing``.
+        sentence: Why nothing is proposed; empty where something is.
+        lines: Points on the paint of each marking that is seen; none unless proposed.
+        supported, explained: As of ``ViewPaint``.
+        runner_up: How much less the next best camera agrees; None where there is no other.
+        error_px: Median distance of the paint to its marking.
+    """
+
+    outcome: Literal["proposed", "unsure", "nothing"]
+    sentence: str
+    lines: Lines
+    supported: float | None = None
+    explained: float | None = None
+    runner_up: float | None = None
+    error_px: float | None = None
+
+
+def propose_lines(
+    media: Media,
+    flipped: bool,
+    settings: Settings,
+    size: ImageSize,
+    known: Sequence[Camera],
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+) -> ViewProposal:
+    """``proposal_of`` for a frame where it lies; raises what ``decode_frame`` does."""
+    return proposal_of(decode_frame(media, flipped, settings), size, known, pitch, policy)
+
+
+def proposal_of(
+    image: Image,
+    size: ImageSize,
+    known: Sequence[Camera],
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+) -> ViewProposal:
+    """Lines for a picture that nobody has annotated.
+
+    Args:
+        image: Red green blue, shape (H, W, 3).
+        size: Annotated size; the lines are in its pixels.
+        known: Cameras of other frames of the match, whose positions are tried first.
+        pitch: The pitch.
+        policy: Prior of the distortion.
+    """
+    why = why_unreadable(image, size)
+    if why is not None:
+        return ViewProposal("nothing", why, {})
+    try:
+        found = propose(image, pitch, known, policy)
+    except (GeometryError, np.linalg.LinAlgError):
+        return ViewProposal("nothing", "The paint of this picture cannot be solved.", {})
+    scale, lines, seen, snapped = PictureScale.of(image, size), {}, found.agreement, found.snapped
+    if found.outcome == "proposed" and snapped is not None:
+        lines = dict(scale.evidence(snapped).some_points())
+    return ViewProposal(
+        found.outcome,
+        "" if found.reason is None else f"{found.reason[:1].upper()}{found.reason[1:]}.",
+        lines,
+        None if seen is None else seen.supported,
+        None if seen is None else seen.explained,
+        found.runner_up,
+        None if snapped is None or snapped.error_px is None else snapped.error_px / scale.x,
+    )

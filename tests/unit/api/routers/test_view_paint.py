@@ -1,0 +1,84 @@
+"""Paint of views over HTTP: what a frame shows, lines that it proposes, and nothing saved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from app.review.importing.ingest import ingest
+from app.soccer.group import Media
+from app.soccer.pitch import Pitch
+from tests.cameras import SIZE
+from tests.unit.api.conftest import lines_of
+from tests.unit.paint.lawns import TRUE, drawn, lawn
+
+API = "/api/v1"
+
+
+CAMERA = TRUE.scaled(4 / 3, 4 / 3)
+"""Of the annotated size; the picture is smaller."""
+
+
+@pytest.fixture
+def document(app, api, group, tmp_path: Path) -> dict[str, Any]:
+    """A group whose frames show its markings; the second one has no file."""
+    path = tmp_path / "7.png"
+    assert cv2.imwrite(str(path), lawn(drawn(TRUE, 3))[:, :, ::-1])
+    first, second = group.views
+    station = replace(first.station, lines=lines_of(CAMERA))
+    views = (replace(first, media=Media(str(path)), station=station), second)
+    store = app.state.services.store
+    ingest(store, "painted", [replace(group, views=views)], source="test", actor="local")
+    row = api.get(f"{API}/groups", params={"dataset": "painted"}).json()["items"][0]
+    return api.get(f"{API}/groups/{row['id']}").json()
+
+
+def ask(api, document: dict[str, Any], what: str, body: Any = None, view: int = 0) -> Any:
+    return api.post(f"{API}/views/{document['views'][view]['id']}/{what}", json=body)
+
+
+class TestPaint:
+    def test_says_where_the_paint_is_and_saves_nothing(self, api, document) -> None:
+        found = ask(api, document, "paint", {}).json()
+        assert (found["outcome"], found["reason"], found["sentence"]) == ("snapped", None, "")
+        assert found["supported"] > 0.9
+        x, y, sigma = found["points"]["Side line right"][0]
+        assert 0 <= x < SIZE.width and 0 <= y < SIZE.height and 0 < sigma < 1
+        assert api.get(f"{API}/groups/{document['id']}").json()["etag"] == document["etag"]
+
+    def test_lines_that_are_not_saved_count(self, api, document) -> None:
+        gone = dict.fromkeys(document["views"][0]["lines"])
+        found = ask(api, document, "paint", {"lines": gone}).json()
+        assert found["outcome"] == "nothing" and found["points"] == {}
+        assert found["line_like"]
+
+    def test_a_view_without_a_frame_says_so_by_name(self, api, document) -> None:
+        answer = ask(api, document, "paint", {}, view=1)
+        assert answer.status_code == 404
+        assert answer.json()["detail"].startswith("view 7_1.png: ")
+
+    def test_a_marking_that_is_none_is_refused(self, api, document) -> None:
+        answer = ask(api, document, "paint", {"lines": {"Halfway": []}})
+        assert answer.status_code == 422
+        assert "Halfway" in answer.text
+
+
+class TestPropose:
+    def test_lines_lie_where_the_view_s_own_lie(self, api, document) -> None:
+        found = ask(api, document, "propose").json()
+        assert (found["outcome"], found["sentence"]) == ("proposed", "")
+        curve = CAMERA.project(Pitch().sample("Side line right", 0.05, 0.05))
+        for point in found["lines"]["Side line right"]:
+            assert np.hypot(*(curve - (point["x"], point["y"])).T).min() < 1.5
+        assert api.get(f"{API}/groups/{document['id']}").json()["etag"] == document["etag"]
+
+    def test_a_frame_that_is_gone_is_named(self, api, document, tmp_path: Path) -> None:
+        (tmp_path / "7.png").unlink()
+        answer = ask(api, document, "propose")
+        assert answer.status_code == 404
+        assert "7.png" in answer.json()["detail"]

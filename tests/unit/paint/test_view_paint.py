@@ -1,0 +1,82 @@
+"""What a view's picture says: in pixels of its annotations, or why it says nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from app.paint.snap import PAINT_DISAGREES
+from app.paint.view_paint import paint_of
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+from app.soccer.policy import PAPER
+from app.soccer.solution import Calibration
+from app.solving.calibrate import calibrate
+from tests.unit.paint.test_snap import panned
+
+SIZE = ImageSize(1280, 720)
+POLICY = PAPER.calibration
+
+
+def seen(image, start, size=SIZE):
+    return paint_of(image, size, start, Pitch(), POLICY)
+
+
+def test_paint_lies_on_the_markings_of_the_true_camera(rendered) -> None:
+    found = seen(rendered.image, rendered.clicked)
+    assert (found.outcome, found.reason, found.sentence) == ("snapped", None, "")
+    assert found.error_px < 0.3 < found.moved_px + 0.3
+    assert found.supported > 0.8 and found.explained > 0.5
+    apart = []
+    for marking, places in found.evidence.points.items():
+        curve = rendered.truth.project(Pitch().sample(marking, 0.02, 0.02))
+        for x, y, _ in places:
+            apart.append(float(np.hypot(*(curve - (x, y)).T).min()))
+    assert np.median(apart) < 0.2
+
+
+def test_a_smaller_picture_is_told_in_the_pixels_of_its_annotations(rendered) -> None:
+    small = np.asarray(cv2.resize(rendered.image, (960, 540), interpolation=cv2.INTER_AREA))
+    whole, found = seen(rendered.image, rendered.clicked), seen(small, rendered.clicked)
+    assert found.outcome == "snapped"
+    marking = max(whole.evidence.points, key=lambda name: len(whole.evidence.points[name]))
+    large, less = (np.array(one.evidence.points[marking])[:, :2] for one in (whole, found))
+    apart = [np.hypot(*(large - place).T).min() for place in less]
+    assert np.median(apart) < 3.0
+    assert max(y for _, y in found.line_like) > 540
+
+
+def test_a_camera_of_other_lines_is_contradicted(rendered) -> None:
+    start = replace(rendered.clicked, camera=panned(rendered.truth, 25.0))
+    found = seen(rendered.image, start)
+    assert (found.outcome, found.reason) == ("kept", PAINT_DISAGREES)
+    assert "labels" in found.sentence
+
+
+def test_without_a_camera_only_what_looks_like_paint_is_told(rendered) -> None:
+    found = seen(rendered.image, calibrate({}, Pitch(), SIZE, POLICY))
+    assert found.outcome == "nothing" and "no camera" in found.sentence
+    assert found.line_like and not found.evidence.points
+
+
+@pytest.mark.parametrize(
+    ("shape", "part"), [((90, 160, 3), "too small"), ((720, 960, 3), "another shape")]
+)
+def test_a_picture_that_cannot_be_it_is_refused(rendered, shape, part: str) -> None:
+    found = seen(np.zeros(shape, np.uint8), rendered.clicked)
+    assert found.outcome == "nothing" and part in found.sentence
+
+
+def test_no_grass_is_nothing_to_read(rendered) -> None:
+    found = seen(np.full((720, 1280, 3), 90, np.uint8), rendered.clicked)
+    assert found.outcome == "nothing" and found.sentence.startswith("There is nothing to read")
+
+
+def test_pixels_that_are_not_square_are_refused(rendered) -> None:
+    camera = rendered.clicked.camera
+    wide = replace(camera, focal_length=(camera.focal_length[0] * 1.05, camera.focal_length[1]))
+    found = seen(rendered.image, Calibration("lines", wide))
+    assert found.outcome == "nothing" and "square pixels" in found.sentence

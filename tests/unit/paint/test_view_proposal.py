@@ -1,0 +1,41 @@
+"""Lines for a view that has none, or why there are none."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from app.paint.view_proposal import proposal_of
+from app.soccer.frames import ImageSize
+from app.soccer.paint_evidence import POINTS_PER_MARKING
+from app.soccer.policy import PAPER
+from app.solving.calibrate import calibrate
+from tests.unit.paint.lawns import PITCH, SMALL, TRUE, drawn, lawn
+
+POLICY = PAPER.calibration
+
+
+def test_the_lines_make_the_camera_that_drew_the_picture() -> None:
+    # Annotated at another size than the picture has.
+    size = ImageSize(1920, 1080)
+    found = proposal_of(lawn(drawn(TRUE, 3)), size, (), PITCH, POLICY)
+    assert (found.outcome, found.sentence) == ("proposed", "")
+    assert max(map(len, found.lines.values())) <= POINTS_PER_MARKING
+    camera = calibrate(found.lines, PITCH, size, POLICY).camera
+    assert camera is not None
+    corner = np.array([[36.0, -20.0, 0.0]])
+    assert np.hypot(*(camera.project(corner) - TRUE.scaled(2, 2).project(corner))[0]) < 3.0
+
+
+def test_an_empty_lawn_gets_none_and_a_sentence() -> None:
+    found = proposal_of(lawn(np.zeros((540, 960), np.bool_)), SMALL, (), PITCH, POLICY)
+    assert (found.outcome, found.lines) == ("nothing", {})
+    assert found.sentence.endswith(".") and found.sentence[0].isupper()
+
+
+def test_a_single_line_is_unsure() -> None:
+    mask = np.zeros((540, 960), np.uint8)
+    cv2.line(mask, (100, 300), (800, 350), 1, 3)
+    found = proposal_of(lawn(mask.astype(np.bool_)), SMALL, (), PITCH, POLICY)
+    assert found.outcome in ("unsure", "nothing")
+    assert found.lines == {} and found.sentence
