@@ -259,6 +259,50 @@ class TestPointer:
         expect(editor.page.locator('[data-lit="true"]').first).to_be_visible()
 
 
+class TestPaint:
+    def test_all_points_move_onto_it_in_one_step_that_is_taken_back(self, editor: Editor) -> None:
+        before = editor.lines
+        editor.press("e")
+        chip = editor.page.locator(".paint-chip")
+        expect(chip).to_contain_text("Markings with paint")
+        editor.press("k")
+        expect(editor.page.locator(".commit__state")).to_contain_text("Points onto the paint")
+        editor.previewed()
+        expect(editor.page.locator(".comparison")).to_contain_text("Median point")
+        had, has = (float(text.split()[0]) for text in editor.compared("median")[:2])
+        assert has < had / 2
+        assert serious_in_both(editor.page) == []
+        editor.press("Control+z")
+        editor.staged(0)
+        editor.press("e")
+        expect(chip).to_have_count(0)
+        assert editor.lines == before
+
+    def test_one_marking_moves_alone(self, editor: Editor) -> None:
+        marking = longest(editor.lines)
+        editor.choose(marking)
+        editor.press("Shift+K")
+        editor.staged(1)
+        expect(editor.page.locator(".commit__state")).to_contain_text(f"{marking} onto the paint")
+        editor.press("Control+Delete")
+        editor.staged(0)
+
+    def test_lines_are_proposed_where_there_are_none(self, editor: Editor) -> None:
+        drawn = editor.drawn()
+        for marking in drawn:
+            editor.choose(marking)
+            editor.press("Shift+Delete")
+        editor.staged(len(drawn))
+        button = editor.page.get_by_role("button", name="Propose lines")
+        button.click()
+        expect(editor.page.locator(".commit__state")).to_contain_text("Lines proposed")
+        editor.previewed()
+        assert float(editor.compared("jac 1")[1]) > 0.75
+        editor.press("Control+Delete")
+        editor.staged(0)
+        assert editor.drawn() == drawn
+
+
 class TestStation:
     def test_an_edit_reaches_all_views_of_the_camera(self, open_page: OpenPage, film: str) -> None:
         page = open_page(None)

@@ -356,13 +356,18 @@ class TestFilesOfOthers:
         assert {str(row) for row in rows("images")} == {
             f"POST {API}/imports",
             f"GET {API}/views/{{view}}/image",
+            f"POST {API}/views/{{view}}/paint",
+            f"POST {API}/views/{{view}}/propose",
         }
         page = json.loads(guarded.ask("GET", f"{API}/groups?dataset=spoiled").body)
         group = json.loads(guarded.ask("GET", f"{API}/groups/{page['items'][0]['id']}").body)
         assert len(group["views"]) >= 2
         for view in group["views"]:
-            for width in ("", "?width=208"):
-                answer = guarded.ask("GET", view["image"] + width)
+            own = f"{API}/views/{view['id']}"
+            asked = [("GET", view["image"] + width, None) for width in ("", "?width=208")]
+            asked += [("POST", f"{own}/paint", b"{}"), ("POST", f"{own}/propose", None)]
+            for method, target, body in asked:
+                answer = guarded.ask(method, target, JSON if body else None, body)
                 assert answer.status in (413, 422), (view["key"], answer.body[:200])
                 assert_guarded(answer, view["key"])
                 assert b"<s" not in answer.body

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -12,6 +12,10 @@ from app.paint.view_paint import ViewPaint
 from app.paint.view_proposal import ViewProposal
 
 Share = float
+Spot = Annotated[list[float], Field(min_length=2, max_length=2)]
+"""x and y."""
+Place = Annotated[list[float], Field(min_length=3, max_length=3)]
+"""x, y and the standard deviation across the marking."""
 DIGITS = 3
 """Of a pixel: what lies below is far less than any sigma."""
 
@@ -41,10 +45,10 @@ class PaintDocument(Document):
     )
     reason: Literal["no_paint", "paint_disagrees"] | None
     sentence: str = Field(description="The reason for people; empty where it is snapped.")
-    points: dict[str, list[tuple[float, float, float]]] = Field(
+    points: dict[str, list[Place]] = Field(
         description="By marking, in their order along it: x, y and the standard deviation across."
     )
-    line_like: list[tuple[float, float]] = Field(
+    line_like: list[Spot] = Field(
         description="Places of everything in the frame that looks like painted lines."
     )
     supported: Share | None = Field(description="Share of the visible markings that has paint.")
@@ -58,10 +62,10 @@ class PaintDocument(Document):
     def of(cls, found: ViewPaint) -> PaintDocument:
         """The document of what was read."""
         points = {
-            name: [tuple(round(value, DIGITS) for value in place) for place in places]
+            name: [[round(value, DIGITS) for value in place] for place in places]
             for name, places in found.evidence.points.items()
         }
-        line_like = [(round(x, 1), round(y, 1)) for x, y in found.line_like]
+        line_like = [[round(x, 1), round(y, 1)] for x, y in found.line_like]
         own = {**vars(found), "points": points, "line_like": line_like}
         del own["evidence"]
         return cls.model_validate(own)

@@ -44,6 +44,8 @@ class TestLaneOf:
             ("GET", "/views/1/neighbours", IMAGES),
             ("GET", "/groups/1/neighbours", READS),
             ("GET", "/exports/1/content", ZIPS),
+            ("POST", "/views/1/paint", IMAGES),
+            ("POST", "/views/1/propose", IMAGES),
             ("POST", "/uploads", UPLOADS),
             ("GET", "/uploads", READS),
             ("GET", "/events", None),
@@ -62,7 +64,7 @@ class TestLaneOf:
         assert [
             (method, path)
             for method, path in routes
-            if method != "GET" and lane_of(method, path) not in (CHANGES, PREVIEWS, UPLOADS)
+            if method != "GET" and lane_of(method, path) not in (CHANGES, PREVIEWS, UPLOADS, IMAGES)
         ] == []
 
 
