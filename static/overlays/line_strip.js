@@ -17,13 +17,15 @@ const BAND = 12;
  * @param {ImageData | null} pixels of the frame, null without one
  * @param {number} scale frame pixels per annotated pixel
  * @param {{width: number, height: number}} image annotated size
+ * @param {ImagePoint[]} paint places of the marking's paint, where it is shown
  */
-export function drawStrip(context, size, marking, pixels, scale, image) {
+export function drawStrip(context, size, marking, pixels, scale, image, paint) {
 	const pieces = piecesOf(marking.polyline, image);
 	context.fillStyle = colours.value.grass;
 	context.fillRect(0, 0, size.width, size.height);
 	if (pixels) context.drawImage(straighten(pieces, size.width, pixels, scale), 0, 0, size.width, size.height);
 	drawMiddle(context, size, marking);
+	drawStripPaint(context, size, paint, pieces);
 	drawStripPoints(context, size, marking, pieces);
 }
 
@@ -68,18 +70,47 @@ function drawMiddle(context, { width, height }, marking) {
 	context.fillRect(0, height / 2 - 0.75, width, 1.5);
 }
 
+/** The middle of the paint, as it was read. */
+/** @param {CanvasRenderingContext2D} context @param {{width: number, height: number}} size @param {ImagePoint[]} paint @param {ImagePoint[][]} pieces */
+function drawStripPaint(context, { width, height }, paint, pieces) {
+	const place = placer(width, height, pieces);
+	context.fillStyle = colours.value.reprojected;
+	for (const point of paint) {
+		const on = place(point);
+		if (on) context.fillRect(on.x - 1, on.y - 1, 2, 2);
+	}
+}
+
+/**
+ * From image points to where they stand in a band.
+ *
+ * @param {number} width @param {number} height @param {ImagePoint[][]} pieces
+ * @returns {(point: ImagePoint) => {x: number, y: number, side: number} | null}
+ */
+function placer(width, height, pieces) {
+	const length = pieces.reduce((sum, piece) => sum + lengthOf(piece), 0) || 1;
+	return (point) => {
+		const on = nearestOfPieces(pieces, point);
+		if (!on) return null;
+		const off = Math.max(-BAND, Math.min(BAND, on.side));
+		return {
+			x: Math.min(width - 4, Math.max(4, (on.along / length) * width)),
+			y: height / 2 + (off / BAND) * (height / 2 - 4),
+			side: on.side,
+		};
+	};
+}
+
 /**
  * @param {CanvasRenderingContext2D} context @param {{width: number, height: number}} size
  * @param {MarkingResiduals} marking @param {ImagePoint[][]} pieces
  */
 function drawStripPoints(context, { width, height }, marking, pieces) {
-	const length = pieces.reduce((sum, piece) => sum + lengthOf(piece), 0) || 1;
+	const place = placer(width, height, pieces);
 	for (const { point } of marking.points) {
-		const on = nearestOfPieces(pieces, point);
+		const on = place(point);
 		if (!on) continue;
-		const x = Math.min(width - 4, Math.max(4, (on.along / length) * width));
-		const off = Math.max(-BAND, Math.min(BAND, on.side));
-		const y = height / 2 + (off / BAND) * (height / 2 - 4);
+		const { x, y } = on;
 		context.beginPath();
 		context.arc(x, y, 3, 0, 2 * Math.PI);
 		context.fillStyle = colours.value.point;

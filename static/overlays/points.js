@@ -7,6 +7,8 @@ import { colours } from '../lib/colours.js';
 import { fixed } from '../lib/format.js';
 import { label, shareOf, strokeLine, UPPER_BORDER } from './pen.js';
 
+/** @import {ImagePoint} from '../geometry/camera.js' */
+/** @import {Grade} from '../geometry/residual.js' */
 /** @import {Scene} from './scene.js' */
 
 const RADIUS = 3.4;
@@ -16,22 +18,30 @@ const LONG_WHISKER = 40;
 
 /** From the projected line through the annotated point, `gain` times as long as it is where it would else be hard to see. */
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
-export function drawWhiskers(context, { picture, viewport, gain }) {
-	for (const { points } of picture.markings) {
+export function drawWhiskers(context, scene) {
+	for (const { points } of scene.picture.markings) {
 		for (const { point, nearest, distance } of points) {
 			if (!nearest || distance === null) continue;
-			if (distance * gain * viewport.scale < SHORTEST_WHISKER) continue;
-			const shown = Math.max(1, Math.min(gain, LONG_WHISKER / (distance * viewport.scale)));
-			const end = {
-				x: nearest.x + shown * (point.x - nearest.x),
-				y: nearest.y + shown * (point.y - nearest.y),
-			};
-			const grade = gradeOfResidual(distance, picture.gamma);
-			strokeLine(context, viewport, [nearest, end], {
-				colour: colours.value[grade], width: grade === 'ok' ? 1 : 1.75, halo: grade !== 'ok',
-			});
+			drawWhisker(context, scene, point, nearest, distance, gradeOfResidual(distance, scene.picture.gamma));
 		}
 	}
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context @param {Scene} scene
+ * @param {ImagePoint} point @param {ImagePoint} nearest place on the marking
+ * @param {number} distance image pixels @param {Grade} grade
+ */
+export function drawWhisker(context, { viewport, gain }, point, nearest, distance, grade) {
+	if (distance * gain * viewport.scale < SHORTEST_WHISKER) return;
+	const shown = Math.max(1, Math.min(gain, LONG_WHISKER / (distance * viewport.scale)));
+	const end = {
+		x: nearest.x + shown * (point.x - nearest.x),
+		y: nearest.y + shown * (point.y - nearest.y),
+	};
+	strokeLine(context, viewport, [nearest, end], {
+		colour: colours.value[grade], width: grade === 'ok' ? 1 : 1.75, halo: grade !== 'ok',
+	});
 }
 
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */

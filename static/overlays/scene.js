@@ -21,6 +21,11 @@ import { pinsOf } from '../lib/pins.js';
 /** @typedef {(viewport: Viewport, at: ScreenPoint) => Mark | null} MarkAt */
 /** @typedef {ViewMarks & {draw: Draw, at: MarkAt}} ViewPredictions   their code is loaded with them */
 /**
+ * @typedef {object} ViewPaint   its code is loaded with it
+ * @property {Draw} draw whiskers from the markings to their paint
+ * @property {(marking: string) => ImagePoint[]} places of the paint of a marking
+ */
+/**
  * @typedef {object} ViewPicture
  * @property {ViewJson} view
  * @property {ViewSolutionJson | null} solved
@@ -33,6 +38,7 @@ import { pinsOf } from '../lib/pins.js';
  * @property {Epipolar[]} epipolars rays of the other views' balls
  * @property {Pin[]} pins notes that stand at a place of this view
  * @property {ViewPredictions} [predictions] once they are known
+ * @property {ViewPaint} [paint] once it is read, while it is shown
  */
 /**
  * @typedef {object} Scene

@@ -88,7 +88,7 @@ export function drawOverlays(context, scene) {
 	context.save();
 	if (scene.projections) drawMarkings(context, scene);
 	if (scene.projections) drawUndrawn(context, scene);
-	if (scene.projections) drawWhiskers(context, scene);
+	if (scene.projections) (scene.picture.paint?.draw ?? drawWhiskers)(context, scene);
 	if (scene.rays) drawEpipolars(context, scene);
 	drawPoints(context, scene);
 	if (scene.boxes) scene.picture.predictions?.draw(context, scene);

@@ -52,8 +52,8 @@ function Strip({ row, width, pixels: data }) {
 	const theme = colours.value;
 	const draw = useCallback((/** @type {CanvasRenderingContext2D} */ context) => {
 		const scale = data ? data.width / picture.view.width : 1;
-		drawStrip(context, { width, height: STRIP }, marking, data ?? null, scale, picture.view);
-	}, [marking, width, data, theme]);
+		drawStrip(context, { width, height: STRIP }, marking, data ?? null, scale, picture.view, picture.paint?.places(marking.marking) ?? []);
+	}, [marking, width, data, theme, picture.paint]);
 	return html`
 		<li class="line-row">
 			<button type="button" onClick=${() => selectWorst(row)} title=${`Select the worst point of ${marking.marking}`}>

@@ -20,8 +20,8 @@ import { accept, askReason, askViewReason, cancelAsking, defer } from '../state/
 import { filled, fitAll, fitPanel, isZoomed, toggleFilled, viewportOf, zoomTo } from '../state/viewports.js';
 import {
 	asking, boxes, cycleEstimator, cycleGain, drawing, editing, equalViews, estimator, focused, focusView, gain,
-	gatesOpen, loupe, maximised, otherInstant, overlaysHidden, pinPlace, pointerPlace, projections, selected,
-	stripCollapsed, toggleMaximised,
+	gatesOpen, loupe, maximised, otherInstant, overlaysHidden, paintWhiskers, pinPlace, pointerPlace, projections,
+	selected, stripCollapsed, toggleMaximised,
 } from '../state/workspace.js';
 import { deleteSelected, nudge, nudgeDiameter } from '../tools/nudge.js';
 import { EDITOR_DOOR } from './calibration/open.js';
@@ -242,6 +242,13 @@ const VIEW = [
 	{
 		keys: ['w'], label: 'Residual whiskers × 1, 5, 20', group: 'View',
 		run: () => { cycleGain(); announce(`Whiskers times ${gain.value}.`); },
+	},
+	{
+		keys: ['Shift+w'], label: 'Whiskers to the paint in the pictures, or to the clicks', group: 'View',
+		run: () => {
+			paintWhiskers.value = !paintWhiskers.value;
+			announce(paintWhiskers.value ? 'Whiskers lead to the paint.' : 'Whiskers lead to the clicks.');
+		},
 	},
 	{ keys: [','], label: 'The focused view one frame before, where the dataset has it', group: 'View', run: () => { stepInstant(-1); } },
 	{ keys: ['.'], label: 'The focused view one frame after', group: 'View', run: () => { stepInstant(1); } },

@@ -21,6 +21,7 @@ import { ReviewHeader } from './review_header.js';
 import { REVIEW_KEYS } from './review_keys.js';
 import { Scene3D } from './scene3d/scene3d.js';
 import { BottomStrip } from './strip.js';
+import { usePaint } from './view_paint.js';
 
 const ConflictBar = lazy(async () => (await import('./conflict_bar.js')).ConflictBar);
 const Loupe = lazy(async () => (await import('./loupe.js')).Loupe);
@@ -52,7 +53,8 @@ function Workspace() {
 	const saved = groupDocument.value;
 	const plain = useMemo(() => (shown ? picturesOf(shown, solved, saved) : []), [shown, solved, saved]);
 	const predicted = usePredictions(shown !== null);
-	const pictures = useMemo(() => withPredictions(plain, predicted), [plain, predicted]);
+	const marked = useMemo(() => withPredictions(plain, predicted), [plain, predicted]);
+	const pictures = usePaint(marked, saved);
 	useEffect(() => keepWithin(pictures.map(({ view }) => view.letter)), [pictures]);
 	if (!shown) return html`<${Absent} />`;
 	return html`

@@ -14,9 +14,24 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.screen import Screen, interior_point, passing, rows, submitted, withdraw_verdict
+from tests.e2e.screen import (
+    Screen,
+    interior_point,
+    passing,
+    rows,
+    submitted,
+    until,
+    withdraw_verdict,
+)
 
 OpenPage = Callable[..., Page]
+
+GREEN_PIXELS = """canvas => {
+  const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  let found = 0;
+  for (let i = 0; i < data.length; i += 4) found += data[i + 1] > 220 && data[i] < 160 && data[i + 2] > 160;
+  return found;
+}"""
 
 
 class TestQueue:
@@ -61,6 +76,27 @@ class TestQueue:
         page.mouse.move(box["x"] + 0.99 * box["width"], box["y"] + 20, steps=4)
         page.mouse.up()
         expect(page.locator(".field--query")).to_have_value("jac>=0.8 jac<=1")
+
+
+class TestPaint:
+    def test_whiskers_lead_to_it_and_strips_show_it_once_it_is_asked_for(
+        self, open_page: OpenPage, console: Any
+    ) -> None:
+        console.expect("willReadFrequently")
+        page = open_page("/review/1")
+        screen = Screen(page)
+        screen.ready()
+        strip = page.locator(".line-row__strip").first
+        expect(strip).to_be_visible()
+        read: list[str] = []
+        page.on("response", lambda answer: read.append(answer.url))
+        views = [view["id"] for view in screen.document()["views"]]
+        screen.press("Shift+W")
+        until(page, lambda: sum(url.endswith("/paint") for url in read) == len(views))
+        # A green that no picture of grass has: the middle of the paint.
+        until(page, lambda: strip.evaluate(GREEN_PIXELS) > 20)
+        screen.press("Shift+W")
+        until(page, lambda: strip.evaluate(GREEN_PIXELS) == 0)
 
 
 class TestEditing:

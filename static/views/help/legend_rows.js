@@ -54,8 +54,9 @@ const predicted = (sure) => sceneOf({ predictions: /** @type {any} */ ({ marks: 
 const ghosts = /** @type {Field[]} */ (/** @type {unknown} */ ([{
 	view: KEY, key: 'ball', base: [{ box: [14, 22, 20, 20] }], mine: [{ box: [70, 12, 20, 20] }],
 }]));
-const strip = (/** @type {'ok' | 'bad'} */ grade, /** @type {number} */ off) => (/** @type {CanvasRenderingContext2D} */ context) => {
-	drawStrip(context, { width: WIDTH, height: HEIGHT }, lineOf(grade, off, { polyline: [{ x: 0, y: 25 }, { x: WIDTH, y: 25 }], points: [{ point: { x: 66, y: 25 + off }, nearest: { x: 66, y: 25 }, distance: off }] }), null, 1, { width: WIDTH, height: HEIGHT });
+const PAINT = [...Array(30).keys()].map((i) => ({ x: 4 + 4.2 * i, y: 27 + Math.sin(i / 4) }));
+const strip = (/** @type {'ok' | 'bad'} */ grade, /** @type {number} */ off, /** @type {{x: number, y: number}[]} */ paint = []) => (/** @type {CanvasRenderingContext2D} */ context) => {
+	drawStrip(context, { width: WIDTH, height: HEIGHT }, lineOf(grade, off, { polyline: [{ x: 0, y: 25 }, { x: WIDTH, y: 25 }], points: [{ point: { x: 66, y: 25 + off }, nearest: { x: 66, y: 25 }, distance: off }] }), null, 1, { width: WIDTH, height: HEIGHT }, paint);
 };
 
 /** @type {Section} */
@@ -112,6 +113,7 @@ const STRIPS = {
 	rows: [
 		{ name: 'Strip that fits', meaning: 'The picture along a marking, straightened. The paint and the points must lie on the middle line.', tokens: 'canvas-grass canvas-ok canvas-point', draw: strip('ok', 1) },
 		{ name: 'Strip that is wrong', meaning: 'Points lie beside the middle line, which is red.', tokens: 'canvas-bad', draw: strip('bad', 9) },
+		{ name: 'Paint that was read', meaning: 'The middle of the painted line, place by place, after Shift W here or E in the calibration editor. There red means that it lies elsewhere than the lines say, and orange is everything that looks like paint.', tokens: 'canvas-reprojected canvas-bad canvas-warn', draw: strip('ok', 1, PAINT) },
 	],
 };
 
