@@ -7,7 +7,7 @@ from fastapi import APIRouter, Response
 from app.api.deps import Actor, AppServices, DatasetPath
 from app.api.jobs import ACCEPTED, job_answer
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply
+from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument
 from app.api.schemas.rig import RigRequest, RigTakenBack
 from app.review.jobs.rig import request_rig, take_rig_back
@@ -48,8 +48,16 @@ def adjust_rig(
     return reply.of(job)
 
 
-@router.delete("/datasets/{dataset}/rig", operation_id="takeRigBack", responses=responses(404, 409))
-def delete_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> RigTakenBack:
+@router.delete(
+    "/datasets/{dataset}/rig",
+    operation_id="takeRigBack",
+    response_model=RigTakenBack,
+    responses=responses(404, 409),
+)
+def delete_rig(
+    dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
+) -> Response:
     """Take an accepted rig back, all its cameras at once; 409 when there is none."""
-    count = take_rig_back(services.jobs, services.store, dataset, actor=actor)
-    return RigTakenBack(taken_back=count)
+    reply: Reply[int] = Reply(asked, lambda count: document(RigTakenBack(taken_back=count)))
+    count = take_rig_back(services.jobs, services.store, dataset, actor=actor, keep=reply.keep)
+    return reply.of(count)

@@ -29,6 +29,7 @@ from app.soccer.solution import SOLVER_VERSION
 from app.solving.calibrate import calibrate_station
 from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import RigProposal, propose_rig
+from app.store.answers import Keep, keep_nothing
 from app.store.codecs import lines_to_json
 from app.store.digest import digest
 from app.store.groups import read_groups, station_pitches
@@ -179,7 +180,9 @@ def accept(store: Store, proposed: ProposedRig, what: str, *, actor: str) -> Non
     submit_stations(store, edits, actor=actor, check=check)
 
 
-def take_back(store: Store, dataset: str | int, *, actor: str) -> int:
+def take_back(
+    store: Store, dataset: str | int, *, actor: str, keep: Keep[int] = keep_nothing
+) -> int:
     """Undo an accepted rig, all its cameras at once; returns how many there were.
 
     Raises:
@@ -196,8 +199,9 @@ def take_back(store: Store, dataset: str | int, *, actor: str) -> int:
         raise ConflictError(
             "no static camera was adjusted by its last edit, so there is nothing to take back"
         )
-    undo_stations(store, [load_station(store, station) for station in adjusted], actor=actor)
-    return len(adjusted)
+    states = [load_station(store, station) for station in adjusted]
+    undo_stations(store, states, actor=actor, keep=keep)
+    return len(states)
 
 
 def proposal_values(proposed: ProposedRig) -> dict[str, Any]:

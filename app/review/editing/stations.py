@@ -156,11 +156,21 @@ def submit_stations(
         _save_all(session, steps, actor)
 
 
-def undo_stations(store: Store, states: Sequence[StationState], *, actor: str) -> None:
-    """Take the last edit of several static cameras back: of all of them, or of none."""
+def undo_stations(
+    store: Store,
+    states: Sequence[StationState],
+    *,
+    actor: str,
+    keep: Keep[int] = keep_nothing,
+) -> None:
+    """Take the last edit of several static cameras back: of all of them, or of none.
+
+    ``keep`` is given how many there were.
+    """
     steps = [(state.id, _plan_step("undo"), state.etag) for state in states]
     with store.write() as session:
         _save_all(session, steps, actor)
+        keep(len(states))(session)
 
 
 def _save_all(session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: str) -> None:

@@ -163,7 +163,11 @@ def preview(
 ) -> tuple[Group, Solution]:
     """The group and its solution as they would be after the edits that ``edits_of`` makes for it.
 
-    Saves nothing, and shared stations may move.
+    Saves nothing, and lines of shared stations may move.
+
+    Raises:
+        NotFoundError: There is no such group.
+        SharedStationError: The picture of a static camera is said to be cropped or stretched.
     """
     with store.read() as session:
         stored = read_groups(session, [group_id]).get(group_id)
@@ -172,6 +176,9 @@ def preview(
         group = stored.group
         edits = edits_of(group)
         require_few_points_in_all(group, edits)
+        for edit in edits:
+            if isinstance(edit, SetPicture):
+                refuse_shared(stored, edit)
         for edit in edits:
             group = edit.apply(group)
         known = known_calibrations(session, [group], stored.policy)

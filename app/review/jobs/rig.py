@@ -54,14 +54,16 @@ def request_rig(
     )
 
 
-def take_rig_back(jobs: Jobs, store: Store, dataset: str, *, actor: str) -> int:
+def take_rig_back(
+    jobs: Jobs, store: Store, dataset: str, *, actor: str, keep: Keep[int] = keep_nothing
+) -> int:
     """Take an accepted rig back, and solve its dataset, soon; returns the number of cameras.
 
     Raises:
         ConflictError: There is nothing to take back.
     """
     found = get_dataset(store, dataset)
-    count = take_back(store, found.id, actor=actor)
+    count = take_back(store, found.id, actor=actor, keep=keep)
     request_solve(jobs, store, found.id, actor=actor)
     return count
 

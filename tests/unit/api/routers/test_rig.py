@@ -62,7 +62,10 @@ class TestRig:
 
         again = api.post(ADDRESS, json={})
         assert (again.status_code, "adjusted already" in again.json()["detail"]) == (409, True)
-        assert api.delete(ADDRESS).json() == {"taken_back": 4}
+        key = {"Idempotency-Key": "back"}
+        assert api.delete(ADDRESS, headers=key).json() == {"taken_back": 4}
+        # The answer of the work, not a refusal because it is done.
+        assert api.delete(ADDRESS, headers=key).json() == {"taken_back": 4}
         assert api.delete(ADDRESS).status_code == 409
 
     def test_a_dataset_without_static_cameras_is_refused(self, api) -> None:

@@ -180,6 +180,8 @@ class TestSubmit:
         with pytest.raises(SharedStationError, match="takes its picture from") as caught:
             change(store, state, SetPicture("cam1", OPEN))
         assert "given camera" in str(caught.value.hint)
+        with pytest.raises(SharedStationError, match="takes its picture from"):
+            preview(store, state.id, lambda _group: [SetPicture("cam1", OPEN)])
 
     def test_a_moved_ball_calibrates_nothing(self, store, state, monkeypatch) -> None:
         def refuse(*_):
