@@ -49,6 +49,8 @@ AROUND, APART_PX, CONFIRMED = 5, 1.0, 0.5
 """Of the places around, this share must show paint within so many pixels of the same offset."""
 UNSURE_PX = 0.2
 """Where noise alone makes sigma this large, blades of grass double it: they are no white noise."""
+DIGITS = 4
+"""Of a pixel, that are kept."""
 SIGMA_FLOOR_PX = 0.04
 """No place is trusted to be better known: blades, wear and the picture's compression."""
 
@@ -251,10 +253,18 @@ def painted_markings() -> BoolArray:
     return np.array([name in PAINTED for name in MARKINGS])
 
 
-def to_paint_evidence(evidence: Evidence) -> PaintEvidence:
-    """The evidence as a value that is kept."""
-    rows = np.column_stack([evidence.pixels, evidence.sigmas])
-    marking = evidence.traced.marking
+def to_paint_evidence(evidence: Evidence, camera: Camera | None = None) -> PaintEvidence:
+    """The evidence as a value that is kept, to a ten-thousandth of a pixel.
+
+    Args:
+        evidence: What was seen.
+        camera: It was sought with this one: then each place is that of the middle line of the
+            marking, of which the middle of its paint as seen is not quite the image.
+    """
+    traced, marking = evidence.traced, evidence.traced.marking
+    middle = traced.pixels if camera is None else camera.project(traced.places)
+    pixels = middle + evidence.offsets[:, None] * traced.normals
+    rows = np.column_stack([pixels, np.maximum(evidence.sigmas, 10.0**-DIGITS)]).round(DIGITS)
     points = {
         MARKINGS[index]: tuple(PaintPoint(*row) for row in rows[marking == index].tolist())
         for index in np.unique(marking)

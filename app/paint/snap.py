@@ -14,52 +14,31 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
-from app.geometry.resection import (
-    PARAMETERS,
-    ROLL,
-    Prior,
-    X,
-    Z,
-    camera_from_parameters,
-    parameters_from_camera,
-)
+from app.geometry.resection import camera_from_parameters, parameters_from_camera
 from app.paint.evidence import SPACING_PX, Evidence, Image, Reading, read_picture, seek, trace
-from app.paint.paint_noise import PaintNoise, marking_weights, paint_noise
 from app.soccer.frames import Box, ImageSize
+from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.resect import (
-    MAIN_FREEDOM,
-    MAIN_MEAN,
-    MAIN_SIGMA,
-    ResectionProblem,
-    is_main_position,
-)
+from app.solving.paint_camera import MOST_SURPRISING, WORST_PX, PaintProblem
+from app.solving.paint_noise import PaintOffsets
+from app.solving.resect import ResectionProblem
 
 WINDOWS = (10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 3.0)
 """Pixels at 960 x 540 that paint is sought to either side, round by round."""
-ROBUST_PX = 1.0
-"""Scale of the soft-L1 loss of the first rounds, at 960 x 540."""
-STRICT_ROUNDS, STRICT_SIGMAS, STRICT_PX = 3, 4.0, 0.3
-"""In the last rounds what lies farther off than so many sigmas, or pixels, counts little."""
+STRICT_ROUNDS = 3
+"""In the last rounds what lies far off counts little."""
 COARSE_PX = 8.0
 """Pixels between the places of the first rounds."""
-INNER_STEPS = 4
 LEAST_POINTS, LEAST_MARKINGS = 24, 3
 """Fewer points of paint, or markings with some, determine no camera."""
 LEAST_ON_MARKING = 4
 LEAST_SEEN = 0.2
 """Of the visible markings: where less shows paint, chance decides what the rest is."""
-WORST_PX, MOST_SURPRISING, KEPT_SHARE = 0.6, 60.0, 0.9
-"""Paint disagrees where it does not lie on the markings in the end (median, at 960 x 540), where
-the camera moved beyond what its clicks allow (squared sigmas of eight parameters: by chance 26
-once in a thousand), or where fewer places show paint than before."""
-NO_PAINT, PAINT_DISAGREES = "no_paint", "paint_disagrees"
-DAMPING = 1e-4
+KEPT_SHARE = 0.9
+"""Paint disagrees, too, where fewer places show paint than before."""
 START_SIGMAS, START_PX = 4.0, 2.0
 """A start that is known is not sought farther off than so many of its sigmas, and pixels more."""
-LEAST_UNIT = 0.6
-"""Windows do not shrink below this share of theirs in small pictures: blur is in pixels."""
 
 
 @dataclass(frozen=True)
@@ -138,13 +117,13 @@ def snap_reading(
         evidence = rounds.seek(parameters, window, SPACING_PX if strict else COARSE_PX)
         if not _suffices(evidence):
             return _kept(rounds, evidence, NO_PAINT)
-        parameters = parameters + rounds.step(parameters, evidence, strict)
+        parameters = parameters + rounds.problem.step(parameters, rounds.seen(evidence), strict)
         if not np.isfinite(parameters).all():
             return _kept(rounds, evidence, PAINT_DISAGREES)
     evidence = rounds.seek(parameters, windows[-1])
     if not _suffices(evidence) or evidence.share < LEAST_SEEN:
         return _kept(rounds, evidence, NO_PAINT)
-    noise = rounds.noise(parameters, evidence)
+    noise = rounds.problem.noise(parameters, rounds.seen(evidence))
     if noise is None:
         return _kept(rounds, evidence, NO_PAINT)
     camera, before = rounds.camera(parameters), rounds.seek(rounds.first, windows[-1])
@@ -152,7 +131,7 @@ def snap_reading(
     if (
         error > rounds.unit * WORST_PX
         or moved > rounds.unit * (windows[0] if start_covariance is None else np.inf)
-        or rounds.surprise(parameters) > MOST_SURPRISING
+        or rounds.problem.surprise(parameters) > MOST_SURPRISING
         or evidence.share < KEPT_SHARE * before.share
     ):
         return _kept(rounds, evidence, PAINT_DISAGREES, error, moved)
@@ -167,15 +146,15 @@ class _Rounds:
         reading: Reading,
         start: Camera,
         pitch: Pitch,
-        problem: ResectionProblem,
+        resection: ResectionProblem,
         covariance: FloatArray | None,
     ):
-        self._reading, self.start, self._pitch, self._problem = reading, start, pitch, problem
+        self._reading, self.start, self._pitch = reading, start, pitch
         self.first = parameters_from_camera(start, reading.half_diagonal)
+        self.problem = PaintProblem.of(resection, self.first, covariance)
         self._covariance = covariance
-        self._information = None if covariance is None else _inverse(covariance)
         self.size = reading.height, reading.width
-        self.unit = max(problem.unit, LEAST_UNIT)
+        self.unit = self.problem.unit
 
     def camera(self, parameters: FloatArray) -> Camera:
         return camera_from_parameters(
@@ -192,61 +171,17 @@ class _Rounds:
         known = START_SIGMAS * sigma + START_PX * self.unit
         return seek(self._reading, traced, np.minimum(window, known))
 
-    def step(self, parameters: FloatArray, evidence: Evidence, strict: bool) -> FloatArray:
-        """Towards the paint: reweighted least squares on the offsets, made linear here."""
-        prior = self.prior(parameters)
-        information = np.diag(prior.sigma**-2.0)
-        pull = (prior.mean - parameters) * prior.sigma**-2.0
-        if self._information is not None:
-            information = information + self._information
-            pull = pull + self._information @ (self.first - parameters)
-        jacobian, offsets = evidence.traced.jacobian, evidence.offsets
-        base = marking_weights(evidence.traced.marking, evidence.sigmas) / evidence.sigmas**2
-        moved: FloatArray = np.zeros(PARAMETERS)
-        for _ in range(INNER_STEPS):
-            rest = offsets - jacobian @ moved
-            weight = base * self._robust(rest, evidence.sigmas, strict)
-            normal = (jacobian * weight[:, None]).T @ jacobian + information
-            normal[np.diag_indices(PARAMETERS)] *= 1 + DAMPING
-            moved = np.asarray(np.linalg.solve(normal, jacobian.T @ (weight * offsets) + pull))
-        return moved
-
-    def _robust(self, rest: FloatArray, sigmas: FloatArray, strict: bool) -> FloatArray:
-        if not strict:
-            weights: FloatArray = 1 / np.sqrt(1 + (rest / (ROBUST_PX * self.unit)) ** 2)
-            return weights
-        scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * self.unit)
-        return np.asarray((1 + (rest / scale) ** 2) ** -2.0)
-
-    def surprise(self, parameters: FloatArray) -> float:
-        """Squared distance from the start in its own sigmas; 0 where nothing is known of it."""
-        if self._information is None:
-            return 0.0
-        moved = parameters - self.first
-        return float(moved @ self._information @ moved)
-
-    def noise(self, parameters: FloatArray, evidence: Evidence) -> PaintNoise | None:
-        prior = self.prior(parameters)
-        robust = self._robust(evidence.offsets, evidence.sigmas, strict=True)
-        return paint_noise(
-            evidence,
-            robust,
-            prior.sigma**-2.0,
-            np.array(self.start.principal_point),
-            self._reading.half_diagonal,
-            self._information,
+    def seen(self, evidence: Evidence) -> PaintOffsets:
+        """The evidence as it is solved with."""
+        traced = evidence.traced
+        apart = (traced.pixels - self.start.principal_point) / self._reading.half_diagonal
+        return PaintOffsets(
+            evidence.offsets,
+            evidence.sigmas,
+            traced.marking,
+            traced.jacobian,
+            np.hypot(*apart.T),
         )
-
-    def prior(self, parameters: FloatArray) -> Prior:
-        """The calibrator's: main cameras stand where main cameras stand, others anywhere."""
-        prior = self._problem.prior()
-        if is_main_position(parameters[X : Z + 1]):
-            offset = parameters[ROLL : Z + 1] - MAIN_MEAN
-            prior.mean[ROLL : Z + 1] = MAIN_MEAN
-            prior.sigma[ROLL : Z + 1] = MAIN_SIGMA * np.sqrt(
-                1 + (offset / MAIN_SIGMA) ** 2 / MAIN_FREEDOM
-            )
-        return prior
 
 
 def _suffices(evidence: Evidence) -> bool:
@@ -271,9 +206,3 @@ def _moved(start: Camera, camera: Camera, evidence: Evidence) -> float:
     apart = np.hypot(*(camera.project(places) - start.project(places)).T)
     known = apart[np.isfinite(apart)]
     return float(np.median(known)) if len(known) else 0.0
-
-
-def _inverse(covariance: FloatArray) -> FloatArray:
-    scale = np.sqrt(np.diag(covariance))
-    inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
-    return np.asarray(inverse / np.outer(scale, scale))

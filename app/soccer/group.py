@@ -9,6 +9,7 @@ from app.errors import InputError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import ImageSize
+from app.soccer.paint_evidence import PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.reasons import LeftOut
@@ -127,6 +128,7 @@ class Group:
         label: What people read: teams and time of play.
         positions: What the match's other pictures say of where the camera of a view stands, by
             the view's key, as it was accepted for the match.
+        paint: What was read of the paint in a view's picture, by the view's key.
     """
 
     key: str
@@ -136,6 +138,7 @@ class Group:
     split: str = ""
     label: str = ""
     positions: Mapping[str, SharedPosition] = field(default_factory=dict)
+    paint: Mapping[str, PaintReading] = field(default_factory=dict)
 
     def view(self, key: str) -> View | None:
         """The view of that key, or None."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +19,9 @@ from app.soccer.pitch import canonical_marking
 
 EXTRACTOR_VERSION = "1"
 """Raised by one whenever the same picture gives other evidence."""
+NO_PAINT, PAINT_DISAGREES, NO_FRAME = "no_paint", "paint_disagrees", "no_frame"
+"""Why a camera stays that of its clicks: too little paint, paint that contradicts them, and a
+picture that is missing or cannot be read."""
 
 
 POINTS_PER_MARKING = 12
@@ -55,6 +61,77 @@ class PaintEvidence:
             places = (points[index] for index in np.unique(chosen).tolist())
             lines[marking] = [ImagePoint(place.x, place.y) for place in places]
         return make_lines(lines)
+
+
+@dataclass(frozen=True)
+class PaintReading:
+    """What was read of the paint in the picture of one view.
+
+    Attributes:
+        frame: Digest of the picture's bytes; empty where there are none.
+        sought_for: Key of the calibration of the clicks that it was sought with: of other clicks
+            it says nothing.
+        evidence: Places of paint, pixels of the annotated size.
+        reason: Why it is not solved with, ``no_paint``, ``paint_disagrees`` or ``no_frame``; None
+            where it is.
+        supported: Agreement of the camera that was found with the picture (``paint.agreement``);
+            None where nothing was measured.
+        explained: The same of the paint that lies near a marking.
+    """
+
+    frame: str
+    sought_for: str
+    evidence: PaintEvidence
+    reason: str | None = None
+    supported: float | None = None
+    explained: float | None = None
+
+    @cached_property
+    def text(self) -> str:
+        """The one JSON text of it."""
+        return json.dumps(
+            reading_to_json(self),
+            sort_keys=True,
+            separators=(",", ":"),
+            ensure_ascii=False,
+            allow_nan=False,
+        )
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of all of it, 32 hexadecimal digits."""
+        return hashlib.sha256(self.text.encode()).hexdigest()[:32]
+
+
+def reading_to_json(reading: PaintReading) -> dict[str, Any]:
+    """As JSON; what was not measured is null."""
+    return {
+        "frame": reading.frame,
+        "sought_for": reading.sought_for,
+        "evidence": evidence_to_json(reading.evidence),
+        "reason": reading.reason,
+        "supported": reading.supported,
+        "explained": reading.explained,
+    }
+
+
+def reading_from_json(value: Any) -> PaintReading:
+    """The reading that ``reading_to_json`` wrote.
+
+    Raises:
+        InputError: It is none.
+    """
+    try:
+        shares = [value[name] for name in ("supported", "explained")]
+        return PaintReading(
+            str(value["frame"]),
+            str(value["sought_for"]),
+            evidence_from_json(value["evidence"]),
+            None if value["reason"] is None else str(value["reason"]),
+            *(None if share is None else float(share) for share in shares),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"this is no reading of paint: {error}") from error
 
 
 def evidence_to_json(evidence: PaintEvidence) -> dict[str, Any]:

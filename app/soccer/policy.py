@@ -66,6 +66,16 @@ class CalibrationPolicy:
     )
     """Where the main camera stands is known from the match's other pictures, where that was
     accepted. Not in the ``repr``, which keys calibrations: they are keyed by the position itself."""
+    source: Literal["lines", "paint"] = _threshold(
+        "lines",
+        CALIBRATION,
+        "What cameras are found from",
+        choices=("lines", "paint"),
+        later=True,
+        told=False,
+    )
+    """``lines``: what was clicked; ``paint``: started by the clicks, drawn onto what was read of the
+    paint in the picture. Not in the ``repr`` either: calibrations are keyed by what was read."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +186,9 @@ def _asked(policy: Policy | CalibrationPolicy) -> dict[str, Any]:
 
 PAPER = Policy()
 STRICT = Policy(name="strict", min_parallax_degrees=5.0, max_sigma_m=0.5)
-POLICIES = {policy.name: policy for policy in (PAPER, STRICT)}
+TOUCHLINE = Policy(name="touchline", calibration=CalibrationPolicy(source="paint"))
+"""As ``paper``, with cameras from the paint of their pictures."""
+POLICIES = {policy.name: policy for policy in (PAPER, STRICT, TOUCHLINE)}
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,8 @@ FINDING_KINDS = (
     "visible_not_annotated",
     "bad_point",
     "under_constrained",
+    "paint_disagrees",
+    "no_paint",
     "picture_geometry",
     "view_disagrees",
     "views_contradict",
@@ -115,11 +117,31 @@ class Picture:
 
 
 @dataclass(frozen=True)
+class PaintFit:
+    """How a camera and the paint of its picture agree.
+
+    Attributes:
+        supported: Share of the visible markings that have paint; None where it was not measured.
+        explained: Share of the line-like paint that lies near a marking.
+        points: Places of paint that were read along the markings.
+        error_px: Median distance of them from the markings, pixels; None where the camera is not
+            that of the paint.
+        reason: Why it is not: ``no_paint``, ``paint_disagrees`` or ``no_frame``.
+    """
+
+    supported: float | None
+    explained: float | None
+    points: int
+    error_px: float | None = None
+    reason: str | None = None
+
+
+@dataclass(frozen=True)
 class Calibration:
     """The camera of one view (or station), and how well it is known.
 
     Attributes:
-        source: ``given`` or ``lines``.
+        source: ``given``, ``lines`` or ``paint``.
         camera: None when the lines do not determine one; ``reason`` then says why.
         jac: JaC for each of ``GAMMAS_PERCENT``; None when there are no lines to measure it.
         error_px: Median distance of the annotated points, pixels.
@@ -129,6 +151,7 @@ class Calibration:
         unobservable: Parameters that the lines do not determine, in words.
         picture: How the picture was stretched or cropped, where the lines say so; the camera is
             found as if it were not.
+        paint: How it and the paint agree, where that was read for the same clicks.
     """
 
     source: str
@@ -141,6 +164,7 @@ class Calibration:
     covariance: tuple[float, ...] | None = None
     unobservable: tuple[str, ...] = ()
     picture: Picture | None = None
+    paint: PaintFit | None = field(default=None, metadata={"later": True})
 
     @property
     def is_known(self) -> bool:

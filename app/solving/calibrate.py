@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -14,13 +16,22 @@ from app.geometry.resection import LOG_FOCAL, PARAMETERS, X, Z
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, SharedPosition, Station, View
+from app.soccer.paint_evidence import PAINT_DISAGREES, PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.soccer.solution import GAMMAS_PERCENT, SOLVER_VERSION, Calibration, MarkingFit, Suspect
+from app.soccer.solution import (
+    GAMMAS_PERCENT,
+    SOLVER_VERSION,
+    Calibration,
+    MarkingFit,
+    PaintFit,
+    Suspect,
+)
 from app.solving.jaccard import jaccard, measure_markings, outcomes, project_markings
 from app.solving.labels import find_suspects
 from app.solving.observations import Observations, observe
+from app.solving.paint_camera import PaintProblem, solve_paint
 from app.solving.picture import find_picture
 from app.solving.picture_camera import PictureProblem, estimate_picture, warp_of
 from app.solving.resect import (
@@ -33,6 +44,8 @@ from app.solving.resect import (
 
 MIN_MEASUREMENTS = 7
 """A camera with one focal length has seven unknowns; the distortion has a prior."""
+
+NONE_KNOWN: Mapping[str, Calibration] = MappingProxyType({})
 
 MAX_POSITION_SIGMA_M = 5.0
 MAX_FOCAL_SIGMA = 0.10
@@ -194,14 +207,109 @@ def calibrate_station(
     return calibrate_near(alone, near, station.lines, pitch, station.size, policy)
 
 
-def calibrate_view(group: Group, view: View, policy: CalibrationPolicy) -> Calibration:
-    """Calibration of a view's station, near the position that its match shares with it."""
+def calibrate_paint(
+    clicked: Calibration,
+    reading: PaintReading,
+    lines: Lines,
+    pitch: Pitch,
+    size: ImageSize,
+    policy: CalibrationPolicy,
+) -> Calibration:
+    """A calibration of clicks with what was read of the paint in its picture.
+
+    The camera is the paint's, with what the clicks know as prior; or it stays the clicks', with the
+    reason in ``paint``.
+
+    Args:
+        clicked: The calibration that the paint was sought for.
+        reading: What was read.
+    """
+    fit = PaintFit(
+        reading.supported, reading.explained, reading.evidence.count, reason=reading.reason
+    )
+    if clicked.camera is None or reading.reason is not None:
+        return replace(clicked, paint=fit)
+    resection = ResectionProblem.of(size, policy)
+    known = None if clicked.covariance is None else np.reshape(clicked.covariance, (8, 8))
+    problem = PaintProblem.of(resection, resection.parameters(clicked.camera), known)
+    found = solve_paint(problem, reading.evidence, pitch)
+    if found is None:
+        return replace(clicked, paint=replace(fit, reason=PAINT_DISAGREES))
+    painted = replace(
+        clicked,
+        source="paint",
+        camera=resection.camera(found.parameters),
+        covariance=tuple(found.covariance.ravel().tolist()),
+        unobservable=_unobservable(found.covariance),
+        paint=replace(fit, error_px=found.error_px),
+    )
+    return measure(painted, lines, pitch, size)
+
+
+def calibrate_view(
+    group: Group,
+    view: View,
+    policy: CalibrationPolicy,
+    known: Mapping[str, Calibration] = NONE_KNOWN,
+) -> Calibration:
+    """Calibration of a view: of its station, near the position that its match shares with it, and
+    on the paint of its picture as far as the policy wants it.
+
+    Args:
+        group: What was said.
+        view: One of its views.
+        policy: What a calibration depends on.
+        known: Calibrations by key; that of the clicks is not computed again where it is there.
+    """
+    key = clicks_key(group, view, policy)
+    clicked = known.get(key) or calibrate_clicks(group, view, policy)
+    reading = wanted_paint(group, view, policy)
+    if reading is None or reading.sought_for != key:
+        return clicked
+    return calibrate_paint(clicked, reading, view.station.lines, group.pitch, view.size, policy)
+
+
+def calibrate_clicks(group: Group, view: View, policy: CalibrationPolicy) -> Calibration:
+    """``calibrate_view`` without paint."""
     return calibrate_station(view.station, group.pitch, policy, _shared(group, view, policy))
 
 
 def view_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
-    """``calibration_key`` of what ``calibrate_view`` makes."""
+    """Key of what ``calibrate_view`` makes."""
+    return view_keys(group, view, policy)[0]
+
+
+def view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str, ...]:
+    """The same, and after it the key of the clicks that it starts from where it is another."""
+    key = clicks_key(group, view, policy)
+    reading = wanted_paint(group, view, policy)
+    if reading is None or reading.sought_for != key:
+        return (key,)
+    painted = hashlib.sha256(f"{key} {reading.digest}".encode()).hexdigest()[:32]
+    return painted, key
+
+
+def clicks_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
+    """``calibration_key`` of what ``calibrate_clicks`` makes."""
     return calibration_key(view.station, group.pitch, policy, _shared(group, view, policy))
+
+
+def takes_paint(view: View) -> bool:
+    """Whether the paint of a view's picture could place its camera.
+
+    A static camera is that of many pictures, a given one is what it is, and a picture that was
+    stretched or cropped has no lens of one radial term about its middle.
+    """
+    station = view.station
+    is_given = station.given is not None and station.calibration == "given"
+    return bool(station.lines) and not (station.shared or is_given or station.picture)
+
+
+def wanted_paint(group: Group, view: View, policy: CalibrationPolicy) -> PaintReading | None:
+    """What was read for a view, as far as the policy wants it; perhaps for other clicks."""
+    if policy.source != "paint" or not takes_paint(view):
+        return None
+    return group.paint.get(view.key)
 
 
 def _shared(group: Group, view: View, policy: CalibrationPolicy) -> SharedPosition | None:

@@ -11,6 +11,7 @@ from app.soccer.solution import Ball3D, Finding, Fix, Pair, ViewSolution
 from app.solving.calibration_findings import calibration_findings
 from app.solving.contradiction import LOW_P_VALUE, SPEEDS, TYPICAL_SPEED, Contradiction
 from app.solving.gates import chance
+from app.solving.paint_findings import paint_findings
 from app.solving.plausible import implausible
 from app.solving.sides import Swap, find_swaps
 from app.solving.triangulate import Sight
@@ -31,11 +32,13 @@ _BY_WEIGHT = (
     "implausible_camera",
     "picture_geometry",
     "under_constrained",
+    "paint_disagrees",
     "bad_point",
     "high_uncertainty",
     "low_parallax",
     "ball_size",
     "visible_not_annotated",
+    "no_paint",
 )
 """What explains the most comes first."""
 
@@ -60,6 +63,7 @@ def find(
             for item in said
             if not (view.station.shared and item.kind == "visible_not_annotated")
         )
+        found.extend(paint_findings(group, view, solved, policy.calibration))
         found.extend(_several_balls(view))
         if view.key in swaps:
             found.append(_sides_swapped(swaps[view.key]))

@@ -90,7 +90,7 @@ def find_swaps(
 
 
 def _from_lines(sight: Sight) -> bool:
-    return sight.calibration.source == "lines"
+    return sight.calibration.source != "given"
 
 
 def _others(sight: Sight, sights: Sequence[Sight]) -> list[Sight]:

@@ -104,7 +104,7 @@ def _calibrated(view: View, group: Group, policy: Policy, known: dict[str, Calib
     """Key of a view's calibration, which is known then."""
     key = view_key(group, view, policy.calibration)
     if key not in known:
-        known[key] = calibrate_view(group, view, policy.calibration)
+        known[key] = calibrate_view(group, view, policy.calibration, known)
     return key
 
 

@@ -20,6 +20,7 @@ from app.geometry.lens import BROWN_CONRADY
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, SharedPosition, Station, View
+from app.soccer.paint_evidence import PaintReading, reading_from_json, reading_to_json
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, Policy
@@ -335,8 +336,11 @@ def view_from_json(value: Mapping[str, Any], station: Station | None = None) -> 
 
 
 def group_to_json(group: Group) -> Json:
-    """A group; each shared station is written once a view, in full."""
-    return {**group_head_to_json(group), "views": [view_to_json(view) for view in group.views]}
+    """A group; each shared station is written once a view, in full, and so is what was read of paint."""
+    whole = {**group_head_to_json(group), "views": [view_to_json(view) for view in group.views]}
+    if group.paint:
+        whole["paint"] = {view: reading_to_json(read) for view, read in group.paint.items()}
+    return whole
 
 
 def group_from_json(value: Mapping[str, Any]) -> Group:
@@ -349,7 +353,13 @@ def group_from_json(value: Mapping[str, Any]) -> Group:
         split=value["split"],
         label=value["label"],
         positions=positions_from_json(value.get("positions")),
+        paint={view: reading_from_json(read) for view, read in value.get("paint", {}).items()},
     )
+
+
+def paint_to_json(paint: Mapping[str, PaintReading]) -> dict[str, Json]:
+    """Digest of what was read by view; the reading itself is kept once, under it."""
+    return {view: reading.digest for view, reading in paint.items()}
 
 
 def positions_to_json(positions: Mapping[str, SharedPosition]) -> dict[str, Json]:
@@ -370,10 +380,10 @@ def positions_from_json(value: Mapping[str, Any] | None) -> dict[str, SharedPosi
 def group_head_to_json(group: Group) -> dict[str, Json]:
     """What a group is without its views.
 
-    ``positions`` stand there only where there are any, so that digests of all other groups are
-    what they always were.
+    ``positions`` and ``paint`` stand there only where there are any, so that digests of all other
+    groups are what they always were.
     """
-    shared = positions_to_json(group.positions)
+    shared, read = positions_to_json(group.positions), paint_to_json(group.paint)
     return {
         "key": group.key,
         "match": group.match,
@@ -381,6 +391,7 @@ def group_head_to_json(group: Group) -> dict[str, Json]:
         "split": group.split,
         "label": group.label,
         **({"positions": shared} if shared else {}),
+        **({"paint": read} if read else {}),
     }
 
 

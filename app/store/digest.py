@@ -12,6 +12,7 @@ from app.store.codecs import (
     ball_to_json,
     canonical,
     group_head_to_json,
+    paint_to_json,
     positions_to_json,
     station_to_json,
     view_to_json,
@@ -43,21 +44,35 @@ def view_digest(view: View) -> str:
 
 
 def inputs_hash(
-    pitch: Pitch, views: Iterable[tuple[str, str]], positions: Mapping[str, SharedPosition]
+    pitch: Pitch,
+    views: Iterable[tuple[str, str]],
+    positions: Mapping[str, SharedPosition],
+    paint: Mapping[str, str],
 ) -> str:
     """Digest of what solving a group reads, from (view digest, station digest) in order of views.
 
     Made of digests, so that a station shared by a thousand groups costs a thousand short sums.
-    A group without shared positions keeps the digest that it always had.
+    A group without shared positions and paint keeps the digest that it always had.
+
+    Args:
+        pitch: The pitch.
+        views: Digests of each view and its station.
+        positions: What the match shares, by view.
+        paint: Digest of what was read of the picture's paint, by view.
     """
     parts: list[Json] = [float(pitch.length), float(pitch.width), [list(pair) for pair in views]]
-    return digest([*parts, positions_to_json(positions)] if positions else parts)
+    if positions or paint:
+        parts.append(positions_to_json(positions))
+    if paint:
+        parts.append(dict(paint))
+    return digest(parts)
 
 
-def group_inputs_hash(group: Group) -> str:
-    """``inputs_hash`` of a group at hand."""
+def group_inputs_hash(group: Group, paint: Mapping[str, str] | None = None) -> str:
+    """``inputs_hash`` of a group at hand; ``paint`` as there, where the readings are not."""
     pairs = ((view_digest(view), station_digest(view.station)) for view in group.views)
-    return inputs_hash(group.pitch, pairs, group.positions)
+    read = paint_to_json(group.paint) if paint is None else paint
+    return inputs_hash(group.pitch, pairs, group.positions, read)
 
 
 def source_hash(group: Group) -> str:

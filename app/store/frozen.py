@@ -16,6 +16,7 @@ from sqlalchemy import insert, select
 from sqlalchemy.orm import Session
 
 from app.soccer.group import Group, Station, View
+from app.soccer.paint_evidence import reading_from_json
 from app.soccer.pitch import Pitch
 from app.store.codecs import (
     Json,
@@ -33,6 +34,7 @@ from app.store.solutions import read_calibration_bodies
 from app.store.version_models import FrozenModel
 
 SAID, STATION, SOLUTION, CALIBRATION = "said:", "station:", "solution:", "calibration:"
+PAINT = "paint:"
 
 Frames = Mapping[str, Mapping[str, Any]]
 """By view: ``path``, ``member``, ``frame``, ``flipped``, and the frame's size and checksum."""
@@ -47,8 +49,9 @@ class FrozenSaid:
 
 
 def freeze_said(group: Group) -> FrozenSaid:
-    """A group as canonical JSON without media; a shared station is a text of its own."""
-    texts: dict[str, str] = {}
+    """A group as canonical JSON without media; a shared station is a text of its own, and so is what
+    was read of a picture's paint."""
+    texts = {PAINT + reading.digest: reading.text for reading in group.paint.values()}
     views = []
     for view in group.views:
         station = _station(view.station)
@@ -69,15 +72,23 @@ def _station(station: Station) -> Json:
     return {name: value for name, value in station_to_json(station).items() if name != "flipped"}
 
 
-def station_keys(said: Json) -> set[str]:
-    """Keys of the shared stations that a frozen group names."""
-    return {view["station"] for view in said["views"] if isinstance(view["station"], str)}
+def named_texts(said: Json) -> set[str]:
+    """Keys of the shared stations and readings of paint that a frozen group names."""
+    stations = {view["station"] for view in said["views"] if isinstance(view["station"], str)}
+    return stations | {PAINT + digest for digest in said.get("paint", {}).values()}
 
 
-def thaw_group(said: Json, stations: Mapping[str, Json], frames: Frames | None = None) -> Group:
-    """Back from ``freeze_said``, with media where ``frames`` has them."""
+def thaw_group(said: Json, texts: Mapping[str, Json], frames: Frames | None = None) -> Group:
+    """Back from ``freeze_said``, with media where ``frames`` has them.
+
+    Args:
+        said: The frozen group.
+        texts: What it names, by key.
+        frames: Where pictures lie.
+    """
     known = frames or {}
-    views = tuple(_thaw_view(view, stations, known.get(view["key"])) for view in said["views"])
+    views = tuple(_thaw_view(view, texts, known.get(view["key"])) for view in said["views"])
+    paint = said.get("paint", {}).items()
     return Group(
         key=said["key"],
         views=views,
@@ -86,6 +97,7 @@ def thaw_group(said: Json, stations: Mapping[str, Json], frames: Frames | None =
         split=said["split"],
         label=said["label"],
         positions=positions_from_json(said.get("positions")),
+        paint={view: reading_from_json(texts[PAINT + digest]) for view, digest in paint},
     )
 
 

@@ -54,14 +54,23 @@ def view_values(view: View, position: int) -> dict[str, Any]:
     }
 
 
+def paint_text(paint: Mapping[str, str]) -> str | None:
+    """The column of what was read of a group's pictures, by digest; None where nothing was."""
+    return codecs.canonical(dict(paint)) if paint else None
+
+
 def positions_text(group: Group) -> str | None:
     """The column of a group's shared positions; None where it has none."""
     shared = codecs.positions_to_json(group.positions)
     return codecs.canonical(shared) if shared else None
 
 
-def head_values(group: Group) -> dict[str, Any]:
-    """Columns of a group that follow from its value."""
+def head_values(group: Group, paint: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """Columns of a group that follow from its value.
+
+    ``paint`` are the digests of what was read of its pictures, where the readings are not at hand.
+    """
+    read = codecs.paint_to_json(group.paint) if paint is None else paint
     return {
         "key": group.key,
         "match": group.match,
@@ -70,7 +79,8 @@ def head_values(group: Group) -> dict[str, Any]:
         "pitch_length": group.pitch.length,
         "pitch_width": group.pitch.width,
         "positions": positions_text(group),
-        "inputs_hash": group_inputs_hash(group),
+        "paint": paint_text(read),
+        "inputs_hash": group_inputs_hash(group, read),
     }
 
 

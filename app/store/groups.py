@@ -17,6 +17,7 @@ from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, SharedPosition, Station, View
+from app.soccer.paint_evidence import PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
@@ -24,7 +25,14 @@ from app.soccer.reasons import LeftOut
 from app.store import codecs
 from app.store.datasets import policy_of
 from app.store.digest import inputs_hash, station_digest, view_digest
-from app.store.group_rows import NewRows, head_values, positions_text, station_values, view_values
+from app.store.group_rows import (
+    NewRows,
+    head_values,
+    paint_text,
+    positions_text,
+    station_values,
+    view_values,
+)
 from app.store.models import (
     DatasetModel,
     GroupModel,
@@ -32,6 +40,7 @@ from app.store.models import (
     StationModel,
     ViewModel,
 )
+from app.store.paint import paint_digests, read_readings
 
 
 @dataclass(frozen=True)
@@ -143,8 +152,10 @@ def read_groups(
         views.setdefault(row.id, []).append(view)
         if view.station_id not in stations:
             stations[view.station_id] = stored_station(_StationRow._make(row[_STATION_START:]))
+    named = {d for row in heads.values() for d in paint_digests(row.paint).values()}
+    readings = read_readings(session, named) if named else {}
     return {
-        number: _stored_group(heads[number], views.get(number, []), stations)
+        number: _stored_group(heads[number], views.get(number, []), stations, readings)
         for number in ids
         if number in heads
     }
@@ -169,7 +180,10 @@ def read_stations(session: Session, ids: Iterable[int]) -> dict[int, StoredStati
 
 
 def _stored_group(
-    head: Any, rows: Sequence[Any], stations: Mapping[int, StoredStation]
+    head: Any,
+    rows: Sequence[Any],
+    stations: Mapping[int, StoredStation],
+    readings: Mapping[str, PaintReading],
 ) -> StoredGroup:
     group = Group(
         key=head.key,
@@ -179,6 +193,7 @@ def _stored_group(
         split=head.split,
         label=head.label,
         positions={} if head.positions is None else _positions(head.positions),
+        paint={} if head.paint is None else _paint(head.paint, readings),
     )
     return StoredGroup(
         id=head.id,
@@ -229,6 +244,11 @@ def stored_station(row: Any) -> StoredStation:
     return StoredStation(
         row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
     )
+
+
+def _paint(text: str, readings: Mapping[str, PaintReading]) -> dict[str, PaintReading]:
+    with codecs.as_written():
+        return {view: readings[digest] for view, digest in paint_digests(text).items()}
 
 
 def _positions(text: str) -> dict[str, SharedPosition]:
@@ -300,7 +320,9 @@ def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
         stored,
         revision=stored.revision + 1,
         changed=at,
-        inputs_hash=inputs_hash(group.pitch, pairs, group.positions),
+        inputs_hash=inputs_hash(
+            group.pitch, pairs, group.positions, codecs.paint_to_json(group.paint)
+        ),
         group=group,
         stations=stations,
         view_digests=digests,
@@ -321,6 +343,7 @@ def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> 
     pitch = after.group.pitch
     values |= {"pitch_length": pitch.length, "pitch_width": pitch.width}
     values["positions"] = positions_text(after.group)
+    values["paint"] = paint_text(codecs.paint_to_json(after.group.paint))
     _update(session, GroupModel.__table__, after.id, values)
 
 
@@ -434,6 +457,7 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
             GroupModel.pitch_length,
             GroupModel.pitch_width,
             GroupModel.positions,
+            GroupModel.paint,
             ViewModel.digest,
             StationModel.digest.label("station_digest"),
         )
@@ -451,7 +475,8 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
     for key, row in heads.items():
         positions = {} if row.positions is None else _positions(row.positions)
         pitch = Pitch(row.pitch_length, row.pitch_width)
-        rows.append({"id": key, "inputs_hash": inputs_hash(pitch, pairs[key], positions)})
+        digest = inputs_hash(pitch, pairs[key], positions, paint_digests(row.paint))
+        rows.append({"id": key, "inputs_hash": digest})
     session.execute(update(GroupModel), rows)
 
 

@@ -59,6 +59,39 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
     return data
 
 
+def read_pixels(
+    media: Media, settings: Settings, known: str = ""
+) -> tuple[str, npt.NDArray[np.uint8] | None]:
+    """Digest of a frame's bytes, and its pixels: red green blue, shape (H, W, 3).
+
+    The frame of a video has no bytes of its own; its pixels are digested.
+
+    Args:
+        media: Where it lies.
+        settings: Limits.
+        known: A digest; the frame of these bytes is not decoded, its pixels are None.
+
+    Raises:
+        NotFoundError, ImageError, TooLargeError: As ``read_frame`` does.
+    """
+    _require_contained(Path(media.path), settings)
+    if media.frame is not None:
+        picture = _video_frame(Path(media.path), media.frame, settings)
+        digest = _digest(np.ascontiguousarray(picture).tobytes())
+    else:
+        data = _source(media, settings)
+        digest = _digest(data)
+        if digest != known:
+            picture = _pixels(data, settings, frame_name(media))
+    if digest == known:
+        return digest, None
+    return digest, np.ascontiguousarray(picture[:, :, ::-1])
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:32]
+
+
 def cached_frame(
     media: Media, width: int | None, flipped: bool, settings: Settings
 ) -> bytes | None:

@@ -66,7 +66,8 @@ class StationModel(Base):
 class GroupModel(Base):
     """A group; ``source_hash`` is that of the whole group as the dataset last brought it.
 
-    ``positions`` (JSON by view) is what its match says of where cameras stand.
+    ``positions`` (JSON by view) is what its match says of where cameras stand, ``paint`` (JSON by
+    view) names what was read of the pictures' paint.
     """
 
     __tablename__ = "groups"
@@ -85,6 +86,7 @@ class GroupModel(Base):
     pitch_length: Mapped[float]
     pitch_width: Mapped[float]
     positions: Mapped[str | None]
+    paint: Mapped[str | None]
     revision: Mapped[int]
     changed: Mapped[str]
     inputs_hash: Mapped[str]
@@ -147,6 +149,20 @@ class ImportFindingModel(Base):
     view: Mapped[str | None]
     kind: Mapped[str]
     sentence: Mapped[str]
+
+
+class PaintEvidenceModel(Base):
+    """What was read of the paint of a picture (compressed JSON), under its own digest.
+
+    Rows are inserted, never changed (a trigger sees to it) and go with their dataset; groups and the
+    log name them.
+    """
+
+    __tablename__ = "paint_evidence"
+
+    digest: Mapped[str] = mapped_column(primary_key=True)
+    dataset_id: Mapped[int] = mapped_column(ForeignKey("dataset.id"), primary_key=True)
+    body: Mapped[bytes] = mapped_column(LargeBinary)
 
 
 class CalibrationModel(Base):

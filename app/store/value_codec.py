@@ -24,7 +24,11 @@ Codec = tuple[Callable[[Any], Any], Callable[[Any], Any]]
 
 
 def to_json(value: Any) -> Any:
-    """A dataclass of numbers, texts, tuples and other dataclasses as JSON values."""
+    """A dataclass of numbers, texts, tuples and other dataclasses as JSON values.
+
+    A field that came later (``metadata``) stands there only where it says something, so that what
+    was computed before it came is the same bytes.
+    """
     return _codec(type(value))[0](value)
 
 
@@ -87,14 +91,24 @@ def _compiled(hint: Any) -> Codec:
 def _dataclass_codec(kind: Any) -> Codec:
     hints = typing.get_type_hints(kind)
     codecs = [(item.name, *_codec(hints[item.name])) for item in dataclasses.fields(kind)]
+    later = {
+        item.name: item.default for item in dataclasses.fields(kind) if "later" in item.metadata
+    }
+
+    def whole(value: Any) -> Any:
+        return {name: to(getattr(value, name)) for name, to, _ in codecs}
 
     def encode(value: Any) -> Any:
-        return {name: to(getattr(value, name)) for name, to, _ in codecs}
+        written = whole(value)
+        for name, default in later.items():
+            if getattr(value, name) == default:
+                del written[name]
+        return written
 
     def decode(value: Any) -> Any:
         return kind(**{name: back(value[name]) for name, _, back in codecs if name in value})
 
-    return encode, decode
+    return encode if later else whole, decode
 
 
 def _optional_codec(arguments: tuple[Any, ...]) -> Codec:

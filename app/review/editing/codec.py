@@ -13,6 +13,7 @@ from app.review.editing.edit import (
     SetBalls,
     SetCalibrationSource,
     SetLines,
+    SetPaint,
     SetPicture,
     SetPitch,
     SetPositions,
@@ -30,6 +31,7 @@ from app.store.codecs import (
     camera_to_json,
     covariance_from_json,
     covariance_to_json,
+    paint_to_json,
     picture_from_json,
     picture_to_json,
     positions_from_json,
@@ -58,6 +60,8 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
             return {"edit": "set_pitch", "length": float(length), "width": float(width)}
         case SetPositions(positions):
             return {"edit": "set_positions", "positions": positions_to_json(positions)}
+        case SetPaint(paint):
+            return {"edit": "set_paint", "paint": paint_to_json(paint)}
         case SetStationLines(lines):
             return {"edit": "set_station_lines", "lines": _lines_to_json(lines)}
         case SetStationCalibration(calibration):

@@ -15,6 +15,7 @@ from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, SharedPosition, Station, View
+from app.soccer.paint_evidence import PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
 from app.soccer.reasons import left_out
@@ -272,6 +273,22 @@ class SetPositions:
     def inverse(self, group: Group) -> SetPositions:
         """The positions as they were."""
         return SetPositions(group.positions)
+
+
+@dataclass(frozen=True)
+class SetPaint:
+    """Say what was read of the paint in the pictures of a group's views, by view."""
+
+    paint: Mapping[str, PaintReading]
+
+    def apply(self, group: Group) -> Group:
+        """The group with these readings, for views that it has."""
+        known = {view: read for view, read in self.paint.items() if group.view(view) is not None}
+        return replace(group, paint=known)
+
+    def inverse(self, group: Group) -> SetPaint:
+        """The readings as they were."""
+        return SetPaint(group.paint)
 
 
 STATION_EDITS = (SetLines, SetCalibrationSource, SetPicture)

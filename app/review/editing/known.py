@@ -7,14 +7,15 @@ from collections.abc import Iterable
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import view_key
+from app.solving.calibrate import view_keys
 from app.store.session import Session
 from app.store.solutions import read_calibrations
 
 
 def calibration_keys(groups: Iterable[Group], policy: Policy) -> set[str]:
-    """Keys of the calibrations that groups need under a policy."""
-    return {view_key(group, view, policy.calibration) for group in groups for view in group.views}
+    """Keys of the calibrations that groups need under a policy, or that those start from."""
+    part = policy.calibration
+    return {key for group in groups for view in group.views for key in view_keys(group, view, part)}
 
 
 def known_calibrations(

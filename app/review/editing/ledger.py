@@ -12,7 +12,7 @@ from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import Policy
-from app.store.codecs import extras_from_json, unpack
+from app.store.codecs import extras_from_json, paint_to_json, unpack
 from app.store.datasets import dataset_rows, policy_of
 from app.store.digest import group_inputs_hash
 from app.store.groups import StoredGroup
@@ -45,7 +45,10 @@ class ViewRecord:
 
 @dataclass
 class GroupRecord:
-    """A group without its views, which follow in order."""
+    """A group without its views, which follow in order.
+
+    ``paint`` are the digests of what was read of their pictures; the log holds no more of it.
+    """
 
     dataset_id: int
     number: int
@@ -54,6 +57,7 @@ class GroupRecord:
     source_hash: str
     head: Group
     views: list[ViewRecord]
+    paint: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass
@@ -74,7 +78,7 @@ class Ledger:
     noticed: set[tuple[int | None, int | None, str | None, str]] = field(default_factory=set)
 
     def group(self, group_id: int) -> Group:
-        """A group whole, with the stations as they are now."""
+        """A group whole but for the paint of its pictures, with the stations as they are now."""
         record = self.groups[group_id]
         views = (
             replace(item.view, station=self.stations[item.station_id].station)
@@ -84,7 +88,7 @@ class Ledger:
 
     def inputs_hash(self, group_id: int) -> str:
         """Digest of everything that solving the group reads."""
-        return group_inputs_hash(self.group(group_id))
+        return group_inputs_hash(self.group(group_id), self.groups[group_id].paint)
 
 
 def without_station(view: View) -> View:
@@ -129,6 +133,7 @@ def _group_record(stored: StoredGroup) -> GroupRecord:
         revision=stored.revision,
         changed=stored.changed,
         source_hash=stored.source_hash,
-        head=replace(stored.group, views=()),
+        head=replace(stored.group, views=(), paint={}),
         views=views,
+        paint=paint_to_json(stored.group.paint),
     )

@@ -332,8 +332,8 @@ def _proposed(pitches: Sequence[Pitch], estimate: PitchEstimate) -> Pitch | None
 
 def _inputs(lines: str, policy: CalibrationPolicy) -> str:
     """Key of an estimate: all that it is computed from."""
-    # Where the camera stands has no part in it: every frame finds that for itself.
-    own = replace(policy, share_position=False)
+    # Where the camera stands has no part in it, nor has paint: every frame's lines say it.
+    own = replace(policy, share_position=False, source="lines")
     return digest([SOLVER_VERSION, digested_calibration(own), lines])
 
 

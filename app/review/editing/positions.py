@@ -276,8 +276,10 @@ def _state(item: MatchPositions, then: str | None, policy: CalibrationPolicy) ->
 
 def _inputs(item: MatchPositions, policy: CalibrationPolicy) -> str:
     """Key of what is estimated: all that it is computed from."""
-    # Whether the policy uses it changes nothing of that.
-    return digest([SOLVER_VERSION, asdict(replace(policy, share_position=True)), item.inputs])
+    # Whether the policy uses it changes nothing of that, nor does paint: lines alone say it.
+    values = asdict(replace(policy, share_position=True))
+    del values["source"]
+    return digest([SOLVER_VERSION, values, item.inputs])
 
 
 def _chosen(

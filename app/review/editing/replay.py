@@ -31,6 +31,7 @@ from app.store.codecs import (
 from app.store.digest import station_digest, view_digest
 from app.store.group_rows import head_values, station_values, view_values
 from app.store.log import LogEntry, read_log, verify_chain
+from app.store.paint import PAINT
 from app.store.pitches import PITCH
 from app.store.positions import POSITION
 from app.store.projection import rewrite
@@ -130,7 +131,7 @@ def _import(ledger: Ledger, entry: LogEntry) -> None:
     for station_id in gone:
         if not ledger.stations[station_id].station.shared:
             del ledger.stations[station_id]
-    record.head = _head(body["group"])
+    record.head, record.paint = _head(body["group"]), dict(body["group"].get("paint", {}))
     record.source_hash = body["source_hash"]
     record.revision, record.changed = record.revision + 1, entry.at
     _notice(ledger, entry.group_id, None, body.get("kept", []))
@@ -173,6 +174,13 @@ def _edit(ledger: Ledger, entry: LogEntry) -> None:
         if after.station != before.station:
             _save_station(ledger, record.dataset_id, item.station_id, after.station, None)
     record.head = replace(record.head, pitch=changed.pitch, positions=changed.positions)
+    record.revision, record.changed = record.revision + 1, entry.at
+
+
+def _paint(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.group_id is not None
+    record = ledger.groups[entry.group_id]
+    record.paint = dict(entry.body["edit"]["paint"])
     record.revision, record.changed = record.revision + 1, entry.at
 
 
@@ -280,7 +288,7 @@ def _rows(ledger: Ledger) -> dict[str, list[dict[str, Any]]]:
 def _group_row(ledger: Ledger, group_id: int) -> dict[str, Any]:
     record = ledger.groups[group_id]
     return {
-        **head_values(ledger.group(group_id)),
+        **head_values(ledger.group(group_id), record.paint),
         "id": group_id,
         "dataset_id": record.dataset_id,
         "number": record.number,
@@ -305,6 +313,7 @@ _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
     "redo": _edit,
     PITCH: _edit,
     POSITION: _edit,
+    PAINT: _paint,
     "station_edit": _station_edit,
     "station_undo": _station_edit,
     "station_redo": _station_edit,

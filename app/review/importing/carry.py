@@ -82,8 +82,8 @@ def carried_group(group: Group) -> dict[str, Json]:
         value = view_to_json(view, view.station.key if view.station.shared else None)
         del value["media"]
         views.append(value)
-    # Where a match puts its cameras follows from its lines, there as here.
-    return {**group_head_to_json(replace(group, positions={})), "views": views}
+    # Where a match puts its cameras follows from its lines, and paint is read in pictures, there as here.
+    return {**group_head_to_json(replace(group, positions={}, paint={})), "views": views}
 
 
 def _write_lines(path: Path, items: Iterator[Json]) -> int:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from app.progress import Progress
 from app.review.datasets.dataset import insert_dataset
-from app.review.editing.edit import SetPositions
+from app.review.editing.edit import SetPaint, SetPositions
 from app.review.editing.pitches import give_pitch
 from app.review.editing.shared_stations import SharedStations
 from app.review.editing.upstream import KIND, Kept, follow_group
@@ -254,6 +254,8 @@ def _follow(
         # What the match shares comes from its other pictures.
         shared_here = SetPositions(stored.group.positions).apply(followed.group)
         followed = replace(followed, group=shared_here)
+    # What was read of a picture says of which, and is read again where that is another.
+    followed = replace(followed, group=SetPaint(stored.group.paint).apply(followed.group))
     save_group(
         session, stored, followed.group, at=at, source=followed.base, digest=digest, shared=shared
     )

@@ -161,7 +161,7 @@ def _lines(state: GroupState) -> Iterator[tuple[str, tuple[float, float]]]:
         return
     for view, solved in zip(state.group.views, state.solution.views, strict=True):
         calibration, size = solved.calibration, view.size
-        if calibration.source == "lines" and calibration.covariance is not None:
+        if calibration.source != "given" and calibration.covariance is not None:
             left_out = {suspect.marking for suspect in calibration.suspects}
             lines = {k: at for k, at in view.station.lines.items() if k not in left_out}
             try:

@@ -27,13 +27,14 @@ from app.solving.solve import solve
 from app.store.codecs import Json
 from app.store.frozen import (
     CALIBRATION,
+    PAINT,
     SAID,
     SOLUTION,
     STATION,
     digest_of,
     json_of,
+    named_texts,
     read_frozen,
-    station_keys,
     text_of,
     thaw_group,
 )
@@ -237,7 +238,7 @@ class _Tasks:
     def _task(self, rows: tuple[VersionGroup, ...], frozen: Mapping[str, bytes]) -> VerifyTask:
         sound = (row for row in rows if not _missing(row, frozen))
         said = (json_of(frozen[row.said or ""]) for row in sound)
-        known = self._known([thaw_group(value, _stations(value, frozen)) for value in said])
+        known = self._known([thaw_group(value, _texts(value, frozen)) for value in said])
         policy = self._version.policy
         return VerifyTask(rows, frozen, known, policy, self._splitter)
 
@@ -258,7 +259,7 @@ def _named_parts(row: VersionGroup, frozen: Mapping[str, bytes]) -> set[str]:
     """Keys that the annotations and the solution of a group name, as far as those are there."""
     names: set[str] = set()
     if row.said is not None and row.said in frozen:
-        names |= station_keys(json_of(frozen[row.said]))
+        names |= named_texts(json_of(frozen[row.said]))
     if row.solution is not None and row.solution in frozen:
         names |= calibration_names(json_of(frozen[row.solution]))
     return names
@@ -270,8 +271,8 @@ def _missing(row: VersionGroup, frozen: Mapping[str, bytes]) -> list[str]:
     return sorted(wanted - frozen.keys())
 
 
-def _stations(said: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
-    return {key: json_of(frozen[key]) for key in station_keys(said)}
+def _texts(said: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
+    return {key: json_of(frozen[key]) for key in named_texts(said)}
 
 
 def _differences(
@@ -284,7 +285,7 @@ def _differences(
     try:
         yield from _frozen_differences(row, task)
         said = json_of(task.frozen[row.said or ""])
-        group = thaw_group(said, _stations(said, task.frozen))
+        group = thaw_group(said, _texts(said, task.frozen))
         yield from _split_differences(row, group, task.splitter)
         yield from _solution_differences(row, group, task, known)
     except Exception as error:
@@ -296,10 +297,10 @@ def _frozen_differences(row: VersionGroup, task: VerifyTask) -> Iterator[Differe
     """Parts that are not what their key says."""
     said = task.frozen[row.said or ""]
     parts = {row.said or "": text_of(said).encode()}
-    parts |= {key: text_of(task.frozen[key]).encode() for key in station_keys(json_of(said))}
+    parts |= {key: text_of(task.frozen[key]).encode() for key in named_texts(json_of(said))}
     parts[row.solution or ""] = task.frozen[row.solution or ""]
     for key, content in parts.items():
-        prefix = next(name for name in (SAID, STATION, SOLUTION) if key.startswith(name))
+        prefix = next(name for name in (SAID, STATION, PAINT, SOLUTION) if key.startswith(name))
         if prefix + digest_of(content) != key:
             yield Difference(row.key, "digest", key, prefix + digest_of(content))
 

@@ -14,7 +14,7 @@ from app.soccer.policy import Policy
 from app.soccer.solution import Solution
 from app.soccer.split import Split
 from app.store.codecs import Json, parse, policy_from_json
-from app.store.frozen import CALIBRATION, json_of, read_frozen, station_keys, thaw_group
+from app.store.frozen import CALIBRATION, json_of, named_texts, read_frozen, thaw_group
 from app.store.session import Session, Store
 from app.store.solutions import decode_calibration, decode_solution
 from app.store.verifications import Verification, read_verifications
@@ -139,7 +139,7 @@ def thaw(session: Session, version: Version, rows: Sequence[VersionGroup]) -> li
     require_frozen(keys, bodies)
     said = {row.key: json_of(bodies[row.said or ""]) for row in rows}
     solved = {row.key: json_of(bodies[row.solution or ""]) for row in rows}
-    shared = {key for value in said.values() for key in station_keys(value)}
+    shared = {key for value in said.values() for key in named_texts(value)}
     names = {name for value in solved.values() for name in calibration_names(value)}
     more = read_frozen(session, version.dataset_id, shared | names)
     require_frozen(shared | names, more)

@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
+from app.geometry.resection import parameters_from_camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
-from app.paint.snap import NO_PAINT, PAINT_DISAGREES, snap
+from app.paint.evidence import to_paint_evidence
+from app.paint.snap import snap
+from app.soccer.frames import ImageSize
+from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES, PaintReading
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.solving.calibrate import calibrate_paint
 from tests.unit.paint.test_grass import GRASS, picture
 
 
@@ -68,3 +75,23 @@ class TestSnap:
         start = panned(rendered.truth, 3.0)
         first, second = (snap(rendered.image, rendered.field, start) for _ in range(2))
         assert first.camera == second.camera
+
+
+class TestStored:
+    def test_solving_with_what_is_kept_gives_the_camera_that_the_picture_gave(self, rendered):
+        clicked = rendered.clicked
+        known = np.reshape(clicked.covariance, (8, 8))
+        found = snap(rendered.image, rendered.field, clicked.camera, start_covariance=known)
+        kept = to_paint_evidence(found.evidence, found.camera)
+        size = ImageSize(1280, 720)
+        again = calibrate_paint(
+            clicked, PaintReading("", "", kept), {}, Pitch(), size, CalibrationPolicy()
+        )
+        assert again.source == "paint"
+        moved = parameters_from_camera(again.camera, size.diagonal / 2) - parameters_from_camera(
+            found.camera, size.diagonal / 2
+        )
+        sigma = np.sqrt(np.diag(found.covariance))
+        assert np.abs(moved / sigma).max() < 0.1
+        told = np.sqrt(np.diag(np.reshape(again.covariance, (8, 8))))
+        assert told == pytest.approx(sigma, rel=0.02)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from app.errors import InputError
@@ -9,8 +11,11 @@ from app.finite import json_text
 from app.soccer.paint_evidence import (
     PaintEvidence,
     PaintPoint,
+    PaintReading,
     evidence_from_json,
     evidence_to_json,
+    reading_from_json,
+    reading_to_json,
 )
 
 
@@ -36,3 +41,34 @@ class TestCodec:
     def test_what_is_no_evidence_is_refused(self, value):
         with pytest.raises(InputError):
             evidence_from_json(value)
+
+
+POINTS = {"Middle line": (PaintPoint(1 / 3, 2.0, 0.05),)}
+READING = PaintReading("frame", "key", PaintEvidence(POINTS), None, 1 / 3, 0.5)
+
+
+class TestReading:
+    def test_every_digit_comes_back_and_so_does_the_digest(self):
+        again = reading_from_json(reading_to_json(READING))
+        assert (again, again.digest) == (READING, READING.digest)
+
+    @pytest.mark.parametrize(
+        "changes",
+        [
+            {"frame": "another"},
+            {"sought_for": "another"},
+            {"evidence": PaintEvidence({})},
+            {"evidence": PaintEvidence(POINTS, "0")},
+            {"reason": "no_paint"},
+            {"supported": None},
+            {"explained": 0.25},
+        ],
+        ids=lambda item: next(iter(item)),
+    )
+    def test_the_digest_is_that_of_all_of_it(self, changes):
+        assert replace(READING, **changes).digest != READING.digest
+
+    @pytest.mark.parametrize("value", [None, {}, {"frame": "", "sought_for": ""}])
+    def test_what_is_no_reading_is_refused(self, value):
+        with pytest.raises(InputError):
+            reading_from_json(value)

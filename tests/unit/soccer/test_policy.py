@@ -9,6 +9,7 @@ from app.soccer.policy import (
     STRICT,
     SUBJECTS,
     THRESHOLDS,
+    TOUCHLINE,
     CalibrationPolicy,
     Policy,
 )
@@ -31,10 +32,16 @@ class TestHash:
         sharing = replace(PAPER, calibration=CalibrationPolicy(share_position=True))
         assert sharing.hash != PAPER.hash
         assert sharing.calibration_hash != PAPER.calibration_hash
+        painted = replace(PAPER, calibration=CalibrationPolicy(source="paint"))
+        assert painted.hash == TOUCHLINE.hash != PAPER.hash
+        assert painted.calibration_hash != PAPER.calibration_hash
 
     def test_sharing_positions_has_no_part_in_what_keys_calibrations(self):
         """Those that were kept before it came stay known; the position itself keys the others."""
         assert repr(CalibrationPolicy(share_position=True)) == repr(CalibrationPolicy())
+
+    def test_paint_has_no_part_in_what_keys_calibrations_either(self):
+        assert repr(CalibrationPolicy(source="paint")) == repr(CalibrationPolicy())
 
     def test_tau_leaves_calibrations_alone(self):
         assert replace(PAPER, tau_percent=0.9).calibration_hash == PAPER.calibration_hash

@@ -7,11 +7,15 @@ import pytest
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, SharedPosition
+from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.store.codecs import group_from_json, group_to_json
 from app.store.digest import group_inputs_hash, source_hash, station_digest, view_digest
 
+READ = PaintReading(
+    "frame", "key", PaintEvidence({"Middle line": (PaintPoint(1.0, 2.0, 0.1),)}), None, 0.5, 0.5
+)
 NEAR = SharedPosition((0.0, 60.0, -15.0), (0.3, 0.3, 0.1))
 
 
@@ -42,6 +46,7 @@ class TestInputsHash:
             lambda g, c: with_station(g, given_covariance=(0.5,) * 64),
             lambda g, c: replace(g, positions={g.views[0].key: NEAR}),
             lambda g, c: with_station(g, picture=PictureGeometry(1.25)),
+            lambda g, c: replace(g, paint={g.views[0].key: READ}),
         ],
     )
     def test_changes_with_everything_that_solving_reads(self, group, camera, change) -> None:
@@ -60,8 +65,13 @@ class TestInputsHash:
         assert group_inputs_hash(change(group)) == group_inputs_hash(group)
         assert source_hash(change(group)) != source_hash(group)
 
+    def test_a_group_without_paint_has_the_hash_that_it_had_before_there_was_any(self) -> None:
+        bare = Group("g", ())
+        assert group_inputs_hash(bare) == "d840b118d89e0dcabd41d2a342024f39"
+
     def test_is_the_same_after_a_round_trip(self, group) -> None:
         group = replace(group, positions={group.views[0].key: NEAR})
+        group = replace(group, paint={group.views[0].key: READ})
         again = group_from_json(group_to_json(group))
         assert group_inputs_hash(again) == group_inputs_hash(group)
         assert source_hash(again) == source_hash(group)

@@ -14,7 +14,7 @@ import numpy as np
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.least_squares import require_determined
-from app.paint.evidence import Evidence, Traced
+from app.geometry.resection import KAPPA
 from app.solving.line_noise import line_noise
 
 SHARE = 0.05
@@ -29,6 +29,26 @@ LENS = 0.0006
 that grows with the fifth power of the radius, as a share of half the diagonal."""
 EXPECTED, LEAST = 1.0, 0.5
 """Standard deviation of a residual in units of its sigma: expected, and never below."""
+
+
+@dataclass(frozen=True)
+class PaintOffsets:
+    """Paint as one camera sees it beside its markings.
+
+    Attributes:
+        offsets: From the marking along its normal, pixels, shape (N,).
+        sigmas: Standard deviations of the offsets, pixels, shape (N,).
+        marking: Index into ``MARKINGS``, shape (N,).
+        jacobian: Derivative of the marking's place along the normal by the parameters,
+            shape (N, 8).
+        radii: Distance from the principal point, half diagonals, shape (N,).
+    """
+
+    offsets: FloatArray
+    sigmas: FloatArray
+    marking: IntArray
+    jacobian: FloatArray
+    radii: FloatArray
 
 
 @dataclass(frozen=True)
@@ -63,47 +83,35 @@ def _shares(sigmas: FloatArray) -> FloatArray:
 
 
 def paint_noise(
-    evidence: Evidence,
+    seen: PaintOffsets,
     robust: FloatArray,
     prior: FloatArray,
-    principal: FloatArray,
-    half_diagonal: float,
     information: FloatArray | None = None,
 ) -> PaintNoise | None:
     """Noise of the paint and covariance of the camera; None where the paint leaves it open.
 
     Args:
-        evidence: At the minimum.
+        seen: At the minimum.
         robust: Weight of each point by its residual, shape (N,).
         prior: Information of the parameters' own prior, a diagonal, shape (8,).
-        principal: Principal point, pixels, shape (2,).
-        half_diagonal: Half the diagonal of the picture, pixels.
         information: What the start knew of the parameters, shape (8, 8).
     """
-    traced = evidence.traced
-    root = np.sqrt(robust) / evidence.sigmas
-    rows, rest = traced.jacobian * root[:, None], evidence.offsets * root
+    root = np.sqrt(robust) / seen.sigmas
+    rows, rest = seen.jacobian * root[:, None], seen.offsets * root
     known = np.diag(prior) + (0.0 if information is None else information)
     try:
         require_determined(rows.T @ rows + known)
-        noise = line_noise(rest, rows, traced.marking, prior, EXPECTED, LEAST)
+        noise = line_noise(rest, rows, seen.marking, prior, EXPECTED, LEAST)
     except (DegenerateGeometryError, np.linalg.LinAlgError):
         return None
-    weighted = rows * marking_weights(traced.marking, evidence.sigmas)[:, None]
+    weighted = rows * marking_weights(seen.marking, seen.sigmas)[:, None]
     bread = np.linalg.inv(weighted.T @ rows + known)
-    shares = np.maximum(_shares(evidence.sigmas), max(noise.share, LEAST_SHARE))[:, None]
-    sums = np.zeros((int(traced.marking.max()) + 1, rows.shape[1]))
-    np.add.at(sums, traced.marking, np.sqrt(shares) * weighted)
+    shares = np.maximum(_shares(seen.sigmas), max(noise.share, LEAST_SHARE))[:, None]
+    sums = np.zeros((int(seen.marking.max()) + 1, rows.shape[1]))
+    np.add.at(sums, seen.marking, np.sqrt(shares) * weighted)
     meat = ((1 - shares) * weighted).T @ weighted + sums.T @ sums
-    lens = weighted.T @ (_further_distortion(traced, principal, half_diagonal) * root)
+    # Kappa moves a place by the third power of its radius, a further term by the fifth.
+    lens = weighted.T @ (seen.radii**2 * seen.jacobian[:, KAPPA] * root)
     meat = noise.variance * meat + LENS**2 * np.outer(lens, lens)
     covariance = bread @ (meat + known) @ bread
     return PaintNoise(noise.variance, float(shares.mean()), 0.5 * (covariance + covariance.T))
-
-
-def _further_distortion(traced: Traced, principal: FloatArray, half: float) -> FloatArray:
-    """What a fifth-power distortion of one half diagonal moves each place along its normal."""
-    radius = (traced.pixels - principal) / half
-    outwards: FloatArray = (radius * traced.normals).sum(axis=1)
-    moved: FloatArray = half * (radius**2).sum(axis=1) ** 2 * outwards
-    return moved

@@ -1,0 +1,212 @@
+"""Paint camera: a camera solved from the paint that was read in its picture.
+
+The clicks' camera starts it and says which line is which; the stored places of paint decide where
+it lies. No picture is needed here: what was read of one is a value (``soccer.paint_evidence``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+from app.geometry.resection import (
+    PARAMETERS,
+    ROLL,
+    Prior,
+    Sightings,
+    X,
+    Z,
+    residuals,
+)
+from app.soccer.frames import ImageSize
+from app.soccer.paint_evidence import PaintEvidence
+from app.soccer.pitch import MARKINGS, Pitch
+from app.solving.observations import pitch_curves, principal_point
+from app.solving.paint_noise import PaintNoise, PaintOffsets, marking_weights, paint_noise
+from app.solving.resect import (
+    MAIN_FREEDOM,
+    MAIN_MEAN,
+    MAIN_SIGMA,
+    ResectionProblem,
+    is_main_position,
+)
+
+ROBUST_PX = 1.0
+"""Scale of the soft-L1 loss of the first rounds, at 960 x 540."""
+STRICT_SIGMAS, STRICT_PX = 4.0, 0.3
+"""In the last rounds what lies farther off than so many sigmas, or pixels, counts little."""
+SOFT_ROUNDS, ROUNDS, SETTLED = 3, 40, 1e-4
+"""Rounds of the first kind, of both at most, and the move (in sigmas) that ends them."""
+WORST_PX, MOST_SURPRISING = 0.6, 60.0
+"""Paint disagrees where it does not lie on the markings in the end (median, at 960 x 540), or where
+the camera moved beyond what its clicks allow (squared sigmas of eight parameters: by chance 26
+once in a thousand)."""
+INNER_STEPS = 4
+DAMPING = 1e-4
+LEAST_UNIT = 0.6
+"""Pixels do not shrink below this share of theirs in small pictures: blur is in pixels."""
+
+
+@dataclass(frozen=True)
+class PaintProblem:
+    """What is known of a camera before its paint.
+
+    Attributes:
+        resection: Of its picture.
+        first: Parameters of the start, shape (8,).
+        information: What the start knows of them, shape (8, 8); None: nothing.
+    """
+
+    resection: ResectionProblem
+    first: FloatArray
+    information: FloatArray | None
+
+    @staticmethod
+    def of(
+        resection: ResectionProblem, first: FloatArray, covariance: FloatArray | None
+    ) -> PaintProblem:
+        """The problem of a start and its covariance."""
+        return PaintProblem(resection, first, None if covariance is None else _inverse(covariance))
+
+    @property
+    def unit(self) -> float:
+        """Pixels of this picture for a pixel at 960 x 540."""
+        return max(self.resection.unit, LEAST_UNIT)
+
+    def step(self, parameters: FloatArray, seen: PaintOffsets, strict: bool) -> FloatArray:
+        """Towards the paint: reweighted least squares on the offsets, made linear here."""
+        prior = self.prior(parameters)
+        information = np.diag(prior.sigma**-2.0)
+        pull = (prior.mean - parameters) * prior.sigma**-2.0
+        if self.information is not None:
+            information = information + self.information
+            pull = pull + self.information @ (self.first - parameters)
+        base = marking_weights(seen.marking, seen.sigmas) / seen.sigmas**2
+        moved: FloatArray = np.zeros(PARAMETERS)
+        for _ in range(INNER_STEPS):
+            weight = base * self._robust(seen.offsets - seen.jacobian @ moved, seen.sigmas, strict)
+            normal = (seen.jacobian * weight[:, None]).T @ seen.jacobian + information
+            normal[np.diag_indices(PARAMETERS)] *= 1 + DAMPING
+            right = seen.jacobian.T @ (weight * seen.offsets) + pull
+            moved = np.asarray(np.linalg.solve(normal, right))
+        return moved
+
+    def _robust(self, rest: FloatArray, sigmas: FloatArray, strict: bool) -> FloatArray:
+        if not strict:
+            weights: FloatArray = 1 / np.sqrt(1 + (rest / (ROBUST_PX * self.unit)) ** 2)
+            return weights
+        scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * self.unit)
+        return np.asarray((1 + (rest / scale) ** 2) ** -2.0)
+
+    def surprise(self, parameters: FloatArray) -> float:
+        """Squared distance from the start in its own sigmas; 0 where nothing is known of it."""
+        if self.information is None:
+            return 0.0
+        moved = parameters - self.first
+        return float(moved @ self.information @ moved)
+
+    def noise(self, parameters: FloatArray, seen: PaintOffsets) -> PaintNoise | None:
+        """Noise of the paint and covariance at a minimum; None where it leaves the camera open."""
+        robust = self._robust(seen.offsets, seen.sigmas, strict=True)
+        prior = self.prior(parameters).sigma ** -2.0
+        return paint_noise(seen, robust, prior, self.information)
+
+    def prior(self, parameters: FloatArray) -> Prior:
+        """The calibrator's: main cameras stand where main cameras stand, others anywhere."""
+        prior = self.resection.prior()
+        if is_main_position(parameters[X : Z + 1]):
+            offset = parameters[ROLL : Z + 1] - MAIN_MEAN
+            prior.mean[ROLL : Z + 1] = MAIN_MEAN
+            prior.sigma[ROLL : Z + 1] = MAIN_SIGMA * np.sqrt(
+                1 + (offset / MAIN_SIGMA) ** 2 / MAIN_FREEDOM
+            )
+        return prior
+
+
+@dataclass(frozen=True)
+class PaintCamera:
+    """A camera on its paint.
+
+    Attributes:
+        parameters: Shape (8,).
+        covariance: Of them, shape (8, 8).
+        error_px: Median distance of the paint from its markings, pixels.
+    """
+
+    parameters: FloatArray
+    covariance: FloatArray
+    error_px: float
+
+
+def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) -> PaintCamera | None:
+    """The camera that stored paint determines, near a start.
+
+    Args:
+        problem: What is known before.
+        evidence: Places of paint, pixels of the problem's size.
+        pitch: The pitch.
+
+    Returns:
+        None where the paint does not determine it, does not lie on the markings in the end, or
+        moves the camera farther than its start allows.
+    """
+    sightings, sigmas = _sightings(evidence, problem.resection.size)
+    if not len(sigmas):
+        return None
+    parameters = problem.first
+    for index in range(ROUNDS):
+        seen = offsets_of(problem, parameters, sightings, sigmas, pitch)
+        strict = index >= SOFT_ROUNDS
+        try:
+            moved = problem.step(parameters, seen, strict)
+        except np.linalg.LinAlgError:
+            return None
+        parameters = parameters + moved
+        if not np.isfinite(parameters).all():
+            return None
+        # The information of one exact place of paint is far above any start's.
+        if strict and float(np.abs(seen.jacobian @ moved).max()) < SETTLED * sigmas.min():
+            break
+    seen = offsets_of(problem, parameters, sightings, sigmas, pitch)
+    noise, error = problem.noise(parameters, seen), float(np.median(np.abs(seen.offsets)))
+    if (
+        noise is None
+        or error > problem.unit * WORST_PX
+        or problem.surprise(parameters) > MOST_SURPRISING
+    ):
+        return None
+    return PaintCamera(parameters, noise.parameters, error)
+
+
+def offsets_of(
+    problem: PaintProblem,
+    parameters: FloatArray,
+    sightings: Sightings,
+    sigmas: FloatArray,
+    pitch: Pitch,
+) -> PaintOffsets:
+    """Stored paint as a camera sees it; what lies beyond the end of its marking, across it."""
+    half = problem.resection.size.diagonal / 2
+    offsets, jacobians = residuals(parameters, pitch_curves(pitch), sightings, half)
+    radii = np.hypot(*sightings.pixels.T) / half
+    return PaintOffsets(offsets[:, 0], sigmas, sightings.curve, -jacobians[:, 0], radii)
+
+
+def _sightings(evidence: PaintEvidence, size: ImageSize) -> tuple[Sightings, FloatArray]:
+    """Places of paint by marking, pixels from the principal point, and their sigmas."""
+    rows = [
+        (index, *point)
+        for index, name in enumerate(MARKINGS)
+        for point in evidence.points.get(name, ())
+    ]
+    table = np.array(rows, dtype=np.float64).reshape(-1, 4)
+    pixels = np.ascontiguousarray(table[:, 1:3] - np.array(principal_point(size)))
+    return Sightings(pixels, table[:, 0].astype(np.int64), np.ones(len(table))), table[:, 3]
+
+
+def _inverse(covariance: FloatArray) -> FloatArray:
+    scale = np.sqrt(np.diag(covariance))
+    inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
+    return np.asarray(inverse / np.outer(scale, scale))

@@ -1,0 +1,46 @@
+"""Findings about paint: why a camera is that of its clicks although the policy wants the paint's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from app.soccer.group import Group, View
+from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES
+from app.soccer.policy import CalibrationPolicy
+from app.soccer.solution import Finding, ViewSolution
+from app.solving.calibrate import takes_paint, wanted_paint
+
+STAYS = "so its camera is that of the clicks"
+NEVER_READ = f"Nobody has read the paint of this view's picture, {STAYS}. Read the paint."
+READ_AGAIN = f"The paint of this view was read for other lines than it has now, {STAYS}. Read the paint again."
+SENTENCES = {
+    NO_PAINT: (
+        f"Too little paint is seen in this view's picture, {STAYS}. Nothing is wrong with it; a "
+        "sharper picture would make it more exact."
+    ),
+    NO_FRAME: (
+        f"The picture of this view is missing or cannot be read, {STAYS}. Put it where it was "
+        "imported from, and read the paint again."
+    ),
+    PAINT_DISAGREES: (
+        "The paint in this view's picture does not lie where its lines were drawn, so its camera is "
+        "that of the clicks. Look whether each line has the right label and lies on its paint, and "
+        "read the paint again."
+    ),
+}
+
+
+def paint_findings(
+    group: Group, view: View, solved: ViewSolution, policy: CalibrationPolicy
+) -> Iterator[Finding]:
+    """Why the camera of a view is not that of its paint; nothing where it is, or cannot be."""
+    if policy.source != "paint" or not takes_paint(view) or solved.calibration.camera is None:
+        return
+    fit, reading = solved.calibration.paint, wanted_paint(group, view, policy)
+    if reading is None:
+        yield Finding(NO_PAINT, NEVER_READ, view.key)
+    elif fit is None:
+        yield Finding(NO_PAINT, READ_AGAIN, view.key)
+    elif fit.reason is not None:
+        kind = PAINT_DISAGREES if fit.reason == PAINT_DISAGREES else NO_PAINT
+        yield Finding(kind, SENTENCES[fit.reason], view.key, number=float(fit.points))

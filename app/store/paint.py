@@ -1,0 +1,149 @@
+"""Paint in the database: what was read of pictures, and which reading gave it to which groups."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, cast
+
+from sqlalchemy import BindParameter, Table, bindparam, func, select
+from sqlalchemy.dialects.sqlite import insert
+from sqlalchemy.orm import Session
+
+from app.soccer.paint_evidence import PaintReading, reading_from_json
+from app.store.codecs import as_written, inflate, parse
+from app.store.log import LogEntry, read_log
+from app.store.models import GroupModel, LogModel, PaintEvidenceModel, StationModel, ViewModel
+
+PAINT = "paint"
+"""Kind of the log's entries that say what was read of a group's pictures."""
+_EVIDENCE = cast(Table, PaintEvidenceModel.__table__)
+_DIGESTS: BindParameter[Any] = bindparam("digests", expanding=True)
+_READINGS = (
+    select(_EVIDENCE.c.digest, func.min(_EVIDENCE.c.body).label("body"))
+    .where(_EVIDENCE.c.digest.in_(_DIGESTS))
+    .group_by(_EVIDENCE.c.digest)
+)
+_BATCH = 500
+
+
+def insert_readings(session: Session, dataset_id: int, readings: Iterable[PaintReading]) -> None:
+    """Keep readings under their digests; what is there already stays."""
+    rows = {reading.digest: zlib.compress(reading.text.encode()) for reading in readings}
+    if rows:
+        session.execute(
+            insert(_EVIDENCE).on_conflict_do_nothing(),
+            [
+                {"digest": digest, "dataset_id": dataset_id, "body": body}
+                for digest, body in rows.items()
+            ],
+        )
+
+
+def read_readings(session: Session, digests: Iterable[str]) -> dict[str, PaintReading]:
+    """Readings by digest; unknown ones are left out.
+
+    Raises:
+        DamagedError: A reading is not what its digest says.
+    """
+    wanted, found = sorted(set(digests)), {}
+    for start in range(0, len(wanted), _BATCH):
+        some = wanted[start : start + _BATCH]
+        for row in session.execute(_READINGS, {"digests": some}):
+            found[row.digest] = _reading(row.digest, row.body)
+    return found
+
+
+@lru_cache(maxsize=256)
+def _reading(digest: str, body: bytes) -> PaintReading:
+    with as_written():
+        reading = reading_from_json(parse(inflate(body)))
+        if reading.digest != digest:
+            raise ValueError(f"{digest} is the digest of another reading")
+    return reading
+
+
+def paint_digests(text: str | None) -> dict[str, str]:
+    """Digest of what was read by view, from the column of a group."""
+    if text is None:
+        return {}
+    with as_written():
+        return dict(parse(text))
+
+
+@dataclass(frozen=True)
+class MatchPaint:
+    """What was read of the pictures of one match.
+
+    Attributes:
+        groups: Ids of its groups.
+        views: Views of moving cameras with lines.
+        readings: What was read of them.
+    """
+
+    match: str
+    groups: tuple[int, ...]
+    views: int
+    readings: tuple[PaintReading, ...]
+
+
+def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
+    """What was read of the pictures of each match of a dataset, by name."""
+    group = GroupModel
+    statement = (
+        select(group.id, group.match, group.paint, func.count(StationModel.id).label("views"))
+        .outerjoin(ViewModel, ViewModel.group_id == group.id)
+        .outerjoin(
+            StationModel,
+            (StationModel.id == ViewModel.station_id)
+            & StationModel.shared.is_(False)
+            & (StationModel.lines != "{}"),
+        )
+        .where(group.dataset_id == dataset_id)
+        .group_by(group.id)
+        .order_by(group.match, group.number)
+    )
+    rows: dict[str, list[Any]] = {}
+    for row in session.execute(statement):
+        rows.setdefault(row.match, []).append(row)
+    return [_match(session, match, some) for match, some in rows.items()]
+
+
+def _match(session: Session, match: str, rows: Sequence[Any]) -> MatchPaint:
+    named = [digest for row in rows for digest in paint_digests(row.paint).values()]
+    readings = read_readings(session, named)
+    return MatchPaint(
+        match,
+        tuple(row.id for row in rows),
+        sum(row.views for row in rows),
+        tuple(readings[digest] for digest in named if digest in readings),
+    )
+
+
+def last_run(session: Session, dataset_id: int) -> list[LogEntry]:
+    """The entries of a dataset's newest reading that was not taken back; none where there is none."""
+    taken_back: set[str] = set()
+    runs: dict[str, list[LogEntry]] = {}
+    for entry in _entries(session, dataset_id):
+        back = entry.body.get("takes_back")
+        if back is not None:
+            taken_back.add(back)
+        else:
+            runs.setdefault(entry.body["run"], []).append(entry)
+    left = [run for run in runs if run not in taken_back]
+    return runs[left[-1]] if left else []
+
+
+def _entries(session: Session, dataset_id: int) -> Iterator[LogEntry]:
+    """Of the groups that a dataset has, oldest first."""
+    statement = (
+        select(LogModel.id)
+        .join(GroupModel, GroupModel.id == LogModel.group_id)
+        .where(LogModel.kind == PAINT, GroupModel.dataset_id == dataset_id)
+        .order_by(LogModel.id)
+    )
+    ids = list(session.scalars(statement))
+    for start in range(0, len(ids), _BATCH):
+        yield from read_log(session, LogModel.id.in_(ids[start : start + _BATCH]))

@@ -1,0 +1,202 @@
+"""A camera solved from stored paint: no picture is there, and none is needed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from app.geometry.camera import Camera
+from app.geometry.polyline import clip_polyline
+from app.soccer.group import Group, Station, View
+from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
+from app.soccer.picture import OPEN
+from app.soccer.pitch import MARKINGS, Pitch
+from app.soccer.policy import PAPER, TOUCHLINE
+from app.solving.calibrate import calibrate_view, view_key
+from app.solving.solve import solve
+from tests.balls import box_around
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, click
+
+SIGMA_PX = 0.08
+BALL = np.array([34.0, -2.0, -1.0])
+TOLD = TOUCHLINE.calibration
+
+
+def painted(camera: Camera, moved_px: float = 0.0) -> PaintEvidence:
+    """Paint every few pixels along each marking that a camera sees, to a tenth of a pixel."""
+    generator = np.random.default_rng(5)
+    points = {}
+    for marking in sorted(MARKINGS):
+        if marking.startswith("Goal"):
+            continue
+        seen = clip_polyline(
+            camera.project(Pitch().sample(marking, 0.3, 0.1)), SIZE.width, SIZE.height
+        )
+        if len(seen) < 10:
+            continue
+        near = seen[:: max(len(seen) // 40, 1)] + generator.normal(0, SIGMA_PX, (1, 2))
+        near = near + generator.normal(0, SIGMA_PX, near.shape) + moved_px
+        points[marking] = tuple(PaintPoint(x, y, SIGMA_PX) for x, y in near.round(4).tolist())
+    return PaintEvidence(points)
+
+
+@cache
+def clicked() -> Group:
+    """Two views with clicks that are a pixel off."""
+    views = tuple(
+        View(key, Station(key, SIZE, lines=click(camera, 1.0, seed)), (box_around(camera, BALL),))
+        for seed, (key, camera) in enumerate((("a", MAIN), ("b", BEHIND_GOAL)))
+    )
+    return Group("g", views)
+
+
+def read(group: Group, **changes) -> Group:
+    """The group, the paint of whose first picture was read."""
+    view = group.views[0]
+    key = view_key(group, view, PAPER.calibration)
+    reading = PaintReading("f" * 32, key, painted(MAIN), None, 0.9, 0.8)
+    return replace(group, paint={view.key: replace(reading, **changes)})
+
+
+def first(group: Group, policy=TOLD):
+    return calibrate_view(group, group.views[0], policy)
+
+
+def off(calibration) -> float:
+    return float(np.linalg.norm(calibration.camera.position - MAIN.position))
+
+
+class TestCamera:
+    def test_it_lies_where_the_paint_lies_and_its_covariance_holds_the_truth(self):
+        clicks, found = first(clicked()), first(read(clicked()))
+        assert (clicks.source, found.source) == ("lines", "paint")
+        assert off(found) < off(clicks) / 2
+        covariance = np.reshape(found.covariance, (8, 8))[3:6, 3:6]
+        moved = found.camera.position - MAIN.position
+        assert moved @ np.linalg.solve(covariance, moved) < 16.3
+        assert found.position_sigma_m < clicks.position_sigma_m / 3
+
+    def test_it_says_how_both_agree_and_is_measured_against_the_clicks(self):
+        clicks, found = first(clicked()), first(read(clicked()))
+        assert (found.paint.supported, found.paint.explained) == (0.9, 0.8)
+        assert found.paint.points > 200 and found.paint.error_px < 2 * SIGMA_PX
+        assert found.jac is not None and found.error_px != clicks.error_px
+
+    def test_the_same_paint_gives_the_same_bits(self):
+        assert first(read(clicked())) == first(read(clicked()))
+
+    def test_what_the_clicks_know_holds_what_the_paint_leaves_open(self):
+        whole = painted(MAIN)
+        name = max(whole.points, key=lambda marking: len(whole.points[marking]))
+        few = first(read(clicked(), evidence=PaintEvidence({name: whole.points[name]})))
+        clicks = first(clicked())
+        assert few.source == "paint"
+        assert off(few) < off(clicks) + 3 * clicks.position_sigma_m
+
+    @pytest.mark.parametrize("reason", ["no_paint", "paint_disagrees", "no_frame"])
+    def test_where_a_reason_was_read_the_clicks_stay(self, reason):
+        found = first(read(clicked(), reason=reason))
+        assert (found.source, found.paint.reason) == ("lines", reason)
+        assert replace(found, paint=None) == first(clicked())
+
+    def test_paint_that_contradicts_the_clicks_moves_nothing(self):
+        found = first(read(clicked(), evidence=painted(MAIN, moved_px=25.0)))
+        assert (found.source, found.paint.reason) == ("lines", "paint_disagrees")
+        assert found.camera == first(clicked()).camera
+
+    def test_without_a_place_of_paint_the_clicks_stay(self):
+        found = first(read(clicked(), evidence=PaintEvidence({})))
+        assert (found.source, found.paint.reason) == ("lines", "paint_disagrees")
+
+
+class TestKey:
+    def test_the_policy_of_lines_knows_nothing_of_paint(self):
+        group = read(clicked())
+        view = group.views[0]
+        assert view_key(group, view, PAPER.calibration) == view_key(
+            clicked(), view, PAPER.calibration
+        )
+        assert first(group, PAPER.calibration) == first(clicked(), PAPER.calibration)
+
+    def test_paint_that_was_not_read_leaves_the_key_of_the_clicks(self):
+        view = clicked().views[0]
+        assert view_key(clicked(), view, TOLD) == view_key(clicked(), view, PAPER.calibration)
+
+    def test_each_reading_has_a_key_of_its_own(self):
+        groups = (clicked(), read(clicked()), read(clicked(), supported=0.5))
+        assert len({view_key(group, group.views[0], TOLD) for group in groups}) == 3
+
+    def test_a_reading_for_other_lines_does_not_count(self):
+        group = read(clicked())
+        view = group.views[0]
+        fewer = dict(view.station.lines)
+        fewer.pop("Middle line", None)
+        fewer.popitem()
+        edited = group.with_view(replace(view, station=replace(view.station, lines=fewer)))
+        assert first(edited) == first(replace(edited, paint={}))
+        assert first(edited).paint is None
+
+    @pytest.mark.parametrize(
+        "changes", [{"shared": True}, {"given": MAIN}, {"picture": OPEN}], ids=lambda item: [*item]
+    )
+    def test_static_given_and_changed_pictures_take_no_paint(self, changes):
+        group = read(clicked())
+        view = group.views[0]
+        other = group.with_view(replace(view, station=replace(view.station, **changes)))
+        assert first(other).source != "paint"
+        bare = replace(other, paint={})
+        assert view_key(other, view, TOLD) == view_key(other, view, TOLD)
+        assert first(other) == first(bare)
+
+
+def kinds(group: Group, policy=TOUCHLINE):
+    said = solve(group, policy).findings
+    return {item.view: item for item in said if item.kind in ("no_paint", "paint_disagrees")}
+
+
+class TestFindings:
+    def test_the_policy_of_lines_asks_for_no_paint(self):
+        assert kinds(clicked(), PAPER) == {}
+
+    def test_a_view_without_a_reading_is_told_and_one_on_its_paint_is_not(self):
+        found = kinds(read(clicked()))
+        assert set(found) == {"b"}
+        assert (found["b"].kind, "Nobody has read" in found["b"].sentence) == ("no_paint", True)
+
+    def test_lines_that_changed_since_ask_for_another_reading(self):
+        group = read(clicked(), sought_for="another")
+        assert "for other lines" in kinds(group)["a"].sentence
+
+    @pytest.mark.parametrize(
+        ("reason", "kind", "words"),
+        [
+            ("no_paint", "no_paint", "Too little paint"),
+            ("no_frame", "no_paint", "missing"),
+            ("paint_disagrees", "paint_disagrees", "does not lie where"),
+        ],
+    )
+    def test_each_reason_is_told(self, reason, kind, words):
+        found = kinds(read(clicked(), reason=reason))["a"]
+        assert (found.kind, words in found.sentence) == (kind, True)
+
+
+class TestSolve:
+    def test_a_known_calibration_of_clicks_or_paint_changes_no_bit(self):
+        group = read(clicked())
+        whole = solve(group, TOUCHLINE)
+        known = {
+            view.calibration_key: view.calibration
+            for policy in (PAPER, TOUCHLINE)
+            for view in solve(group, policy).views
+        }
+        assert len(known) == 3
+        assert solve(group, TOUCHLINE, known) == whole
+
+    def test_the_ball_is_where_it_is_more_exactly(self):
+        group = read(clicked())
+        before, after = solve(group, PAPER).ball, solve(group, TOUCHLINE).ball
+        assert after.sigma_m < before.sigma_m
