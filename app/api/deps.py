@@ -23,6 +23,7 @@ from app.review.jobs.evaluations import resume_evaluations
 from app.review.jobs.exports import resume_exports
 from app.review.jobs.imports import resume_imports
 from app.review.jobs.jobs import Jobs, Pool
+from app.review.jobs.paint import resume_reading
 from app.review.jobs.solve import resume_solving, solve_leftovers
 from app.review.jobs.upkeep import Upkeep
 from app.review.jobs.versions import resume_versions
@@ -84,6 +85,7 @@ class Services:
         Thread(target=warm_up, daemon=True).start()
         self.frames.warm()
         resume_solving(self.jobs, self.store)
+        resume_reading(self.jobs, self.store)
         resume_exports(self.jobs, self.store, self.exports, self.frames)
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)

@@ -1,13 +1,15 @@
-"""Commands that read the paint of pictures: snap, agree; they need no dataset."""
+"""Commands that read the paint of pictures: of a dataset's, or of files (snap, agree)."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from app.commands.options import Json, read_settings
+from app.commands.opened import opened_store
+from app.commands.options import Json, Workers, read_settings
 from app.commands.terminal import print_json, say, show_progress
 
 commands = typer.Typer()
@@ -16,6 +18,51 @@ Images = Annotated[
     list[Path],
     typer.Argument(metavar="IMAGES...", exists=True, help="Folder, zip or files (jpg, png, webp)."),
 ]
+
+
+@commands.command()
+def paint(
+    dataset: Annotated[str, typer.Argument(metavar="DATASET", help="Name of the dataset.")],
+    match: Annotated[str | None, typer.Option(help="The pictures of this match alone.")] = None,
+    show: Annotated[
+        bool, typer.Option("--show", help="Read nothing: show what was read before.")
+    ] = False,
+    undo: Annotated[
+        bool, typer.Option("--undo", help="Give all groups what they had before the last reading.")
+    ] = False,
+    workers: Workers = None,
+    json_: Json = False,
+) -> None:
+    """Read the paint of a dataset's pictures: cameras are drawn onto it.
+
+    Pictures that were read for the lines that they have now are left alone. The policy must say
+    calibration.source paint, as touchline does; `touchline solve` computes what follows.
+    """
+    from app.review.editing.paint import get_paint, read_paint, take_back_paint
+
+    if show and undo:
+        raise typer.BadParameter("show what was read or take it back, one at a time")
+    with opened_store() as store:
+        if undo:
+            found = take_back_paint(store, dataset, actor="local")
+        elif show:
+            found = get_paint(store, dataset)
+        else:
+            with show_progress("Reading paint") as progress:
+                found = read_paint(
+                    store,
+                    dataset,
+                    None if match is None else [match],
+                    actor="local",
+                    children=workers,
+                    progress=progress,
+                )
+    items = [item for item in found.items if match in (None, item.match)]
+    if json_:
+        print_json([{**asdict(item), "sentence": item.sentence} for item in items])
+        return
+    for item in items:
+        say(f"{item.match}: {item.sentence}" if item.match else item.sentence)
 
 
 @commands.command()

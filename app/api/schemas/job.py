@@ -21,6 +21,7 @@ JobKind = Literal[
     "practice",
     "rig",
     "positions",
+    "paint",
 ]
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 

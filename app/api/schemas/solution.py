@@ -112,10 +112,29 @@ class CameraSigmaDocument(Document):
     k1: float
 
 
+class PaintFitDocument(Document):
+    """How a camera and the paint of its picture agree."""
+
+    supported: float | None = Field(
+        description="Share of the visible markings that have paint; null: not measured."
+    )
+    explained: float | None = Field(
+        description="Share of the line-like paint that lies near a marking; null: not measured."
+    )
+    points: int = Field(description="Places of paint that were read along the markings.")
+    error_px: float | None = Field(
+        description="Median distance of the paint from the markings; null where it places no camera."
+    )
+    reason: str | None = Field(
+        description="Why the camera is that of the clicks: `no_paint`, `paint_disagrees` or "
+        "`no_frame`; null where it is the paint's."
+    )
+
+
 class CalibrationDocument(Document):
     """The camera of a view and how well it is known."""
 
-    source: str = Field(description="`given` or `lines`.")
+    source: str = Field(description="`given`, `lines` or `paint`.")
     camera: Annotated[CameraDocument, BeforeValidator(_camera)] | None
     sigma: CameraSigmaDocument | None = Field(
         description="How well the camera is known; null for a given one of which nothing more is known."
@@ -128,6 +147,9 @@ class CalibrationDocument(Document):
     unobservable: list[str]
     markings: list[MarkingDocument]
     suspects: list[SuspectDocument]
+    paint: PaintFitDocument | None = Field(
+        description="How it and the paint agree; null where none was read for these lines."
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -1,0 +1,67 @@
+"""What is read of the paint in a dataset's pictures: shown, read, taken back."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath
+from app.api.jobs import ACCEPTED, job_answer
+from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply
+from app.api.schemas.job import JobDocument
+from app.api.schemas.paint import DatasetPaintDocument, PaintRequest
+from app.review.editing.paint import get_paint
+from app.review.jobs.paint import request_paint, take_paint_back
+
+router = APIRouter(prefix="/datasets/{dataset}/paint", tags=["datasets"])
+
+
+@router.get("", operation_id="listPaint", responses=responses(404))
+def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
+    """How many pictures of each match were read for their paint, and what came of it."""
+    return DatasetPaintDocument.model_validate(get_paint(store, dataset))
+
+
+@router.post(
+    "",
+    operation_id="readPaint",
+    status_code=202,
+    response_model=JobDocument,
+    responses={**responses(404, 409, 413, 415), **ACCEPTED},
+)
+def read_paint(
+    dataset: DatasetPath,
+    request: PaintRequest,
+    services: AppServices,
+    actor: Actor,
+    asked: AskedUnder,
+) -> Response:
+    """Read the paint of pictures and give it to their groups, which are solved again.
+
+    Pictures that were read for the lines that their view has now are left alone. An edit never
+    reads any; this does. 409 while the policy does not use paint.
+    """
+    reply = Reply(asked, job_answer)
+    job = request_paint(
+        services.jobs, services.store, dataset, request.match, actor=actor, keep=reply.keep
+    )
+    return reply.of(job)
+
+
+@router.delete(
+    "",
+    operation_id="takePaintBack",
+    status_code=202,
+    response_model=JobDocument,
+    responses={**responses(404, 409), **ACCEPTED},
+)
+def take_back_paint(
+    dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
+) -> Response:
+    """Give all groups what they had before paint was read last; the job solves them.
+
+    Once more takes back the reading before that one; 409 when there is none any more.
+    """
+    reply = Reply(asked, job_answer)
+    job = take_paint_back(services.jobs, services.store, dataset, actor=actor, keep=reply.keep)
+    return reply.of(job)

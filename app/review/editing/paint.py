@@ -1,0 +1,316 @@
+"""Paint: what is read of the paint in a dataset's pictures, given to its groups, and taken back.
+
+It is read when somebody asks for it, in processes of their own, and is data of the group from then
+on: ``solve`` needs no picture. Views whose picture was read for the clicks that they have now are
+left alone. A run can be killed anywhere; the next one goes on where it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from typing import Any
+
+from app.child import Allowance, ChildEnded
+from app.child_pool import ChildPool, PoolTask
+from app.errors import ConflictError, ImageError, NotFoundError
+from app.progress import Progress
+from app.review.datasets.dataset import Dataset, read_dataset
+from app.review.datasets.paint_reading import NOTHING, PaintTask, read_view_paint
+from app.review.editing.codec import edit_to_json
+from app.review.editing.edit import SetPaint
+from app.review.editing.known import known_calibrations
+from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, PaintReading
+from app.soccer.policy import CalibrationPolicy
+from app.solving.calibrate import clicks_key, takes_paint
+from app.store.clock import now
+from app.store.groups import StoredGroup, next_revision, read_groups, save_revision
+from app.store.log import Entry, append
+from app.store.paint import (
+    PAINT,
+    MatchPaint,
+    insert_readings,
+    last_run,
+    match_paint,
+    read_readings,
+)
+from app.store.queue import refresh_queue
+from app.store.session import Session, Store
+
+ALLOWANCE = Allowance(memory=2 * 2**30, processor=60.0, silence=180.0)
+"""For one picture; the first one of a process may have to wait for kernels to be compiled."""
+_A_CHILD = 6
+"""Groups that each child gets before they are written."""
+_BATCH = 100
+
+
+@dataclass(frozen=True)
+class PaintState:
+    """What was read of the pictures of one match.
+
+    Attributes:
+        groups: How many it has.
+        views: Views of moving cameras with lines.
+        read: How many of them were read.
+        painted: How many of those have a camera from their paint, as far as the lines are still
+            those that it was read for.
+        no_paint: How many show too little of it.
+        paint_disagrees: In how many it does not lie where the lines were drawn.
+        no_frame: How many have no picture that can be read.
+    """
+
+    match: str
+    groups: int
+    views: int
+    read: int
+    painted: int
+    no_paint: int
+    paint_disagrees: int
+    no_frame: int
+
+    @property
+    def sentence(self) -> str:
+        """What people read of it."""
+        if not self.read:
+            return f"the paint of none of {self.views} pictures was read"
+        parts = [f"{self.read} of {self.views} pictures were read: {self.painted} by their paint"]
+        parts += [
+            f"{count} {words}"
+            for count, words in (
+                (self.no_paint, "with too little paint"),
+                (self.paint_disagrees, "with paint that disagrees with the lines"),
+                (self.no_frame, "missing or unreadable"),
+            )
+            if count
+        ]
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True)
+class DatasetPaint:
+    """What was read of a dataset's pictures; ``used``: whether its policy uses it."""
+
+    dataset_id: int
+    dataset: str
+    used: bool
+    items: tuple[PaintState, ...]
+
+
+def get_paint(store: Store, dataset: str | int) -> DatasetPaint:
+    """What was read of the pictures of a dataset's matches.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        items = tuple(map(_state, match_paint(session, found.id)))
+    return DatasetPaint(found.id, found.name, found.policy.calibration.source == "paint", items)
+
+
+def read_paint(
+    store: Store,
+    dataset: str | int,
+    matches: Collection[str] | None = None,
+    *,
+    actor: str,
+    run: str | None = None,
+    children: int | None = None,
+    progress: Progress | None = None,
+) -> DatasetPaint:
+    """Read the paint of pictures and give it to their groups; stale until solved.
+
+    Views whose picture was read for the same lines before, and is the same, are left alone.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        matches: By name; None: all.
+        actor: Who wants it.
+        run: Name of this reading, by which it is taken back; None: the time.
+        children: How many pictures are read at once; None: as the settings say.
+        progress: Called with groups done and in all; an error that it raises ends the run.
+
+    Raises:
+        ConflictError: The dataset's policy does not use paint.
+        NotFoundError: There is no such dataset or match.
+    """
+    found, ids = require_readable(store, dataset, matches)
+    run, count, done = run or now(), children or store.settings.image_workers, 0
+    with closing(ChildPool(ALLOWANCE, count, 0, "pictures")) as pool:
+        for start in range(0, len(ids), _A_CHILD * count):
+            some = ids[start : start + _A_CHILD * count]
+            readings = _readings(store, pool, _tasks(store, some, found))
+            with store.write() as session:
+                _give(session, found.id, readings, actor, {"run": run})
+            done += len(some)
+            if progress is not None:
+                progress(done, len(ids))
+    return get_paint(store, found.id)
+
+
+def require_readable(
+    store: Store, dataset: str | int, matches: Collection[str] | None = None
+) -> tuple[Dataset, list[int]]:
+    """The dataset and the ids of the groups whose pictures would be read.
+
+    Raises:
+        ConflictError: The dataset's policy does not use paint.
+        NotFoundError: There is no such dataset or match.
+    """
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        known = {item.match: item.groups for item in match_paint(session, found.id)}
+    for match in matches or ():
+        if match not in known:
+            raise NotFoundError(f'"{found.name}" has no match {match}')
+    if found.policy.calibration.source != "paint":
+        raise ConflictError(
+            f'the policy of "{found.name}" does not use the paint of pictures',
+            hint="Choose the policy touchline, or set calibration.source to paint, first.",
+        )
+    return found, sorted(
+        number
+        for match, groups in known.items()
+        if matches is None or match in matches
+        for number in groups
+    )
+
+
+def take_back_paint(store: Store, dataset: str | int, *, actor: str) -> DatasetPaint:
+    """Give the groups of a dataset what they had before paint was read last.
+
+    Once more takes back the reading before that one.
+
+    Raises:
+        ConflictError: Nothing was read, or all of it is taken back.
+        NotFoundError: There is no such dataset.
+    """
+    with store.write() as session:
+        apply_take_back(session, dataset, actor=actor)
+    return get_paint(store, dataset)
+
+
+def apply_take_back(session: Session, dataset: str | int, *, actor: str) -> None:
+    """``take_back_paint`` within a write session."""
+    found = read_dataset(session, dataset)
+    entries = last_run(session, found.id)
+    if not entries:
+        raise ConflictError(f'no paint was read in "{found.name}"')
+    before: dict[int, Mapping[str, str]] = {}
+    for entry in entries:
+        # A run that was begun again may have given a group something twice.
+        before.setdefault(entry.group_id or 0, entry.body["inverse"]["paint"])
+    named = {digest for paint in before.values() for digest in paint.values()}
+    known = read_readings(session, named)
+    wanted = {
+        number: {view: known[digest] for view, digest in paint.items()}
+        for number, paint in before.items()
+    }
+    run = entries[0].body["run"]
+    _give(session, found.id, wanted, actor, {"run": f"{run} back", "takes_back": run})
+
+
+def _give(
+    session: Session,
+    dataset_id: int,
+    wanted: Mapping[int, Mapping[str, PaintReading]],
+    actor: str,
+    body: dict[str, Any],
+) -> None:
+    """One entry for each group that changes; of a take-back for the first in any case."""
+    ids, at = sorted(wanted), now()
+    for start in range(0, len(ids), _BATCH):
+        entries, changed = [], []
+        for stored in read_groups(session, ids[start : start + _BATCH]).values():
+            edit = SetPaint(wanted[stored.id])
+            group = edit.apply(stored.group)
+            is_told = "takes_back" in body and stored.id == ids[0]
+            if group == stored.group and not is_told:
+                continue
+            insert_readings(session, dataset_id, group.paint.values())
+            save_revision(session, stored, next_revision(stored, group, at))
+            done = {
+                "edit": edit_to_json(SetPaint(group.paint)),
+                "inverse": edit_to_json(edit.inverse(stored.group)),
+            }
+            entries.append(Entry(PAINT, actor, at, {**body, **done}, dataset_id, stored.id))
+            changed.append(stored.id)
+        append(session, entries)
+        refresh_queue(session, changed)
+
+
+def _tasks(store: Store, ids: Sequence[int], dataset: Dataset) -> dict[int, list[PaintTask]]:
+    """What is to be read for each group; groups without a view that takes paint have none."""
+    with store.read() as session:
+        stored = read_groups(session, ids, extras=False)
+        clicks = replace(dataset.policy, calibration=_without_paint(dataset.policy.calibration))
+        known = known_calibrations(session, [item.group for item in stored.values()], clicks)
+    return {
+        number: list(_group_tasks(item, dataset.policy.calibration, known))
+        for number, item in stored.items()
+    }
+
+
+def _without_paint(policy: CalibrationPolicy) -> CalibrationPolicy:
+    return replace(policy, source="lines")
+
+
+def _group_tasks(
+    stored: StoredGroup, policy: CalibrationPolicy, known: Mapping[str, Any]
+) -> Iterator[PaintTask]:
+    group = stored.group
+    for view in group.views:
+        if takes_paint(view):
+            key = clicks_key(group, view, policy)
+            alone = replace(group, views=(view,), paint={})
+            yield PaintTask(alone, policy, key, known.get(key), group.paint.get(view.key))
+
+
+def _readings(
+    store: Store,
+    pool: ChildPool,
+    tasks: Mapping[int, Sequence[PaintTask]],
+) -> dict[int, dict[str, PaintReading]]:
+    """What was read for each group, by view; views without a camera of their clicks are left out."""
+
+    def ask(task: PaintTask) -> PoolTask:
+        return pool.submit(read_view_paint, task, store.settings, explain=_refusal, bounded=False)
+
+    asked = {number: [(task, ask(task)) for task in some] for number, some in tasks.items()}
+    return {
+        number: {
+            task.view.key: reading
+            for task, waiting in some
+            if (reading := _result(task, waiting.future)) is not None
+        }
+        for number, some in asked.items()
+    }
+
+
+def _result(task: PaintTask, future: Any) -> PaintReading | None:
+    try:
+        reading: PaintReading | None = future.result()
+    except ImageError:
+        # Its process ended over it: to this service that picture is unreadable.
+        return task.fitting or PaintReading("", task.sought_for, NOTHING, NO_FRAME)
+    return reading
+
+
+def _refusal(error: ChildEnded) -> ImageError:
+    return ImageError(f"the picture {error}")
+
+
+def _state(item: MatchPaint) -> PaintState:
+    reasons = [reading.reason for reading in item.readings]
+    return PaintState(
+        match=item.match,
+        groups=len(item.groups),
+        views=item.views,
+        read=len(reasons),
+        painted=reasons.count(None),
+        no_paint=reasons.count(NO_PAINT),
+        paint_disagrees=reasons.count(PAINT_DISAGREES),
+        no_frame=reasons.count(NO_FRAME),
+    )
