@@ -41,7 +41,7 @@ class PictureScale:
 
     def evidence(self, snapped: Snapped) -> PaintEvidence:
         """The paint that was found, in pixels of the annotations."""
-        found = to_paint_evidence(snapped.evidence)
+        found = to_paint_evidence(snapped.evidence, snapped.camera)
         points = {
             name: tuple(PaintPoint(*self.told(x, y), sigma / self.x) for x, y, sigma in places)
             for name, places in found.points.items()

@@ -16,10 +16,10 @@ from app.paint.evidence import Image
 from app.paint.grass import field_of_play, why_no_field
 from app.paint.picture_scale import SHAPES_APART, PictureScale, why_unreadable
 from app.paint.ridges import line_like
-from app.paint.snap import NO_PAINT, PAINT_DISAGREES, snap
+from app.paint.snap import snap
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Media
-from app.soccer.paint_evidence import PaintEvidence
+from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES, PaintEvidence
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration

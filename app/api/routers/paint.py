@@ -9,14 +9,14 @@ from app.api.jobs import ACCEPTED, job_answer
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply
 from app.api.schemas.job import JobDocument
-from app.api.schemas.paint import DatasetPaintDocument, PaintRequest
+from app.api.schemas.paint import DatasetPaintDocument, DatasetPaintRequest
 from app.review.editing.paint import get_paint
 from app.review.jobs.paint import request_paint, take_paint_back
 
 router = APIRouter(prefix="/datasets/{dataset}/paint", tags=["datasets"])
 
 
-@router.get("", operation_id="listPaint", responses=responses(404))
+@router.get("", operation_id="listDatasetPaint", responses=responses(404))
 def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
     """How many pictures of each match were read for their paint, and what came of it."""
     return DatasetPaintDocument.model_validate(get_paint(store, dataset))
@@ -24,14 +24,14 @@ def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
 
 @router.post(
     "",
-    operation_id="readPaint",
+    operation_id="readDatasetPaint",
     status_code=202,
     response_model=JobDocument,
     responses={**responses(404, 409, 413, 415), **ACCEPTED},
 )
 def read_paint(
     dataset: DatasetPath,
-    request: PaintRequest,
+    request: DatasetPaintRequest,
     services: AppServices,
     actor: Actor,
     asked: AskedUnder,
@@ -50,7 +50,7 @@ def read_paint(
 
 @router.delete(
     "",
-    operation_id="takePaintBack",
+    operation_id="takeDatasetPaintBack",
     status_code=202,
     response_model=JobDocument,
     responses={**responses(404, 409), **ACCEPTED},

@@ -32,7 +32,7 @@ class DatasetPaintDocument(Document):
     items: list[MatchPaintDocument]
 
 
-class PaintRequest(BaseModel):
+class DatasetPaintRequest(BaseModel):
     """Read the paint of pictures."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})

@@ -16,7 +16,7 @@ from app.soccer.solution import Finding
 from app.store.log import LogEntry
 
 THUMBNAIL_WIDTH = 208
-TOLD_KINDS = frozenset({"edit", "undo", "redo", "verdict", "pitch", "position"})
+TOLD_KINDS = frozenset({"edit", "undo", "redo", "verdict", "pitch", "position", "paint"})
 
 
 def thumbnail_address(view_id: int | None) -> str | None:

@@ -1,4 +1,4 @@
-"""Paint reading: what is read of the paint in the picture of one view; runs in a child."""
+"""Paint reading: what is kept of the paint in the picture of one view; runs in a child."""
 
 from __future__ import annotations
 
@@ -6,17 +6,12 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from app.config import Settings
-from app.errors import GeometryError, ImageError, NotFoundError, StorageError, TooLargeError
-from app.geometry.arrays import BoolArray
-from app.paint.agreement import agreement
-from app.paint.evidence import to_paint_evidence
-from app.paint.grass import field_of_play, why_no_field
-from app.paint.propose import LEAST_SIDE
-from app.paint.ridges import line_like
-from app.paint.snap import snap
+from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
+from app.paint.evidence import Image
+from app.paint.picture_scale import why_unreadable
+from app.paint.view_paint import paint_of
 from app.soccer.group import Group, View
 from app.soccer.paint_evidence import (
     EXTRACTOR_VERSION,
@@ -27,11 +22,10 @@ from app.soccer.paint_evidence import (
 )
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import calibrate_clicks, calibrate_paint
+from app.solving.calibrate import calibrate_clicks
 from app.store.media import read_pixels
 
 NOTHING = PaintEvidence({})
-Image = npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -65,6 +59,11 @@ class PaintTask:
             return None
         return old if old.evidence.version == EXTRACTOR_VERSION else None
 
+    @property
+    def without_frame(self) -> PaintReading:
+        """What is kept where no picture can be read."""
+        return PaintReading("", self.sought_for, NOTHING, NO_FRAME)
+
 
 def read_view_paint(task: PaintTask, settings: Settings) -> PaintReading | None:
     """What is to be kept of a view's picture; None where its clicks give no camera.
@@ -73,60 +72,29 @@ def read_view_paint(task: PaintTask, settings: Settings) -> PaintReading | None:
     what was read of it stays.
     """
     fitting, media = task.fitting, task.view.media
-    missing = PaintReading("", task.sought_for, NOTHING, NO_FRAME)
     if media is None:
-        return fitting or missing
+        return fitting or task.without_frame
     try:
         digest, image = read_pixels(media, settings, "" if fitting is None else fitting.frame)
     except NotFoundError:
-        return fitting or missing
+        return fitting or task.without_frame
     except (ImageError, StorageError, TooLargeError):
-        return missing
-    return fitting if image is None else _read(task, digest, _as_annotated(image, task.view))
-
-
-def _as_annotated(image: Image, view: View) -> Image:
-    """The picture as people annotated it: turned right, and of that size."""
-    if view.station.flipped:
-        image = np.asarray(cv2.flip(image, 1), np.uint8)
-    size = view.size.width, view.size.height
-    if image.shape[1::-1] == size:
-        return image
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+        return task.without_frame
+    if image is None:
+        return fitting
+    if task.view.station.flipped:
+        image = np.ascontiguousarray(cv2.flip(image, 1))
+    return _read(task, digest, np.asarray(image, np.uint8))
 
 
 def _read(task: PaintTask, digest: str, image: Image) -> PaintReading | None:
-    clicked = task.clicked or calibrate_clicks(task.group, task.view, task.policy)
+    size, policy = task.view.size, task.policy
+    clicked = task.clicked or calibrate_clicks(task.group, task.view, policy)
     if clicked.camera is None:
         return None
-    nothing = PaintReading(digest, task.sought_for, NOTHING, NO_PAINT)
-    if min(image.shape[:2]) < LEAST_SIDE:
-        return nothing
-    field = field_of_play(image)
-    if why_no_field(image, field) is not None:
-        return nothing
-    try:
-        return _snapped(task, nothing, image, field, clicked)
-    except (GeometryError, np.linalg.LinAlgError):
-        return nothing
-
-
-def _snapped(
-    task: PaintTask, nothing: PaintReading, image: Image, field: BoolArray, clicked: Calibration
-) -> PaintReading:
-    """The reading, with the agreement of the camera that solving finds with it."""
-    assert clicked.camera is not None
-    known = None if clicked.covariance is None else np.reshape(clicked.covariance, (8, 8))
-    pitch = task.group.pitch
-    found = snap(image, field, clicked.camera, pitch, policy=task.policy, start_covariance=known)
-    reading = replace(nothing, reason=found.reason)
-    camera = clicked.camera
-    if found.reason is None:
-        reading = replace(reading, evidence=to_paint_evidence(found.evidence, found.camera))
-        view = task.view
-        solved = calibrate_paint(
-            clicked, reading, view.station.lines, pitch, view.size, task.policy
-        )
-        camera = solved.camera or camera
-    seen = agreement(camera, field, line_like(image, field), pitch)
-    return replace(reading, supported=seen.supported, explained=seen.explained)
+    if why_unreadable(image, size) is not None:
+        return replace(task.without_frame, frame=digest)
+    seen = paint_of(image, size, clicked, task.group.pitch, policy)
+    reason = NO_PAINT if seen.outcome == "nothing" else seen.reason
+    evidence = seen.evidence if reason is None else NOTHING
+    return PaintReading(digest, task.sought_for, evidence, reason, seen.supported, seen.explained)

@@ -17,7 +17,7 @@ from app.child_pool import ChildPool, PoolTask
 from app.errors import ConflictError, ImageError, NotFoundError
 from app.progress import Progress
 from app.review.datasets.dataset import Dataset, read_dataset
-from app.review.datasets.paint_reading import NOTHING, PaintTask, read_view_paint
+from app.review.datasets.paint_reading import PaintTask, read_view_paint
 from app.review.editing.codec import edit_to_json
 from app.review.editing.edit import SetPaint
 from app.review.editing.known import known_calibrations
@@ -294,7 +294,7 @@ def _result(task: PaintTask, future: Any) -> PaintReading | None:
         reading: PaintReading | None = future.result()
     except ImageError:
         # Its process ended over it: to this service that picture is unreadable.
-        return task.fitting or PaintReading("", task.sought_for, NOTHING, NO_FRAME)
+        return task.fitting or task.without_frame
     return reading
 
 

@@ -19,7 +19,7 @@ from app.review.editing.point_limits import require_few_points_in_all
 from app.soccer.group import Group, Media, View
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import calibrate_view, view_key
+from app.solving.calibrate import calibrate_clicks, clicks_key, view_key
 from app.store.frames import Frames
 from app.store.groups import StoredGroup, group_of_view, read_groups
 from app.store.pitches import groups_of_match
@@ -79,13 +79,14 @@ def paint_question(store: Store, view_id: int, lines: LineChanges) -> PaintQuest
         policy = stored.policy
         known = known_calibrations(session, [group], policy)
     changed = next(item for item in group.views if item.key == view.key)
-    start = known.get(view_key(group, changed, policy.calibration))
+    # What the lines alone make: what was read of the paint before has no part in what is read.
+    start = known.get(clicks_key(group, changed, policy.calibration))
     return PaintQuestion(
         group,
         changed,
         _media(changed),
         policy.calibration,
-        start=start or calibrate_view(group, changed, policy.calibration),
+        start=start or calibrate_clicks(group, changed, policy.calibration),
     )
 
 

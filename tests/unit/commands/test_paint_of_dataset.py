@@ -1,0 +1,69 @@
+"""Paint of a dataset's pictures on the command line."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.cli import main
+from app.config import Settings
+from app.review.importing.ingest import ingest
+from app.review.policies.policy import change_policy
+from app.soccer.policy import TOUCHLINE
+from app.store.session import Store
+from tests.unit.review.editing.test_positions import MATCH, match
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Run the command in a home with a match without pictures, as ``demo`` and as ``paper``."""
+    for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
+    store = Store.open(Settings(home=tmp_path / "home"))
+    for dataset in ("demo", "paper"):
+        ingest(store, dataset, match(), source="files", actor="ann")
+    change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
+    store.close()
+
+    def command(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["touchline", "paint", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return command
+
+
+class TestPaint:
+    def test_shows_reads_and_takes_back(self, run: Run) -> None:
+        assert run("demo", "--show")[:2] == (
+            0,
+            f"{MATCH}: the paint of none of 12 pictures was read\n",
+        )
+        (read,) = json.loads(run("demo", "--workers", "1", "--json")[1])
+        assert (read["read"], read["painted"], read["no_frame"]) == (12, 0, 12)
+        assert "12 missing or unreadable" in run("demo", "--show")[1]
+        (back,) = json.loads(run("demo", "--undo", "--json")[1])
+        assert back["read"] == 0
+
+    @pytest.mark.parametrize(
+        ("words", "code", "sentence"),
+        [
+            (("paper",), 1, "does not use the paint"),
+            (("demo", "--match", "final"), 1, "has no match final"),
+            (("demo", "--undo"), 1, "no paint was read"),
+            (("demo", "--undo", "--show"), 2, "one at a time"),
+        ],
+    )
+    def test_what_cannot_be_is_said(self, run: Run, words, code: int, sentence: str) -> None:
+        found, _, err = run(*words)
+        assert (found, sentence in err) == (code, True)
