@@ -48,7 +48,9 @@ def show(
 
 @commands.command("set")
 def set_(
-    policy: Annotated[str, typer.Argument(metavar="POLICY", help="paper, strict, or a YAML file.")],
+    policy: Annotated[
+        str, typer.Argument(metavar="POLICY", help="paper, strict, touchline, or a YAML file.")
+    ],
     dataset: Dataset,
     json_: Json = False,
 ) -> None:

@@ -20,7 +20,8 @@ def solve(
     policy: Annotated[
         str | None,
         typer.Option(
-            metavar="paper|strict|FILE.yaml", help="Judge the dataset by this policy from now on."
+            metavar="paper|strict|touchline|FILE.yaml",
+            help="Judge the dataset by this policy from now on.",
         ),
     ] = None,
     workers: Workers = None,

@@ -43,4 +43,4 @@ def paint_findings(
         yield Finding(NO_PAINT, READ_AGAIN, view.key)
     elif fit.reason is not None:
         kind = PAINT_DISAGREES if fit.reason == PAINT_DISAGREES else NO_PAINT
-        yield Finding(kind, SENTENCES[fit.reason], view.key, number=float(fit.points))
+        yield Finding(kind, SENTENCES[fit.reason], view.key, number=fit.supported)

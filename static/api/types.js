@@ -100,6 +100,18 @@
  * @property {number | null} error_px
  * @property {string[]} unobservable
  * @property {MarkingFitJson[]} markings
+ * @property {PaintFitJson | null} [paint]
+ */
+
+/**
+ * How a camera and the paint of its picture agree; `reason` says why the camera is that of the clicks.
+ *
+ * @typedef {object} PaintFitJson
+ * @property {number | null} supported
+ * @property {number | null} explained
+ * @property {number} points
+ * @property {number | null} error_px
+ * @property {string | null} reason
  */
 
 /**

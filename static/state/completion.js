@@ -16,7 +16,7 @@ const NUMBERS = /** @type {{[field: string]: string}} */ ({
 const FINDINGS = [
 	'any', 'none', 'wrong_label', 'sides_swapped', 'visible_not_annotated', 'bad_point', 'under_constrained',
 	'view_disagrees', 'views_contradict', 'not_synchronous', 'ball_size', 'low_parallax', 'high_uncertainty', 'implausible_ball',
-	'implausible_camera', 'picture_geometry', 'several_balls', 'upstream_changed', 'pitch_size',
+	'implausible_camera', 'picture_geometry', 'paint_disagrees', 'no_paint', 'several_balls', 'upstream_changed', 'pitch_size',
 ];
 const GATES = ['none', 'calibratable', 'jac', 'two_views', 'ball', 'baseline', 'reprojection', 'parallax', 'sigma', 'chi_square'];
 const SORTS = ['value', 'newest', 'sigma', 'jac', 'error', 'error_percent', 'parallax', 'margin', 'ratio', 'height', 'distance', 'box', 'views', 'findings', 'gate', 'status', 'split', 'reviewer', 'label', 'number'];

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,27 +14,35 @@ import cv2
 import numpy as np
 from scipy.stats import chi2
 
+from app.config import Settings
 from app.datasets.report import Report
 from app.datasets.sn_calibration_reader import lines_from_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.geometry.resection import parameters_from_camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.paint.agreement import agreement
 from app.paint.grass import field_of_play
 from app.paint.ridges import line_like
 from app.paint.snap import Snapped, snap
+from app.review.editing.paint import get_paint, read_paint
+from app.review.editing.recompute import solve_dataset
+from app.review.editing.submit import load
+from app.review.importing.ingest import ingest
+from app.review.policies.policy import change_policy
 from app.sample.render import render
 from app.sample.scene import Scene
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group
+from app.soccer.group import Group, Media
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
-from app.soccer.policy import PAPER
-from app.soccer.solution import Calibration
+from app.soccer.policy import PAPER, TOUCHLINE
+from app.soccer.solution import Calibration, Solution
 from app.solving.calibrate import calibrate, calibration_key, measure
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
 from app.solving.solve import solve
+from app.store.session import Store
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
 
@@ -59,22 +69,69 @@ class Shot:
     clicked: Calibration
     snapped: Snapped
     milliseconds: float
+    solved: Calibration | None = None
+    """Through a dataset: solved with what was kept of the picture."""
 
 
 def bench_paint(data: Path) -> None:
     """Print every table."""
     shots: list[Shot] = []
     balls = []
-    for scene in make_scenes(GROUPS, SEED, faults=False):
-        seen = list(_shots(scene))
-        shots += [shot for _, shot in seen]
-        balls.append(_balls(scene, dict(seen)))
+    scenes = make_scenes(GROUPS, SEED, faults=False)
+    solutions = _through_a_dataset(scenes)
+    for scene, solution in zip(scenes, solutions, strict=True):
+        seen = {
+            key: replace(shot, solved=_calibration(solution, key)) for key, shot in _shots(scene)
+        }
+        shots += seen.values()
+        clicked, snapped, true = _balls(scene, seen)
+        balls.append((clicked, snapped, _off(solution, scene), true))
     _print_sample(shots, np.array(balls))
     _print_detector(shots)
     if (data / "broadcast" / "lines").is_dir():
         _print_real(data / "broadcast")
     else:
         print(f"\nPaint of real frames: no data in {data}, left out")
+
+
+def _through_a_dataset(scenes: Sequence[Scene]) -> list[Solution]:
+    """Solutions of a dataset whose pictures were read, in the order of the scenes."""
+    with tempfile.TemporaryDirectory() as place, closing(_opened(Path(place) / "home")) as store:
+        groups = [_with_pictures(scene, Path(place), n) for n, scene in enumerate(scenes)]
+        ingest(store, "bench", groups, source="sample", actor="bench")
+        change_policy(store, "bench", TOUCHLINE, if_match=None, actor="bench")
+        began = time.perf_counter()
+        read_paint(store, "bench", actor="bench")
+        between = time.perf_counter()
+        solve_dataset(store, "bench")
+        spent = [between - began, time.perf_counter() - between]
+        (item,) = get_paint(store, "bench").items or (None,)
+        print(f"\nThrough a dataset: {item.sentence if item else 'nothing'}")
+        print(f"{spent[0]:.1f} s to read, {spent[1]:.1f} s to solve {len(groups)} groups")
+        return [
+            solution
+            for number in range(1, len(groups) + 1)
+            if (solution := load(store, number).solution) is not None
+        ]
+
+
+def _opened(home: Path) -> Store:
+    return Store.open(Settings(home=home))
+
+
+def _with_pictures(scene: Scene, folder: Path, number: int) -> Group:
+    """The group with its pictures in a folder."""
+    views = []
+    for view in scene.group.views:
+        file = folder / f"{number}_{view.key}.jpg"
+        cv2.imwrite(str(file), render(scene, view.key), JPEG)
+        views.append(replace(view, media=Media(str(file))))
+    return replace(scene.group, key=f"{number:03}", match="bench", views=tuple(views))
+
+
+def _calibration(solution: Solution, key: str) -> Calibration | None:
+    found = solution.view(key)
+    return None if found is None else found.calibration
 
 
 def _shots(scene: Scene) -> Iterator[tuple[str, Shot]]:
@@ -124,7 +181,11 @@ def _balls(scene: Scene, shots: dict[str, Shot]) -> tuple[float, float, float]:
 
 
 def _ball_error(group: Group, scene: Scene, known: dict[str, Calibration]) -> float:
-    ball = solve(group, PAPER, known).ball
+    return _off(solve(group, PAPER, known), scene)
+
+
+def _off(solution: Solution, scene: Scene) -> float:
+    ball = solution.ball
     return (
         np.nan if ball is None else float(np.linalg.norm(np.subtract(ball.point, scene.truth.ball)))
     )
@@ -136,7 +197,7 @@ def _print_sample(shots: list[Shot], balls: FloatArray) -> None:
     places = np.array(
         [[np.linalg.norm(c.position - s.truth.position) for c in _cameras(s)] for s in shots]
     )
-    for column, name in enumerate(("clicks", "clicks and paint")):
+    for column, name in enumerate(("clicks", "clicks and paint", "through a dataset")):
         held = [_holds(shot, column) for shot in shots]
         rows.append(
             [
@@ -147,7 +208,7 @@ def _print_sample(shots: list[Shot], balls: FloatArray) -> None:
                 100 * float(np.mean([one for one in held if one is not None])),
             ]
         )
-    rows.append(["true cameras", 0.0, 0.0, 0.0, 0.0, *_two(balls[:, 2]), None])
+    rows.append(["true cameras", 0.0, 0.0, 0.0, 0.0, *_two(balls[:, 3]), None])
     header = (
         f"{len(shots)} sample views", "field px median", "p95", "position m median", "p95",
         "ball m median", "p95", "position in 95 %",
@@ -156,7 +217,12 @@ def _print_sample(shots: list[Shot], balls: FloatArray) -> None:
     worse = fields[:, 1] > fields[:, 0] + WORSE_PX
     reasons = [shot.snapped.reason for shot in shots]
     times = [shot.milliseconds for shot in shots]
+    apart = [moved for shot in shots if (moved := _apart(shot)) is not None]
     summary = [
+        ["through a dataset, from snap's camera, sigmas: median", float(np.median(apart))],
+        ["the same, p95", float(np.percentile(apart, 95))],
+        ["the same, largest", float(np.max(apart))],
+        ["through a dataset: cameras of their paint", len(apart)],
         [f"worse than its clicks by more than {WORSE_PX} px, without a reason", int(worse.sum())],
         ["clicks' camera kept: no_paint", reasons.count("no_paint")],
         ["clicks' camera kept: paint_disagrees", reasons.count("paint_disagrees")],
@@ -166,9 +232,22 @@ def _print_sample(shots: list[Shot], balls: FloatArray) -> None:
     print_table("Snap on the sample", ("what", "value"), summary)
 
 
-def _cameras(shot: Shot) -> tuple[Camera, Camera]:
-    assert shot.clicked.camera is not None
-    return shot.clicked.camera, shot.snapped.camera
+def _cameras(shot: Shot) -> tuple[Camera, Camera, Camera]:
+    clicked = shot.clicked.camera
+    assert clicked is not None
+    solved = None if shot.solved is None else shot.solved.camera
+    return clicked, shot.snapped.camera, solved or clicked
+
+
+def _apart(shot: Shot) -> float | None:
+    """How far the dataset's camera is from that of snap, the most of its parameters, sigmas."""
+    snapped, solved = shot.snapped, shot.solved
+    if snapped.covariance is None or solved is None or solved.source != "paint":
+        return None
+    assert solved.camera is not None
+    half = shot.size.diagonal / 2
+    one, other = (parameters_from_camera(item, half) for item in (snapped.camera, solved.camera))
+    return float(np.abs((one - other) / np.sqrt(np.diag(snapped.covariance))).max())
 
 
 def _field_error(camera: Camera, truth: Camera, size: ImageSize) -> float:
@@ -181,11 +260,12 @@ def _field_error(camera: Camera, truth: Camera, size: ImageSize) -> float:
 
 def _holds(shot: Shot, column: int) -> bool | None:
     """Whether the 95 % ellipsoid of the position holds the truth."""
-    if column == 0:
-        known = shot.clicked.covariance
-        covariance = None if known is None else np.reshape(known, (8, 8))
-    else:
+    found = (shot.clicked, None, shot.solved)[column]
+    if column == 1:
         covariance = shot.snapped.covariance
+    else:
+        known = None if found is None else found.covariance
+        covariance = None if known is None else np.reshape(known, (8, 8))
     if covariance is None:
         return None
     off = _cameras(shot)[column].position - shot.truth.position

@@ -34,6 +34,7 @@ BETTER_CAUSES = frozenset(
         "several_balls",
         "under_constrained",
         "picture_geometry",
+        "paint_disagrees",
         "implausible_camera",
     }
 )

@@ -147,7 +147,7 @@ def _checked_name(name: object) -> str:
 
 
 def _require_honest(policy: Policy) -> None:
-    """Whoever reads ``paper`` or ``strict`` in an export must be able to rely on it."""
+    """Whoever reads the name of a shipped policy in an export must be able to rely on it."""
     shipped = POLICIES.get(policy.name)
     if shipped is not None and shipped.hash != policy.hash:
         raise InputError(

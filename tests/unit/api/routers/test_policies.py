@@ -21,7 +21,7 @@ def put(api: Any, body: Any, etag: str | None = None, **headers: str) -> Any:
 class TestListPolicies:
     def test_gives_what_is_shipped_and_what_can_be_set(self, api) -> None:
         body = api.get("/api/v1/policies").json()
-        assert [item["name"] for item in body["items"]] == ["paper", "strict"]
+        assert [item["name"] for item in body["items"]] == ["paper", "strict", "touchline"]
         assert body["items"][1]["values"]["max_sigma_m"] == 0.5
         fields = {field["name"]: field for field in body["fields"]}
         assert fields["tau_percent"] == {
