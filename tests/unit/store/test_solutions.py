@@ -16,6 +16,7 @@ from app.soccer.solution import (
     Fix,
     Gate,
     MarkingFit,
+    PaintFit,
     Pair,
     Solution,
     Suspect,
@@ -144,6 +145,16 @@ class TestValueCodec:
         value = value_codec.to_json(Finding("low_parallax", "3 degrees"))
         del value["fix"], value["confidence"]
         assert value_codec.from_json(Finding, value) == Finding("low_parallax", "3 degrees")
+
+    def test_what_came_later_stands_there_only_where_it_says_something(self) -> None:
+        """Calibrations that are frozen must come out as the same bytes."""
+        bare = Calibration("lines", None)
+        assert "paint" not in value_codec.to_json(bare)
+        told = replace(bare, paint=PaintFit(0.5, None, 7, reason="no_paint"))
+        value = value_codec.to_json(told)
+        assert value["paint"]["points"] == 7
+        assert value_codec.from_json(Calibration, value) == told
+        assert value_codec.from_json(Calibration, value_codec.to_json(bare)) == bare
 
     def test_a_type_without_a_codec_is_a_programming_error(self) -> None:
         with pytest.raises(TypeError, match="no codec"):
