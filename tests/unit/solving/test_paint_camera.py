@@ -10,6 +10,7 @@ import pytest
 
 from app.geometry.camera import Camera
 from app.geometry.polyline import clip_polyline
+from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.group import Group, Station, View
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.soccer.picture import OPEN
@@ -108,6 +109,12 @@ class TestCamera:
         assert (found.source, found.paint.reason) == ("lines", "paint_disagrees")
         assert found.camera == first(clicked()).camera
 
+    def test_a_camera_that_its_clicks_do_not_allow_is_not_taken_however_well_it_fits(self):
+        pan, tilt, roll = np.radians(MAIN.pan_tilt_roll_degrees)
+        turned = replace(MAIN, rotation=rotation_from_pan_tilt_roll(pan + 0.003, tilt, roll))
+        found = first(read(clicked(), evidence=painted(turned)))
+        assert (found.source, found.paint.reason) == ("lines", "paint_disagrees")
+
     def test_without_a_place_of_paint_the_clicks_stay(self):
         found = first(read(clicked(), evidence=PaintEvidence({})))
         assert (found.source, found.paint.reason) == ("lines", "paint_disagrees")
@@ -144,13 +151,12 @@ class TestKey:
         "changes", [{"shared": True}, {"given": MAIN}, {"picture": OPEN}], ids=lambda item: [*item]
     )
     def test_static_given_and_changed_pictures_take_no_paint(self, changes):
-        group = read(clicked())
-        view = group.views[0]
-        other = group.with_view(replace(view, station=replace(view.station, **changes)))
-        assert first(other).source != "paint"
-        bare = replace(other, paint={})
-        assert view_key(other, view, TOLD) == view_key(other, view, TOLD)
-        assert first(other) == first(bare)
+        view = clicked().views[0]
+        bare = clicked().with_view(replace(view, station=replace(view.station, **changes)))
+        painted = read(bare)
+        assert first(painted).source != "paint"
+        assert first(painted) == first(bare)
+        assert view_key(painted, painted.views[0], TOLD) == view_key(bare, bare.views[0], TOLD)
 
 
 def kinds(group: Group, policy=TOUCHLINE):

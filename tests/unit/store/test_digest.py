@@ -52,6 +52,12 @@ class TestInputsHash:
     def test_changes_with_everything_that_solving_reads(self, group, camera, change) -> None:
         assert group_inputs_hash(change(group, camera)) != group_inputs_hash(group)
 
+    def test_changes_with_each_number_that_was_read_of_the_paint(self, group) -> None:
+        key = group.views[0].key
+        read = [READ, replace(READ, supported=0.25), replace(READ, frame="another")]
+        hashes = {group_inputs_hash(replace(group, paint={key: one})) for one in read}
+        assert len(hashes) == 3
+
     @pytest.mark.parametrize(
         "change",
         [

@@ -32,6 +32,7 @@ from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Media
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT
 from app.soccer.policy import PAPER, TOUCHLINE
+from app.store import media
 from app.store.groups import read_groups
 from app.store.session import Store
 from tests.scenes import make_scenes
@@ -161,7 +162,8 @@ class TestReadPaint:
                 assert np.linalg.norm(found.camera.position - truth.position) < 0.25
         assert kinds(painted) == []
 
-    def test_what_was_read_is_not_read_again(self, painted, here, looked):
+    def test_what_was_read_is_not_read_again(self, painted, here, looked, monkeypatch):
+        monkeypatch.setattr(media, "_pixels", lambda *_: pytest.fail("it was decoded again"))
         read_paint(painted, "demo", actor="ann")
         assert (here.read, looked, stale_groups(painted, "demo")) == (4, [], [])
         assert [entry.kind for entry in history(painted, 1)] == ["import", "paint"]
@@ -195,9 +197,9 @@ class TestReadPaint:
 
     def test_a_picture_that_changed_is_read_again(self, painted, pictures, tmp_path, looked):
         changed = groups(pictures)[0]
-        media = Path(changed.views[0].media.path)
-        other = tmp_path / media.name
-        picture = cv2.imread(str(media))
+        file = Path(changed.views[0].media.path)
+        other = tmp_path / file.name
+        picture = cv2.imread(str(file))
         cv2.imwrite(str(other), np.full_like(picture, 127))
         view = replace(changed.views[0], media=Media(str(other)))
         ingest(painted, "demo", [changed.with_view(view)], source="files", actor="ann")
@@ -225,8 +227,8 @@ class TestReadPaint:
         self, painted, pictures, tmp_path
     ):
         changed = groups(pictures)[0]
-        media = Path(changed.views[0].media.path)
-        picture = cv2.flip(cv2.imread(str(media)), 1)
+        file = changed.views[0].media.path
+        picture = cv2.flip(cv2.imread(file), 1)
         cv2.imwrite(str(tmp_path / "half.png"), cv2.resize(picture, (960, 540)))
         view = replace(
             changed.views[0],
