@@ -12,7 +12,10 @@ from app.solving.calibrate import takes_paint, wanted_paint
 
 STAYS = "so its camera is that of the clicks"
 NEVER_READ = f"Nobody has read the paint of this view's picture, {STAYS}. Read the paint."
-READ_AGAIN = f"The paint of this view was read for other lines than it has now, {STAYS}. Read the paint again."
+READ_AGAIN = (
+    "The lines of this view, its pitch or the thresholds have changed since its paint was read, "
+    f"{STAYS}. Read the paint again."
+)
 SENTENCES = {
     NO_PAINT: (
         f"Too little paint is seen in this view's picture, {STAYS}. Nothing is wrong with it; a "

@@ -56,7 +56,7 @@ def read_readings(session: Session, digests: Iterable[str]) -> dict[str, PaintRe
     return found
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def _reading(digest: str, body: bytes) -> PaintReading:
     with as_written():
         reading = reading_from_json(parse(inflate(body)))

@@ -175,7 +175,7 @@ class TestFindings:
 
     def test_lines_that_changed_since_ask_for_another_reading(self):
         group = read(clicked(), sought_for="another")
-        assert "for other lines" in kinds(group)["a"].sentence
+        assert "changed since its paint was read" in kinds(group)["a"].sentence
 
     @pytest.mark.parametrize(
         ("reason", "kind", "words"),

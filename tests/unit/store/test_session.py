@@ -281,7 +281,10 @@ class TestAppendOnly:
                 session.scalars(text("SELECT name FROM sqlite_master WHERE type = 'trigger'"))
             )
         assert triggers == {
-            *(f"{name}_refuses_update" for name in ("solution", "calibration", "frozen")),
+            *(
+                f"{name}_refuses_update"
+                for name in ("solution", "calibration", "frozen", "paint_evidence")
+            ),
             "frozen_refuses_delete",
             "frozen_keeps_what_it_has",
             "calibration_stays_in_versions",
