@@ -154,6 +154,7 @@ class ImportFindingModel(Base):
 class PaintEvidenceModel(Base):
     """What was read of the paint of a picture (compressed JSON), under its own digest.
 
+    ``reason`` is why it is not solved with, or None, for those who count.
     Rows are inserted, never changed (a trigger sees to it) and go with their dataset; groups and the
     log name them.
     """
@@ -162,6 +163,7 @@ class PaintEvidenceModel(Base):
 
     digest: Mapped[str] = mapped_column(primary_key=True)
     dataset_id: Mapped[int] = mapped_column(ForeignKey("dataset.id"), primary_key=True)
+    reason: Mapped[str | None]
     body: Mapped[bytes] = mapped_column(LargeBinary)
 
 

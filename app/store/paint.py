@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, cast
 
-from sqlalchemy import BindParameter, Table, bindparam, func, select
+from sqlalchemy import BindParameter, Table, bindparam, func, select, true
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
@@ -31,13 +31,18 @@ _BATCH = 500
 
 def insert_readings(session: Session, dataset_id: int, readings: Iterable[PaintReading]) -> None:
     """Keep readings under their digests; what is there already stays."""
-    rows = {reading.digest: zlib.compress(reading.text.encode()) for reading in readings}
-    if rows:
+    unique = {reading.digest: reading for reading in readings}
+    if unique:
         session.execute(
             insert(_EVIDENCE).on_conflict_do_nothing(),
             [
-                {"digest": digest, "dataset_id": dataset_id, "body": body}
-                for digest, body in rows.items()
+                {
+                    "digest": digest,
+                    "dataset_id": dataset_id,
+                    "reason": reading.reason,
+                    "body": zlib.compress(reading.text.encode()),
+                }
+                for digest, reading in unique.items()
             ],
         )
 
@@ -80,20 +85,20 @@ class MatchPaint:
     Attributes:
         groups: Ids of its groups.
         views: Views of moving cameras with lines.
-        readings: What was read of them.
+        reasons: How many readings there are by the reason why they are not solved with, or None.
     """
 
     match: str
     groups: tuple[int, ...]
     views: int
-    readings: tuple[PaintReading, ...]
+    reasons: Mapping[str | None, int]
 
 
 def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
     """What was read of the pictures of each match of a dataset, by name."""
     group = GroupModel
     statement = (
-        select(group.id, group.match, group.paint, func.count(StationModel.id).label("views"))
+        select(group.id, group.match, func.count(StationModel.id).label("views"))
         .outerjoin(ViewModel, ViewModel.group_id == group.id)
         .outerjoin(
             StationModel,
@@ -105,21 +110,40 @@ def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
         .group_by(group.id)
         .order_by(group.match, group.number)
     )
+    reasons = _reasons(session, dataset_id)
     rows: dict[str, list[Any]] = {}
     for row in session.execute(statement):
         rows.setdefault(row.match, []).append(row)
-    return [_match(session, match, some) for match, some in rows.items()]
+    return [
+        MatchPaint(
+            match,
+            tuple(row.id for row in some),
+            sum(row.views for row in some),
+            reasons.get(match, {}),
+        )
+        for match, some in rows.items()
+    ]
 
 
-def _match(session: Session, match: str, rows: Sequence[Any]) -> MatchPaint:
-    named = [digest for row in rows for digest in paint_digests(row.paint).values()]
-    readings = read_readings(session, named)
-    return MatchPaint(
-        match,
-        tuple(row.id for row in rows),
-        sum(row.views for row in rows),
-        tuple(readings[digest] for digest in named if digest in readings),
+def _reasons(session: Session, dataset_id: int) -> dict[str, dict[str | None, int]]:
+    """How many readings each match has by their reason; nothing of them is decoded."""
+    group = GroupModel
+    named = func.json_each(group.paint).table_valued("value")
+    statement = (
+        select(group.match, _EVIDENCE.c.reason, func.count())
+        .select_from(group)
+        .join(named, true())
+        .join(
+            _EVIDENCE,
+            (_EVIDENCE.c.digest == named.c.value) & (_EVIDENCE.c.dataset_id == group.dataset_id),
+        )
+        .where(group.dataset_id == dataset_id, group.paint.is_not(None))
+        .group_by(group.match, _EVIDENCE.c.reason)
     )
+    found: dict[str, dict[str | None, int]] = {}
+    for match, reason, count in session.execute(statement):
+        found.setdefault(match, {})[reason] = count
+    return found
 
 
 def last_run(session: Session, dataset_id: int) -> list[LogEntry]:

@@ -16,6 +16,7 @@ def upgrade() -> None:
         "paint_evidence",
         sa.Column("digest", sa.String(), nullable=False),
         sa.Column("dataset_id", sa.Integer(), nullable=False),
+        sa.Column("reason", sa.String(), nullable=True),
         sa.Column("body", sa.LargeBinary(), nullable=False),
         sa.ForeignKeyConstraint(["dataset_id"], ["dataset.id"]),
         sa.PrimaryKeyConstraint("digest", "dataset_id"),

@@ -303,14 +303,13 @@ def _refusal(error: ChildEnded) -> ImageError:
 
 
 def _state(item: MatchPaint) -> PaintState:
-    reasons = [reading.reason for reading in item.readings]
     return PaintState(
         match=item.match,
         groups=len(item.groups),
         views=item.views,
-        read=len(reasons),
-        painted=reasons.count(None),
-        no_paint=reasons.count(NO_PAINT),
-        paint_disagrees=reasons.count(PAINT_DISAGREES),
-        no_frame=reasons.count(NO_FRAME),
+        read=sum(item.reasons.values()),
+        painted=item.reasons.get(None, 0),
+        no_paint=item.reasons.get(NO_PAINT, 0),
+        paint_disagrees=item.reasons.get(PAINT_DISAGREES, 0),
+        no_frame=item.reasons.get(NO_FRAME, 0),
     )

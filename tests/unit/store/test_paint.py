@@ -11,7 +11,7 @@ from sqlalchemy import text
 from app.errors import DamagedError, StorageError
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.store.groups import next_revision, read_groups, refresh_inputs_hashes, save_revision
-from app.store.paint import insert_readings, read_readings
+from app.store.paint import insert_readings, match_paint, read_readings
 from app.store.removal import delete_rows
 from app.store.session import Store
 
@@ -65,7 +65,7 @@ class TestReadings:
         body = zlib.compress(replace(READING, supported=0.25).text.encode())
         with filled.write() as session:
             session.execute(
-                text("INSERT INTO paint_evidence VALUES (:digest, 1, :body)"),
+                text("INSERT INTO paint_evidence VALUES (:digest, 1, NULL, :body)"),
                 {"digest": READING.digest, "body": body},
             )
         with filled.read() as session, pytest.raises(DamagedError):
@@ -85,3 +85,9 @@ class TestReadings:
         with filled.write() as session:
             delete_rows(session, 1)
             assert session.scalar(text("SELECT count(*) FROM paint_evidence")) == 0
+
+    def test_readings_are_counted_by_match_and_reason(self, filled: Store) -> None:
+        give(filled, READING, OTHER, READING)
+        with filled.read() as session:
+            (item,) = match_paint(session, 1)
+        assert (item.match, item.groups, item.reasons) == ("m", (1,), {None: 2, "no_paint": 1})
