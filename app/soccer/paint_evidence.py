@@ -134,6 +134,21 @@ def reading_from_json(value: Any) -> PaintReading:
         raise InputError(f"this is no reading of paint: {error}") from error
 
 
+def reading_from_text(text: str) -> PaintReading:
+    """The reading whose text this is; its digest is that of the text.
+
+    Raises:
+        InputError: It is none.
+    """
+    try:
+        reading = reading_from_json(json.loads(text))
+    except json.JSONDecodeError as error:
+        raise InputError(f"this is no reading of paint: {error}") from error
+    # It need not be written again to be digested.
+    vars(reading)["text"] = text
+    return reading
+
+
 def evidence_to_json(evidence: PaintEvidence) -> dict[str, Any]:
     """As JSON: ``{"version", "points": {marking: [[x, y, sigma_px], ...]}}``."""
     points = {name: [list(point) for point in evidence.points[name]] for name in evidence.points}
@@ -149,7 +164,7 @@ def evidence_from_json(value: Any) -> PaintEvidence:
     """
     try:
         points = {
-            canonical_marking(name): tuple(_point(row) for row in value["points"][name])
+            canonical_marking(name): _points(value["points"][name])
             for name in sorted(value["points"])
         }
         return PaintEvidence(points, str(value["version"]))
@@ -157,8 +172,8 @@ def evidence_from_json(value: Any) -> PaintEvidence:
         raise InputError(f"this is no evidence of paint: {error}") from error
 
 
-def _point(row: Any) -> PaintPoint:
-    x, y, sigma = map(float, row)
-    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(sigma) and sigma > 0):
-        raise ValueError(f"{row} is no place with a standard deviation")
-    return PaintPoint(x, y, sigma)
+def _points(rows: Any) -> tuple[PaintPoint, ...]:
+    points = tuple(PaintPoint(float(x), float(y), float(sigma)) for x, y, sigma in rows)
+    if not math.isfinite(sum(map(sum, points))) or any(not point.sigma_px > 0 for point in points):
+        raise ValueError("some point is no place with a standard deviation")
+    return points

@@ -20,7 +20,7 @@ from app.geometry.lens import BROWN_CONRADY
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, SharedPosition, Station, View
-from app.soccer.paint_evidence import PaintReading, reading_from_json, reading_to_json
+from app.soccer.paint_evidence import PaintReading, reading_from_text
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, Policy
@@ -339,7 +339,7 @@ def group_to_json(group: Group) -> Json:
     """A group; each shared station is written once a view, in full, and so is what was read of paint."""
     whole = {**group_head_to_json(group), "views": [view_to_json(view) for view in group.views]}
     if group.paint:
-        whole["paint"] = {view: reading_to_json(read) for view, read in group.paint.items()}
+        whole["paint"] = {view: reading.text for view, reading in group.paint.items()}
     return whole
 
 
@@ -353,7 +353,7 @@ def group_from_json(value: Mapping[str, Any]) -> Group:
         split=value["split"],
         label=value["label"],
         positions=positions_from_json(value.get("positions")),
-        paint={view: reading_from_json(read) for view, read in value.get("paint", {}).items()},
+        paint={view: reading_from_text(read) for view, read in value.get("paint", {}).items()},
     )
 
 

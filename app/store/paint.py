@@ -12,7 +12,7 @@ from sqlalchemy import BindParameter, Table, bindparam, func, select, true
 from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
-from app.soccer.paint_evidence import PaintReading, reading_from_json
+from app.soccer.paint_evidence import PaintReading, reading_from_text
 from app.store.codecs import as_written, inflate, parse
 from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, LogModel, PaintEvidenceModel, StationModel, ViewModel
@@ -64,7 +64,7 @@ def read_readings(session: Session, digests: Iterable[str]) -> dict[str, PaintRe
 @lru_cache(maxsize=64)
 def _reading(digest: str, body: bytes) -> PaintReading:
     with as_written():
-        reading = reading_from_json(parse(inflate(body)))
+        reading = reading_from_text(inflate(body).decode())
         if reading.digest != digest:
             raise ValueError(f"{digest} is the digest of another reading")
     return reading

@@ -15,6 +15,7 @@ from app.soccer.paint_evidence import (
     evidence_from_json,
     evidence_to_json,
     reading_from_json,
+    reading_from_text,
     reading_to_json,
 )
 
@@ -51,6 +52,8 @@ class TestReading:
     def test_every_digit_comes_back_and_so_does_the_digest(self):
         again = reading_from_json(reading_to_json(READING))
         assert (again, again.digest) == (READING, READING.digest)
+        again = reading_from_text(READING.text)
+        assert (again, again.digest) == (READING, READING.digest)
 
     @pytest.mark.parametrize(
         "changes",
@@ -72,3 +75,5 @@ class TestReading:
     def test_what_is_no_reading_is_refused(self, value):
         with pytest.raises(InputError):
             reading_from_json(value)
+        with pytest.raises(InputError):
+            reading_from_text("{")
