@@ -45,7 +45,7 @@ PLAIN_WORDS = """
     solving soundness source sources sphere spill spread squares stage staging standpoints starts
     state statistics steps storage store stream submit summary surface swap synloc tab table tables term
     terminal text textures threshold ticks tools triangulate truth types undo undrawn unknown upload uploads
-    v3 v3d video viewport viewports virtual wal walk warm what when words workspace write writer zip
+    v3 v3d video viewport viewports virtual wal walk warm what when whiskers words workspace write writer zip
 """
 PLAIN = frozenset(PLAIN_WORDS.split())
 """Words of file names that are plain English, or that every programmer knows; any other has to be

@@ -21,6 +21,7 @@ from app.review.editing.paint import get_paint, read_paint, take_back_paint
 from app.review.editing.recompute import solve_dataset, stale_groups
 from app.review.editing.replay import rebuild, replay
 from app.review.editing.submit import history, load, submit, undo
+from app.review.importing.carry import carried_group
 from app.review.importing.ingest import ingest
 from app.review.policies.policy import change_policy
 from app.review.versions.freeze import FreezeRequest, freeze
@@ -292,6 +293,9 @@ class TestKept:
         solve_dataset(painted, "demo")
         assert load(painted, 1).group.paint == before
         assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
+
+    def test_it_does_not_go_to_another_installation(self, painted):
+        assert "paint" not in carried_group(load(painted, 1).group)
 
     def test_an_import_keeps_it(self, painted, pictures):
         changed = replace(groups(pictures)[0], label="the source says more of it now")
