@@ -17,6 +17,7 @@ from app.api.errors import PreconditionRequiredError
 from app.api.events import Events
 from app.config import Settings
 from app.errors import BusyError, InputError
+from app.review.editing.follow_paint import PaintFollower
 from app.review.evaluating.prediction_reader import PredictionReader
 from app.review.exporting.folder import ExportFolder
 from app.review.jobs.evaluations import resume_evaluations
@@ -60,6 +61,11 @@ class Services:
     noises: NoiseStore
     upkeep: Upkeep
     stopping: Event = field(default_factory=Event)
+
+    @property
+    def paint(self) -> PaintFollower:
+        """Reads the paint of edited lines again."""
+        return PaintFollower(self.frames)
 
     @staticmethod
     def open(settings: Settings, pool: Pool | None = None) -> Services:

@@ -125,6 +125,16 @@ class Frames:
             work, media, flipped, self._settings, *arguments, explain=explain, bounded=True
         )
 
+    def ask_to(self, work: Callable[..., Any], *arguments: Any) -> PoolTask:
+        """Have a function called that reads frames itself, ``work(*arguments, settings)``.
+
+        Its future may have ``ChildEnded``.
+
+        Raises:
+            OverloadedError: Too many wait.
+        """
+        return self._pool.submit(work, *arguments, self._settings)
+
     def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
         return self._pool.submit(
             make_picture,

@@ -19,6 +19,8 @@ from app.store.models import GroupModel, LogModel, PaintEvidenceModel, StationMo
 
 PAINT = "paint"
 """Kind of the log's entries that say what was read of a group's pictures."""
+FOLLOWS = "follows"
+"""In the body of such an entry: the edit beside which it was read, and with which it goes."""
 _EVIDENCE = cast(Table, PaintEvidenceModel.__table__)
 _DIGESTS: BindParameter[Any] = bindparam("digests", expanding=True)
 _READINGS = (
@@ -151,6 +153,8 @@ def last_run(session: Session, dataset_id: int) -> list[LogEntry]:
     taken_back: set[str] = set()
     runs: dict[str, list[LogEntry]] = {}
     for entry in _entries(session, dataset_id):
+        if FOLLOWS in entry.body:
+            continue
         back = entry.body.get("takes_back")
         if back is not None:
             taken_back.add(back)

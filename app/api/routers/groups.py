@@ -13,6 +13,7 @@ from app.api.cursor import foreign_cursor
 from app.api.deps import (
     MAX_ID,
     Actor,
+    AppServices,
     AppStore,
     DatasetQuery,
     Id,
@@ -179,9 +180,11 @@ def get_history(group: Id, store: AppStore) -> History:
 @router.post(
     "/{group}/preview", operation_id="previewGroup", responses=responses(404, 409, 413, 415)
 )
-def preview_group(group: Id, changes: PreviewRequest, store: AppStore) -> PreviewDocument:
+def preview_group(group: Id, changes: PreviewRequest, services: AppServices) -> PreviewDocument:
     """What the solution would be; nothing is saved."""
-    edited, solution = submit.preview(store, group, lambda found: preview_edits(found, changes))
+    edited, solution = submit.preview(
+        services.store, group, lambda found: preview_edits(found, changes), services.paint
+    )
     return PreviewDocument(solution=SolutionDocument.of(solution, edited))
 
 
@@ -192,10 +195,13 @@ def preview_group(group: Id, changes: PreviewRequest, store: AppStore) -> Previe
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 def undo(
-    group: Id, store: AppStore, actor: Actor, if_match: IfMatch, asked: AskedUnder
+    group: Id, services: AppServices, actor: Actor, if_match: IfMatch, asked: AskedUnder
 ) -> Response:
     """Take the last edit back; 409 when there is none."""
-    change = partial(submit.undo, store, group, if_match=if_match, actor=actor)
+    store = services.store
+    change = partial(
+        submit.undo, store, group, if_match=if_match, actor=actor, paint=services.paint
+    )
     return change_group(asked, lambda: load_document(store, group), change)
 
 
@@ -206,10 +212,13 @@ def undo(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 def redo(
-    group: Id, store: AppStore, actor: Actor, if_match: IfMatch, asked: AskedUnder
+    group: Id, services: AppServices, actor: Actor, if_match: IfMatch, asked: AskedUnder
 ) -> Response:
     """Do again what was undone last; 409 when there is nothing."""
-    change = partial(submit.redo, store, group, if_match=if_match, actor=actor)
+    store = services.store
+    change = partial(
+        submit.redo, store, group, if_match=if_match, actor=actor, paint=services.paint
+    )
     return change_group(asked, lambda: load_document(store, group), change)
 
 

@@ -15,9 +15,9 @@ from fastapi import APIRouter, Body, Query, Request, Response
 from app.api.deps import (
     Actor,
     AppServices,
-    AppStore,
     Id,
     IfMatch,
+    Services,
     etag_matches,
 )
 from app.api.problem import Responses, responses
@@ -43,7 +43,6 @@ from app.review.editing.view_paint import NO_FRAME_HINT
 from app.soccer.group import Media
 from app.store.frames import Frames, Picture
 from app.store.neighbours import FARTHEST
-from app.store.session import Store
 
 router = APIRouter(prefix="/views", tags=["views"])
 
@@ -78,13 +77,15 @@ IMAGES: Responses = {
 def patch_lines(
     view: Id,
     lines: LinesEdit,
-    store: AppStore,
+    services: AppServices,
     actor: Actor,
     if_match: IfMatch,
     asked: AskedUnder,
 ) -> Response:
     """Draw, move or delete markings; 409 names the station when the camera is static."""
-    return _submit(store, view, lambda key: SetLines(key, lines.points()), if_match, actor, asked)
+    return _submit(
+        services, view, lambda key: SetLines(key, lines.points()), if_match, actor, asked
+    )
 
 
 @router.patch(
@@ -96,14 +97,14 @@ def patch_lines(
 def patch_ball(
     view: Id,
     ball: Annotated[BallEdit | None, Body(description="null: no ball is annotated.")],
-    store: AppStore,
+    services: AppServices,
     actor: Actor,
     if_match: IfMatch,
     asked: AskedUnder,
 ) -> Response:
     """Say where the ball is in this view, that it is out of view, or that there is none."""
     said = None if ball is None else ball.ball()
-    return _submit(store, view, lambda key: SetBall(key, said), if_match, actor, asked)
+    return _submit(services, view, lambda key: SetBall(key, said), if_match, actor, asked)
 
 
 @router.patch(
@@ -115,7 +116,7 @@ def patch_ball(
 def patch_view(
     view: Id,
     change: ViewEdit,
-    store: AppStore,
+    services: AppServices,
     actor: Actor,
     if_match: IfMatch,
     asked: AskedUnder,
@@ -130,18 +131,21 @@ def patch_view(
             return SetPicture(key, None if picture is None else picture.picture())
         return IncludeView(key, change.included, change.reason, change.note)
 
-    return _submit(store, view, edit, if_match, actor, asked)
+    return _submit(services, view, edit, if_match, actor, asked)
 
 
 def _submit(
-    store: Store,
+    services: Services,
     view: int,
     edit_of: Callable[[str], Edit],
     if_match: str,
     actor: str,
     asked: Asked | None,
 ) -> Response:
-    change = partial(submit_view, store, view, edit_of, if_match=if_match, actor=actor)
+    store = services.store
+    change = partial(
+        submit_view, store, view, edit_of, if_match=if_match, actor=actor, paint=services.paint
+    )
     return change_group(
         asked, lambda: load_document(store, find_view(store, view).group_id), change
     )

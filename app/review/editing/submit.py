@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 
 from app.errors import ConflictError, NotFoundError, SharedStationError
 from app.review.editing.codec import edit_from_json, edit_to_json
-from app.review.editing.edit import STATION_EDITS, Edit, SetPicture, need_view
+from app.review.editing.edit import STATION_EDITS, Edit, SetPaint, SetPicture, need_view
 from app.review.editing.etags import read_etags, read_head, require_said, require_unchanged
+from app.review.editing.follow_paint import PaintFollower
 from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points_in_all
 from app.review.editing.solve_encoded import solve_encoded
@@ -33,6 +34,7 @@ from app.store.groups import (
     save_revision,
 )
 from app.store.log import Entry, LogEntry, append, group_entries
+from app.store.paint import FOLLOWS, PAINT, insert_readings
 from app.store.queue import refresh_queue, update_row
 from app.store.session import Session, Store
 from app.store.solutions import EncodedSolution, insert_solutions, read_solutions
@@ -49,9 +51,10 @@ class _Change:
 
 @dataclass(frozen=True)
 class _Outcome:
-    """A change with all that is saved of it."""
+    """A change with all that is saved of it; ``painted`` is its group as it is afterwards."""
 
     change: _Change
+    painted: Group
     before: Record
     after: Record
     solution: Solution
@@ -93,6 +96,7 @@ def submit(
     if_match: str,
     actor: str,
     keep: Keep[GroupState] = keep_nothing,
+    paint: PaintFollower | None = None,
 ) -> GroupState:
     """Save an edit and answer with the group as it is then, solved.
 
@@ -103,6 +107,7 @@ def submit(
         if_match: ETag of the state that the edit builds on.
         actor: Who says so.
         keep: Keeps the answer with the edit.
+        paint: Reads the paint of edited lines again, as part of the edit; None: it stays as it is.
 
     Raises:
         StaleRevisionError: Somebody else was faster.
@@ -111,7 +116,7 @@ def submit(
         StorageError: Nothing was saved.
     """
     plan = _plan_edit(lambda _stored: edit)
-    return _change(store, lambda _session: group_id, plan, if_match, actor, keep)
+    return _change(store, lambda _session: group_id, plan, if_match, actor, keep, paint)
 
 
 def submit_view(
@@ -122,6 +127,7 @@ def submit_view(
     if_match: str,
     actor: str,
     keep: Keep[GroupState] = keep_nothing,
+    paint: PaintFollower | None = None,
 ) -> GroupState:
     """``submit`` for a view's id: ``edit_of`` makes the edit from the view's key."""
 
@@ -131,7 +137,7 @@ def submit_view(
     def find(session: Session) -> int:
         return group_of_view(session, view_id)
 
-    return _change(store, find, _plan_edit(edit), if_match, actor, keep)
+    return _change(store, find, _plan_edit(edit), if_match, actor, keep, paint)
 
 
 def undo(
@@ -141,9 +147,12 @@ def undo(
     if_match: str,
     actor: str,
     keep: Keep[GroupState] = keep_nothing,
+    paint: PaintFollower | None = None,
 ) -> GroupState:
     """Take the last edit of a group back, whoever made it; raises ConflictError without one."""
-    return _change(store, lambda _session: group_id, _plan_step("undo"), if_match, actor, keep)
+    return _change(
+        store, lambda _session: group_id, _plan_step("undo"), if_match, actor, keep, paint
+    )
 
 
 def redo(
@@ -153,13 +162,19 @@ def redo(
     if_match: str,
     actor: str,
     keep: Keep[GroupState] = keep_nothing,
+    paint: PaintFollower | None = None,
 ) -> GroupState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    return _change(store, lambda _session: group_id, _plan_step("redo"), if_match, actor, keep)
+    return _change(
+        store, lambda _session: group_id, _plan_step("redo"), if_match, actor, keep, paint
+    )
 
 
 def preview(
-    store: Store, group_id: int, edits_of: Callable[[Group], Sequence[Edit]]
+    store: Store,
+    group_id: int,
+    edits_of: Callable[[Group], Sequence[Edit]],
+    paint: PaintFollower | None = None,
 ) -> tuple[Group, Solution]:
     """The group and its solution as they would be after the edits that ``edits_of`` makes for it.
 
@@ -182,6 +197,8 @@ def preview(
         for edit in edits:
             group = edit.apply(group)
         known = known_calibrations(session, [group], stored.policy)
+    if paint is not None:
+        group = paint.follow(group, stored.policy.calibration, known)
     return group, solve(group, stored.policy, known)
 
 
@@ -244,6 +261,7 @@ def _change(
     if_match: str,
     actor: str,
     keep: Keep[GroupState],
+    paint: PaintFollower | None,
 ) -> GroupState:
     while True:
         with store.read() as session:
@@ -255,7 +273,10 @@ def _change(
                 found = read_solutions(session, [before.solution_key])
                 return before.state(found.get(before.stored.id))
             known = known_calibrations(session, [change.group], before.stored.policy)
-        outcome = _outcome(before, change, known)
+        painted = change.group
+        if paint is not None:
+            painted = paint.follow(painted, before.stored.policy.calibration, known)
+        outcome = _outcome(before, change, painted, known)
         state = outcome.after.state(outcome.solution)
         kept = keep(state)
         with store.write() as session:
@@ -267,22 +288,39 @@ def _change(
         # Another policy judges the dataset by now, so another solution belongs to the edit.
 
 
-def _outcome(before: Record, change: _Change, known: Mapping[str, Calibration]) -> _Outcome:
-    stored = next_revision(before.stored, change.group, now())
+def _outcome(
+    before: Record, change: _Change, painted: Group, known: Mapping[str, Calibration]
+) -> _Outcome:
+    at = now()
+    stored = next_revision(before.stored, change.group, at)
+    if painted is not change.group:
+        stored = next_revision(stored, painted, at)
     after = replace(before, stored=stored, stacks=before.stacks.then(change.kind))
-    solution, encoded = solve_encoded(change.group, stored.policy, known)
-    return _Outcome(change, before, after, solution, encoded)
+    solution, encoded = solve_encoded(painted, stored.policy, known)
+    return _Outcome(change, painted, before, after, solution, encoded)
 
 
 def _save(session: Session, outcome: _Outcome, actor: str) -> None:
     change, after = outcome.change, outcome.after
     stored = after.stored
     save_revision(session, outcome.before.stored, stored)
-    entry = Entry(change.kind, actor, stored.changed, change.body, stored.dataset_id, stored.id)
-    append(session, [entry])
+    where = stored.dataset_id, stored.id
+    entries = [Entry(change.kind, actor, stored.changed, change.body, *where)]
+    if outcome.painted is not change.group:
+        insert_readings(session, stored.dataset_id, outcome.painted.paint.values())
+        entries.append(Entry(PAINT, actor, stored.changed, _read_beside(outcome), *where))
+    append(session, entries)
     insert_solutions(session, [(after.solution_key, outcome.encoded)])
     noticed = [item.kind for item in after.noticed]
     update_row(session, stored, after.newest_verdict, noticed, outcome.encoded.summary)
+
+
+def _read_beside(outcome: _Outcome) -> Json:
+    """Body of the entry that says what was read of the paint with a change."""
+    before = outcome.change.group
+    edit = SetPaint(outcome.painted.paint)
+    body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(before))}
+    return {FOLLOWS: outcome.change.kind, **body}
 
 
 def _plan_edit(edit_of: Callable[[StoredGroup], Edit]) -> _Plan:

@@ -16,6 +16,7 @@ from app.soccer.pitch import Pitch
 from tests.cameras import SIZE
 from tests.unit.api.conftest import lines_of
 from tests.unit.paint.lawns import TRUE, drawn, lawn
+from tests.waiting import SECONDS
 
 API = "/api/v1"
 
@@ -82,3 +83,34 @@ class TestPropose:
         answer = ask(api, document, "propose")
         assert answer.status_code == 404
         assert "7.png" in answer.json()["detail"]
+
+
+class TestFollowing:
+    def test_an_edit_of_lines_and_its_preview_stay_on_the_paint(self, app, api, document) -> None:
+        jobs, policy = app.state.services.jobs, f"{API}/datasets/painted/policy"
+        present = {"If-Match": api.get(policy).headers["etag"]}
+        solving = api.put(policy, json={"name": "touchline"}, headers=present)
+        jobs.wait(solving.json()["id"], SECONDS)
+        read = api.post(f"{API}/datasets/painted/paint", json={})
+        assert jobs.wait(read.json()["id"], SECONDS).state == "done"
+        own = f"{API}/groups/{document['id']}"
+        before = api.get(own)
+        assert source(before.json()) == "paint"
+        lines = {"Side line right": None}
+        wanted = {"views": {"7.png": {"lines": lines}}}
+        assert source(api.post(f"{own}/preview", json=wanted).json()) == "paint"
+        view = document["views"][0]["id"]
+        changed = api.patch(
+            f"{API}/views/{view}/lines",
+            json={"lines": lines},
+            headers={"If-Match": before.headers["etag"]},
+        )
+        assert source(changed.json()) == "paint"
+        back = api.post(f"{own}/undo", headers={"If-Match": changed.headers["etag"]})
+        assert back.json()["solution"] == before.json()["solution"]
+
+
+def source(answer: dict[str, Any]) -> str:
+    """Of the first view's calibration."""
+    found: str = answer["solution"]["views"][0]["calibration"]["source"]
+    return found
