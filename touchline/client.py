@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from json import dumps
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ class Client:
         patience: float = PATIENCE,
     ):
         self.address, self._patience = address.rstrip("/").removesuffix("/api/v1"), patience
+        self._again = {"headers": headers, "timeout": timeout, "patience": patience}
         self._httpx = package("httpx")
         self._http = self._httpx.Client(
             headers={"Accept": "application/json", **(headers or {})},
@@ -56,6 +58,15 @@ class Client:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def __del__(self) -> None:
+        # A client that a version keeps for its frames is closed with it.
+        if hasattr(self, "_http"):
+            self.close()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Workers that load data make connections of their own."""
+        return partial(Client, **self._again), (self.address,)
 
     def close(self) -> None:
         """Close the connections."""

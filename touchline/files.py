@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import zipfile
+import zlib
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -68,7 +69,7 @@ class Files:
             return self._zip.read(name) if self._zip else (self.path / name).read_bytes()
         except (KeyError, FileNotFoundError):
             raise DataError(f"{self.path} holds no {name}") from None
-        except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError) as error:
+        except (OSError, zipfile.BadZipFile, RuntimeError, zlib.error) as error:
             raise DataError(f"{name} of {self.path} cannot be read ({error})") from None
 
 

@@ -52,13 +52,16 @@ def open_version(
     if not path.exists():
         request = {"dataset": found["dataset"], "format": "parquet", "version": found["id"]}
         client.export(path, **request, boxes=boxes, images="copy" if images else "none")
-    export = Export(path)
-    if export.hash != found["hash"]:
+    try:
+        export = Export(path)
+        if export.hash != found["hash"]:
+            raise DataError(f'it is not version "{found["name"]}" ({found["hash"][:16]})')
+        return Dataset(export, _frames(frames, export, (client, found["dataset"])))
+    except DataError as error:
         raise HashError(
-            f'{path} is not version "{found["name"]}" ({found["hash"][:16]}) that the server names',
+            f"what was kept of the version is not what the server has: {error.message}",
             f"Delete {path} and open the version again.",
-        )
-    return Dataset(export, _frames(frames, export, (client, found["dataset"])))
+        ) from error
 
 
 def _is_address(source: str | Path) -> bool:
