@@ -6,8 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from touchline.dataset import Dataset
+from touchline.errors import DataError
+from touchline.files import is_safe
 from touchline.packages import package
 from touchline.view import Group, View
+
+MOMENT = "moment"
+"""The field that joins the views of one moment."""
 
 
 def to_fiftyone(version: Dataset, folder: str | Path, name: str | None = None) -> Any:
@@ -26,22 +31,30 @@ def to_fiftyone(version: Dataset, folder: str | Path, name: str | None = None) -
         DataError: A frame is not there.
     """
     fo = package("fiftyone")
+    samples = to_samples(version, folder)
     dataset = fo.Dataset(name) if name else fo.Dataset()
-    dataset.add_group_field("moment", default="1")
+    dataset.add_group_field(MOMENT, default="1")
     dataset.info = {"dataset": version.name, "version": version.version, "hash": version.hash}
-    root = Path(folder)
+    dataset.add_samples(samples)
+    return dataset
+
+
+def to_samples(version: Dataset, folder: str | Path) -> list[Any]:
+    """The samples of ``to_fiftyone``, in no dataset yet: this needs no database."""
+    fo = package("fiftyone")
     samples = []
     for group in version.groups:
         moment = fo.Group()
         for number, view in enumerate(group.views, 1):
-            sample = _sample(fo, group, view, _written(root, view))
-            sample["moment"] = moment.element(str(number))
+            sample = _sample(fo, group, view, _written(Path(folder), view))
+            sample[MOMENT] = moment.element(str(number))
             samples.append(sample)
-    dataset.add_samples(samples, progress=False)
-    return dataset
+    return samples
 
 
 def _written(root: Path, view: View) -> Path:
+    if not is_safe(view.file_name):
+        raise DataError(f'"{view.file_name}" leads out of {root}')
     path = root / view.file_name
     path.parent.mkdir(parents=True, exist_ok=True)
     if not path.exists():
@@ -51,9 +64,9 @@ def _written(root: Path, view: View) -> Path:
 
 def _sample(fo: Any, group: Group, view: View, path: Path) -> Any:
     sample = fo.Sample(filepath=str(path.resolve()), tags=[view.split] if view.split else [])
-    for name in ("group", "match", "in_valid_pair", "failed"):
-        sample[f"touchline_{name}" if name == "group" else name] = getattr(view, name)
-    sample["view"], sample["verdict"] = view.key, group.verdict
+    sample["key"], sample["view"], sample["match"] = group.key, view.key, view.match
+    sample["in_valid_pair"], sample["failed"] = view.in_valid_pair, view.failed
+    sample["verdict"] = group.verdict
     sample["jac"] = view.jac[0]
     if view.ball_3d is not None:
         sample["ball_3d"] = list(view.ball_3d.position)
