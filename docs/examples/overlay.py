@@ -1,4 +1,4 @@
-"""Draw the pitch onto a frame: python overlay.py SOURCE [OUT.png]
+"""Draw the pitch and the ball onto a frame: python overlay.py SOURCE [OUT]
 
 SOURCE is an export (folder or zip of `touchline export --format parquet`) or the address of a server.
 """
@@ -12,13 +12,24 @@ import touchline
 
 source, out = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else "overlay.png"
 version = touchline.open(source)
-view = next(view for view in version.views if view.camera and view.ball_3d)
+group = next(group for group in version if group.ball)
+view = next(view for view in group.views if view.in_valid_pair)
+half_length, half_width = group.pitch[0] / 2, group.pitch[1] / 2
+areas = [(-half_length, half_length, half_width), (0, 0, half_width)]
+for depth, width in ((16.5, 20.16), (5.5, 9.16)):  # penalty area and goal area
+    areas += [
+        (-half_length, depth - half_length, width),
+        (half_length - depth, half_length, width),
+    ]
+
+figure = plt.figure(figsize=(view.width / 160, view.height / 160))
+plt.axes((0, 0, 1, 1), xlim=(-0.5, view.width - 0.5), ylim=(view.height - 0.5, -0.5)).axis("off")
 plt.imshow(view.image())
-for x in np.arange(-52.5, 53, 5.25):
-    line = np.column_stack([np.full(200, x), np.linspace(-34, 34, 200), np.zeros(200)])
-    plt.plot(*view.camera.project(line).T, color="cyan", linewidth=0.7)
-plt.plot(*view.camera.project(view.ball_3d.position), "o", color="red", fillstyle="none")
-plt.xlim(-0.5, view.width - 0.5)
-plt.ylim(view.height - 0.5, -0.5)
-plt.savefig(out, dpi=150)
-print(f"{view.key}: the ball lies {view.ball_3d.height_m:.2f} m above the grass; see {out}")
+for left, right, width in areas:
+    corners = np.array([(left, -width), (right, -width), (right, width), (left, width)])
+    for start, end in zip(corners, np.roll(corners, 1, axis=0), strict=True):
+        ground = np.linspace([*start, 0], [*end, 0], 300)  # x, y, z of points along the line
+        plt.plot(*view.camera.project(ground).T, color="cyan", linewidth=1)
+plt.plot(*view.camera.project(group.ball.position), "o", color="red", fillstyle="none")
+figure.savefig(out, dpi=160)
+print(f"{view.key}: the ball is {group.ball.height_m:.2f} m above the grass; see {out}")

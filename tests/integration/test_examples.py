@@ -64,7 +64,7 @@ class TestExamples:
         assert [path.name for path in EXAMPLES.glob("*.py") if path.name not in told] == []
 
     def test_the_pitch_is_drawn_onto_a_frame(self, export: Path, tmp_path: Path) -> None:
-        assert "above the grass" in run(tmp_path, EXAMPLES / "overlay.py", export)
+        assert "m above the grass" in run(tmp_path, EXAMPLES / "overlay.py", export)
         assert (tmp_path / "overlay.png").read_bytes().startswith(b"\x89PNG")
 
     def test_a_model_trains_on_a_version(self, export: Path, tmp_path: Path) -> None:

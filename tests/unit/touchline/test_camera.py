@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera as ServerCamera
-from app.geometry.lens import ARCTAN_POLYNOMIAL, FISHEYE
+from app.geometry.lens import ARCTAN_POLYNOMIAL, FISHEYE, LENSES
 from tests.cameras import EVERY_COEFFICIENT, looking, wide
 from touchline.camera import Camera
 from touchline.errors import CameraError
+from touchline.lens import COEFFICIENTS
 
 MAIN = looking((2.0, 60.0, -15.0), (20.0, 5.0, 0.0), 1800.0)
 CAMERAS = {
@@ -123,6 +124,11 @@ class TestScaled:
         points = camera.unproject(np.array([[700.0, 500.0]]))
         half = camera.scaled(0.5).project(points)[0]
         assert half.tolist() == pytest.approx([(700.5) / 2 - 0.5, (500.5) / 2 - 0.5])
+
+
+class TestLenses:
+    def test_every_lens_of_the_server_is_compared_here(self) -> None:
+        assert {camera.lens for camera in CAMERAS.values()} == set(LENSES) == set(COEFFICIENTS)
 
 
 class TestCamera:
