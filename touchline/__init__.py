@@ -15,6 +15,7 @@ from touchline.client import Client
 from touchline.dataset import Dataset
 from touchline.errors import TouchlineError
 from touchline.opening import open_version as open  # noqa: A004  `touchline.open` is its name
+from touchline.pitch import markings
 from touchline.samples import Samples
 from touchline.view import Group, View
 
@@ -29,5 +30,6 @@ __all__ = [
     "Samples",
     "TouchlineError",
     "View",
+    "markings",
     "open",
 ]

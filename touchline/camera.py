@@ -19,6 +19,8 @@ from touchline.lens import BROWN_CONRADY, FloatArray, Lens, lens_of
 
 MIN_DEPTH = 1e-3
 """Metres in front of the camera below which nothing is seen."""
+_ROUNDING = 1e-10
+"""Below, a matrix and its angles are the same rotation but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,29 @@ class Camera:
             distortion=tuple(row["distortion"]),
             lens=row.get("lens") or BROWN_CONRADY,
         )
+
+    @staticmethod
+    def from_json(document: Mapping[str, Any]) -> Camera:
+        """The camera of SoccerNet's JSON, as ``camera_<frame>.json`` holds it.
+
+        The angles count; a ``rotation_matrix`` that is theirs but for rounding has more digits.
+        Distortion that is not there is none.
+
+        Raises:
+            CameraError: A number is missing.
+        """
+        try:
+            return Camera(
+                rotation=tuple(map(tuple, _rotation(document).tolist())),
+                position=tuple(document["position_meters"]),
+                focal_length=(document["x_focal_length"], document["y_focal_length"]),
+                principal_point=tuple(document["principal_point"]),
+                skew=document.get("skew", 0.0),
+                distortion=_coefficients(document),
+                lens=document.get("lens") or BROWN_CONRADY,
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise CameraError(f"this is no camera of SoccerNet's JSON ({error!r})") from None
 
     @cached_property
     def K(self) -> FloatArray:
@@ -171,6 +196,32 @@ class Camera:
         y = (pixels[:, 1] - y0) / ay
         x = (pixels[:, 0] - x0 - self.skew * y) / ax
         return self._lens.undistort(np.column_stack([x, y]))
+
+
+def _rotation(document: Mapping[str, Any]) -> FloatArray:
+    """``(Rz(pan) Rx(tilt) Rz(roll))^T``, shape (3, 3)."""
+    names = ("pan_degrees", "tilt_degrees", "roll_degrees")
+    pan, tilt, roll = np.radians([document[name] for name in names])
+    cosine, sine = np.cos(tilt), np.sin(tilt)
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+    rotation: FloatArray = (_about_z(pan) @ about_x @ _about_z(roll)).T
+    given = np.array(document.get("rotation_matrix", rotation), dtype=np.float64).reshape(3, 3)
+    return given if np.abs(given - rotation).max() < _ROUNDING else rotation
+
+
+def _about_z(angle: float) -> FloatArray:
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _coefficients(document: Mapping[str, Any]) -> tuple[float, ...]:
+    """Of the lens, in OpenCV's order; SoccerNet has all k before p."""
+    if document.get("lens") not in (None, BROWN_CONRADY):
+        return tuple(document["lens_coefficients"])
+    k1, k2, k3, k4, k5, k6 = document.get("radial_distortion") or (0.0,) * 6
+    p1, p2 = document.get("tangential_distortion") or (0.0,) * 2
+    s1, s2, s3, s4 = document.get("thin_prism_distortion") or (0.0,) * 4
+    return (k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4)
 
 
 def _rows(values: npt.ArrayLike, width: int) -> tuple[FloatArray, bool]:

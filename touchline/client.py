@@ -159,24 +159,32 @@ class Client:
         sent = self.send("POST", "uploads", params=params, content=file, headers=headers)
         return str(_value(sent)["id"])
 
-    def export(self, out: Path | str, **request: Any) -> Path:
+    def download(self, path: str, out: Path | str) -> Path:
+        """Fetch a file of any size; it appears whole or not at all."""
+        target = Path(out)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        partial = target.with_name(f".{target.name}.{uuid4().hex}.partial")
+        try:
+            self.send("GET", path, into=partial)
+            partial.replace(target)
+        finally:
+            partial.unlink(missing_ok=True)
+        return target
+
+    def export(self, out: Path | str, *, keep: bool = True, **request: Any) -> Path:
         """Make an export and fetch its zip.
 
         Args:
             out: The file to write; it appears whole or not at all.
+            keep: Whether the server keeps its own copy.
             request: What to export: ``dataset``, ``format``, ``version``, ``boxes``, ``images``,
                 ``all``.
         """
         job = self.post("exports", request)
         self.wait(job)
-        target = Path(out)
-        partial = target.with_name(f".{target.name}.{uuid4().hex}.partial")
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            partial.write_bytes(self.read(f"exports/{job['id']}/content"))
-            partial.replace(target)
-        finally:
-            partial.unlink(missing_ok=True)
+        target = self.download(f"exports/{job['id']}/content", out)
+        if not keep:
+            self.delete(f"exports/{job['id']}")
         return target
 
     def send(
@@ -188,6 +196,7 @@ class Client:
         json: Any = None,
         always: bool = False,
         content: Path | None = None,
+        into: Path | None = None,
         if_match: str | Mapping[str, Any] | None = None,
         key: str | None = None,
         headers: Mapping[str, str] | None = None,
@@ -201,6 +210,7 @@ class Client:
             json: The body; None sends none.
             always: Send ``null`` for a body that is None.
             content: A file to send instead.
+            into: A file to write what comes into.
             if_match: The ETag that a change builds on, or the document that has it as ``etag``.
             key: Idempotency key; one is made for whatever changes something.
             headers: More of them.
@@ -222,12 +232,24 @@ class Client:
 
         def ask() -> Any:
             url, more = self._url(path), {"params": query, "headers": sent}
+            if into is not None:
+                return self._fetch(into, method, url, more)
             if content is None:
                 return self._http.request(method, url, **more, **body)
             with content.open("rb") as file:
                 return self._http.request(method, url, **more, content=_chunks(file))
 
         return self._patiently(ask)
+
+    def _fetch(self, into: Path, method: str, url: str, more: Mapping[str, Any]) -> Any:
+        with self._http.stream(method, url, **more) as answer:
+            if not answer.is_success:
+                answer.read()
+                return answer
+            with into.open("wb") as file:
+                for chunk in answer.iter_bytes(_CHUNK):
+                    file.write(chunk)
+        return answer
 
     def _url(self, path: str) -> str:
         if path.startswith(("http://", "https://")):

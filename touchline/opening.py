@@ -51,7 +51,7 @@ def open_version(
     path = cached_version(Path(cache or cache_folder()), found["hash"], boxes, images)
     if not path.exists():
         request = {"dataset": found["dataset"], "format": "parquet", "version": found["id"]}
-        client.export(path, **request, boxes=boxes, images="copy" if images else "none")
+        client.export(path, keep=False, **request, boxes=boxes, images="copy" if images else "none")
     try:
         export = Export(path)
         if export.hash != found["hash"]:

@@ -12,9 +12,18 @@ import numpy as np
 import pytest
 
 import touchline as library
+from tests.e2e.service import serving
+from tests.homes import copy_home
 from touchline.errors import DataError, HashError, RequestError, StaleError, UnreachableError
 
 ALIKE_PX = 1e-9
+
+
+@pytest.fixture(scope="module")
+def address(filled: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A server over a home of its own: what others judge and edit changes what is in a version."""
+    with serving(copy_home(filled, tmp_path_factory)) as address:
+        yield address
 
 
 @pytest.fixture(scope="module")
@@ -27,12 +36,9 @@ def connected(address: str) -> Iterator[library.Client]:
 @pytest.fixture(scope="module")
 def frozen(connected: library.Client) -> dict[str, Any]:
     """A version of what the policy passes."""
-    names = {item["name"] for item in connected.get("datasets/small/versions")["items"]}
-    if "library" not in names:
-        job = connected.post("datasets/small/versions", {"name": "library", "groups": "passing"})
-        connected.wait(job)
-    items = connected.get("datasets/small/versions")["items"]
-    found: dict[str, Any] = next(item for item in items if item["name"] == "library")
+    request = {"name": "library", "groups": "passing"}
+    connected.wait(connected.post("datasets/small/versions", request))
+    found: dict[str, Any] = connected.get("datasets/small/versions")["items"][0]
     return found
 
 
@@ -64,6 +70,16 @@ class TestOpen:
         before = kept.stat().st_mtime_ns
         again = library.open(address, frozen["hash"][:12], dataset="small", cache=cache)
         assert (again.groups, kept.stat().st_mtime_ns) == (version.groups, before)
+
+    def test_nothing_is_left_on_the_server(
+        self,
+        connected: library.Client,
+        version: library.Dataset,
+        frozen: dict[str, Any],
+    ) -> None:
+        exports = list(connected.pages("exports", dataset="small"))
+        ours = [item for item in exports if item["request"]["version"] == frozen["id"]]
+        assert {item["status"] for item in ours} == {"gone"}
 
     def test_what_was_spoiled_in_the_cache_is_refused_with_what_to_do(
         self, address: str, version: library.Dataset, tmp_path: Path

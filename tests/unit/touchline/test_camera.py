@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from app.datasets.camera_json import camera_from_json, camera_to_json
 from app.geometry.camera import Camera as ServerCamera
 from app.geometry.lens import ARCTAN_POLYNOMIAL, FISHEYE, LENSES
 from tests.cameras import EVERY_COEFFICIENT, looking, wide
@@ -124,6 +126,31 @@ class TestScaled:
         points = camera.unproject(np.array([[700.0, 500.0]]))
         half = camera.scaled(0.5).project(points)[0]
         assert half.tolist() == pytest.approx([(700.5) / 2 - 0.5, (500.5) / 2 - 0.5])
+
+
+class TestFromJson:
+    @EVERY
+    def test_a_file_of_the_servers_is_the_servers_camera(self, server: ServerCamera) -> None:
+        document = json.loads(json.dumps(camera_to_json(server)))
+        theirs = camera_from_json(document, "camera.json").project(everywhere())
+        mine = Camera.from_json(document).project(everywhere())
+        assert largest_difference(mine, theirs) < ALIKE_PX
+        del document["rotation_matrix"]
+        mine = Camera.from_json(document).project(everywhere())
+        # What is nearly beside the camera is far off the picture, and so is its rounding.
+        near = (np.abs(theirs) < 1e4).all(axis=1)
+        assert largest_difference(mine[near], theirs[near]) < 1e-8
+
+    def test_distortion_that_is_not_there_is_none_and_a_number_is_missed(self) -> None:
+        document = {
+            name: value
+            for name, value in camera_to_json(MAIN).items()
+            if not name.endswith("distortion")
+        }
+        assert Camera.from_json(document).distortion == (0.0,) * 12
+        del document["tilt_degrees"]
+        with pytest.raises(CameraError, match="tilt_degrees"):
+            Camera.from_json(document)
 
 
 class TestLenses:
