@@ -45,7 +45,7 @@ class Client:
         patience: float = PATIENCE,
     ):
         self.address, self._patience = address.rstrip("/").removesuffix("/api/v1"), patience
-        self._again = {"headers": headers, "timeout": timeout, "patience": patience}
+        self._again = partial(Client, headers=headers, timeout=timeout, patience=patience)
         self._httpx = package("httpx")
         self._http = self._httpx.Client(
             headers={"Accept": "application/json", **(headers or {})},
@@ -66,7 +66,7 @@ class Client:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Workers that load data make connections of their own."""
-        return partial(Client, **self._again), (self.address,)
+        return self._again, (self.address,)
 
     def close(self) -> None:
         """Close the connections."""

@@ -60,7 +60,8 @@ def markings(
 def _line(start: tuple[float, ...], end: tuple[float, ...], step: float) -> FloatArray:
     ends = np.array([(*point, 0.0)[:3] for point in (start, end)])
     count = max(math.ceil(float(np.linalg.norm(ends[1] - ends[0])) / step), 1)
-    points: FloatArray = np.linspace(*ends, count + 1)
+    share = np.linspace(0.0, 1.0, count + 1)[:, None]
+    points: FloatArray = (1 - share) * ends[0] + share * ends[1]
     return points
 
 

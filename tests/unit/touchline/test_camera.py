@@ -11,7 +11,7 @@ import pytest
 from app.datasets.camera_json import camera_from_json, camera_to_json
 from app.geometry.camera import Camera as ServerCamera
 from app.geometry.lens import ARCTAN_POLYNOMIAL, FISHEYE, LENSES
-from tests.cameras import EVERY_COEFFICIENT, looking, wide
+from tests.cameras import CENTER, EVERY_COEFFICIENT, looking, wide
 from touchline.camera import Camera
 from touchline.errors import CameraError
 from touchline.lens import COEFFICIENTS
@@ -54,8 +54,10 @@ def everywhere() -> np.ndarray:
 
 
 def pixels_around() -> np.ndarray:
-    """Pixels of the picture and somewhat beyond."""
-    return np.random.default_rng(2).uniform((-300, -200), (1600, 950), (2000, 2))
+    """Pixels of the picture and somewhat beyond, and about its middle, where polynomials tear."""
+    random = np.random.default_rng(2)
+    middle = random.normal(CENTER, 2.0, (200, 2))
+    return np.vstack([random.uniform((-300, -200), (1600, 950), (2000, 2)), middle, [CENTER]])
 
 
 def largest_difference(one: np.ndarray, other: np.ndarray) -> float:

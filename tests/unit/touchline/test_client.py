@@ -133,7 +133,7 @@ class TestWait:
         problem = {"detail": "the disk is full", "hint": "Make room.", "pointer": None}
         answers.say(200, job("failed", problem=problem))
         with pytest.raises(JobError, match=r"the disk is full\. Make room\.") as caught:
-            Client(answers.address).wait(5)
+            Client(answers.address).wait(5, timeout=5)
         assert caught.value.job["id"] == 5
 
     def test_who_waits_no_longer_is_told_how_far_it_is(self, answers) -> None:
