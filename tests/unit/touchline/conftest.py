@@ -16,7 +16,7 @@ from PIL import Image
 
 from app.datasets.export_record import ExportRecord, frame_name
 from app.datasets.manifest import Manifest, write_manifest
-from app.datasets.output import output_tree
+from app.datasets.output import output_tree, write_zip
 from app.datasets.parquet_writer import write_parquet
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
@@ -54,6 +54,13 @@ def write_export(out: Path, records: list[ExportRecord], images: bool = True) ->
         stamp = {"frozen": {"hash": HASH}}
         manifest = Manifest("league", "parquet", "2030-01-01", counts, version="v1", stamp=stamp)
         write_manifest(root, manifest)
+    return out
+
+
+def zipped(folder: Path, out: Path) -> Path:
+    """The zip of an export."""
+    with out.open("wb") as file:
+        write_zip(folder, file)
     return out
 
 
@@ -113,7 +120,7 @@ def _handler(told: Answers) -> type[BaseHTTPRequestHandler]:
                 return
             content = b"" if value is None else json.dumps(value).encode()
             self.send_response(status)
-            for name, text in {**headers, "Content-Length": str(len(content))}.items():
+            for name, text in {"Content-Length": str(len(content)), **headers}.items():
                 self.send_header(name, text)
             self.end_headers()
             self.wfile.write(content)

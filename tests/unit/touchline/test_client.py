@@ -151,3 +151,15 @@ class TestExport:
             Client(answers.address).export(tmp_path / "a" / "v1.zip", dataset="a")
         assert [*(tmp_path / "a").iterdir()] == []
         assert json.loads(answers.asked[0].body) == {"dataset": "a"}
+
+    def test_one_that_breaks_off_leaves_what_was_there(self, answers, tmp_path: Path) -> None:
+        (out := tmp_path / "v1.zip").write_bytes(b"the version before")
+        answers.say(200, "half of a zip", Content_Length="1000")
+        with pytest.raises(UnreachableError):
+            Client(answers.address, patience=0).download("exports/5/content", out)
+        assert [path.name for path in tmp_path.iterdir()] == ["v1.zip"]
+        assert out.read_bytes() == b"the version before"
+        answers.say(200, "the version")
+        answers.waiting.pop(0)
+        Client(answers.address).download("exports/5/content", out)
+        assert out.read_bytes() == b'"the version"'

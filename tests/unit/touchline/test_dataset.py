@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 import touchline
 from app.datasets.export_record import ExportRecord
+from tests.unit.touchline.conftest import zipped
 from touchline.errors import DataError, MissingPackageError
 
 
@@ -110,8 +112,19 @@ class TestSamples:
         with pytest.raises(DataError, match="Splits are: test, train"):
             version.samples("valid")
 
-    def test_a_worker_process_can_have_a_copy(self, version: touchline.Dataset) -> None:
-        samples = version.samples("train")
+    def test_what_a_view_lacks_is_not_a_number(self, version: touchline.Dataset) -> None:
+        bare = replace(version.views[0], ball=None, ball_3d=None, camera=None)
+        sample = touchline.Samples([bare], images=False)[0]
+        shapes = {name: sample[name].shape for name in ("box", "center", "ball", "P")}
+        assert shapes == {"box": (4,), "center": (2,), "ball": (3,), "P": (3, 4)}
+        assert all(np.isnan(sample[name]).all() for name in shapes)
+
+    @pytest.mark.parametrize("packed", [False, True])
+    def test_a_worker_process_can_have_a_copy(
+        self, export: Path, tmp_path: Path, packed: bool
+    ) -> None:
+        source = zipped(export, tmp_path / "v1.zip") if packed else export
+        samples = touchline.open(source).samples("train")
         with ProcessPoolExecutor(1, get_context("spawn")) as pool:
             again = [*pool.map(samples.__getitem__, [0])]
         assert (again[0]["image"] == samples[0]["image"]).all()

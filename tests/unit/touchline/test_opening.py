@@ -12,8 +12,7 @@ import pytest
 
 import touchline
 from app.datasets.export_record import ExportRecord
-from app.datasets.output import write_zip
-from tests.unit.touchline.conftest import HASH, write_export
+from tests.unit.touchline.conftest import HASH, write_export, zipped
 from touchline.errors import DataError, HashError
 
 
@@ -21,12 +20,6 @@ from touchline.errors import DataError, HashError
 def copy(export: Path, tmp_path: Path) -> Path:
     """An export to spoil."""
     return Path(shutil.copytree(export, tmp_path / "copy"))
-
-
-def zipped(folder: Path, out: Path) -> Path:
-    with out.open("wb") as file:
-        write_zip(folder, file)
-    return out
 
 
 class TestOpen:
