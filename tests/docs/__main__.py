@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from tests.docs.pages import GLOSSARY_PAGE, GUIDE, glossary_page, guide_text
+from tests.docs.settings import SETTINGS_PAGE, settings_page
 
 if __name__ == "__main__":
     GLOSSARY_PAGE.write_text(glossary_page(), encoding="utf-8")
     GUIDE.write_text(guide_text(), encoding="utf-8")
+    SETTINGS_PAGE.write_text(settings_page(), encoding="utf-8")

@@ -180,6 +180,19 @@ class TestInstallation:
         assert version == f"touchline {next(dist.glob(WHEEL)).name.split('-')[1]}"
         assert "--with-frames" in words
 
+    def test_brings_the_library_for_scripts_beside_the_command(
+        self, installed: Installation
+    ) -> None:
+        ask = [
+            installed.folder / "bin" / "python",
+            "-c",
+            "import touchline; print(touchline.__file__)",
+        ]
+        told = subprocess.check_output(
+            ask, cwd=installed.work, env=installed.environment, text=True, timeout=SECONDS
+        )
+        assert Path(told.strip()).is_relative_to(installed.folder)
+
     def test_shows_a_group_in_a_browser_which_finds_every_module(
         self, installed: Installation, dist: Path
     ) -> None:

@@ -16,6 +16,7 @@ from tests.docs.pages import (
     guide_text,
     sections,
 )
+from tests.docs.settings import SETTINGS_PAGE, settings_page
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
@@ -74,6 +75,9 @@ class TestPages:
 
     def test_the_guide_in_the_product_is_the_guide_page(self):
         assert GUIDE.read_text(encoding="utf-8") == guide_text(), AGAIN
+
+    def test_the_page_of_settings_is_what_the_code_reads(self):
+        assert SETTINGS_PAGE.read_text(encoding="utf-8") == settings_page(), AGAIN
 
 
 class TestGlossary:

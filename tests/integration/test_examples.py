@@ -1,0 +1,115 @@
+"""The examples of the documents run as they stand, on a real server and an export of it."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.service import serving
+from tests.homes import copy_home
+from touchline import Client
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "docs" / "examples"
+PAGES = (ROOT / "README.md", ROOT / "docs" / "library.md")
+BLOCK = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
+
+
+@pytest.fixture(scope="module")
+def address(filled: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A server over a home of its own: what others judge and edit changes what is in a version."""
+    with serving(copy_home(filled, tmp_path_factory)) as address:
+        yield address
+
+
+@pytest.fixture(scope="module")
+def client(address: str) -> Client:
+    return Client(address)
+
+
+@pytest.fixture(scope="module")
+def export(client: Client, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An export with frames of what the policy passes."""
+    request = {"name": "examples", "groups": "passing"}
+    client.wait(client.post("datasets/small/versions", request))
+    out = tmp_path_factory.mktemp("examples") / "version.zip"
+    asked = {"dataset": "small", "format": "parquet", "version": "examples", "images": "copy"}
+    return client.export(out, **asked)
+
+
+def run(folder: Path, *arguments: object) -> str:
+    """What a script prints, in a folder of its own."""
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(ROOT),
+        "MPLBACKEND": "agg",
+        "TOUCHLINE_CACHE": str(folder / "cache"),
+    }
+    done = subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+class TestExamples:
+    def test_each_is_run_here(self) -> None:
+        text = Path(__file__).read_text(encoding="utf-8")
+        unrun = [path.name for path in EXAMPLES.glob("*.py") if f'"{path.name}"' not in text]
+        assert unrun == []
+        told = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")
+        assert [path.name for path in EXAMPLES.glob("*.py") if path.name not in told] == []
+
+    def test_the_pitch_is_drawn_onto_a_frame(self, export: Path, tmp_path: Path) -> None:
+        assert "m above the grass" in run(tmp_path, EXAMPLES / "overlay.py", export)
+        assert (tmp_path / "overlay.png").read_bytes().startswith(b"\x89PNG")
+
+    def test_a_model_trains_on_a_version(self, export: Path, tmp_path: Path) -> None:
+        told = run(tmp_path, EXAMPLES / "train_loop.py", export)
+        assert "4 samples to train on" in told
+        losses = [float(text) for text in re.findall(r"loss ([\d.]+)", told)]
+        assert len(losses) == 5
+
+    def test_two_calibrators_are_compared(self, export: Path, tmp_path: Path) -> None:
+        told = run(tmp_path, EXAMPLES / "compare_cameras.py", export)
+        ours, other = (float(text) for text in re.findall(r"median ([\d.]+) px", told))
+        assert ours < other
+
+    def test_a_match_is_plotted(self, export: Path, tmp_path: Path) -> None:
+        assert "balls of" in run(tmp_path, EXAMPLES / "plot_match.py", export)
+        assert (tmp_path / "match.png").read_bytes().startswith(b"\x89PNG")
+
+    def test_a_detector_is_evaluated(self, address: str, export: Path, tmp_path: Path) -> None:
+        script = EXAMPLES / "evaluate_detector.py"
+        told = run(tmp_path, script, address, "small", "examples")
+        assert "8 boxes in 8 frames, 0 unknown" in told
+        assert re.search(r"\nDetection\n  All frames\n    AP.* 0\.0  \(", told), told
+
+    def test_a_script_curates_and_freezes(self, address: str, export: Path, tmp_path: Path) -> None:
+        told = run(tmp_path, EXAMPLES / "curate.py", address, "small", "curated")
+        assert "4 accepted, 0 deferred" in told
+        assert "4 groups would enter version curated" in told
+
+
+class TestPages:
+    @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+    def test_every_block_of_python_runs(
+        self, page: Path, address: str, export: Path, tmp_path: Path
+    ) -> None:
+        blocks = BLOCK.findall(page.read_text(encoding="utf-8"))
+        assert blocks
+        text = "\n".join(blocks).replace("http://127.0.0.1:8000", address)
+        text = text.replace("league-v1.zip", str(export)).replace('"league"', '"small"')
+        (script := tmp_path / "page.py").write_text(text.replace('"v1"', '"examples"'))
+        assert "somebody was faster" not in run(tmp_path, script)

@@ -1,0 +1,49 @@
+"""Samples of FiftyOne, where the package is installed; its database is asked for nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import touchline
+from touchline.errors import DataError, MissingPackageError
+from touchline.fiftyone import _written, to_fiftyone, to_samples
+
+
+class TestToFiftyone:
+    def test_the_package_is_asked_for_where_it_is_not(
+        self, export: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setitem(__import__("sys").modules, "fiftyone", None)
+        with pytest.raises(MissingPackageError, match="pip install 'fiftyone'"):
+            to_fiftyone(touchline.open(export), tmp_path)
+
+
+class TestToSamples:
+    def test_views_of_one_moment_are_one_group_with_box_and_lines(
+        self, export: Path, tmp_path: Path
+    ) -> None:
+        pytest.importorskip("fiftyone")
+        version = touchline.open(export)
+        found = to_samples(version, tmp_path)
+        assert [sample["view"] for sample in found] == [view.key for view in version.views]
+        moments = [sample["moment"].id for sample in found]
+        assert len(set(moments)) == len(version)
+        view, sample = version.views[0], found[0]
+        assert Path(sample.filepath).read_bytes() == view.frame()
+        assert sample.tags == [view.split]
+        x, y, width, height = sample["ball"].bounding_box
+        box = view.ball.box
+        assert (x * view.width - 0.5, y * view.height - 0.5) == pytest.approx((box.x, box.y))
+        assert (width * view.width, height * view.height) == pytest.approx((box.width, box.height))
+        labels = {line.label for line in sample["lines"].polylines}
+        assert labels == set(view.lines)
+
+
+class TestWritten:
+    def test_no_frame_is_written_outside_of_the_folder(self, export: Path, tmp_path: Path) -> None:
+        view = replace(touchline.open(export).views[0], file_name="../outside.png")
+        with pytest.raises(DataError, match="leads out of"):
+            _written(tmp_path / "frames", view)

@@ -1,0 +1,112 @@
+"""Versions opened from folders and zips: the right ones, and those that are refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import touchline
+from app.datasets.export_record import ExportRecord
+from tests.unit.touchline.conftest import HASH, write_export, zipped
+from touchline.errors import DataError, HashError
+
+
+@pytest.fixture
+def copy(export: Path, tmp_path: Path) -> Path:
+    """An export to spoil."""
+    return Path(shutil.copytree(export, tmp_path / "copy"))
+
+
+class TestOpen:
+    @pytest.mark.parametrize("version", [None, "v1", HASH, HASH[:8]])
+    def test_a_folder_and_its_zip_are_the_same_version(
+        self, export: Path, tmp_path: Path, version: str | None
+    ) -> None:
+        folder = touchline.open(export, version)
+        packed = touchline.open(zipped(export, tmp_path / "v1.zip"), version)
+        assert folder.groups == packed.groups
+        assert (folder.name, folder.version, folder.hash) == ("league", "v1", HASH)
+        assert (packed.views[1].image() == folder.views[1].image()).all()
+
+    @pytest.mark.parametrize("version", ["v2", "0" * 16, HASH[:7]])
+    def test_another_version_than_was_asked_for_is_refused(
+        self, export: Path, version: str
+    ) -> None:
+        with pytest.raises(HashError, match=f"--version {version} --format parquet"):
+            touchline.open(export, version)
+
+    def test_a_table_that_was_changed_is_refused(self, copy: Path) -> None:
+        table = copy / "views.parquet"
+        content = bytearray(table.read_bytes())
+        content[len(content) // 2] ^= 1
+        table.write_bytes(content)
+        with pytest.raises(HashError, match=r"Delete .* and export"):
+            touchline.open(copy)
+
+    def test_a_frame_that_was_changed_is_refused_when_it_is_read(self, copy: Path) -> None:
+        view = touchline.open(copy).views[0]
+        (copy / view.file_name).write_bytes(b"another picture")
+        with pytest.raises(HashError, match="is not what its manifest says"):
+            view.image()
+
+    def test_what_is_no_export_is_refused(self, copy: Path, tmp_path: Path) -> None:
+        (other := tmp_path / "thesis.txt").write_text("years of work")
+        for path in (tmp_path / "nothing", tmp_path, other):
+            with pytest.raises(DataError):
+                touchline.open(path)
+        manifest = json.loads((copy / "manifest.json").read_text())
+        manifest["files"] = [item for item in manifest["files"] if "parquet" not in item["path"]]
+        (copy / "manifest.json").write_text(json.dumps(manifest | {"format": "yolo"}))
+        with pytest.raises(DataError, match=r"another format \(yolo\)"):
+            touchline.open(copy)
+
+
+class TestFrames:
+    def test_without_frames_one_is_told_how_to_give_them(
+        self, records: list[ExportRecord], tmp_path: Path
+    ) -> None:
+        bare = touchline.open(write_export(tmp_path / "bare", records, images=False))
+        with pytest.raises(DataError, match="frames="):
+            bare.views[0].image()
+
+    def test_they_are_found_under_soccernets_names_too(
+        self, records: list[ExportRecord], export: Path, tmp_path: Path
+    ) -> None:
+        bare = write_export(tmp_path / "bare", records, images=False)
+        wanted = touchline.open(export).views
+        for record in records:
+            folder = tmp_path / "frames" / record.group.match
+            folder.mkdir(parents=True, exist_ok=True)
+            with zipfile.ZipFile(folder / "Frames-v3.zip", "a") as archive:
+                for view in record.group.views:
+                    content = next(
+                        item.frame()
+                        for item in wanted
+                        if (item.group, item.key) == (record.group.key, view.key)
+                    )
+                    archive.writestr(f"v3_frames/{view.key}", content)
+        for frames in (tmp_path / "frames", export):
+            found = touchline.open(bare, frames=frames).views
+            assert [view.frame() for view in found] == [view.frame() for view in wanted]
+        (tmp_path / "empty").mkdir()
+        with pytest.raises(DataError, match="has no frame"):
+            touchline.open(bare, frames=tmp_path / "empty").views[0].frame()
+
+    def test_no_name_leads_out_of_the_folder(self, copy: Path) -> None:
+        (copy.parent / "secret.png").write_bytes(b"somebody else's")
+        view = touchline.open(copy, frames=copy).views[0]
+        object.__setattr__(view, "file_name", "../secret.png")
+        with pytest.raises(DataError, match="no frame"):
+            view.frame()
+
+    def test_a_larger_frame_is_shown_at_the_annotated_size(self, export: Path) -> None:
+        view = touchline.open(export).views[1]
+        object.__setattr__(view, "width", view.width // 2)
+        assert view.image().shape == (view.height, view.width, 3)
+        assert view.image(resize=False).shape == (view.height, view.width * 2, 3)
+        assert np.unique(view.image()).tolist() == [40]

@@ -1,0 +1,118 @@
+"""Frames: where the pictures of views come from: an export, a folder, a zip, or a server."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Protocol
+
+from touchline.errors import DataError
+from touchline.files import Export, Files
+
+if TYPE_CHECKING:
+    from touchline.client import Client
+    from touchline.view import View
+
+ARCHIVE, FOLDER = "Frames-v3.zip", "Frames-v3"
+"""Where SoccerNet has the frames of a match."""
+_INSIDE = ("", "v3_frames/", "Frames-v3/", "frames/")
+
+
+class Frames(Protocol):
+    """Reads the frame of a view."""
+
+    def read(self, view: View) -> bytes:
+        """The file's content; DataError where it is not there."""
+
+
+class NoFrames:
+    """Nobody said where the frames are."""
+
+    def read(self, view: View) -> bytes:
+        """Raises DataError."""
+        raise DataError(
+            f"nobody said where the frame of {view.key} is",
+            "Give the folder, zip or server that has the frames: touchline.open(..., frames=...).",
+        )
+
+
+class ExportFrames:
+    """Frames that were exported along (``--images copy``), checked by their hash."""
+
+    def __init__(self, export: Export):
+        self._export = export
+
+    def read(self, view: View) -> bytes:
+        """The file's content; DataError where it is not there."""
+        if not self._export.lists(view.file_name):
+            return NoFrames().read(view)
+        return self._export.read(view.file_name)
+
+
+class FileFrames:
+    """Frames in a folder or zip, named as an export names them, or as SoccerNet does.
+
+    Args:
+        path: Folder or zip; its matches may have their frames in ``Frames-v3.zip``.
+    """
+
+    def __init__(self, path: Path):
+        self._files = Files(path)
+        self._archives: dict[str, Files] = {}
+
+    def read(self, view: View) -> bytes:
+        """The file's content; DataError where it is not there."""
+        for name in _places(view.file_name):
+            if self._files.holds(name):
+                return self._files.read(name)
+        match, _, name = view.file_name.partition(f"/{FOLDER}/")
+        archive = self._archive(match)
+        for folder in _INSIDE:
+            if archive is not None and archive.holds(folder + name):
+                return archive.read(folder + name)
+        raise DataError(f"{self._files.path} has no frame {view.file_name}")
+
+    def _archive(self, match: str) -> Files | None:
+        """The zip of a match's frames, opened once; those inside a zip are not looked into."""
+        if match not in self._archives and self._files.path.is_dir():
+            if not self._files.holds(f"{match}/{ARCHIVE}"):
+                return None
+            self._archives[match] = Files(self._files.path / match / ARCHIVE)
+        return self._archives.get(match)
+
+
+class ServerFrames:
+    """Frames as a server has them; asked for one by one.
+
+    Args:
+        client: The server.
+        dataset: Name of the dataset.
+    """
+
+    def __init__(self, client: Client, dataset: str):
+        self._client, self._dataset = client, dataset
+        self._groups: dict[str, int] = {}
+        self._views: dict[tuple[str, str], str] = {}
+
+    def read(self, view: View) -> bytes:
+        """The file's content; DataError where it is not there."""
+        if not self._groups:
+            rows = self._client.pages("groups", dataset=self._dataset)
+            self._groups = {row["key"]: row["id"] for row in rows}
+        if view.group not in self._groups:
+            raise DataError(f'"{self._dataset}" no longer has the group {view.group}')
+        if (view.group, view.key) not in self._views:
+            document = self._client.get(f"groups/{self._groups[view.group]}")
+            for item in document["views"]:
+                self._views[view.group, item["key"]] = item["image"]
+        address = self._views.get((view.group, view.key))
+        if address is None:
+            raise DataError(f"{view.group} no longer has the view {view.key}")
+        return self._client.read(address)
+
+
+def _places(name: str) -> Iterator[str]:
+    """Where a frame may lie: under its name, beside the folder of frames, or flat."""
+    yield name
+    yield name.replace(f"/{FOLDER}/", "/", 1)
+    yield PurePosixPath(name).name
