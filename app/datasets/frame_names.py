@@ -59,3 +59,10 @@ def view_stem(key: str) -> str:
     """Key of a view without the ending of an image's name."""
     place = PurePosixPath(key)
     return str(place.with_suffix("")) if place.suffix.lower() in IMAGE_SUFFIXES else key
+
+
+def view_place(group: Group, view: View) -> str:
+    """Where the files of a view go, without prefix and ending: ``<match>/7_1``."""
+    # The key of a frame that is a group alone is the place of its file.
+    match = group.match if view.key != group.key else ""
+    return str(PurePosixPath(match) / view_stem(view.key))

@@ -18,6 +18,7 @@ from app.datasets.issia_3d_writer import write_issia_3d
 from app.datasets.issia_writer import write_issia
 from app.datasets.manifest import SOFTWARE, software_version
 from app.datasets.parquet_writer import write_parquet
+from app.datasets.sn_calibration import line_frame
 from app.datasets.sn_calibration_writer import write_sn_calibration
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.datasets.soccernet_v3d_writer import write_soccernet_v3d
@@ -35,6 +36,8 @@ CONTENT = {
 """What a format consists of: the name of its count, and the word for one."""
 WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
 """Formats whose cameras are SoccerNet's: they have no place for a wide lens."""
+LAYOUTS: Mapping[str, FrameName] = {"yolo": flat_frame, "sn-calibration": line_frame}
+"""Where a format looks for the frames of its views, unless beside the labels of a match."""
 WITH_BOXES = ("soccernet-v3d", "coco", "yolo", "parquet")
 """Formats that hold the ball box that was chosen; all others have no place for it."""
 
@@ -128,7 +131,7 @@ def _with_plain_lenses(
 
 def frame_layout(format: str) -> FrameName:  # noqa: A002
     """Where a format looks for the frames of its views."""
-    return flat_frame if format == "yolo" else match_frame
+    return LAYOUTS.get(format, match_frame)
 
 
 def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
