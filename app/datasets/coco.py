@@ -5,5 +5,3 @@ from __future__ import annotations
 STATE = "touchline"
 """The extra field of an image that holds everything that was said of its view."""
 PREFIX = "instances_"
-UNASSIGNED = "unassigned"
-"""Stands for the split of groups that are in none."""

@@ -9,8 +9,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, check_name, open_tree
-from app.datasets.coco import PREFIX, STATE, UNASSIGNED
-from app.datasets.frame_names import IMAGE_SUFFIXES
+from app.datasets.coco import PREFIX, STATE
+from app.datasets.frame_names import IMAGE_SUFFIXES, UNASSIGNED
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.datasets.soccernet_v3 import SPLITS

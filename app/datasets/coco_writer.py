@@ -9,8 +9,9 @@ from types import TracebackType
 from typing import IO, Any
 
 from app.datasets.camera_json import camera_to_json
-from app.datasets.coco import PREFIX, STATE, UNASSIGNED
+from app.datasets.coco import PREFIX, STATE
 from app.datasets.export_record import ExportRecord, chosen_box, frame_name
+from app.datasets.frame_names import UNASSIGNED
 from app.datasets.view_state import head_to_json, view_to_json
 from app.finite import json_text
 from app.soccer.frames import Box

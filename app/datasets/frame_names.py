@@ -12,6 +12,8 @@ from app.soccer.group import Group, View
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
 FOLDER = "Frames-v3"
 """Beside the labels of a match, where SoccerNet's readers look for loose frames."""
+UNASSIGNED = "unassigned"
+"""Stands for the split of groups that are in none."""
 _UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any
 
-from app.datasets.frame_names import match_frame, view_place
+from app.datasets.frame_names import UNASSIGNED, match_frame, view_place
 from app.datasets.soccernet_v3 import SPLITS
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
@@ -22,8 +22,6 @@ from app.soccer.group import Group, Media, View
 DEFAULT_SIZE = ImageSize(960, 540)
 LINES, CAMERAS = "lines", "cameras"
 """Folders of an export: the public evaluator takes every JSON beside the lines for a frame."""
-UNASSIGNED = "unassigned"
-"""Stands for the split of groups that are in none."""
 _FOLDER = re.compile(rf"({'|'.join((*SPLITS, UNASSIGNED))})-(\d{{1,5}})x(\d{{1,5}})", re.ASCII)
 _PLAIN = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 LARGEST_UNIT = 2.0

@@ -12,6 +12,7 @@ from app.datasets.coco_writer import write_coco
 from app.datasets.export_record import ExportRecord
 from app.datasets.format_names import ExportFormat
 from app.datasets.frame_names import FrameName, flat_frame, match_frame
+from app.datasets.gamestate import sequence_frame
 from app.datasets.gamestate_writer import write_gamestate
 from app.datasets.issia import FramePersons
 from app.datasets.issia_3d_writer import write_issia_3d
@@ -36,7 +37,11 @@ CONTENT = {
 """What a format consists of: the name of its count, and the word for one."""
 WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
 """Formats whose cameras are SoccerNet's: they have no place for a wide lens."""
-LAYOUTS: Mapping[str, FrameName] = {"yolo": flat_frame, "sn-calibration": line_frame}
+LAYOUTS: Mapping[str, FrameName] = {
+    "gamestate": sequence_frame,
+    "sn-calibration": line_frame,
+    "yolo": flat_frame,
+}
 """Where a format looks for the frames of its views, unless beside the labels of a match."""
 WITH_BOXES = ("soccernet-v3d", "coco", "yolo", "parquet")
 """Formats that hold the ball box that was chosen; all others have no place for it."""
@@ -89,7 +94,7 @@ def write_format(
         case "sn-calibration":
             return write_sn_calibration(root, records)
         case "gamestate":
-            return write_gamestate(root, groups)
+            return write_gamestate(root, records)
         case "coco":
             info = {"description": options.provenance.get("dataset"), "software": _software()}
             return write_coco(root, records, everything=everything, boxes=boxes, info=info)
