@@ -33,8 +33,11 @@ CONTENT = {
     "issia-3d": ("groups", "ball"),
     "sn-calibration": ("frames", "frame"),
     "gamestate": ("images", "image"),
+    "yolo": ("labels", "view that a detector may learn from"),
 }
 """What a format consists of: the name of its count, and the word for one."""
+TRAINING = ("coco", "yolo")
+"""Formats from which detectors learn: no ball that other views do not confirm, unless asked."""
 WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
 """Formats whose cameras are SoccerNet's: they have no place for a wide lens."""
 LAYOUTS: Mapping[str, FrameName] = {
@@ -55,6 +58,7 @@ class WriteOptions:
         format: One of ``FORMATS``.
         everything: Whether groups and views that failed a gate take part.
         boxes: Which ball box is written.
+        every_view: Whether training data hold views in which the 3D ball does not hold.
         provenance: Where the groups come from, by the names of ``parquet.PROVENANCE``.
         spare: People of frames that are no view of a group.
     """
@@ -62,6 +66,7 @@ class WriteOptions:
     format: str
     everything: bool = False
     boxes: str = "optimized"
+    every_view: bool = False
     provenance: Mapping[str, str | None] = field(default_factory=dict)
     spare: Iterable[FramePersons] = ()
 
@@ -97,7 +102,14 @@ def write_format(
             return write_gamestate(root, records)
         case "coco":
             info = {"description": options.provenance.get("dataset"), "software": _software()}
-            return write_coco(root, records, everything=everything, boxes=boxes, info=info)
+            return write_coco(
+                root,
+                records,
+                everything=everything,
+                boxes=boxes,
+                every_view=options.every_view,
+                info=info,
+            )
         case "yolo":
             return write_yolo(root, records, boxes=boxes)
         case _:
@@ -146,6 +158,11 @@ def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
     # optimized_d is defined around the centre of the annotated box.
     own = {"ball_bbox": "annotated"} if format == "soccernet-v3d" else {}
     return {"boxes": boxes, **own}
+
+
+def view_settings(format: str, every_view: bool) -> dict[str, str]:  # noqa: A002
+    """Which views a detector learns from, for a format that leaves some out."""
+    return {"views": "all" if every_view else "valid"} if format in TRAINING else {}
 
 
 def missing_sentence(format: str, counts: Mapping[str, int]) -> dict[str, str]:  # noqa: A002
