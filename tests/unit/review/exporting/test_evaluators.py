@@ -106,9 +106,10 @@ class TestGamestate:
 
 class TestTables:
     def test_a_table_of_pandas_has_a_row_a_view(self, written) -> None:
-        pandas = pytest.importorskip("pandas")
+        import pandas
+
         table = pandas.read_csv(written("soccernet-v3d") / "SNv3D.csv", index_col=0)
-        assert table.shape == (4, 18)
+        assert table.shape == (4, 20)
         assert (table.is_ball.dtype, table.replay.dtype) == (bool, float)
         frame = pandas.read_parquet(written("parquet") / "views.parquet")
         assert frame.ball_3d_x.notna().sum() == frame.in_valid_pair.sum() == 4
