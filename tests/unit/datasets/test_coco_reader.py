@@ -145,6 +145,11 @@ class TestReadCoco:
         assert len(set(stations)) == 4
         assert report.problems == []
 
+    def test_the_split_is_in_the_name_of_the_file(self, tmp_path: Path, report: Report) -> None:
+        (tmp_path / "outside_valid.json").write_text(json.dumps(foreign()))
+        (group,) = read_coco(tmp_path, report)
+        assert group.split == "valid"
+
     @pytest.mark.parametrize(
         ("changes", "field"),
         [

@@ -92,8 +92,9 @@ class TestOnGround:
         assert np.allclose(EVERY_COEFFICIENT.on_ground(pixels), places[:, :2], atol=1e-6)
 
     def test_what_looks_above_the_horizon_is_nowhere(self) -> None:
-        pixels = np.array([[600.0, -80_000.0], [600.0, 360.0]])
-        assert np.isnan(EVERY_COEFFICIENT.on_ground(pixels)).all(axis=1).tolist() == [True, False]
+        pixels = np.array([[480.0, -2000.0], [480.0, 270.0]])
+        found = main_camera().on_ground(pixels)
+        assert np.isnan(found).tolist() == [[True, True], [False, False]]
 
 
 class TestScaled:
