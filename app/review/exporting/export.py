@@ -264,5 +264,6 @@ def _require_content(dataset: str, format: str, counts: Mapping[str, int]) -> No
     count, what = CONTENT.get(format, ("groups", "group"))
     if not counts[count]:
         raise InputError(
-            f'no group of "{dataset}" has a {what} for {format}, so there is nothing to export'
+            f'no group of "{dataset}" has a {what} for {format}, so there is nothing to export',
+            hint="Ask for every view (views: all)." if format == "yolo" else None,
         )
