@@ -39,6 +39,13 @@ class Boxes(StrEnum):
     EXACT = "exact"
 
 
+class Views(StrEnum):
+    """From which views training data are made."""
+
+    VALID = "valid"
+    ALL = "all"
+
+
 class Images(StrEnum):
     """What an export does with frames."""
 
@@ -108,6 +115,9 @@ def export(
     ] = False,
     boxes: Annotated[Boxes, typer.Option(help="Which ball box is written.")] = Boxes.OPTIMIZED,
     images: Annotated[Images, typer.Option(help="What happens to frames.")] = Images.NONE,
+    views: Annotated[
+        Views, typer.Option(help="coco and yolo: balls that no other view confirms, too?")
+    ] = Views.VALID,
     version: Annotated[
         str | None, typer.Option(help="A frozen version (name, id or hash): always the same bytes.")
     ] = None,
@@ -125,6 +135,7 @@ def export(
             everything=everything,
             boxes=boxes.value,
             images=images.value,
+            views=views.value,
             version=version,
             progress=progress,
         )

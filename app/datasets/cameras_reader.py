@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -12,7 +12,9 @@ from typing import Any
 from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
 from app.datasets.camera_json import camera_from_json
 from app.datasets.json_text import read_json
+from app.datasets.match_info import place_of, read_match_info
 from app.datasets.report import Report
+from app.datasets.sn_calibration import CAMERAS, LINES
 from app.datasets.synloc import camera_from_synloc, images_of, is_synloc
 from app.errors import DatasetFormatError
 from app.geometry.camera import Camera
@@ -28,30 +30,50 @@ def read_cameras(path: Path, report: Report, limits: Limits = DEFAULT_LIMITS) ->
     ``path`` is a folder or zip of ``camera_<stem>.json``, one such file, or a file with ISSIA's
     ``{"cam1": {...}, ...}`` (also inside ``{"cameras": {...}}``, also double-encoded), or a COCO
     file of SynLoc, whose cameras are called like their images. The key is the stem, with
-    ``<league>/<season>/<match>/`` before it where the file lies that deep.
+    ``<league>/<season>/<match>/`` before it where the file lies that deep. In an export as
+    sn-calibration ``match_info.json`` says where each frame came from: that is its key.
     """
     tree = open_tree(path, report, limits)
     if tree is None:
         return {}
     with closing(tree):
-        cameras = cameras_of(tree, _camera_files(tree), report)
+        names = tree.names()
+        cameras = cameras_of(tree, _camera_files(names), report, _places(tree, names))
     report.imported += len(cameras)
     return cameras
 
 
-def cameras_of(tree: FileTree, names: Sequence[str], report: Report) -> dict[str, Camera]:
-    """The cameras of some files of a tree, by key."""
+def cameras_of(
+    tree: FileTree,
+    names: Sequence[str],
+    report: Report,
+    places: Mapping[str, str] | None = None,
+) -> dict[str, Camera]:
+    """The cameras of some files of a tree, by key: that of ``places``, or made from the name."""
     cameras: dict[str, Camera] = {}
+    known = places or {}
     stems = Counter(_key(name, deep=False) for name in names)
     for name in names:
         deep = stems[_key(name, deep=False)] > 1
-        _read_file(tree, name, _key(name, deep), cameras, report)
+        _read_file(tree, name, known.get(name) or _key(name, deep), cameras, report)
     return cameras
 
 
-def _camera_files(tree: FileTree) -> list[str]:
+def _places(tree: FileTree, names: list[str]) -> dict[str, str]:
+    """Where the frames of an export as sn-calibration came from, by the files of their cameras."""
+    found = {}
+    # What is wrong with the file is no matter of cameras.
+    for image, record in read_match_info(tree, names, Report()).items():
+        lines, place = PurePosixPath(image), place_of(record)
+        if place is not None and lines.parts[0] == LINES:
+            file = PurePosixPath(CAMERAS, *lines.parts[1:-1], f"camera_{lines.name}.json")
+            found[str(file)] = place
+    return found
+
+
+def _camera_files(names: Iterable[str]) -> list[str]:
     """Camera files; where none is called ``camera_...``, every JSON file may be one."""
-    names = [name for name in tree.names() if name.lower().endswith(".json")]
+    names = [name for name in names if name.lower().endswith(".json")]
     named = [name for name in names if PurePosixPath(name).name.startswith("camera_")]
     return named or [name for name in names if PurePosixPath(name).name not in _NO_CAMERAS]
 

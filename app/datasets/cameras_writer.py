@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 
 from app.datasets.archive import resolve_inside
 from app.datasets.camera_json import camera_to_json
 from app.datasets.export_record import ExportRecord
-from app.datasets.frame_names import view_stem
+from app.datasets.frame_names import view_place
 from app.finite import json_text
 from app.geometry.camera import Camera
-from app.soccer.group import View
 
 
 def camera_text(camera: Camera) -> str:
@@ -57,18 +56,11 @@ def write_camera_files(root: Path, records: Iterable[ExportRecord]) -> dict[str,
 
 
 def write_view_cameras(root: Path, record: ExportRecord, written: set[str]) -> int:
+    """Write the cameras of a group that are not written yet; how many that were."""
     before = len(written)
-    for view, place in placed_views(record):
-        camera = record.camera(view)
+    for view in record.group.views:
+        place, camera = view_place(record.group, view), record.camera(view)
         if camera is not None and place not in written:
             write_cameras(root, {place: camera})
             written.add(place)
     return len(written) - before
-
-
-def placed_views(record: ExportRecord) -> Iterator[tuple[View, str]]:
-    """Where the files of each view go, without prefix and ending."""
-    for view in record.group.views:
-        # The key of a frame that is a group alone is the place of its file.
-        match = record.group.match if view.key != record.group.key else ""
-        yield view, str(PurePosixPath(match) / view_stem(view.key))

@@ -4,6 +4,5 @@ from __future__ import annotations
 
 STATE = "touchline"
 """The extra field of an image that holds everything that was said of its view."""
-PREFIX = "instances_"
-UNASSIGNED = "unassigned"
-"""Stands for the split of groups that are in none."""
+PREFIX, OUTSIDE = "instances_", "outside_"
+"""Of the files with the images from which a detector learns, and of those with all others."""

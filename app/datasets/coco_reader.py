@@ -9,8 +9,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, check_name, open_tree
-from app.datasets.coco import PREFIX, STATE, UNASSIGNED
-from app.datasets.frame_names import IMAGE_SUFFIXES
+from app.datasets.coco import OUTSIDE, PREFIX, STATE
+from app.datasets.frame_names import IMAGE_SUFFIXES, UNASSIGNED
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.datasets.soccernet_v3 import SPLITS
@@ -37,8 +37,9 @@ def read_coco(
     """The images of every COCO file below ``root``.
 
     Images with the field ``touchline`` come back as the groups that they were; a box that
-    somebody has changed since is the new annotation. Any other image is a group of one view,
-    keyed by its file name; boxes of other categories are kept beside the ball.
+    somebody has changed since is the new annotation. Of any other file images with one
+    ``group_id`` are a group, whose views are called as ``view`` says; an image without is a group
+    of one view, keyed by its file name. Boxes of other categories are kept beside the ball.
 
     Args:
         root: Folder, zip or one JSON file.
@@ -94,7 +95,7 @@ class _File:
     ):
         self.path, self._tree, self._names = tree.shown(name), tree, set(names)
         self._value, self._report, self._calibration = value, report, calibration
-        stem = PurePosixPath(name).stem.removeprefix(PREFIX)
+        stem = PurePosixPath(name).stem.removeprefix(PREFIX).removeprefix(OUTSIDE)
         self._split = stem if stem in SPLITS and stem != UNASSIGNED else ""
         self._top = str(PurePosixPath(name).parent.parent)
         self._categories = {
@@ -133,7 +134,7 @@ class _File:
                 if STATE in image.value:
                     yield self._ours(image)
                 else:
-                    yield self._theirs(image)
+                    yield self._theirs(image, index)
             except DatasetFormatError as error:
                 self._report.skip(error)
 
@@ -166,12 +167,10 @@ class _File:
             self._note(record, "bbox", f"{error}; left out")
             return None
 
-    def _theirs(self, image: StateReader) -> PlacedView:
+    def _theirs(self, image: StateReader, index: int) -> PlacedView:
         name = image.text("file_name")
-        try:
-            key = str(PurePosixPath(check_name(name)))
-        except UnsafePathError as error:
-            raise image.error("file_name", error.message) from error
+        key = _safe(image, "file_name", name)
+        group, view_key = self._placed(image, key)
         balls, boxes = [], []
         for item in self._annotations(image):
             box = self._box(item, image.record)
@@ -182,10 +181,27 @@ class _File:
                 balls.append(BallAnnotation(box=box, occluded=item.get("occluded") is True))
             else:
                 boxes.append(_shown(category, item, box))
-        station = Station(key, image.size(), calibration=self._calibration)
-        view = View(key, station, tuple(balls), self._media(name), extras=Extras(tuple(boxes)))
-        label = f"Image {PurePosixPath(key).name}"
-        return PlacedView(GroupHead(key, "", self._split, label, Pitch(), 1), 0, view)
+        station_key = key if group is None else f"{group}/{view_key}"
+        station = Station(station_key, image.size(), calibration=self._calibration)
+        media, extras = self._media(name), Extras(tuple(boxes))
+        view = View(view_key, station, tuple(balls), media, extras=extras)
+        if group is None:
+            label = f"Image {PurePosixPath(key).name}"
+            return PlacedView(GroupHead(key, "", self._split, label, Pitch(), 1), 0, view)
+        label = f"Group {PurePosixPath(group).name}"
+        # How many views it has is known once everything is read.
+        return PlacedView(GroupHead(group, "", self._split, label, Pitch()), index, view)
+
+    def _placed(self, image: StateReader, key: str) -> tuple[str | None, str]:
+        """Group and name of a view; no group where the file says none."""
+        group, view = image.value.get("group_id"), image.value.get("view")
+        if group is None or isinstance(group, bool) or not isinstance(group, str | int):
+            return None, key
+        if view is None:
+            view = PurePosixPath(key).name
+        if isinstance(view, bool) or not isinstance(view, str | int):
+            raise image.error("view", "is no name of a view")
+        return _safe(image, "group_id", str(group)), _safe(image, "view", str(view))
 
     def _media(self, name: str) -> Media | None:
         """The frame beside the annotations, where it lies in the tree."""
@@ -198,6 +214,13 @@ class _File:
                         return Media(self._tree.shown(place))
                     return Media(str(self._tree.path), place)
         return None
+
+
+def _safe(image: StateReader, field: str, text: str) -> str:
+    try:
+        return str(PurePosixPath(check_name(text)))
+    except UnsafePathError as error:
+        raise image.error(field, error.message) from error
 
 
 def _shown(category: str, item: Mapping[str, Any], box: Box) -> Mapping[str, Any]:

@@ -1,4 +1,7 @@
-"""COCO: ``annotations/instances_<split>.json``, one category ``ball``, and 3D in extra fields."""
+"""COCO: ``annotations/instances_<split>.json``, one category ``ball``, and 3D in extra fields.
+
+Views from which no detector should learn lie in ``outside_<split>.json`` beside it.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,9 @@ from types import TracebackType
 from typing import IO, Any
 
 from app.datasets.camera_json import camera_to_json
-from app.datasets.coco import PREFIX, STATE, UNASSIGNED
+from app.datasets.coco import OUTSIDE, PREFIX, STATE
 from app.datasets.export_record import ExportRecord, chosen_box, frame_name
+from app.datasets.frame_names import UNASSIGNED
 from app.datasets.view_state import head_to_json, view_to_json
 from app.finite import json_text
 from app.soccer.frames import Box
@@ -29,9 +33,13 @@ def write_coco(
     *,
     everything: bool = False,
     boxes: str = "optimized",
+    every_view: bool = False,
     info: Mapping[str, Any] | None = None,
 ) -> dict[str, int]:
-    """Write one file a split below an existing folder.
+    """Write one file a split below an existing folder, and one of the views outside.
+
+    A view that annotates a ball and is in no valid pair is outside: as a picture without a box it
+    would teach that there is no ball, and its own box is not confirmed.
 
     An annotation is the ball of a view: its chosen box, and where it lies in 3D once that is
     known. A ball that has only a centre and no 3D point to make a box from has no annotation;
@@ -42,13 +50,15 @@ def write_coco(
         records: Groups; one is in memory at a time.
         everything: Whether views that failed a gate say where the 3D ball is.
         boxes: One of ``BOX_KINDS``.
+        every_view: Whether views outside lie with all others, as they do with ``everything``.
         info: What stands under ``info``.
 
     Returns:
         Counts: ``groups``, ``images``, ``annotations`` (boxes), ``balls`` (views in which the 3D
-        ball holds).
+        ball holds), ``images_outside``.
     """
-    counts = {"groups": 0, "images": 0, "annotations": 0, "balls": 0}
+    counts = {"groups": 0, "images": 0, "annotations": 0, "balls": 0, "images_outside": 0}
+    every_view = every_view or everything
     folder = root / "annotations"
     folder.mkdir()
     with ExitStack() as stack:
@@ -56,16 +66,19 @@ def write_coco(
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
-                split = record.split(view) or UNASSIGNED
-                if split not in files:
-                    path = folder / f"{PREFIX}{split}.json"
-                    files[split] = stack.enter_context(_Instances(path, info or {}))
-                counts["images"] += 1
+                teaches = every_view or record.teaches(view)
+                prefix = PREFIX if teaches else OUTSIDE
+                name = f"{prefix}{record.split(view) or UNASSIGNED}.json"
+                if name not in files:
+                    files[name] = stack.enter_context(_Instances(folder / name, info or {}))
+                counts["images" if teaches else "images_outside"] += 1
                 counts["balls"] += record.has_ball_3d(view)
-                files[split].add_image(_image(record, view, counts["images"], everything))
-                annotation = _annotation(record, view, counts, everything, boxes)
+                identity = counts["images"] + counts["images_outside"]
+                files[name].add_image(_image(record, view, identity, everything))
+                annotation = _annotation(record, view, identity, everything, boxes)
                 if annotation is not None:
-                    files[split].add_annotation(annotation)
+                    files[name].add_annotation(annotation)
+                    counts["annotations"] += teaches
     return counts
 
 
@@ -140,17 +153,17 @@ def _image(record: ExportRecord, view: View, identity: int, everything: bool) ->
 
 
 def _annotation(
-    record: ExportRecord, view: View, counts: dict[str, int], everything: bool, boxes: str
+    record: ExportRecord, view: View, identity: int, everything: bool, boxes: str
 ) -> dict[str, Any] | None:
     box = chosen_box(record, view, boxes)
     if view.ball is None or box is None:
         return None
-    counts["annotations"] += 1
     fit, annotated = record.ball_fit(view, everything), view.ball.box
     written = _bbox(box)
     return {
-        "id": counts["annotations"],
-        "image_id": counts["images"],
+        # A view has one box at most, so that both can have one number.
+        "id": identity,
+        "image_id": identity,
         "category_id": CATEGORY_ID,
         "bbox": written,
         "area": written[2] * written[3],

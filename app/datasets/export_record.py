@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from app.datasets.frame_names import likely_suffix, match_frame
 from app.geometry.camera import Camera
@@ -67,6 +67,19 @@ class ExportRecord:
     def has_ball_3d(self, view: View) -> bool:
         """Whether the 3D ball holds in one view; every format's count of balls counts these."""
         return has_ball_3d(self.solution, view)
+
+    def teaches(self, view: View) -> bool:
+        """Whether a detector may learn from a view: its ball holds in 3D, or it shows none.
+
+        In any other view a ball was annotated that the other views do not confirm.
+        """
+        shown = any(not ball.out_of_view for ball in view.balls)
+        return not shown or self.has_ball_3d(view)
+
+    def for_training(self) -> ExportRecord:
+        """The same group with the views alone from which a detector may learn."""
+        views = tuple(view for view in self.group.views if self.teaches(view))
+        return replace(self, group=replace(self.group, views=views))
 
     @property
     def point(self) -> tuple[float, float, float] | None:

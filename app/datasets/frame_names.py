@@ -12,6 +12,8 @@ from app.soccer.group import Group, View
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
 FOLDER = "Frames-v3"
 """Beside the labels of a match, where SoccerNet's readers look for loose frames."""
+UNASSIGNED = "unassigned"
+"""Stands for the split of groups that are in none."""
 _UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
 
 
@@ -59,3 +61,10 @@ def view_stem(key: str) -> str:
     """Key of a view without the ending of an image's name."""
     place = PurePosixPath(key)
     return str(place.with_suffix("")) if place.suffix.lower() in IMAGE_SUFFIXES else key
+
+
+def view_place(group: Group, view: View) -> str:
+    """Where the files of a view go, without prefix and ending: ``<match>/7_1``."""
+    # The key of a frame that is a group alone is the place of its file.
+    match = group.match if view.key != group.key else ""
+    return str(PurePosixPath(match) / view_stem(view.key))

@@ -52,18 +52,21 @@ def read_gamestate(
         files = [name for name in names if PurePosixPath(name).name == LABELS]
         if not files:
             report.note(str(root), None, None, f"holds no {LABELS}")
-        seen: dict[str, str] = {}
+        seen: dict[tuple[str, str], str] = {}
+        stems: dict[str, set[str]] = {}
         for name in files:
             try:
                 sequence = _Sequence(tree, name, names, report, limits)
-                if sequence.key in seen:
-                    problem = f"is a second {sequence.key}; {seen[sequence.key]} is used"
+                # A match whose groups are in several splits has a file in each.
+                place = (sequence.key, sequence.split)
+                if place in seen:
+                    problem = f"is a second {sequence.key}; {seen[place]} is used"
                     raise DatasetFormatError(sequence.path, None, None, problem)
             except DatasetFormatError as error:
                 report.skip(error)
                 continue
-            seen[sequence.key] = sequence.path
-            yield from sequence.groups(calibration)
+            seen[place] = sequence.path
+            yield from sequence.groups(calibration, stems.setdefault(sequence.key, set()))
 
 
 @dataclass
@@ -90,7 +93,7 @@ class _Sequence:
         self._inside = files_inside(names, self._folder)
         self.key = self._key()
         parts = PurePosixPath(name).parts
-        self._split = next((part for part in reversed(parts) if part in SPLITS), "")
+        self.split = next((part for part in reversed(parts) if part in SPLITS), "")
 
     def _key(self) -> str:
         folders = PurePosixPath(self._folder).parts
@@ -110,9 +113,14 @@ class _Sequence:
             return []
         return value
 
-    def groups(self, calibration: str) -> Iterator[Group]:
-        """Image by image, in the file's order."""
-        records = dict(self._records())
+    def groups(self, calibration: str, stems: set[str]) -> Iterator[Group]:
+        """Image by image, in the file's order.
+
+        Args:
+            calibration: What counts for a view that has a camera and lines.
+            stems: Names that other files of this sequence have already; those of this one join.
+        """
+        records = dict(self._records(stems))
         images = self._annotated(records)
         common = {name: self._value[name] for name in ("info", "categories") if name in self._value}
         for identity, (record, size) in records.items():
@@ -125,11 +133,10 @@ class _Sequence:
             view = View(key, station, tuple(image.balls), self._media(key), extras=extras)
             self._report.imported += 1
             label = f"{self.key} · {PurePosixPath(key).stem}"
-            yield Group(name, (view,), match=self.key, split=self._split, label=label)
+            yield Group(name, (view,), match=self.key, split=self.split, label=label)
 
-    def _records(self) -> Iterator[tuple[str, tuple[dict[str, Any], ImageSize]]]:
+    def _records(self, names: set[str]) -> Iterator[tuple[str, tuple[dict[str, Any], ImageSize]]]:
         """Sound image records by their id as text, each name once."""
-        names: set[str] = set()
         for index, record in enumerate(self._list("images")):
             self._report.read += 1
             where = f"images[{index}]"

@@ -3,21 +3,38 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import groupby
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from app.datasets import fields
 from app.datasets.archive import resolve_inside
-from app.datasets.frame_names import view_stem
-from app.datasets.gamestate import BALL_ID, LABELS, METADATA, PITCH_ID
+from app.datasets.camera_json import camera_to_json
+from app.datasets.export_record import ExportRecord
+from app.datasets.gamestate import (
+    BALL_ID,
+    CAMERA_ID,
+    IMAGES,
+    LABELS,
+    METADATA,
+    PITCH_ID,
+    file_name,
+    kept_of,
+    sequence_folder,
+)
 from app.datasets.sn_calibration_writer import lines_to_json
+from app.errors import InputError
 from app.finite import json_text
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation
 from app.soccer.group import Group, View
 from app.soccer.pitch import MARKINGS
+from app.soccer.policy import PAPER
 
 _ROLES = {
     "player": 1,
@@ -34,6 +51,16 @@ _CATEGORIES: list[dict[str, Any]] = [
     {"supercategory": "object", "id": 7, "name": "other"},
 ]
 _OTHER = 7
+_BALL: dict[str, Any] = {
+    "track_id": None,
+    "supercategory": "object",
+    "category_id": BALL_ID,
+    "attributes": {"role": "ball", "jersey": None, "team": None},
+    "bbox_pitch": None,
+}
+_SPLIT_NUMBERS = {"train": 1, "valid": 2, "test": 3, "challenge": 4}
+_FIRST_OF_OURS = 100_001
+"""Track in a sequence that brings tracks of its own."""
 
 
 @dataclass
@@ -41,124 +68,223 @@ class _File:
     """One Labels-GameState.json while it is made."""
 
     name: str
-    kept: Mapping[str, Any]
+    number: int
+    split: str
+    kept: Mapping[str, Any] = field(default_factory=dict)
     images: list[dict[str, Any]] = field(default_factory=list)
     annotations: list[dict[str, Any]] = field(default_factory=list)
+    tracks: dict[Hashable, int] = field(default_factory=dict)
 
     def value(self) -> dict[str, Any]:
-        info = self.kept.get("info") or {"version": "1.3", "name": self.name, "im_dir": "img1"}
         return {
-            "info": info,
+            "info": self.kept.get("info") or self._info(),
             "images": self.images,
             "annotations": self.annotations,
             "categories": self.kept.get("categories") or _CATEGORIES,
         }
 
+    def _info(self) -> dict[str, Any]:
+        info = {"version": "1.3", "id": str(self.number), "name": self.name, "im_dir": IMAGES}
+        return {**info, "seq_length": len(self.images)}
 
-def write_gamestate(root: Path, groups: Iterable[Group]) -> dict[str, int]:
-    """Write ``<match>/Labels-GameState.json`` for the groups, sequence by sequence.
+    def image_id(self) -> str:
+        """Id of the next image; no sequence of an export has the same."""
+        return f"{_SPLIT_NUMBERS.get(self.split, 9)}{self.number:03d}{len(self.images) + 1:06d}"
+
+    def track(self, who: Hashable) -> int:
+        """Number of a track, beyond those that a file may have brought."""
+        start = _FIRST_OF_OURS if self.kept else 1
+        return self.tracks.setdefault(who, start + len(self.tracks))
+
+
+def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, int]:
+    """Write ``<split>/<sequence>/Labels-GameState.json`` for the groups, sequence by sequence.
 
     Images, people and whatever else came from such a file are written as they came. Of other
-    datasets each view becomes an image; roles and teams follow from SoccerNet's classes.
+    datasets each view becomes an image; roles and teams follow from SoccerNet's classes, places
+    on the pitch from its camera.
 
     Args:
         root: Existing folder.
-        groups: Groups; one run of a match is in memory at a time.
+        records: Groups; one run of a match is in memory at a time.
 
     Returns:
         Counts: ``groups``, ``images``, ``annotated_balls``.
 
     Raises:
+        InputError: Two matches would have one folder.
         UnsafePathError: A key would leave ``root``.
     """
     counts = {"groups": 0, "images": 0, "annotated_balls": 0}
-    written: set[Path] = set()
-    for match, run in groupby(groups, key=lambda group: group.match):
-        name = match or "sequence"
-        path = resolve_inside(root, f"{name}/{LABELS}")
-        file = _File(PurePosixPath(name).name, {})
-        if path in written:
-            earlier = json.loads(path.read_text(encoding="utf-8"))
-            file = _File(file.name, earlier, earlier["images"], earlier["annotations"])
-        for group in run:
+    files, matches = dict[Path, _File](), dict[Path, str]()
+    for match, run in groupby(records, key=lambda record: record.group.match):
+        touched: set[Path] = set()
+        for record in run:
             counts["groups"] += 1
-            for view in group.views:
-                _add(file, group, view, counts)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        text = json_text(file.value())
-        path.write_text(text + "\n", encoding="utf-8")
-        written.add(path)
+            for view in record.group.views:
+                split = record.split(view)
+                path = resolve_inside(root, f"{sequence_folder(match, split)}/{LABELS}")
+                other = matches.setdefault(path, match)
+                if other != match:
+                    raise InputError(f"the matches {other} and {match} would be one sequence")
+                if path not in files:
+                    files[path] = _File(path.parent.name, len(files) + 1, split)
+                elif path not in touched:
+                    _read_again(files[path], path)
+                touched.add(path)
+                _add(files[path], record, view, counts)
+        for path in sorted(touched):
+            _write(files[path], path)
     return counts
 
 
-def _add(file: _File, group: Group, view: View, counts: dict[str, int]) -> None:
-    kept = view.extras.metadata.get(METADATA)
-    kept = kept if isinstance(kept, dict) else {}
+def _write(file: _File, path: Path) -> None:
+    """Write a file, and forget what it holds until its match comes again."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json_text(file.value()) + "\n", encoding="utf-8")
+    file.images, file.annotations = [], []
+
+
+def _read_again(file: _File, path: Path) -> None:
+    earlier = json.loads(path.read_text(encoding="utf-8"))
+    file.images, file.annotations = earlier["images"], earlier["annotations"]
+
+
+def _add(file: _File, record: ExportRecord, view: View, counts: dict[str, int]) -> None:
+    kept = kept_of(view)
     file.kept = file.kept or kept
-    image = _image(kept, view, len(file.images) + 1, group)
+    camera = record.camera(view)
+    people = list(_people(file, record.group, view, camera))
+    image = _image(file, record.group, view, camera, people)
     file.images.append(image)
     identity = str(image.get("image_id", image.get("id")))
-    numbered = enumerate(_annotations(kept, view), 1)
-    for number, annotation in numbered:
+    annotations = [*people, *_balls(file, record, view), *_rest(view, camera)]
+    for number, annotation in enumerate(annotations, 1):
         own = {"id": f"{identity}{number:03d}", "image_id": identity}
         file.annotations.append(own | annotation)
     counts["images"] += 1
     counts["annotated_balls"] += sum(ball.center is not None for ball in view.balls)
 
 
-def _image(kept: Mapping[str, Any], view: View, number: int, group: Group) -> dict[str, Any]:
-    if isinstance(kept.get("image"), dict):
-        return dict(kept["image"])
-    stem = view_stem(view.key)
-    if view.station.shared:
-        stem = f"{group.key}_{stem}"
+def _image(
+    file: _File, group: Group, view: View, camera: Camera | None, people: list[dict[str, Any]]
+) -> dict[str, Any]:
+    kept = kept_of(view).get("image")
+    if isinstance(kept, dict):
+        return dict(kept)
     return {
         "is_labeled": True,
-        "image_id": str(1_000_000_000 + number),
-        "file_name": f"{PurePosixPath(stem).name}{PurePosixPath(view.key).suffix or '.jpg'}",
+        "image_id": file.image_id(),
+        "file_name": file_name(group, view),
         "height": view.size.height,
         "width": view.size.width,
-        "has_labeled_person": bool(view.extras.boxes),
+        # An evaluation asks for the place of everybody; somebody without one would end it.
+        "has_labeled_person": bool(people)
+        and (camera is None or all(person["bbox_pitch"] for person in people)),
         "has_labeled_pitch": bool(view.station.lines),
-        "has_labeled_camera": False,
+        "has_labeled_camera": _holds(camera),
         "ignore_regions_y": [],
         "ignore_regions_x": [],
     }
 
 
-def _annotations(kept: Mapping[str, Any], view: View) -> Iterator[dict[str, Any]]:
-    """The annotations of one image: people, balls, the pitch, and what else there was."""
-    for box in view.extras.boxes:
+def _holds(camera: Camera | None) -> bool:
+    """Whether the format has a place for a camera: it is SoccerNet's, with no wide lens."""
+    return camera is not None and not camera.is_wide
+
+
+def _people(
+    file: _File, group: Group, view: View, camera: Camera | None
+) -> Iterator[dict[str, Any]]:
+    """The people of an image, as they came or made anew, each track once."""
+    seen: set[int] = set()
+    for index, box in enumerate(view.extras.boxes):
         annotation = box.get(METADATA)
-        made = dict(annotation) if isinstance(annotation, dict) else _person(box)
-        if made is not None:
-            yield made
-    rest = kept.get("balls") or []
+        if isinstance(annotation, dict):
+            yield dict(annotation)
+            continue
+        made = _person(box)
+        if made is None:
+            continue
+        track = file.track(_who(box, group, view, index))
+        if track in seen:
+            track = file.track((group.key, view.key, index))
+        seen.add(track)
+        yield {**made, "track_id": track, "bbox_pitch": _on_pitch(camera, made["bbox_image"])}
+
+
+def _who(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashable:
+    """Whose box it is: a shirt number is the same all match long, another tag in its group."""
+    name, tag = box.get("class"), box.get("ID")
+    if tag is None:
+        return (group.key, view.key, index)
+    return (name, str(tag)) if str(tag).isdigit() else (name, str(tag), group.key)
+
+
+def _on_pitch(camera: Camera | None, place: Mapping[str, float]) -> dict[str, float] | None:
+    """Where the lower edge of a box stands on the grass, metres; None without a place there."""
+    if camera is None:
+        return None
+    bottom = place["y"] + place["h"]
+    ends = (place["x"], place["x_center"], place["x"] + place["w"])
+    found = camera.on_ground(np.array([[x, bottom] for x in ends]))
+    return _pitch_box(found) if np.isfinite(found).all() else None
+
+
+def _pitch_box(places: FloatArray) -> dict[str, float]:
+    """``bbox_pitch`` of the left, middle and right of a lower edge, pitch frame, shape (3, 2)."""
+    names = ("left", "middle", "right")
+    return {
+        f"{axis}_bottom_{name}": float(value)
+        for name, place in zip(names, places, strict=True)
+        for axis, value in zip("xy", place, strict=True)
+    }
+
+
+def _balls(file: _File, record: ExportRecord, view: View) -> Iterator[dict[str, Any]]:
+    rest = kept_of(view).get("balls") or []
     balls = [ball for ball in view.balls if ball.center is not None]
     for index, ball in enumerate(balls):
-        yield _ball(ball, rest[index] if index < len(rest) else {})
+        kept = rest[index] if index < len(rest) else _new_ball(file, record, view, index)
+        yield {**_BALL, **kept, "bbox_image": _box_of(ball)}
+
+
+def _new_ball(file: _File, record: ExportRecord, view: View, index: int) -> dict[str, Any]:
+    return {"track_id": file.track(("ball", index)), "bbox_pitch": _below_ball(record, view)}
+
+
+def _below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
+    """The spot below the 3D ball, where that holds: the box of a ball in the air stands elsewhere."""
+    camera, point = record.camera(view), record.point
+    if camera is None or point is None or not record.has_ball_3d(view):
+        return None
+    # To the right in the image, along the grass.
+    right = camera.rotation[0, :2] / max(float(np.hypot(*camera.rotation[0, :2])), 1e-9)
+    radius = PAPER.ball_diameter_m / 2
+    return _pitch_box(np.array(point[:2]) + np.outer([-radius, 0.0, radius], right))
+
+
+def _rest(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:
+    """The lines, the camera, and what else there was."""
+    kept = kept_of(view)
     if view.station.lines or view.extras.lines or "pitch" in kept:
         lines = lines_to_json(view.station.lines, view.size, view.extras.lines)
         head = {"supercategory": "pitch", "category_id": PITCH_ID}
         # This format spells no name with a space at its end.
         stripped = {name.strip(): points for name, points in lines.items()}
         yield head | (kept.get("pitch") or {}) | {"lines": stripped}
+    if camera is not None and _holds(camera) and not kept:
+        head = {"supercategory": "camera", "category_id": CAMERA_ID}
+        measured = {"relative_mean_reproj": None, "accuracy@5": None}
+        yield {**head, "parameters": camera_to_json(camera), **measured}
     yield from (dict(item) for item in kept.get("others") or [])
 
 
-def _ball(ball: BallAnnotation, rest: Mapping[str, Any]) -> dict[str, Any]:
+def _box_of(ball: BallAnnotation) -> dict[str, float]:
     assert ball.center is not None, "the caller leaves out what is out of view"
     x, y = ball.center
     box = ball.box
-    place = (x, y, 0.0, 0.0) if box is None else (box.x, box.y, box.width, box.height)
-    head = {
-        "track_id": None,
-        "supercategory": "object",
-        "category_id": BALL_ID,
-        "attributes": {"role": "ball", "jersey": None, "team": None},
-        "bbox_pitch": None,
-    }
-    return {**head, **rest, "bbox_image": _place(*place)}
+    return _place(*((x, y, 0.0, 0.0) if box is None else (box.x, box.y, box.width, box.height)))
 
 
 def _place(x: float, y: float, width: float, height: float) -> dict[str, float]:

@@ -20,6 +20,8 @@ FILES = (FILE, "match_info_cam_gt.json")
 """The second one is a third party's, with the kind of camera beside the match."""
 METADATA = "match_info"
 """Under this name ``Extras.metadata`` keeps the record of an image."""
+PLACE = "touchline_place"
+"""Ours, in the record of an image: where its files would lie without the folders of an export."""
 _PATHS = ("UrlLocal", "game", "match")
 _PARTS = ("league", "season", "match")
 _MOMENT = {"half": "half", "gameTime": "gameTime", "position": "ms_time"}
@@ -54,6 +56,17 @@ def read_match_info(
             else:
                 report.note(tree.shown(name), image[:80], None, "is neither text nor an object")
     return found
+
+
+def place_of(record: Mapping[str, Any]) -> str | None:
+    """Where the frame of one of our exports came from; None where nobody says so."""
+    place = record.get(PLACE)
+    if not isinstance(place, str):
+        return None
+    try:
+        return check_name(place)
+    except UnsafePathError:
+        return None
 
 
 def match_of(record: Mapping[str, Any]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -13,9 +13,9 @@ from app.datasets import fields
 from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.json_text import read_json
-from app.datasets.match_info import METADATA, match_of, read_match_info
+from app.datasets.match_info import METADATA, PLACE, match_of, place_of, read_match_info
 from app.datasets.report import Report
-from app.datasets.sn_calibration import LARGEST_UNIT, LineFile
+from app.datasets.sn_calibration import LARGEST_UNIT, LineFile, split_and_size
 from app.datasets.soccernet_v3 import SPLITS
 from app.errors import DatasetFormatError, UnknownMarkingError
 from app.soccer.annotation import Extras, Lines, make_lines
@@ -46,24 +46,54 @@ def read_line_files(
     if tree is None:
         return
     with closing(tree):
-        yield from line_files_of(tree, tree.names(), size, report)
+        names = tree.names()
+        places = _places(read_match_info(tree, names, Report()))
+        yield from line_files_of(tree, names, size, report, Ours(places))
+
+
+@dataclass(frozen=True)
+class Ours:
+    """What one of our own exports says of its files, each by its path without the ending."""
+
+    places: Mapping[str, str] = field(default_factory=dict)
+    """Where a frame would lie without the folders of the export."""
+    sizes: Mapping[str, ImageSize] = field(default_factory=dict)
+
+
+_NOTHING = Ours()
 
 
 def line_files_of(
-    tree: FileTree, names: Sequence[str], size: ImageSize, report: Report
+    tree: FileTree, names: Sequence[str], size: ImageSize, report: Report, ours: Ours = _NOTHING
 ) -> Iterator[LineFile]:
     """The line files among some files of a tree, with the images that lie beside them."""
     beside = _images(names)
-    line_files = [name for name in names if _is_line_file(name)]
-    stems = Counter(PurePosixPath(name).stem for name in line_files)
-    for name in line_files:
-        whole = str(PurePosixPath(name).with_suffix(""))
-        stem = PurePosixPath(name).stem
-        key = stem if stems[stem] == 1 else whole
-        empty = LineFile(key, size, {}, (), _media(tree, beside.get(whole)), whole)
+    wholes = {name: _whole(name) for name in names if _is_line_file(name)}
+    places = {name: ours.places.get(whole, whole) for name, whole in wholes.items()}
+    # Names of an export are in no order of a match's frames.
+    ordered = sorted(places, key=places.__getitem__) if ours.places else list(places)
+    stems = Counter(PurePosixPath(place).name for place in places.values())
+    for name in ordered:
+        whole, place = wholes[name], PurePosixPath(places[name])
+        key = place.name if stems[place.name] == 1 else str(place)
+        media = _media(tree, beside.get(whole))
+        empty = LineFile(key, ours.sizes.get(whole, size), {}, (), media, whole)
         file = _read_line_file(tree, name, empty, report)
         if file is not None:
             yield file
+
+
+def _whole(name: str) -> str:
+    return str(PurePosixPath(name).with_suffix(""))
+
+
+def _places(infos: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    return {whole: place for whole, info in infos.items() if (place := place_of(info))}
+
+
+def _sizes(places: Iterable[str]) -> dict[str, ImageSize]:
+    said = {whole: split_and_size(PurePosixPath(whole).parent.name) for whole in places}
+    return {whole: found[1] for whole, found in said.items() if found}
 
 
 def _read_line_file(tree: FileTree, name: str, empty: LineFile, report: Report) -> LineFile | None:
@@ -163,7 +193,15 @@ def read_sn_calibration(
     """Each frame as a group of one view, keyed by its stem.
 
     Its match comes from match_info.json, its split from a folder ``train``, ``valid``, ``test``
-    or ``challenge``. Cameras that lie beside the lines are not read: import them as ``cameras``.
+    or ``challenge``. A folder of our own exports says the size, too (``test-1280x720``). Cameras
+    are not read: import them as ``cameras``.
+
+    Args:
+        path: Folder, zip or JSON file.
+        size: Size of the annotated images where no folder says it, pixels.
+        report: Takes what had to be left out.
+        calibration: What counts for a view that has a camera and lines.
+        limits: Caps on what is read.
     """
     tree = open_tree(path, report, limits)
     if tree is None:
@@ -171,16 +209,26 @@ def read_sn_calibration(
     with closing(tree):
         names = tree.names()
         infos = read_match_info(tree, names, report)
-        for file in line_files_of(tree, names, size, report):
+        places = _places(infos)
+        ours = Ours(places, _sizes(places))
+        for file in line_files_of(tree, names, size, report, ours):
             yield _group(file, infos.get(file.place, {}), calibration)
 
 
-def _group(file: LineFile, info: Mapping[str, Any], calibration: str) -> Group:
+def _group(file: LineFile, record: Mapping[str, Any], calibration: str) -> Group:
+    info = {name: value for name, value in record.items() if name != PLACE}
     station = Station(file.stem, file.size, lines=file.lines, calibration=calibration)
-    extras = Extras(lines=file.others, metadata={METADATA: dict(info)} if info else {})
+    extras = Extras(lines=file.others, metadata={METADATA: info} if info else {})
     view = View(file.stem, station, media=file.media, extras=extras)
     match, folders = match_of(info), PurePosixPath(file.place).parts[:-1]
-    split = next((part for part in reversed(folders) if part in SPLITS), "")
+    splits = (_split(folder) for folder in reversed(folders))
+    split = next((split for split in splits if split), "")
     name = PurePosixPath(file.stem).name
     label = f"{PurePosixPath(match).name} · frame {name}" if match else f"Frame {file.stem}"
     return Group(file.stem, (view,), match=match, split=split, label=label)
+
+
+def _split(folder: str) -> str:
+    """The split that a folder says, or nothing."""
+    said = split_and_size(folder)
+    return said[0] if said else folder if folder in SPLITS else ""

@@ -1,4 +1,4 @@
-"""sn-calibration, written: lines (``7_1.json``) and cameras (``camera_7_1.json``)."""
+"""sn-calibration, written: lines, and cameras in a folder of their own."""
 
 from __future__ import annotations
 
@@ -8,11 +8,21 @@ from typing import Any
 
 from app.datasets import fields
 from app.datasets.archive import resolve_inside
-from app.datasets.cameras_writer import placed_views, write_view_cameras
+from app.datasets.cameras_writer import write_cameras
 from app.datasets.exact import exact_inverse
 from app.datasets.export_record import ExportRecord
-from app.datasets.match_info import MatchInfoWriter, record_of
-from app.datasets.sn_calibration import LARGEST_UNIT, LineFile, spelling
+from app.datasets.frame_names import view_place
+from app.datasets.match_info import PLACE, MatchInfoWriter, record_of
+from app.datasets.sn_calibration import (
+    CAMERAS,
+    LARGEST_UNIT,
+    LINES,
+    LineFile,
+    flat_name,
+    spelling,
+    split_folder_of,
+)
+from app.errors import InputError
 from app.finite import json_text
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
@@ -90,29 +100,55 @@ def write_line_files(root: Path, files: Iterable[LineFile]) -> list[Path]:
 
 
 def write_sn_calibration(root: Path, records: Iterable[ExportRecord]) -> dict[str, int]:
-    """Write ``<match>/<stem>.json`` with the lines of every view, and its camera beside it.
+    """Write ``lines/<folder>/<name>.json`` and ``cameras/<folder>/camera_<name>.json``.
 
-    ``match_info.json`` names the match of every image. Frames that came from sn-calibration go
-    to the place that they came from.
+    A folder holds the frames of one split and one size, and its name says both: the public
+    evaluator wants all frames of a split in one folder, nothing else in it, and one size.
+    ``match_info.json`` names the match of every image, and the place that it came from.
 
     Returns:
         Counts: ``groups``, ``frames`` and ``cameras``.
 
     Raises:
+        InputError: Two frames of a split would have one name.
         UnsafePathError: A key would leave ``root``.
     """
     counts = {"groups": 0, "frames": 0, "cameras": 0}
-    lines_written: set[str] = set()
-    cameras_written: set[str] = set()
+    names, with_camera = _Names(), set[str]()
     with MatchInfoWriter(root) as info:
         for record in records:
             counts["groups"] += 1
-            for view, place in placed_views(record):
-                if place not in lines_written:
+            for view in record.group.views:
+                place, camera = view_place(record.group, view), record.camera(view)
+                # A static camera that many groups share is written once.
+                known = place in names.of_place
+                name = names.of(place, record.split(view), view.size)
+                if not known:
                     lines, others = view.station.lines, view.extras.lines
-                    write_line_files(root, [LineFile(place, view.size, lines, others)])
-                    info.add(f"{place}.jpg", record_of(record.group, view))
-                    lines_written.add(place)
+                    write_line_files(root, [LineFile(f"{LINES}/{name}", view.size, lines, others)])
+                    said = {**record_of(record.group, view), PLACE: place}
+                    info.add(f"{LINES}/{name}.jpg", said)
                     counts["frames"] += 1
-            counts["cameras"] += write_view_cameras(root, record, cameras_written)
-    return counts
+                if camera is not None and name not in with_camera:
+                    write_cameras(root, {f"{CAMERAS}/{name}": camera})
+                    with_camera.add(name)
+    return counts | {"cameras": len(with_camera)}
+
+
+class _Names:
+    """Folder and name of each frame, by its place."""
+
+    def __init__(self) -> None:
+        self.of_place: dict[str, str] = {}
+        self._place_of: dict[str, str] = {}
+
+    def of(self, place: str, split: str, size: ImageSize) -> str:
+        """The name of a frame; that of a static camera stays what it was at first."""
+        if place in self.of_place:
+            return self.of_place[place]
+        name = f"{split_folder_of(split, size)}/{flat_name(place, split)}"
+        other = self._place_of.setdefault(name, place)
+        if other != place:
+            raise InputError(f"the frames {other} and {place} would both be called {name}")
+        self.of_place[place] = name
+        return name

@@ -6,19 +6,20 @@ import math
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
-from typing import IO, Any
+from typing import Any
 
 from app.datasets.csv_text import Table
 from app.datasets.export_record import ExportRecord, chosen_box
 from app.datasets.frame_names import flat_frame, likely_suffix, split_folder
+from app.datasets.yolo_lists import ImageLists
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
 
-LISTS = ("train", "val", "test")
 TABLE = "frames.csv"
 _COLUMNS = ("image", "present", "group", "view", "split", "width", "height", "verdict")
+# Without a path the lists lie beside this file, wherever that is.
 _DATA = """# Ball boxes, one class. {missing}
-path: .
+# {validation}
 train: train.txt
 val: {val}
 {test}nc: 1
@@ -33,7 +34,8 @@ def write_yolo(
     """Write labels, lists and ``data.yaml`` below an existing folder.
 
     Every view has a label file; one without a ball box is empty, which says "no ball here".
-    Boxes are clipped at the image border. ``frames.csv`` says which image is which view, and
+    Boxes are clipped at the image border. Where no split validates, some of what trains is held
+    out; what tests never validates. ``frames.csv`` says which image is which view, and
     whether it is there: a frame that was not copied must be put under its name before training.
 
     Args:
@@ -48,25 +50,17 @@ def write_yolo(
     names = ("groups", "labels", "boxes", "balls", "images", "images_missing")
     counts = dict.fromkeys(names, 0)
     with ExitStack() as stack:
-        lists = {name: stack.enter_context(_open(root / f"{name}.txt")) for name in LISTS}
-        used: set[str] = set()
+        lists = stack.enter_context(ImageLists(root))
         file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
         table = Table(file, _COLUMNS)
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
-                split = split_folder(record.split(view))
-                used.add(split)
                 image = _add(root, record, view, table, boxes, counts)
-                lists[split].write(f"./{image}\n")
-    for name in set(LISTS) - used - {"train"}:
-        (root / f"{name}.txt").unlink()
-    _write_data(root, used, counts)
+                split, group = split_folder(record.split(view)), record.group
+                lists.add(split, group.match, group.key, image)
+    _write_data(root, lists, counts)
     return counts
-
-
-def _open(path: Path) -> IO[str]:
-    return path.open("w", encoding="utf-8", newline="\n")
 
 
 def _add(
@@ -114,15 +108,14 @@ def label_line(box: Box, size: ImageSize) -> str | None:
     return "0 " + " ".join(f"{number:.9g}" for number in numbers)
 
 
-def _write_data(root: Path, used: set[str], counts: dict[str, int]) -> None:
+def _write_data(root: Path, lists: ImageLists, counts: dict[str, int]) -> None:
     missing = counts["images_missing"]
     sentence = (
         f"{missing} images are not in this export: put each frame where {TABLE} names it."
         if missing
         else "All images are in this export."
     )
-    # Without a validation split, tools look at the next best list.
-    val = next((f"{name}.txt" for name in ("val", "test") if name in used), "train.txt")
-    test = "test: test.txt\n" if "test" in used else ""
-    text = _DATA.format(missing=sentence, val=val, test=test)
+    val = "val.txt" if "val" in lists.used else "train.txt"
+    test = "test: test.txt\n" if "test" in lists.used else ""
+    text = _DATA.format(missing=sentence, validation=lists.sentence, val=val, test=test)
     (root / "data.yaml").write_text(text, encoding="utf-8")

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from app.datasets.frame_names import flat_frame, match_frame
+from app.datasets.gamestate import sequence_frame
+from app.datasets.sn_calibration import line_frame
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 
@@ -146,4 +148,9 @@ def _exported(frame: NamedFrame) -> Iterator[str]:
     view = View(frame.view, station)
     group = Group(frame.group, (view,), match=frame.match)
     yield _bare(match_frame(group, view, "", ".jpg"))
+    yield _bare(sequence_frame(group, view, "", ".jpg").split("/", 1)[-1])
     yield _bare(flat_frame(group, view, "", ".jpg").rsplit("/", 1)[-1])
+    lines = _bare(line_frame(group, view, "", ".jpg").rsplit("/", 1)[-1])
+    # A plain number tells no match, and a static camera has one file of lines.
+    if not frame.station and lines != _bare(frame.view).rsplit("/", 1)[-1]:
+        yield lines

@@ -220,6 +220,22 @@ class Camera:
         ideal = self.pixel_to_ideal(pixels)
         return np.column_stack([ideal, np.ones(len(ideal))]) @ self.rotation
 
+    def on_ground(self, pixels: FloatArray) -> FloatArray:
+        """Where on the grass (z = 0) pixels look, pitch frame, metres, shape (N, 2).
+
+        Args:
+            pixels: As the image shows them, shape (N, 2).
+
+        Returns:
+            x and y; NaN for pixels that look at or above the horizon, or have no ray.
+        """
+        rays = self.rays(pixels)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = -self.position[2] / rays[:, 2]
+            places: FloatArray = self.position[:2] + reach[:, None] * rays[:, :2]
+        places[~(np.isfinite(reach) & (reach > 0))] = np.nan
+        return places
+
     def scaled(self, factor_x: float, factor_y: float) -> Camera:
         """The same camera for the image resized by these factors.
 

@@ -19,7 +19,7 @@ export const FORMATS = [
 	{ name: 'gamestate', label: 'Game state', note: 'Labels-GameState.json for each sequence' },
 	{ name: 'touchline', label: 'Touchline', note: 'edits and verdicts, for another installation' },
 	{ name: 'cameras', label: 'Cameras', note: 'a camera JSON for each view' },
-	{ name: 'sn-calibration', label: 'sn-calibration lines', note: 'a JSON of lines for each view' },
+	{ name: 'sn-calibration', label: 'sn-calibration', note: 'lines and a camera for each view, as its evaluator reads them' },
 ];
 
 /**

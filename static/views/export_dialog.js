@@ -78,6 +78,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 				all: form.get('groups') === 'all',
 				boxes: String(form.get('boxes')),
 				images: form.get('images') ? 'copy' : 'none',
+				views: form.get('views') ? 'all' : 'valid',
 				version: version?.id ?? null,
 			}, (job) => setState((before) => ({ ...before, job })), closed.current.signal);
 			// Whoever closed the dialog finds the export among the jobs.
@@ -103,6 +104,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 							: html`<${Choice} legend="Groups" name="groups" options=${groupChoices(one)} />`}
 						<${Choice} legend="Ball boxes" name="boxes" options=${BOXES} />
 						<label class="form__check"><input type="checkbox" name="images" />Copy the frames into the zip</label>
+						<label class="form__check"><input type="checkbox" name="views" />COCO and YOLO: balls that no other view confirms, too</label>
 					</div>
 				</div>
 				${state.job ? html`<${JobProgress} job=${state.job} />` : null}

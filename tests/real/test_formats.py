@@ -18,7 +18,8 @@ from app.datasets.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.datasets.report import Report
 from app.datasets.sn_calibration import DEFAULT_SIZE
 from app.datasets.sn_calibration_reader import read_line_files, read_sn_calibration
-from app.datasets.sn_calibration_writer import write_line_files
+from app.datasets.sn_calibration_writer import write_line_files, write_sn_calibration
+from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS
 
 REAL_DATA = Path(
@@ -72,6 +73,17 @@ class TestLineFiles:
         assert [(file.stem, file.lines) for file in again] == [
             (file.stem, file.lines) for file in first
         ]
+
+    def test_an_export_gives_every_frame_back_with_its_name_split_and_size(
+        self, report: Report, tmp_path: Path
+    ) -> None:
+        first = list(read_sn_calibration(LINES, DEFAULT_SIZE, report))
+        write_sn_calibration(tmp_path, (ExportRecord(group, None, "accepted") for group in first))
+        # One folder a split and size, and every file in it a frame.
+        folders = list((tmp_path / "lines").iterdir())
+        assert sum(len(list(folder.glob("*.json"))) for folder in folders) == 727
+        assert {folder.name.rsplit("-", 1)[1] for folder in folders} == {"960x540"}
+        assert list(read_sn_calibration(tmp_path, ImageSize(2, 2), report)) == first
 
 
 class TestCameras:

@@ -14,6 +14,7 @@ from app.store.jobs import DONE, Job
 
 Boxes = Literal["optimized", "annotated", "exact"]
 Images = Literal["none", "copy"]
+Views = Literal["valid", "all"]
 VersionId = Annotated[int, Field(ge=1, le=2**63 - 1)] | Annotated[str, Field(max_length=100)]
 
 
@@ -35,6 +36,11 @@ class ExportRequest(BaseModel):
     )
     boxes: Boxes = Field(default="optimized", description="Which ball box is written.")
     images: Images = Field(default="none", description="Whether frames are copied into the zip.")
+    views: Views = Field(
+        default="valid",
+        description="coco and yolo: whether views that annotate a ball and are in no valid pair "
+        "take part.",
+    )
 
 
 class ExportJobDocument(JobDocument):

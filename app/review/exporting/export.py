@@ -22,6 +22,7 @@ from app.review.exporting.formats import (
     box_settings,
     frame_layout,
     missing_sentence,
+    view_settings,
     write_format,
 )
 from app.review.exporting.images import ExportImages, ReadPicture
@@ -35,6 +36,7 @@ from app.store.frames import make_picture
 from app.store.session import Session, Store
 
 IMAGES = ("none", "copy", "link")
+VIEWS = ("valid", "all")
 
 
 @dataclass(frozen=True)
@@ -61,12 +63,19 @@ class _Options:
     everything: bool
     boxes: str
     images: str
+    views: str
+
+    @property
+    def every_view(self) -> bool:
+        """Whether training data hold every view."""
+        return self.everything or self.views == "all"
 
     def check(self, out: Path) -> None:
         for name, value, choices in (
             ("format", self.format, FORMATS),
             ("boxes", self.boxes, BOX_KINDS),
             ("images", self.images, IMAGES),
+            ("views", self.views, VIEWS),
         ):
             if value not in choices:
                 raise InputError(
@@ -86,6 +95,7 @@ def export(
     everything: bool = False,
     boxes: str = "optimized",
     images: str = "none",
+    views: str = "valid",
     version: str | None = None,
     progress: Progress | None = None,
     read: ReadPicture | None = None,
@@ -105,6 +115,8 @@ def export(
             YOLO and Parquet hold. Other formats have no place for a chosen box, and their
             manifests name none.
         images: ``none``, ``copy`` or ``link`` (folders only).
+        views: ``valid`` or ``all``: whether COCO and YOLO, from which detectors learn, hold the
+            views that annotate a ball and are in no valid pair. ``everything`` says all.
         version: Name, id or hash of a frozen version to export instead of the dataset as it is:
             the same bytes every time.
         progress: Called as groups are written.
@@ -114,7 +126,7 @@ def export(
         InputError: Nothing to export, or the groups do not fit the format.
         StorageError: The disk refuses.
     """
-    options = _Options(format, everything, boxes, images)
+    options = _Options(format, everything, boxes, images, views)
     options.check(out)
     if format == CARRY:
         return _carry(store, dataset, out, version, progress)
@@ -193,7 +205,12 @@ class _Run:
             "date": source.date,
         }
         wanted = WriteOptions(
-            options.format, options.everything, options.boxes, provenance, self.spare
+            options.format,
+            options.everything,
+            options.boxes,
+            options.every_view,
+            provenance,
+            self.spare,
         )
         return write_format(root, self._records(), wanted)
 
@@ -210,6 +227,7 @@ class _Run:
                 **source.settings(),
                 "images": self._options.images,
                 **box_settings(self._options.format, self._options.boxes),
+                **view_settings(self._options.format, self._options.every_view),
                 **missing_sentence(self._options.format, counts),
             },
             licence=source.licence or terms,
@@ -221,11 +239,15 @@ class _Run:
         )
 
     def _records(self) -> Iterator[ExportRecord]:
-        for place, (record, facts) in enumerate(self._source.items(), 1):
-            self._licences.add(licence_of(record.group.match))
-            self._images.add(record.group, facts, record.splits)
-            self._note(record)
-            yield replace(record, frames=self._images.placed)
+        # A frame without its label would teach that it shows no ball: it stays out as well.
+        chosen = self._options.format == "yolo" and not self._options.every_view
+        for place, (found, facts) in enumerate(self._source.items(), 1):
+            record = found.for_training() if chosen else found
+            if record.group.views:
+                self._licences.add(licence_of(record.group.match))
+                self._images.add(record.group, facts, record.splits)
+                self._note(record)
+                yield replace(record, frames=self._images.placed)
             if self._progress is not None:
                 self._progress(place, self._source.count)
 
@@ -242,5 +264,6 @@ def _require_content(dataset: str, format: str, counts: Mapping[str, int]) -> No
     count, what = CONTENT.get(format, ("groups", "group"))
     if not counts[count]:
         raise InputError(
-            f'no group of "{dataset}" has a {what} for {format}, so there is nothing to export'
+            f'no group of "{dataset}" has a {what} for {format}, so there is nothing to export',
+            hint="Ask for every view (views: all)." if format == "yolo" else None,
         )

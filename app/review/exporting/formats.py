@@ -12,12 +12,14 @@ from app.datasets.coco_writer import write_coco
 from app.datasets.export_record import ExportRecord
 from app.datasets.format_names import ExportFormat
 from app.datasets.frame_names import FrameName, flat_frame, match_frame
+from app.datasets.gamestate import sequence_frame
 from app.datasets.gamestate_writer import write_gamestate
 from app.datasets.issia import FramePersons
 from app.datasets.issia_3d_writer import write_issia_3d
 from app.datasets.issia_writer import write_issia
 from app.datasets.manifest import SOFTWARE, software_version
 from app.datasets.parquet_writer import write_parquet
+from app.datasets.sn_calibration import line_frame
 from app.datasets.sn_calibration_writer import write_sn_calibration
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.datasets.soccernet_v3d_writer import write_soccernet_v3d
@@ -31,10 +33,19 @@ CONTENT = {
     "issia-3d": ("groups", "ball"),
     "sn-calibration": ("frames", "frame"),
     "gamestate": ("images", "image"),
+    "yolo": ("labels", "view that a detector may learn from"),
 }
 """What a format consists of: the name of its count, and the word for one."""
+TRAINING = ("coco", "yolo")
+"""Formats from which detectors learn: no ball that other views do not confirm, unless asked."""
 WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
 """Formats whose cameras are SoccerNet's: they have no place for a wide lens."""
+LAYOUTS: Mapping[str, FrameName] = {
+    "gamestate": sequence_frame,
+    "sn-calibration": line_frame,
+    "yolo": flat_frame,
+}
+"""Where a format looks for the frames of its views, unless beside the labels of a match."""
 WITH_BOXES = ("soccernet-v3d", "coco", "yolo", "parquet")
 """Formats that hold the ball box that was chosen; all others have no place for it."""
 
@@ -47,6 +58,7 @@ class WriteOptions:
         format: One of ``FORMATS``.
         everything: Whether groups and views that failed a gate take part.
         boxes: Which ball box is written.
+        every_view: Whether training data hold views in which the 3D ball does not hold.
         provenance: Where the groups come from, by the names of ``parquet.PROVENANCE``.
         spare: People of frames that are no view of a group.
     """
@@ -54,6 +66,7 @@ class WriteOptions:
     format: str
     everything: bool = False
     boxes: str = "optimized"
+    every_view: bool = False
     provenance: Mapping[str, str | None] = field(default_factory=dict)
     spare: Iterable[FramePersons] = ()
 
@@ -86,10 +99,17 @@ def write_format(
         case "sn-calibration":
             return write_sn_calibration(root, records)
         case "gamestate":
-            return write_gamestate(root, groups)
+            return write_gamestate(root, records)
         case "coco":
             info = {"description": options.provenance.get("dataset"), "software": _software()}
-            return write_coco(root, records, everything=everything, boxes=boxes, info=info)
+            return write_coco(
+                root,
+                records,
+                everything=everything,
+                boxes=boxes,
+                every_view=options.every_view,
+                info=info,
+            )
         case "yolo":
             return write_yolo(root, records, boxes=boxes)
         case _:
@@ -128,7 +148,7 @@ def _with_plain_lenses(
 
 def frame_layout(format: str) -> FrameName:  # noqa: A002
     """Where a format looks for the frames of its views."""
-    return flat_frame if format == "yolo" else match_frame
+    return LAYOUTS.get(format, match_frame)
 
 
 def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
@@ -138,6 +158,11 @@ def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
     # optimized_d is defined around the centre of the annotated box.
     own = {"ball_bbox": "annotated"} if format == "soccernet-v3d" else {}
     return {"boxes": boxes, **own}
+
+
+def view_settings(format: str, every_view: bool) -> dict[str, str]:  # noqa: A002
+    """Which views a detector learns from, for a format that leaves some out."""
+    return {"views": "all" if every_view else "valid"} if format in TRAINING else {}
 
 
 def missing_sentence(format: str, counts: Mapping[str, int]) -> dict[str, str]:  # noqa: A002

@@ -94,6 +94,8 @@ def export_work(
             everything=request["all"],
             boxes=request["boxes"],
             images=request["images"],
+            # Requests of before say nothing of views.
+            views=request.get("views", "valid"),
             version=None if version is None else str(version),
             progress=counting(progress, "groups written"),
             read=frames.read,

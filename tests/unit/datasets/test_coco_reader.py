@@ -103,7 +103,7 @@ class TestReadCoco:
     def test_a_state_that_was_tampered_with_leaves_its_image_out(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
     ) -> None:
-        write_coco(tmp_path, [solved(soccer_group(replays=2))])
+        write_coco(tmp_path, [solved(soccer_group(replays=2))], every_view=True)
         path = tmp_path / "annotations/instances_train.json"
         value = json.loads(path.read_text())
         images = value["images"]
@@ -113,6 +113,57 @@ class TestReadCoco:
         path.write_text(json.dumps(value))
         assert list(read_coco(tmp_path, report)) == []
         assert [item.record for item in report.problems] == [f"images[{n}]" for n in range(3)]
+
+    def test_views_outside_come_back_to_their_group(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        group = soccer_group(replays=2)
+        write_coco(tmp_path, [solved(group)])
+        assert len(list((tmp_path / "annotations").iterdir())) == 2
+        assert list(read_coco(tmp_path, report)) == [group]
+        assert report.problems == []
+
+    def test_the_groups_of_others_are_groups(
+        self, read: Callable[[Any], list[Group]], report: Report
+    ) -> None:
+        size = {"width": 1280, "height": 720}
+        images = [
+            {"id": 1, "file_name": "a/1.jpg", "group_id": "m/7", "view": "main", **size},
+            {"id": 2, "file_name": "b/1.jpg", **size},
+            {"id": 5, "file_name": "c/1.jpg", "group_id": "m/7", "view": "goal", **size},
+            {"id": 6, "file_name": "d/1.jpg", "group_id": 8, **size},
+        ]
+        groups = {group.key: group for group in read(foreign(images=images))}
+        assert {key: [view.key for view in group.views] for key, group in groups.items()} == {
+            "m/7": ["main", "goal"],
+            "b/1.jpg": ["b/1.jpg"],
+            "8": ["1.jpg"],
+        }
+        assert groups["m/7"].split == "test"
+        assert groups["m/7"].views[1].balls[0].box == Box(1.0, 2.0, 3.0, 4.0)
+        stations = [view.station.key for group in groups.values() for view in group.views]
+        assert len(set(stations)) == 4
+        assert report.problems == []
+
+    def test_the_split_is_in_the_name_of_the_file(self, tmp_path: Path, report: Report) -> None:
+        (tmp_path / "outside_valid.json").write_text(json.dumps(foreign()))
+        (group,) = read_coco(tmp_path, report)
+        assert group.split == "valid"
+
+    @pytest.mark.parametrize(
+        ("changes", "field"),
+        [
+            ({"group_id": "../x"}, "group_id"),
+            ({"group_id": "g", "view": "/etc/x"}, "view"),
+            ({"group_id": "g", "view": [1]}, "view"),
+        ],
+    )
+    def test_names_that_are_none_are_named(
+        self, read: Callable[[Any], list[Group]], report: Report, changes: Any, field: str
+    ) -> None:
+        image = foreign()["images"][0] | changes
+        assert read(foreign(images=[image])) == []
+        assert [item.field for item in report.problems] == [field]
 
     def test_categories_that_are_no_list_are_named(
         self, read: Callable[[Any], list[Group]], report: Report

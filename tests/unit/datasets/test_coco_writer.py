@@ -35,7 +35,13 @@ class TestWriteCoco:
             solved(soccer_group("9.png", split="")),
         ]
         counts = write_coco(tmp_path, records)
-        assert counts == {"groups": 3, "images": 6, "annotations": 6, "balls": 6}
+        assert counts == {
+            "groups": 3,
+            "images": 6,
+            "annotations": 6,
+            "balls": 6,
+            "images_outside": 0,
+        }
         names = ("train", "test", "unassigned")
         assert sorted(path.name for path in (tmp_path / "annotations").iterdir()) == sorted(
             f"instances_{name}.json" for name in names
@@ -74,8 +80,32 @@ class TestWriteCoco:
             root = tmp_path / str(everything)
             root.mkdir()
             write_coco(root, [solved(soccer_group(replays=2))], everything=everything)
-            third = instances(root, "train")["images"][2]
+            name = "instances_train" if everything else "outside_train"
+            value = json.loads((root / f"annotations/{name}.json").read_text())
+            third = next(image for image in value["images"] if image["view"] == "7_2.png")
             assert (third["ball_3d"] is not None) is everything
+
+    def test_a_ball_that_no_other_view_confirms_teaches_nobody_unless_asked(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        from pycocotools.coco import COCO
+
+        group = soccer_group(replays=3)
+        # The last view shows no ball: it may teach that.
+        group = replace(group, views=(*group.views[:3], replace(group.views[3], balls=())))
+        for asked, taught in ((False, 3), (True, 4)):
+            root = tmp_path / str(asked)
+            root.mkdir()
+            counts = write_coco(root, [solved(group)], every_view=asked)
+            assert (counts["images"], counts["images_outside"]) == (taught, 4 - taught)
+            coco = COCO(str(root / "annotations/instances_train.json"))
+            assert len(coco.getImgIds()) == taught
+            assert len(coco.getAnnIds()) == counts["annotations"] == taught - 1
+        outside = COCO(str(tmp_path / "False/annotations/outside_train.json"))
+        (image,) = outside.loadImgs(outside.getImgIds())
+        (annotation,) = outside.loadAnns(outside.getAnnIds())
+        assert (image["view"], annotation["image_id"]) == ("7_2.png", image["id"])
+        assert annotation["bbox"] == annotation["annotated_bbox"]
 
     @pytest.mark.parametrize("boxes", ["annotated", "exact"])
     def test_the_box_is_the_chosen_one(
@@ -93,7 +123,7 @@ class TestWriteCoco:
         group = soccer_group(replays=0)
         ball = BallAnnotation(point=ImagePoint(5.0, 6.0))
         group = replace(group, views=(replace(group.views[0], balls=(ball,)),))
-        counts = write_coco(tmp_path, [solved(group, ball=False)])
+        counts = write_coco(tmp_path, [solved(group, ball=False)], every_view=True)
         assert counts["annotations"] == 0
         image = instances(tmp_path, "train")["images"][0]
         assert image["touchline"]["balls"][0]["point"] == [5.0, 6.0]

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
 from app.datasets.export_record import ExportRecord, chosen_box
+from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Group
 
@@ -19,6 +21,15 @@ class TestExportRecord:
         third = record.group.views[2]
         assert record.ball_fit(third, everything=False) is None
         assert record.ball_fit(third, everything=True) is not None
+
+    def test_a_detector_learns_from_balls_that_hold_and_from_views_without_one(
+        self, soccer_group: Callable[..., Group], solved: Solved
+    ) -> None:
+        group = soccer_group(replays=3)
+        gone = replace(group.views[3], balls=(BallAnnotation(out_of_view=True),))
+        record = solved(replace(group, views=(*group.views[:3], gone)))
+        keys = [view.key for view in record.for_training().group.views]
+        assert keys == ["7.png", "7_1.png", "7_3.png"]
 
     def test_calibrated_means_through_the_gates_on_cameras(
         self, soccer_group: Callable[..., Group], solved: Solved

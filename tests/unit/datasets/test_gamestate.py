@@ -7,14 +7,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from app.datasets.camera_json import camera_from_json
+from app.datasets.export_record import ExportRecord
+from app.datasets.gamestate import sequence_frame
 from app.datasets.gamestate_reader import read_gamestate
 from app.datasets.gamestate_writer import write_gamestate
 from app.datasets.report import Report
+from app.errors import InputError
+from app.geometry.camera import Camera
 from app.soccer.annotation import Extras
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Group
+from app.soccer.group import Group, Media
+from tests.cameras import WIDE_LENSES, wide
 
 Value = dict[str, Any]
 
@@ -55,6 +62,29 @@ def labels() -> Value:
 
 
 Read = Callable[..., list[Group]]
+Solved = Callable[..., ExportRecord]
+Make = Callable[..., Group]
+PLAYER = {"x1": 600, "y1": 300, "x2": 620, "y2": 360}
+
+
+def write(root: Path, groups: list[Group]) -> dict[str, int]:
+    """Groups that nobody has solved, written."""
+    return write_gamestate(root, [ExportRecord(group, None, "unreviewed") for group in groups])
+
+
+def written(root: Path) -> Value:
+    (path,) = root.rglob("Labels-GameState.json")
+    value: Value = json.loads(path.read_text())
+    return value
+
+
+def with_people(group: Group, *people: Value) -> Group:
+    views = (replace(view, extras=Extras(boxes=people)) for view in group.views)
+    return replace(group, views=tuple(views))
+
+
+def person(tag: str | None, name: str = "Player team left", **corners: float) -> Value:
+    return {"class": name, "ID": tag, "points": PLAYER | corners}
 
 
 @pytest.fixture
@@ -135,22 +165,36 @@ class TestReadGamestate:
         assert len(groups) == 2
         assert "is a second SNGS-060" in report.problems[-1].problem
 
+    def test_a_match_in_two_splits_is_one_sequence_with_each_image_once(
+        self, tmp_path: Path, soccer_group: Make, report: Report
+    ) -> None:
+        pairs = (("7.png", "train"), ("8.png", "test"))
+        write(tmp_path, [soccer_group(name, split=split) for name, split in pairs])
+        groups = list(read_gamestate(tmp_path, report))
+        assert [group.split for group in groups] == ["test", "test", "train", "train"]
+        assert len({group.match for group in groups}) == 1
+        assert report.problems == []
+        (again,) = tmp_path.glob("train/*/Labels-GameState.json")
+        (first,) = tmp_path.glob("test/*/Labels-GameState.json")
+        again.write_text(first.read_text())
+        assert len(list(read_gamestate(tmp_path, report))) == 2
+        assert "is a second 8" in report.problems[0].problem
+
 
 class TestWriteGamestate:
     def test_comes_back_as_it_was(
         self, read: Read, labels: Value, tmp_path: Path, report: Report
     ) -> None:
-        groups = read(labels, "SNGS-060")
-        counts = write_gamestate(tmp_path / "out", groups)
+        groups = read(labels)
+        counts = write(tmp_path / "out", groups)
         assert counts == {"groups": 2, "images": 2, "annotated_balls": 2}
-        path = tmp_path / "out/SNGS-060/Labels-GameState.json"
-        written = json.loads(path.read_text())
+        found = json.loads((tmp_path / "out/test/SNGS-060/Labels-GameState.json").read_text())
         assert list(read_gamestate(tmp_path / "out", report)) == groups
         expected = copy.deepcopy(labels)
         expected["annotations"][2]["image_id"] = 306000002
         for part in ("info", "images", "categories"):
-            assert written[part] == expected[part]
-        by_id = {item["id"]: item for item in written["annotations"]}
+            assert found[part] == expected[part]
+        by_id = {item["id"]: item for item in found["annotations"]}
         for item in expected["annotations"]:
             again = by_id[item["id"]]
             assert {k: v for k, v in again.items() if k not in ("bbox_image", "lines")} == {
@@ -158,8 +202,8 @@ class TestWriteGamestate:
             }
 
     def test_no_name_ends_with_a_space(self, read: Read, labels: Value, tmp_path: Path) -> None:
-        write_gamestate(tmp_path / "out", read(labels))
-        text = (tmp_path / "out/SNGS-060/Labels-GameState.json").read_text()
+        write(tmp_path / "out", read(labels))
+        text = (tmp_path / "out/test/SNGS-060/Labels-GameState.json").read_text()
         assert '"Goal left post left": ' in text
         assert "left " not in text.replace("Goal left post", "")
 
@@ -176,23 +220,149 @@ class TestWriteGamestate:
         group = soccer_group(replays=0)
         odd = ({"class": "Odd", "points": "text"}, {"class": "Odder", "points": [1, "x"]})
         view = replace(group.views[0], extras=Extras(boxes, odd))
-        write_gamestate(tmp_path, [replace(group, views=(view,))])
-        (path,) = tmp_path.rglob("Labels-GameState.json")
-        written = json.loads(path.read_text())["annotations"]
-        assert [item["attributes"] for item in written[:2]] == [
+        write(tmp_path, [replace(group, views=(view,))])
+        found = written(tmp_path)["annotations"]
+        assert [item["attributes"] for item in found[:2]] == [
             {"role": "goalkeeper", "jersey": "1", "team": "right"},
             {"role": "referee", "jersey": None, "team": None},
         ]
-        assert written[0]["bbox_image"]["x"] == 5.0
-        assert [item["category_id"] for item in written] == [2, 3, 4, 5]
+        assert found[0]["bbox_image"]["x"] == 5.0
+        assert [item["category_id"] for item in found] == [2, 3, 4, 5]
 
     def test_a_match_that_comes_again_is_added_to_its_file(
         self, tmp_path: Path, soccer_group: Callable[..., Group]
     ) -> None:
         groups = [soccer_group(), soccer_group(match="a/b/c"), soccer_group("8.png")]
-        write_gamestate(tmp_path, groups)
+        write(tmp_path, groups)
         counts = [
             len(json.loads(path.read_text())["images"])
             for path in sorted(tmp_path.rglob("Labels-GameState.json"))
         ]
         assert counts == [2, 4]
+
+
+class TestWhatEvaluatorsAskFor:
+    """What sn-trackeval and TrackLab were seen to need before they take a frame."""
+
+    def test_every_frame_with_people_a_camera_and_lines_is_labelled(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        write_gamestate(tmp_path, [solved(with_people(soccer_group(), person("9")))])
+        found = written(tmp_path)
+        for image in found["images"]:
+            assert all(image[f"has_labeled_{what}"] for what in ("person", "pitch", "camera"))
+        assert len({image["image_id"] for image in found["images"]}) == 2
+        assert all(image["image_id"].isdigit() for image in found["images"])
+        assert found["info"]["seq_length"] == 2
+
+    def test_people_stand_where_the_camera_sees_the_lower_edge_of_their_box(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, camera: Camera
+    ) -> None:
+        write_gamestate(tmp_path, [solved(with_people(soccer_group(replays=0), person("9")))])
+        place = written(tmp_path)["annotations"][0]["bbox_pitch"]
+        for name, x in (("left", 600.0), ("middle", 610.0), ("right", 620.0)):
+            foot = [place[f"x_bottom_{name}"], place[f"y_bottom_{name}"], 0.0]
+            assert camera.project(np.array([foot]))[0] == pytest.approx([x, 360.0], abs=1e-6)
+
+    def test_tracks_are_numbers_and_a_shirt_keeps_its_own(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        people = [person("9"), person("9"), person("a"), person(None), person(None)]
+        groups = [with_people(soccer_group(action), *people) for action in ("7.png", "8.png")]
+        write_gamestate(tmp_path, map(solved, groups))
+        by_image: dict[str, list[int]] = {}
+        for item in written(tmp_path)["annotations"]:
+            if item["supercategory"] == "object":
+                by_image.setdefault(item["image_id"], []).append(item["track_id"])
+        first, second, third, fourth = by_image.values()
+        for tracks in by_image.values():
+            # Five people and the ball.
+            assert len(tracks) == len(set(tracks)) == 6
+            assert (tracks[0], tracks[5]) == (first[0], first[5])
+        # A letter means somebody among the views of one moment.
+        assert first[2] == second[2] != third[2] == fourth[2]
+
+    def test_a_frame_with_somebody_above_the_horizon_is_not_labelled_with_people(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        group = with_people(soccer_group(replays=0), person("9"), person("8", y1=-9e4, y2=-8e4))
+        write_gamestate(tmp_path, [solved(group)])
+        found = written(tmp_path)
+        assert [item.get("bbox_pitch") is None for item in found["annotations"][:2]] == [
+            False,
+            True,
+        ]
+        assert (found["images"][0]["has_labeled_person"], found["images"][0]["has_labeled_camera"]) == (
+            False, True,
+        )  # fmt: skip
+
+    def test_the_ball_is_below_its_3d_point_or_nowhere(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        write_gamestate(tmp_path, [solved(soccer_group(replays=2))])
+        first, second, third = (
+            item["bbox_pitch"]
+            for item in written(tmp_path)["annotations"]
+            if item["category_id"] == 4
+        )
+        assert (first["x_bottom_middle"], first["y_bottom_middle"]) == (1.5, -2.25)
+        width = [first[f"{axis}_bottom_right"] - first[f"{axis}_bottom_left"] for axis in "xy"]
+        assert np.hypot(*width) == pytest.approx(0.226)
+        assert first == second
+        # The third view is in no valid pair.
+        assert third is None
+
+    def test_the_camera_is_there_and_comes_back(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, camera: Camera, report: Report
+    ) -> None:
+        write_gamestate(tmp_path / "out", [solved(soccer_group(replays=0))])
+        (item,) = (
+            item for item in written(tmp_path)["annotations"] if item["supercategory"] == "camera"
+        )
+        assert camera_from_json(item["parameters"], "f") == camera
+        again = list(read_gamestate(tmp_path / "out", report))
+        assert report.problems == []
+        write(tmp_path / "second", again)
+        assert written(tmp_path / "second") == written(tmp_path / "out")
+
+    def test_a_wide_lens_has_no_place(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, camera: Camera
+    ) -> None:
+        record = solved(soccer_group(replays=0))
+        lens = wide((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), next(iter(WIDE_LENSES)), focal=700.0)
+        (view,) = record.solution.views
+        seen = replace(view, calibration=replace(view.calibration, camera=lens))
+        write_gamestate(
+            tmp_path, [replace(record, solution=replace(record.solution, views=(seen,)))]
+        )
+        found = written(tmp_path)
+        assert found["images"][0]["has_labeled_camera"] is False
+        assert {item["supercategory"] for item in found["annotations"]} == {"object", "pitch"}
+
+    def test_sequences_lie_flat_in_the_folder_of_their_split(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        groups = [soccer_group(match="a/b/c", split="test"), soccer_group(match="d", split="")]
+        write_gamestate(tmp_path, map(solved, groups))
+        paths = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.json"))
+        assert paths == [f"{name}/Labels-GameState.json" for name in ("test/a_b_c", "unassigned/d")]
+        infos = [json.loads((tmp_path / path).read_text())["info"] for path in paths]
+        # Predictions are called like the sequence, which is called like its folder.
+        assert [info["name"] for info in infos] == ["a_b_c", "d"]
+
+    def test_two_matches_that_would_be_one_sequence_are_refused(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        with pytest.raises(InputError, match="a/b and a_b would be one sequence"):
+            write_gamestate(tmp_path, [solved(soccer_group(match=name)) for name in ("a/b", "a_b")])
+
+    def test_frames_lie_where_a_sequence_looks_for_them(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        group = soccer_group(replays=0)
+        write_gamestate(tmp_path, [solved(group)])
+        place = tmp_path / sequence_frame(group, group.views[0], "train", ".jpg")
+        place.parent.mkdir()
+        place.write_bytes(b"x")
+        (again,) = read_gamestate(tmp_path, report)
+        assert again.views[0].media == Media(str(place))

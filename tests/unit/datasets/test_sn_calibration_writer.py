@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +12,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.datasets.cameras_reader import read_cameras
+from app.datasets.cameras_writer import write_cameras
 from app.datasets.export_record import ExportRecord
 from app.datasets.report import Report
-from app.datasets.sn_calibration import DEFAULT_SIZE, LineFile, spelling
-from app.datasets.sn_calibration_reader import lines_from_json, read_line_files
+from app.datasets.sn_calibration import DEFAULT_SIZE, LineFile, line_frame, spelling
+from app.datasets.sn_calibration_reader import lines_from_json, read_line_files, read_sn_calibration
 from app.datasets.sn_calibration_writer import lines_to_json, write_line_files, write_sn_calibration
-from app.errors import UnsafePathError
+from app.errors import InputError, UnsafePathError
+from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group
+from app.soccer.group import Group, Media, Station
 from app.soccer.pitch import MARKINGS
 
+MATCH = "l/s/m"
 UNIT = st.floats(-0.5, 1.5)
 LINE_FILES = st.dictionaries(
     st.sampled_from([spelling(marking) for marking in MARKINGS] + ["Line unknown"]),
@@ -35,16 +40,92 @@ Make = Callable[..., Group]
 
 
 class TestWriteSnCalibration:
-    def test_lines_and_cameras_lie_beside_each_other_and_come_back(
+    def test_lines_and_cameras_lie_in_folders_of_their_own_and_come_back(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
     ) -> None:
-        group = soccer_group()
+        group = soccer_group(split="test")
         counts = write_sn_calibration(tmp_path, [solved(group)])
         assert counts == {"groups": 1, "frames": 2, "cameras": 2}
-        files = list(read_line_files(tmp_path, ImageSize(1280, 720), report))
-        assert [file.stem for file in files] == ["7", "7_1"]
-        assert [file.lines for file in files] == [view.station.lines for view in group.views]
-        assert len(read_cameras(tmp_path, report)) == 2
+        again = list(read_sn_calibration(tmp_path, DEFAULT_SIZE, report))
+        assert [item.key for item in again] == ["7", "7_1"]
+        assert {(item.match, item.split) for item in again} == {(group.match, "test")}
+        assert [item.views[0].station for item in again] == [
+            Station(item.key, ImageSize(1280, 720), lines=view.station.lines)
+            for item, view in zip(again, group.views, strict=True)
+        ]
+        assert set(read_cameras(tmp_path, report)) == {f"{group.match}/7", f"{group.match}/7_1"}
+        assert report.problems == []
+
+    def test_a_folder_holds_nothing_but_frames_of_one_split_and_one_size(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        small = soccer_group("9.png", replays=0, split="test")
+        station = replace(small.views[0].station, size=ImageSize(960, 540))
+        small = replace(small, views=(replace(small.views[0], station=station),))
+        groups = [soccer_group(split="test"), small, soccer_group("8.png", split="")]
+        write_sn_calibration(tmp_path, map(solved, groups))
+        folders = ["test-1280x720", "test-960x540", "unassigned-1280x720"]
+        for part, prefix in (("lines", ""), ("cameras", "camera_")):
+            assert sorted(path.name for path in (tmp_path / part).iterdir()) == folders
+            files = [path.name for path in (tmp_path / part / folders[0]).iterdir()]
+            assert len(files) == 2
+            # The evaluator cuts a name at its first dot and takes no folders.
+            assert all(re.fullmatch(prefix + r"[0-9a-f]{12}_7(_1)?\.json", name) for name in files)
+
+    def test_what_came_from_sn_calibration_keeps_its_name(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        for split in ("train", "valid"):
+            write_line_files(tmp_path / "in", [LineFile(f"{split}/00002", DEFAULT_SIZE, {})])
+        first = list(read_sn_calibration(tmp_path / "in", DEFAULT_SIZE, report))
+        (tmp_path / "out").mkdir()
+        write_sn_calibration(tmp_path / "out", [solved(group) for group in first])
+        names = sorted(
+            str(path.relative_to(tmp_path / "out")) for path in tmp_path.glob("out/l*/*/*")
+        )
+        assert names == ["lines/train-960x540/00002.json", "lines/valid-960x540/00002.json"]
+        assert list(read_sn_calibration(tmp_path / "out", ImageSize(9, 9), report)) == first
+        assert sorted(read_cameras(tmp_path / "out", report)) == ["train/00002", "valid/00002"]
+
+    def test_two_frames_of_one_name_are_refused(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        view = soccer_group(replays=0).views[0]
+        keys = ("00002", "valid/00002")
+        groups = [Group(key, (replace(view, key=key),), split="valid") for key in keys]
+        with pytest.raises(InputError, match="would both be called valid-1280x720/00002"):
+            write_sn_calibration(tmp_path, map(solved, groups))
+
+    def test_the_layout_of_before_is_read_all_the_same(
+        self, tmp_path: Path, soccer_group: Make, camera: Camera, report: Report
+    ) -> None:
+        view = soccer_group(replays=0).views[0]
+        write_line_files(tmp_path, [LineFile(f"{MATCH}/7", view.size, view.station.lines)])
+        write_cameras(tmp_path, {f"{MATCH}/7": camera})
+        (tmp_path / "match_info.json").write_text(json.dumps({f"{MATCH}/7.jpg": {"match": MATCH}}))
+        (group,) = read_sn_calibration(tmp_path, view.size, report)
+        assert (group.key, group.match, group.views[0].station.lines) == (
+            "7",
+            MATCH,
+            view.station.lines,
+        )
+        assert list(read_cameras(tmp_path, report)) == [f"{MATCH}/7"]
+
+
+class TestTheFramesOfAnExport:
+    def test_they_lie_beside_their_lines_where_they_are_found(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        group = soccer_group(replays=0)
+        write_sn_calibration(tmp_path, [solved(group)])
+        place = tmp_path / line_frame(group, group.views[0], "train", ".png")
+        place.write_bytes(b"x")
+        (again,) = read_sn_calibration(tmp_path, DEFAULT_SIZE, report)
+        assert again.views[0].media == Media(str(place))
+
+    def test_those_of_a_static_camera_lie_by_its_match(self, issia_group: Make) -> None:
+        group = issia_group()
+        assert line_frame(group, group.views[0], "", ".jpg") == "issia/Frames-v3/cam3/358.jpg"
 
 
 class TestLinesToJson:

@@ -18,6 +18,19 @@ Make = Callable[..., Group]
 SIZE = ImageSize(960, 540)
 
 
+def trained_on(data: Path, split: str) -> list[Path]:
+    """The images of a split as Ultralytics finds them.
+
+    Its ``path`` is the folder of the file where none is given, but one that is relative lies
+    below the working directory; ``./`` in a list is the folder of the list.
+    """
+    value = yaml.safe_load(data.read_text())
+    root = Path(value["path"]) if value.get("path") else data.parent
+    listed = (root / value[split]).resolve()
+    lines = listed.read_text().splitlines()
+    return [listed.parent / line.removeprefix("./") for line in lines]
+
+
 class TestLabelLine:
     @pytest.mark.parametrize(
         ("box", "line"),
@@ -68,13 +81,72 @@ class TestWriteYolo:
         assert (second["present"], second["view"]) == ("False", "7_1.png")
         assert second["group"] == f"{match}/7.png"
 
-    def test_without_validation_the_test_list_stands_in(
+    @pytest.mark.parametrize("place", ["here", "elsewhere"])
+    def test_the_data_file_works_from_anywhere(
+        self,
+        tmp_path: Path,
+        solved: Solved,
+        soccer_group: Make,
+        monkeypatch: pytest.MonkeyPatch,
+        place: str,
+    ) -> None:
+        for name in ("here", "elsewhere"):
+            (tmp_path / name).mkdir()
+        write_yolo(tmp_path / "here", [solved(soccer_group(split="valid"))])
+        monkeypatch.chdir(tmp_path / place)
+        assert {image.parts[-4] for image in trained_on(tmp_path / "here/data.yaml", "val")} == {
+            "here"
+        }
+
+    def test_what_tests_never_validates(
         self, tmp_path: Path, solved: Solved, soccer_group: Make
     ) -> None:
-        records = [solved(soccer_group()), solved(soccer_group("9.png", split="test"))]
-        write_yolo(tmp_path, records)
-        assert yaml.safe_load((tmp_path / "data.yaml").read_text())["val"] == "test.txt"
-        assert not (tmp_path / "val.txt").exists()
+        for count in (0, 1, 3):
+            root = tmp_path / str(count)
+            root.mkdir()
+            groups = [soccer_group(f"{n}.png") for n in range(count)]
+            groups.append(soccer_group("9.png", split="test"))
+            write_yolo(root, map(solved, groups))
+            images = {name: set(trained_on(root / "data.yaml", name)) for name in ("val", "test")}
+            assert len(images["test"]) == 2
+            assert not images["val"] & images["test"]
+
+    def test_the_last_groups_of_a_few_matches_are_held_out(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        groups = [soccer_group(f"{n}.png") for n in range(20)]
+        write_yolo(tmp_path, map(solved, groups))
+        train, val = (trained_on(tmp_path / "data.yaml", name) for name in ("train", "val"))
+        assert [image.stem.split("_", 1)[1] for image in val] == ["18", "18_1", "19", "19_1"]
+        assert len(train) == 36
+        assert not set(train) & set(val)
+        assert "of matches that train, too" in (tmp_path / "data.yaml").read_text()
+
+    def test_whole_matches_are_held_out_where_there_are_some(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        groups = [soccer_group("7.png", match=f"l/s/{n}") for n in range(12)]
+        for order in (groups, groups[::-1]):
+            root = tmp_path / order[0].match[-1]
+            root.mkdir()
+            write_yolo(root, map(solved, order))
+        lists = [sorted((tmp_path / name / "val.txt").read_text().split()) for name in "01"]
+        # Two of twelve matches are the first to be a tenth; which, their names say.
+        assert len(lists[0]) == 4
+        assert lists[0] == lists[1]
+        train = (tmp_path / "0/train.txt").read_text().split()
+        assert len(train) == 20
+        assert not {line.split("/")[-1][:12] for line in lists[0]} & {
+            line.split("/")[-1][:12] for line in train
+        }
+
+    def test_one_group_alone_validates_itself_and_says_so(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        write_yolo(tmp_path, [solved(soccer_group())])
+        assert yaml.safe_load((tmp_path / "data.yaml").read_text())["val"] == "train.txt"
+        assert "Too few groups" in (tmp_path / "data.yaml").read_text()
+        assert sorted(path.name for path in tmp_path.glob("*.txt")) == ["train.txt"]
 
     def test_a_view_without_a_ball_has_an_empty_label(
         self, tmp_path: Path, solved: Solved, soccer_group: Make

@@ -3,6 +3,8 @@ from __future__ import annotations
 import pytest
 
 from app.datasets.frame_names import flat_frame, match_frame
+from app.datasets.gamestate import sequence_frame
+from app.datasets.sn_calibration import line_frame
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
@@ -65,7 +67,7 @@ class TestFind:
 
     def test_knows_what_exports_call_it(self, names) -> None:
         group, view = Group(f"{ALDER}/7.png", (), match=ALDER), View("7_1.png", Station("x", SIZE))
-        for place in (match_frame, flat_frame):
+        for place in (match_frame, flat_frame, line_frame, sequence_frame):
             assert names.find(place(group, view, "test", ".jpg")).id == 2
         label = flat_frame(group, view, "test", ".jpg").replace("images/", "labels/")
         assert names.find(label.rsplit(".", 1)[0] + ".txt").id == 2

@@ -8,7 +8,7 @@ from app.errors import DegenerateGeometryError, ShapeError
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.frames import ImageSize
-from tests.cameras import looking
+from tests.cameras import EVERY_COEFFICIENT, WIDE_LENSES, looking, wide
 
 SMALL = ImageSize(960, 540)
 
@@ -80,6 +80,21 @@ class TestRays:
         point = np.array([[12.0, 4.0, -1.5]])
         ray = camera.rays(camera.project(point))[0]
         assert np.allclose(np.cross(ray, point[0] - camera.position), 0.0, atol=1e-7)
+
+
+class TestOnGround:
+    def test_a_place_on_the_grass_comes_back_through_any_lens(self) -> None:
+        places = np.array([[0.0, 0.0, 0.0], [10.0, -5.0, 0.0], [-7.5, 3.0, 0.0]])
+        for lens in WIDE_LENSES:
+            camera = wide((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), lens, focal=700.0)
+            assert np.allclose(camera.on_ground(camera.project(places)), places[:, :2], atol=1e-6)
+        pixels = EVERY_COEFFICIENT.project(places)
+        assert np.allclose(EVERY_COEFFICIENT.on_ground(pixels), places[:, :2], atol=1e-6)
+
+    def test_what_looks_above_the_horizon_is_nowhere(self) -> None:
+        pixels = np.array([[480.0, -2000.0], [480.0, 270.0]])
+        found = main_camera().on_ground(pixels)
+        assert np.isnan(found).tolist() == [[True, True], [False, False]]
 
 
 class TestScaled:

@@ -59,6 +59,13 @@ class TestMakeExport:
         assert (done["state"], done["done"], done["total"]) == ("done", 3, 3)
         assert done["result"]["content"] == document["content"]
 
+    def test_whether_detectors_learn_from_every_view_is_asked_for(self, api) -> None:
+        for order, said in ((ORDER, "valid"), ({**ORDER, "format": "coco", "views": "all"}, "all")):
+            job = api.post(API, json=order).json()
+            api.get(job["content"])
+            assert api.get(f"{API}/{job['id']}").json()["request"]["views"] == said
+        assert api.post(API, json={**ORDER, "views": "some"}).status_code == 422
+
     def test_an_impossible_export_is_refused_before_a_job_starts(self, app, api) -> None:
         nothing = api.post(API, json={**ORDER, "all": False})
         assert (nothing.status_code, "accepted" in nothing.json()["detail"]) == (400, True)

@@ -50,7 +50,7 @@ def mixed(store: Store, fill, make_group) -> Store:
 
 
 def coco(root: Path) -> tuple[int, int]:
-    (path,) = (root / "annotations").iterdir()
+    (path,) = (root / "annotations").glob("instances_*")
     found = json.loads(path.read_text())["annotations"]
     return sum(item["ball_3d"] is not None for item in found), len(found)
 
@@ -100,10 +100,34 @@ class TestCounts:
         assert version.counts["balls"] == 4
         assert manifest["counts"]["balls"] == 4
         assert balls in (None, 4)
-        # Two views, and three of which one is in no valid pair and keeps its annotated box.
-        assert written == 5
-        named = manifest["counts"].get("boxes", manifest["counts"].get("annotations", 5))
-        assert named == 5
+        # Two views, and three of which one is in no valid pair: it keeps its annotated box, and no
+        # detector learns from it.
+        expected = 4 if format_ in ("coco", "yolo") else 5
+        assert written == expected
+        named = manifest["counts"].get("boxes", manifest["counts"].get("annotations", expected))
+        assert named == expected
+
+    @pytest.mark.parametrize("format_", ["coco", "yolo"])
+    def test_detectors_learn_from_the_view_apart_where_that_is_asked(
+        self, mixed: Store, tmp_path: Path, format_: str
+    ) -> None:
+        said = {}
+        for name, options in (
+            ("asked", {"version": "v1", "views": "all"}),
+            ("everything", {"everything": True}),
+            ("not asked", {"version": "v1"}),
+        ):
+            export(mixed, "demo", format_, tmp_path / name, **options)
+            manifest = json.loads((tmp_path / name / "manifest.json").read_text())
+            said[name] = (READ[format_](tmp_path / name)[1], manifest["settings"]["views"])
+        assert said == {"asked": (5, "all"), "everything": (5, "all"), "not asked": (4, "valid")}
+
+    def test_a_frame_that_teaches_nobody_is_not_copied_to_yolo(
+        self, mixed: Store, tmp_path: Path
+    ) -> None:
+        export(mixed, "demo", "yolo", tmp_path / "out", version="v1")
+        assert "8_2" not in (tmp_path / "out/frames.csv").read_text()
+        assert list((tmp_path / "out").rglob("*8_2*")) == []
 
     @pytest.mark.parametrize("format_", READ)
     def test_an_export_of_everything_counts_the_same(
@@ -142,7 +166,7 @@ class TestBoxOfAViewApart:
     def test_it_is_the_annotated_one_in_every_format(
         self, mixed: Store, tmp_path: Path, kind: str
     ) -> None:
-        export(mixed, "demo", "coco", tmp_path / "coco", boxes=kind, version="v1")
+        export(mixed, "demo", "coco", tmp_path / "coco", boxes=kind, version="v1", views="all")
         export(mixed, "demo", "parquet", tmp_path / "parquet", boxes=kind, version="v1")
         (path,) = (tmp_path / "coco" / "annotations").iterdir()
         value = json.loads(path.read_text())

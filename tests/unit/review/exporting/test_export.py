@@ -73,6 +73,15 @@ class TestExport:
         assert verdicts["9"] == "accepted: overrides reprojection: seen on video"
         assert verdicts["7"] == "unreviewed"
 
+    def test_where_no_view_may_teach_yolo_is_refused_and_says_so(
+        self, store, three, tmp_path
+    ) -> None:
+        judge(store, three[2], "accepted", note="seen on video")
+        with pytest.raises(InputError, match="has a view that a detector may learn from for yolo"):
+            export(store, "demo", "yolo", tmp_path / "out")
+        assert not (tmp_path / "out").exists()
+        assert export(store, "demo", "yolo", tmp_path / "out", views="all").counts["labels"] == 2
+
     def test_an_override_of_one_gate_covers_no_other_that_fails_later(
         self, store, three, tmp_path
     ) -> None:
