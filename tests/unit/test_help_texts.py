@@ -30,8 +30,8 @@ PLAIN_WORDS = """
     detect diagram dialog diff doctor document documents drags drawing durable editor empty encode
     encoded engine environment estimator etags evaluate event events exact examination export
     exports facets facts failures fan faults fields figure figures files finite first fixes fixture
-    folder folders follow form format formats frozen gestures glossary grass grid guess guide header headers
-    heads health heat help histograms history hit home hooks idempotency identity if image images
+    folder folders follow form format formats frozen gestures glossary grass grid guess guide header
+    headers heads health heat help histograms history hit home hooks idempotency identity if image images
     import imports in info init insight items jaccard json key keys known konva last latest lazy
     least leftovers legend lens lesson lessons letter licence limits list listing live locks look loupe
     kernels profile trace

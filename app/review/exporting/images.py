@@ -72,7 +72,9 @@ class ExportImages:
             self.missing.append(f"{group.key}, {view.key}: {error.message}")
 
     def _place(self, group: Group, view: View, media: Media) -> None:
-        if self._images == "link" and media.member is None and media.frame is None:
+        is_file = media.member is None and media.frame is None
+        # A mirrored picture is turned right: a link would show it as it lies.
+        if self._images == "link" and is_file and not view.station.flipped:
             target = self._target(group, view, PurePosixPath(media.path).suffix.lower())
             target.symlink_to(media.path)
             return
