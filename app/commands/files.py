@@ -125,8 +125,18 @@ def export(
 ) -> None:
     """Write accepted groups, all of them, or a frozen version, with a manifest."""
     from app.review.exporting.export import export as run_export
+    from app.review.exporting.export import require_possible
 
     with opened_store() as store, show_progress("Exporting") as progress:
+        require_possible(
+            store,
+            dataset,
+            format_,
+            everything=everything,
+            boxes=boxes.value,
+            images=images.value,
+            version=version,
+        )
         report = run_export(
             store,
             dataset,

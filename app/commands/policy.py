@@ -74,15 +74,14 @@ def read_policy_option(text: str) -> Policy:
         InputError: The file holds no policy.
     """
     from app.errors import InputError
-    from app.review.policies.text import MAX_CHARACTERS, policy_from_yaml
+    from app.review.policies.text import MAX_CHARACTERS, policy_from_yaml, unknown_policy
     from app.soccer.policy import POLICIES
 
     if text in POLICIES:
         return POLICIES[text]
     path = Path(text)
     if not path.is_file():
-        names = ", ".join(POLICIES)
-        raise typer.BadParameter(f'"{text}" is no policy ({names}) and no YAML file')
+        raise typer.BadParameter(unknown_policy(text, "it is no YAML file").message)
     yaml = read_text(path, MAX_CHARACTERS)
     try:
         return policy_from_yaml(yaml)

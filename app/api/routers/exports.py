@@ -100,12 +100,14 @@ def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     responses={**responses(404, 409), 204: {"description": "It is gone."}},
 )
 def delete_export(export: ExportId, services: AppServices) -> Response:
-    """Delete the file of an export; 409 while it is being written, which its job can end."""
+    """Delete the file of an export, or one that failed altogether; 409 while it is being written."""
     document = _document(services, export)
     if document.status in ("waiting", "running"):
         raise _not_ready(document)
     if document.status == "gone":
         raise NotFoundError("there is no such export")
+    if document.status in ("failed", "cancelled"):
+        services.jobs.forget(int(export))
     services.exports.forget(export)
     return Response(status_code=204)
 
