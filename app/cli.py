@@ -34,8 +34,11 @@ from app.commands import (
     solving,
     versions,
 )
-from app.commands.terminal import complain
+from app.commands.terminal import complain, spell_out
 from app.errors import ReviewError
+
+READER_GONE = 141
+"""Exit code of a command whose reader has gone, as shells have it."""
 
 app = typer.Typer(
     name="touchline",
@@ -90,8 +93,14 @@ def options(
 
 def main() -> None:
     """Entry point: what a caller can cause is one sentence on stderr and exit code 1."""
+    spell_out()
     try:
         app()
+    except SystemExit as end:
+        # Whoever reads, such as head, has seen enough.
+        if isinstance(end.__context__, BrokenPipeError):
+            sys.exit(READER_GONE)
+        raise
     except ReviewError as error:
         complain(error.message, error.hint)
         sys.exit(1)

@@ -47,9 +47,7 @@ class TestTryPolicy:
         assert gates(answer)["sigma"] == 3
         assert found["policy"]["max_sigma_m"] == 0.01
         assert api.get(PATH).json()["passing"] == 3
-        assert (
-            api.get("/api/v1/datasets/broadcast").json()["policy"]["max_sigma_m"] is None
-        )
+        assert api.get("/api/v1/datasets/broadcast").json()["policy"]["max_sigma_m"] is None
 
     def test_null_switches_an_optional_gate_off_and_is_refused_elsewhere(self, api) -> None:
         policy = "/api/v1/datasets/broadcast/policy"
