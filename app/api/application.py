@@ -36,6 +36,7 @@ from app.api.routers import (
     positions,
     practice,
     predictions,
+    query_fields,
     rig,
     saved_views,
     stations,
@@ -86,6 +87,7 @@ ROUTERS = (
     imports,
     bulk,
     saved_views,
+    query_fields,
     statistics,
     practice,
 )
