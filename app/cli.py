@@ -32,8 +32,10 @@ from app.commands import (
     sample,
     service,
     solving,
+    verdicts,
     versions,
 )
+from app.commands.options import act_as
 from app.commands.terminal import complain, spell_out
 from app.errors import ReviewError
 
@@ -52,6 +54,7 @@ PARTS = (
     files,
     solving,
     rig,
+    verdicts,
     lines,
     propose,
     noise,
@@ -81,6 +84,14 @@ def _tell_version(asked: bool) -> None:
 
 @app.callback()
 def options(
+    actor: Annotated[
+        str | None,
+        typer.Option(
+            envvar="TOUCHLINE_ACTOR",
+            metavar="NAME",
+            help="What this script calls itself; history and verdicts name it as script:NAME.",
+        ),
+    ] = None,
     version: Annotated[
         bool,
         typer.Option(
@@ -89,6 +100,7 @@ def options(
     ] = False,
 ) -> None:
     """Turn multi-view soccer frames into a trusted 3D ball dataset."""
+    act_as(actor)
 
 
 def main() -> None:

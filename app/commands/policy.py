@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Dataset, Json, read_text
+from app.commands.options import Dataset, Json, acting, read_text
 from app.commands.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def set_(
 
     chosen = read_policy_option(policy)
     with opened_store() as store:
-        state = change_policy(store, dataset, chosen, if_match=None, actor="local")
+        state = change_policy(store, dataset, chosen, if_match=None, actor=acting())
         stale = len(stale_groups(store, state.dataset_id))
     values = {**_head(state.dataset, state.policy), "version": state.version, "to_solve": stale}
     print_values(values, json_)

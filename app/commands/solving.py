@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from app.commands.opened import executor_of, opened_store
-from app.commands.options import Dataset, Json, Workers, read_settings
+from app.commands.options import Dataset, Json, Workers, acting, read_settings
 from app.commands.policy import read_policy_option
 from app.commands.terminal import (
     complain,
@@ -50,7 +50,7 @@ def solve(
         show_progress("Solving") as progress,
     ):
         if chosen is not None:
-            change_policy(store, dataset, chosen, if_match=None, actor="local")
+            change_policy(store, dataset, chosen, if_match=None, actor=acting())
         with held_interrupts() as interrupted:
             report = solve_dataset(store, dataset, executor, progress, interrupted)
             if interrupted():

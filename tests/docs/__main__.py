@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tests.docs.fixes import PAGE, fixes_page
 from tests.docs.pages import (
     GLOSSARY_PAGE,
     GUIDE,
@@ -14,6 +15,7 @@ from tests.docs.settings import SETTINGS_PAGE, settings_page
 
 if __name__ == "__main__":
     GLOSSARY_PAGE.write_text(glossary_page(), encoding="utf-8")
+    PAGE.write_text(fixes_page(), encoding="utf-8")
     QUERIES_PAGE.write_text(queries_page(), encoding="utf-8")
     GUIDE.write_text(guide_text(), encoding="utf-8")
     SETTINGS_PAGE.write_text(settings_page(), encoding="utf-8")

@@ -23,6 +23,7 @@ from tests.docs.settings import SETTINGS_PAGE, settings_page
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
+    actor actors
     candidate proposal propose scoring search straight
     3d accept action actions address adjust adjustments advice ahead anchor annotate answers app
     application archive archives arrays arrival ask axis backup bar bars batches best binned bodies
