@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import codecs
 import io
-import json
 import logging
 import math
 import signal
@@ -94,7 +93,7 @@ def _spelt(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
     text = error.object[error.start : error.end]
-    return json.dumps(text)[1:-1], error.end
+    return json_text(text, ascii_=True)[1:-1], error.end
 
 
 def complain(message: str, hint: str | None = None) -> None:

@@ -56,6 +56,7 @@ class TestMakeExport:
             assert "manifest.json" in archive.namelist()
         document = api.get(f"{API}/{job['id']}").json()
         assert (document["status"], document["counts"]["cameras"]) == ("ready", 2)
+        assert document["state"] == "done"
         assert document["bytes"] == len(content.content)
         done = api.get(f"/api/v1/jobs/{job['id']}").json()
         assert (done["state"], done["done"], done["total"]) == ("done", 3, 3)
