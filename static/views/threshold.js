@@ -50,7 +50,7 @@ function Slider({ field, value, id, change }) {
 		/>
 		<input
 			class="field threshold__number" id=${id} type="number" min=${low} max=${high} step="any" value=${off ? '' : shown} disabled=${off} title=${off ? OFF : ''}
-			onChange=${(/** @type {Event} */ event) => { if (Number.isFinite(number(event))) change(number(event)); }}
+			onChange=${(/** @type {Event} */ event) => { if (Number.isFinite(number(event))) change(Math.max(low, Math.min(high, number(event)))); }}
 		/>
 		<${Unit} unit=${field.unit} />
 	`;

@@ -119,6 +119,10 @@ class TestFields:
         if field.several and len(field.values) > 1:
             parse_query(f"{field.name}:{','.join(field.values)}")
 
+    @pytest.mark.parametrize("text", ["status<accepted", "passes>yes", "match>=a", "id<12", "sort<x"])
+    def test_only_numbers_have_an_order(self, text: str) -> None:
+        assert pointer(text) == "/q/0"
+
     def test_one_that_there_is_not_is_answered_with_the_nearest(self) -> None:
         with pytest.raises(InputError, match="did you mean sigma"):
             parse_query("sigmaa<0.1")
