@@ -14,7 +14,7 @@ from pathlib import Path
 from tests.integration.conftest import COMMAND, environment
 from tests.waiting import SECONDS
 
-GROUPS = 120
+GROUPS = 60
 
 
 def solved(home: Path) -> int:
