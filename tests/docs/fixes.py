@@ -45,6 +45,11 @@ FINDINGS: dict[str, tuple[tuple[str, ...], str]] = {
     "visible_not_annotated": ((), "draw the marking: `PATCH /views/{id}/lines`"),
     "bad_point": (("drop_point",), ""),
     "under_constrained": ((), "draw more markings: `PATCH /views/{id}/lines`"),
+    "paint_disagrees": (
+        (),
+        "correct the lines, then read the paint again: `POST /datasets/{id}/paint`",
+    ),
+    "no_paint": ((), "read the paint: `POST /datasets/{id}/paint`"),
     "picture_geometry": (("free_picture",), ""),
     "view_disagrees": (("exclude_view",), "or correct its ball: `PATCH /views/{id}/ball`"),
     "views_contradict": (("exclude_view",), ""),

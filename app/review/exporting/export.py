@@ -36,6 +36,7 @@ from app.review.versions.version import find_version
 from app.soccer.ball_boxes import BOX_KINDS
 from app.store.frames import make_picture
 from app.store.session import Session, Store
+from app.store.views import frame_files
 
 IMAGES = ("none", "copy", "link")
 VIEWS = ("valid", "all")
@@ -179,14 +180,21 @@ def require_possible(
         options = _Options(format, everything, boxes, images)
         frames = ExportImages(Path(folder), "none", _here(store), frame_layout(format))
         counts = _Run(source, options, frames, None).write(Path(folder))
+        if images != "none" and not frames.media:
+            files = [] if source.is_all else frame_files(session, whole.dataset_id)
+            _require_frames(whole.dataset, files)
     if source.is_all:
         _require_content(whole.dataset, format, counts)
-        if images != "none" and not frames.media:
-            raise InputError(
-                f'none of the images of "{whole.dataset}" is there, so none can go with it',
-                hint="Export without images, or import the dataset again with its frames.",
-                pointer="/images",
-            )
+
+
+def _require_frames(dataset: str, files: Iterable[str]) -> None:
+    """Raises InputError where images are wanted and no file of them is there."""
+    if not any(Path(file).exists() for file in files):
+        raise InputError(
+            f'none of the images of "{dataset}" is there, so none can go with it',
+            hint="Export without images, or import the dataset again with its frames.",
+            pointer="/images",
+        )
 
 
 def _require_plain(format: str, everything: bool, version: str | None) -> None:  # noqa: A002

@@ -48,7 +48,7 @@ def policy_from_yaml(text: str) -> Policy:
 def unknown_policy(name: str, otherwise: str, *, pointer: str | None = None) -> InputError:
     """What to say of a name that no shipped policy has; ``otherwise``: what else it is not."""
     nearest = get_close_matches(name.lower(), POLICIES, n=1)
-    meant = f"did you mean {nearest[0]}?" if nearest else f"there are {' and '.join(POLICIES)}"
+    meant = f"did you mean {nearest[0]}?" if nearest else f"there are {', '.join(POLICIES)}"
     return InputError(
         f'there is no policy "{name}", and {otherwise}; {meant}',
         hint="A policy of one's own comes with its thresholds.",

@@ -94,6 +94,22 @@ class TestMakeExport:
         assert words in answer.json()["detail"]
         assert app.state.services.jobs.find() == []
 
+    def test_the_images_of_many_groups_are_looked_for_beyond_the_first(
+        self, app, api, group, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.review.exporting.export.TRIED", 1)
+        framed = [
+            replace(group, key=f"{n}.png", views=tuple(
+                replace(view, media=Media(str(tmp_path / f"{n}.png"))) for view in group.views
+            ))
+            for n in range(3)
+        ]  # fmt: skip
+        ingest(app.state.services.store, "many", framed, source="test", actor="local")
+        order = {**ORDER, "dataset": "many", "images": "copy"}
+        assert api.post(API, json=order).status_code == 400
+        (tmp_path / "2.png").write_bytes(b"a picture")
+        assert api.post(API, json=order).status_code == 202
+
     def test_a_format_without_room_for_anything_that_is_there_is_refused(self, app, api) -> None:
         services = app.state.services
         bare = Group("1.png", (View("1.png", Station("1.png", ImageSize(1280, 720))),), "m")

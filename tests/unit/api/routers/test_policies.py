@@ -111,7 +111,7 @@ class TestSetPolicy:
     def test_a_name_that_does_not_exist_is_answered_with_the_nearest(self, api) -> None:
         answer = put(api, {"name": "strictt"}).json()
         assert "did you mean strict?" in answer["detail"]
-        assert "paper and strict" in put(api, {"name": "mine"}).json()["detail"]
+        assert "there are paper, strict" in put(api, {"name": "mine"}).json()["detail"]
 
     def test_its_own_name_alone_changes_nothing(self, api) -> None:
         put(api, {"name": "ours", "values": {"tau_percent": 0.5}})

@@ -119,7 +119,9 @@ class TestFields:
         if field.several and len(field.values) > 1:
             parse_query(f"{field.name}:{','.join(field.values)}")
 
-    @pytest.mark.parametrize("text", ["status<accepted", "passes>yes", "match>=a", "id<12", "sort<x"])
+    @pytest.mark.parametrize(
+        "text", ["status<accepted", "passes>yes", "match>=a", "id<12", "sort<x"]
+    )
     def test_only_numbers_have_an_order(self, text: str) -> None:
         assert pointer(text) == "/q/0"
 
