@@ -138,6 +138,7 @@ def export(
             everything=everything,
             boxes=boxes.value,
             images=images.value,
+            views=views.value,
             version=version,
         )
         report = run_export(

@@ -159,6 +159,7 @@ def require_possible(
     everything: bool = False,
     boxes: str = "optimized",
     images: str = "none",
+    views: str = "valid",
     version: str | None = None,
 ) -> None:
     """Refuse, before anything is written, an export that cannot succeed.
@@ -177,7 +178,7 @@ def require_possible(
         if format == CARRY:
             return
         source = _First(whole)
-        options = _Options(format, everything, boxes, images)
+        options = _Options(format, everything, boxes, images, views)
         frames = ExportImages(Path(folder), "none", _here(store), frame_layout(format))
         counts = _Run(source, options, frames, None).write(Path(folder))
         if images != "none" and not frames.media:

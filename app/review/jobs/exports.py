@@ -54,6 +54,7 @@ def request_export(
         everything=request["all"],
         boxes=request["boxes"],
         images=request["images"],
+        views=request.get("views", "valid"),
         version=None if version is None else str(version),
     )
     asked = {**request, "dataset": found.name}
