@@ -15,6 +15,7 @@ import select
 import signal
 import traceback
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -195,6 +196,14 @@ def _launch(allowance: Allowance) -> tuple[BaseProcess, Connection]:
             line.close()
             raise
     return process, line
+
+
+def abandon(executor: ProcessPoolExecutor) -> None:
+    """End the processes of a pool with what they are at; nothing of it is waited for."""
+    workers = list((executor._processes or {}).values())
+    executor.shutdown(wait=False, cancel_futures=True)
+    for worker in workers:
+        worker.terminate()
 
 
 def end_with_parent() -> None:

@@ -32,10 +32,15 @@ from app.commands import (
     sample,
     service,
     solving,
+    verdicts,
     versions,
 )
-from app.commands.terminal import complain
+from app.commands.options import act_as
+from app.commands.terminal import complain, spell_out
 from app.errors import ReviewError
+
+READER_GONE = 141
+"""Exit code of a command whose reader has gone, as shells have it."""
 
 app = typer.Typer(
     name="touchline",
@@ -49,6 +54,7 @@ PARTS = (
     files,
     solving,
     rig,
+    verdicts,
     lines,
     propose,
     noise,
@@ -78,6 +84,14 @@ def _tell_version(asked: bool) -> None:
 
 @app.callback()
 def options(
+    actor: Annotated[
+        str | None,
+        typer.Option(
+            envvar="TOUCHLINE_ACTOR",
+            metavar="NAME",
+            help="What this script calls itself; history and verdicts name it as script:NAME.",
+        ),
+    ] = None,
     version: Annotated[
         bool,
         typer.Option(
@@ -86,12 +100,19 @@ def options(
     ] = False,
 ) -> None:
     """Turn multi-view soccer frames into a trusted 3D ball dataset."""
+    act_as(actor)
 
 
 def main() -> None:
     """Entry point: what a caller can cause is one sentence on stderr and exit code 1."""
+    spell_out()
     try:
         app()
+    except SystemExit as end:
+        # Whoever reads, such as head, has seen enough.
+        if isinstance(end.__context__, BrokenPipeError):
+            sys.exit(READER_GONE)
+        raise
     except ReviewError as error:
         complain(error.message, error.hint)
         sys.exit(1)

@@ -1,4 +1,4 @@
-"""The one way in which numbers leave: finite, or not at all.
+"""The one way in which numbers leave: finite, or not at all; and texts: as JSON quotes them.
 
 JSON, CSV and logs have no infinity and no NaN that every reader understands. A number that is
 neither known nor finite leaves as null, as an empty cell, as nothing.
@@ -53,3 +53,14 @@ def json_text(
     except ValueError:
         # Rare, so that what is finite costs nothing.
         return text(finite(value))
+
+
+def quoted(text: str, most: int = 40) -> str:
+    """The beginning of somebody's text in a sentence, in quotes; what cannot be printed is spelt out.
+
+    Example:
+        >>> quoted("Müller"), quoted("a\\nb"), quoted("abc", 2)
+        ('"Müller"', '"a\\\\nb"', '"ab"')
+    """
+    start = text[:most]
+    return json_text(start, ascii_=not start.isprintable())

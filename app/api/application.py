@@ -9,7 +9,7 @@ from pathlib import Path
 from anyio.to_thread import current_default_thread_limiter
 from fastapi import Depends, FastAPI
 
-from app.api.deps import LOCAL_USER, Services
+from app.api.deps import Services
 from app.api.errors import install_handlers
 from app.api.idempotency import Idempotency
 from app.api.metrics import install_metrics
@@ -36,6 +36,7 @@ from app.api.routers import (
     positions,
     practice,
     predictions,
+    query_fields,
     rig,
     saved_views,
     stations,
@@ -57,6 +58,7 @@ from app.api.unknown_names import refuse_unknown_parameters
 from app.config import Settings
 from app.datasets.manifest import software_version
 from app.review.jobs.jobs import Pool
+from app.soccer.actors import LOCAL_USER
 
 PREFIX = "/api/v1"
 ROUTERS = (
@@ -86,6 +88,7 @@ ROUTERS = (
     imports,
     bulk,
     saved_views,
+    query_fields,
     statistics,
     practice,
 )

@@ -31,12 +31,12 @@ from app.review.jobs.versions import resume_versions
 from app.review.policies.noise_store import NoiseStore
 from app.review.practice.practice import resume_practice
 from app.review.yields.store import YieldStore
+from app.soccer.actors import LOCAL_USER, script_name
 from app.solving.warm import warm_up
 from app.store.frames import Frames
 from app.store.session import Store
 
-LOCAL_USER = "local"
-"""Who acts in single-user mode."""
+ACTOR_HEADER = "X-Actor"
 LEFTOVERS_AGAIN_S = 2.0
 MAX_ID = 2**63 - 1
 _STRONG_ETAG = re.compile(r'"[\x21\x23-\x7e]*"')
@@ -136,9 +136,23 @@ async def get_store(services: Annotated[Services, Depends(get_services)]) -> Sto
     return services.store
 
 
-async def get_actor() -> str:
-    """Who acts; the single user of a local server until there are accounts."""
-    return LOCAL_USER
+async def get_actor(
+    said: Annotated[
+        str | None,
+        Header(
+            alias=ACTOR_HEADER,
+            description="What a script calls itself: up to 60 letters, digits, spaces and . _ @ + -. "
+            "History, verdicts and jobs name it as `script:NAME`. Nobody checks who it is.",
+            examples=["nightly import"],
+        ),
+    ] = None,
+) -> str:
+    """Who acts: the single user of a local server until there are accounts, or a script by its name.
+
+    Raises:
+        InputError: The name cannot be one.
+    """
+    return LOCAL_USER if said is None else script_name(said, pointer=f"/{ACTOR_HEADER}")
 
 
 async def require_if_match(

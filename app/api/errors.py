@@ -132,8 +132,25 @@ def _sentence(request: Request, detail: dict[str, Any]) -> str:
     """Pydantic's message without the prefix that it gives to our own validators."""
     if detail["type"] == UNKNOWN:
         return sentence_about(request, detail["loc"])
-    text = str(detail["msg"]).removeprefix("Value error, ")
+    if detail["type"] in ("literal_error", "enum"):
+        return f"must be {detail['ctx']['expected'].replace(chr(39), '')}"
+    text = _PLAIN.get(detail["type"]) or str(detail["msg"]).removeprefix("Value error, ")
     return text[:1].lower() + text[1:]
+
+
+_OBJECT, _LIST = "must be an object", "must be a list"
+_PLAIN = {
+    "dict_type": _OBJECT,
+    "model_type": _OBJECT,
+    "model_attributes_type": _OBJECT,
+    "dataclass_type": _OBJECT,
+    "list_type": _LIST,
+    "tuple_type": _LIST,
+    "none_required": "must be null",
+    "bool_type": "must be true or false",
+    "string_pattern_mismatch": "has characters that are not allowed here, or lacks some",
+}
+"""What is said instead of the framework's words, which are Python's."""
 
 
 def _pointer(location: Sequence[int | str]) -> str:

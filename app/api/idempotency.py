@@ -17,6 +17,7 @@ from anyio.to_thread import run_sync
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.api.deps import ACTOR_HEADER
 from app.api.errors import RETRY_SECONDS, status_of
 from app.api.problem import make_problem, problem_response
 from app.api.reply import ASKED, KEPT_HEADERS, Asked
@@ -180,8 +181,9 @@ class _Request:
         return {"type": "http.request", "body": b"".join(self._body), "more_body": False}
 
     def digest(self) -> str:
-        """Digest of method, address and body; the same JSON in another order gives the same one."""
-        place = (self.scope["method"], self.scope["path"], self.scope["query_string"].decode())
+        """Digest of method, address, body and actor; JSON in another order gives the same one."""
+        place = [self.scope["method"], self.scope["path"], self.scope["query_string"].decode()]
+        place += Headers(scope=self.scope).getlist(ACTOR_HEADER)
         if self.streamed:
             body = self._sum.hexdigest()
         else:

@@ -17,6 +17,7 @@ Everything that the browser does goes through these addresses.
 * **State and ETag.** `PATCH`, `PUT`, undo and redo need `If-Match` with the ETag of the state that
   they build on: 428 without it, 412 (with the present document as `current`) when somebody else
   was faster.
+* **Names.** A script says its name in `X-Actor` and is remembered as `script:NAME`; nobody checks it.
 * **Problems.** Every answer that is not a success is `application/problem+json` (RFC 9457).
 * **Pages.** Lists take `limit` and `cursor`; `next` is the cursor of the next page, `total` says
   how many match.

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Json
+from app.commands.options import Json, acting
 from app.commands.terminal import print_json, print_values, say
 
 commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
@@ -51,7 +51,7 @@ def delete(
     with opened_store() as store:
         contents = read_contents(store, name)
         typed = contents.name if yes else _ask(contents.name, contents.counts)
-        contents = delete_dataset(store, contents.id, confirm=typed, actor="local")
+        contents = delete_dataset(store, contents.id, confirm=typed, actor=acting())
     print_values({"deleted": contents.name, **contents.counts}, json_)
 
 

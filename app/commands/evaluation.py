@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Dataset, Json, parse_size
+from app.commands.options import Dataset, Json, acting, parse_size
 from app.commands.predictions import print_set
 from app.commands.terminal import print_json, say, show_progress
 from app.soccer.frames import ImageSize
@@ -189,7 +189,7 @@ def evaluate(
     with opened_store() as store, show_progress("Evaluating") as progress:
         done = evaluate_sources(
             store, dataset, request, predictions=found, careful=drawn,
-            version=version, actor="local", progress=progress,
+            version=version, actor=acting(), progress=progress,
         )  # fmt: skip
         if out is not None:
             write_evaluation(store, done.evaluation, out)

@@ -12,6 +12,7 @@ from app.commands.opened import opened_store
 from app.commands.options import (
     Dataset,
     Json,
+    acting,
     parse_cameras,
     parse_frame_offset,
     parse_size,
@@ -98,7 +99,9 @@ def import_(
     )
     settings = read_settings()
     with opened_store(settings) as store, show_progress("Importing") as progress:
-        imported = import_source(store, dataset, source, settings, progress, dry_run=dry_run)
+        imported = import_source(
+            store, dataset, source, settings, progress, actor=acting(), dry_run=dry_run
+        )
     print_import(imported.values(), json_)
     if not imported.something:
         complain(*imported.nothing_read())
@@ -125,8 +128,19 @@ def export(
 ) -> None:
     """Write accepted groups, all of them, or a frozen version, with a manifest."""
     from app.review.exporting.export import export as run_export
+    from app.review.exporting.export import require_possible
 
     with opened_store() as store, show_progress("Exporting") as progress:
+        require_possible(
+            store,
+            dataset,
+            format_,
+            everything=everything,
+            boxes=boxes.value,
+            images=images.value,
+            views=views.value,
+            version=version,
+        )
         report = run_export(
             store,
             dataset,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Dataset, Json
+from app.commands.options import Dataset, Json, acting
 from app.commands.terminal import print_json, say
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def noise(
 
     with opened_store() as store:
         found = read_noise(store, dataset)
-        policy = apply_noise(store, found, actor="local").policy if apply else None
+        policy = apply_noise(store, found, actor=acting()).policy if apply else None
     if json_:
         applied = None if policy is None else {"name": policy.name, "hash": policy.hash}
         advice = [{**asdict(item), "agrees": item.agrees} for item in found.advice]

@@ -40,6 +40,8 @@ def process_pool(workers: int) -> Iterator[Executor]:
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
+    from app.child import abandon
+
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(
         workers, mp_context=context, initializer=_belong_to_the_parent
@@ -47,8 +49,8 @@ def process_pool(workers: int) -> Iterator[Executor]:
         try:
             yield executor
         except BaseException:
-            # What waits is found again by the next run.
-            executor.shutdown(wait=False, cancel_futures=True)
+            # What waits, and what is not done yet, is found again by the next run.
+            abandon(executor)
             raise
 
 

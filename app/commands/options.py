@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from app.soccer.actors import LOCAL_USER, script_name
 from app.soccer.frames import ImageSize
 
 if TYPE_CHECKING:
@@ -40,6 +42,23 @@ def parse_frame_offset(text: str) -> int | dict[int, int]:
     if len(found) < len(pairs):
         raise typer.BadParameter(f'"{text}" is not an offset; write 8, or 1=8,2=9 by camera')
     return dict(found)
+
+
+def acting() -> str:
+    """Who acts in this command: the local user, or the script that `--actor` names."""
+    return _ACTING.get()
+
+
+def act_as(said: str | None) -> None:
+    """Let this command act under the name of a script; None: as the local user.
+
+    Raises:
+        InputError: It cannot be a name.
+    """
+    _ACTING.set(LOCAL_USER if said is None else script_name(said))
+
+
+_ACTING = ContextVar("acting", default=LOCAL_USER)
 
 
 Dataset = Annotated[str, typer.Option("--dataset", help="Name of the dataset.")]

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Json, Workers, read_settings
+from app.commands.options import Json, Workers, acting, read_settings
 from app.commands.terminal import print_json, say, show_progress
 
 commands = typer.Typer()
@@ -44,7 +44,7 @@ def paint(
         raise typer.BadParameter("show what was read or take it back, one at a time")
     with opened_store() as store:
         if undo:
-            found = take_back_paint(store, dataset, actor="local")
+            found = take_back_paint(store, dataset, actor=acting())
         elif show:
             found = get_paint(store, dataset)
         else:
@@ -53,7 +53,7 @@ def paint(
                     store,
                     dataset,
                     None if match is None else [match],
-                    actor="local",
+                    actor=acting(),
                     children=workers,
                     progress=progress,
                 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.commands.opened import executor_of, opened_store
-from app.commands.options import Json, Size, Workers, read_settings
+from app.commands.options import Json, Size, Workers, acting, read_settings
 from app.commands.terminal import print_json, print_values, say, show_progress
 from app.errors import InputError
 
@@ -89,7 +89,7 @@ def _of_dataset(
         }
         if as_taken:
             wanted = {item.match: None for item in chosen}
-        changed = change_pictures(store, dataset, wanted, actor="local") if wanted else 0
+        changed = change_pictures(store, dataset, wanted, actor=acting()) if wanted else 0
     if json_:
         print_json([{**_values(item), "changed": item.match in wanted} for item in chosen])
         return

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.commands.opened import executor_of, opened_store
-from app.commands.options import Json, Size, Workers, read_settings
+from app.commands.options import Json, Size, Workers, acting, read_settings
 from app.commands.terminal import print_json, print_values, say, show_progress
 from app.errors import InputError
 
@@ -85,7 +85,7 @@ def _of_dataset(
             wanted = {chosen[0].match: _size(chosen[0], size)}
         if not wanted:
             return found
-        return change_pitches(store, dataset, wanted, if_match=found.etag, actor="local")
+        return change_pitches(store, dataset, wanted, if_match=found.etag, actor=acting())
 
 
 def _size(state: PitchState, text: str) -> Any:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Dataset, Json, read_text
+from app.commands.options import Dataset, Json, acting, read_text
 from app.commands.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def set_(
 
     chosen = read_policy_option(policy)
     with opened_store() as store:
-        state = change_policy(store, dataset, chosen, if_match=None, actor="local")
+        state = change_policy(store, dataset, chosen, if_match=None, actor=acting())
         stale = len(stale_groups(store, state.dataset_id))
     values = {**_head(state.dataset, state.policy), "version": state.version, "to_solve": stale}
     print_values(values, json_)
@@ -74,15 +74,14 @@ def read_policy_option(text: str) -> Policy:
         InputError: The file holds no policy.
     """
     from app.errors import InputError
-    from app.review.policies.text import MAX_CHARACTERS, policy_from_yaml
+    from app.review.policies.text import MAX_CHARACTERS, policy_from_yaml, unknown_policy
     from app.soccer.policy import POLICIES
 
     if text in POLICIES:
         return POLICIES[text]
     path = Path(text)
     if not path.is_file():
-        names = ", ".join(POLICIES)
-        raise typer.BadParameter(f'"{text}" is no policy ({names}) and no YAML file')
+        raise typer.BadParameter(unknown_policy(text, "it is no YAML file").message)
     yaml = read_text(path, MAX_CHARACTERS)
     try:
         return policy_from_yaml(yaml)

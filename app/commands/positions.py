@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from app.commands.opened import executor_of, opened_store
-from app.commands.options import Dataset, Json, Workers, read_settings
+from app.commands.options import Dataset, Json, Workers, acting, read_settings
 from app.commands.terminal import print_json, say, show_progress
 
 commands = typer.Typer()
@@ -43,7 +43,7 @@ def positions(
     settings = read_settings()
     with opened_store(settings) as store:
         if undo:
-            found = take_back_positions(store, dataset, match or "", actor="local")
+            found = take_back_positions(store, dataset, match or "", actor=acting())
         elif share:
             with (
                 executor_of(workers or settings.workers) as executor,
@@ -51,7 +51,7 @@ def positions(
             ):
                 chosen = None if match is None else [match]
                 found = share_positions(
-                    store, dataset, chosen, actor="local", executor=executor, progress=progress
+                    store, dataset, chosen, actor=acting(), executor=executor, progress=progress
                 )
         else:
             found = get_positions(store, dataset)

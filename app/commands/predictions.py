@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Dataset, Json, Workers, read_settings
+from app.commands.options import Dataset, Json, Workers, acting, read_settings
 from app.commands.terminal import complain, print_json, print_values, say, show_progress
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def accept(
             plan = plan_accept(store, dataset, request)
             values = {"views": len(plan.changes), "groups": plan.groups, "refused": plan.refused}
         else:
-            report = run_accept(store, dataset, request, actor="local", progress=progress)
+            report = run_accept(store, dataset, request, actor=acting(), progress=progress)
             values = vars(report)
     print_values(values, json_)
 
@@ -107,7 +107,7 @@ def detect(
     )
     with opened_store() as store, show_progress("Detecting") as progress:
         request = DetectRequest(name or model.stem, query, missing, min_score)
-        found = run_detect(store, dataset, opened, request, actor="local", progress=progress)
+        found = run_detect(store, dataset, opened, request, actor=acting(), progress=progress)
     if json_:
         print_json(vars(found))
         return

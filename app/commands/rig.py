@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Dataset, Json
+from app.commands.options import Dataset, Json, acting
 from app.commands.terminal import print_json, print_values, say
 
 commands = typer.Typer()
@@ -52,11 +52,11 @@ def rig(
         raise typer.BadParameter("accept a rig or take it back, one at a time")
     with opened_store() as store:
         if undo:
-            print_values({"taken_back": take_back(store, dataset, actor="local")}, json_)
+            print_values({"taken_back": take_back(store, dataset, actor=acting())}, json_)
             return
         proposed = propose(store, dataset, lines)
         if accept is not None:
-            accept_rig(store, proposed, accept.value, actor="local")
+            accept_rig(store, proposed, accept.value, actor=acting())
     values = {**proposal_values(proposed), "accepted": accept and accept.value}
     if json_:
         print_json(values)

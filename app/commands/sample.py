@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.commands.opened import executor_of, opened_store
-from app.commands.options import Json, Workers, read_settings
+from app.commands.options import Json, Workers, acting, read_settings
 from app.commands.terminal import print_values, show_progress
 from app.store.home import keep_private
 
@@ -79,7 +79,7 @@ def practice(
     keep_private()
     settings = read_settings()
     with opened_store(settings) as store, show_progress("Making the practice groups") as progress:
-        made = make_practice_dataset(store, settings, progress, again=again, actor="local")
+        made = make_practice_dataset(store, settings, progress, again=again, actor=acting())
     print_values(made, json_)
 
 

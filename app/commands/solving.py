@@ -7,11 +7,21 @@ from typing import Annotated
 import typer
 
 from app.commands.opened import executor_of, opened_store
-from app.commands.options import Dataset, Json, Workers, read_settings
+from app.commands.options import Dataset, Json, Workers, acting, read_settings
 from app.commands.policy import read_policy_option
-from app.commands.terminal import print_json, print_values, say, show_progress
+from app.commands.terminal import (
+    complain,
+    held_interrupts,
+    print_json,
+    print_values,
+    say,
+    show_progress,
+)
 
 commands = typer.Typer()
+
+INTERRUPTED = 130
+"""Exit code of what Ctrl+C ended, as shells have it."""
 
 
 @commands.command()
@@ -27,7 +37,7 @@ def solve(
     workers: Workers = None,
     json_: Json = False,
 ) -> None:
-    """Compute what is missing or out of date; can be interrupted at any time."""
+    """Compute what is missing or out of date; Ctrl+C keeps what is done, and the next run goes on."""
     from app.review.editing.pitches import estimate_pitches
     from app.review.editing.recompute import solve_dataset
     from app.review.policies.policy import change_policy
@@ -40,8 +50,13 @@ def solve(
         show_progress("Solving") as progress,
     ):
         if chosen is not None:
-            change_policy(store, dataset, chosen, if_match=None, actor="local")
-        report = solve_dataset(store, dataset, executor, progress)
+            change_policy(store, dataset, chosen, if_match=None, actor=acting())
+        with held_interrupts() as interrupted:
+            report = solve_dataset(store, dataset, executor, progress, interrupted)
+            if interrupted():
+                left = report.total - report.solved - len(report.failed)
+                complain(f"stopped; {report.solved} groups are kept, {left} are left to do")
+                raise typer.Exit(INTERRUPTED)
         estimate_pitches(store, dataset, executor)
     print_values(vars(report), json_)
 

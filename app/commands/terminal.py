@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import codecs
+import io
 import logging
 import math
+import signal
 import sys
 import time
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
+from threading import Event
 from typing import Any, TextIO, cast
 
 from app.finite import finite, json_text
@@ -56,6 +60,40 @@ def show_progress(what: str) -> Iterator[Progress]:
                 bar.update(task, completed=done, total=total)
 
         yield progress
+
+
+@contextmanager
+def held_interrupts() -> Iterator[Callable[[], bool]]:
+    """Ctrl+C as something that is asked for, so that what is done can be kept.
+
+    Processes that are started meanwhile never hear of it.
+
+    Yields:
+        Whether somebody pressed it.
+    """
+    heard = Event()
+    before = signal.signal(signal.SIGINT, lambda *_: heard.set())
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield lambda: heard.is_set() or signal.SIGINT in signal.sigpending()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, before)
+
+
+def spell_out() -> None:
+    """Let no letter be too much for the terminal's encoding: it is spelt as JSON spells it."""
+    codecs.register_error("spelt", _spelt)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="spelt")
+
+
+def _spelt(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text = error.object[error.start : error.end]
+    return json_text(text, ascii_=True)[1:-1], error.end
 
 
 def complain(message: str, hint: str | None = None) -> None:

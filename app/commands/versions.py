@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.commands.opened import executor_of, opened_store
-from app.commands.options import Dataset, Json, Workers, parse_cameras, read_settings, read_text
+from app.commands.options import (
+    Dataset,
+    Json,
+    Workers,
+    acting,
+    parse_cameras,
+    read_settings,
+    read_text,
+)
 from app.commands.terminal import complain, print_json, print_values, say, show_progress
 
 if TYPE_CHECKING:
@@ -81,7 +89,7 @@ def freeze(
         if dry_run:
             print_values(vars(plan_freeze(store, dataset, request)), json_)
             return
-        version = run_freeze(store, dataset, request, actor="local", progress=progress)
+        version = run_freeze(store, dataset, request, actor=acting(), progress=progress)
     print_values(version_values(version), json_)
 
 
@@ -143,7 +151,7 @@ def verify(
             chosen = newest_version(store, dataset)
         else:
             chosen = find_version(store, dataset, version)
-        report = verify_and_keep(store, chosen.id, executor, progress, actor="local")
+        report = verify_and_keep(store, chosen.id, executor, progress, actor=acting())
     print_values(report.values(), json_)
     if not report.ok:
         if not json_:

@@ -20,6 +20,7 @@ from app.config import Settings
 from app.datasets.plain_file import open_plain
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, UnsafePathError
+from app.finite import quoted
 from app.nested_zip import UNREADABLE, open_nested, open_zip
 
 _DRIVE = re.compile(r"[A-Za-z]:")
@@ -64,9 +65,11 @@ def check_name(path: str) -> str:
     for spelling in _spellings(path):
         problem = _unsafe(spelling)
         if problem:
-            raise UnsafePathError(f"the path {path[:200]!r} {problem}")
+            raise UnsafePathError(f"the path {quoted(path, 200)} {problem}")
     if any(len(part.encode()) > MAX_PART for part in path.split("/")):
-        raise UnsafePathError(f"the path {path[:200]!r} has a part of more than {MAX_PART} bytes")
+        raise UnsafePathError(
+            f"the path {quoted(path, 200)} has a part of more than {MAX_PART} bytes"
+        )
     return path
 
 
@@ -84,7 +87,7 @@ def resolve_inside(root: Path, path: str) -> Path:
     real_root = Path(os.path.realpath(root))
     real = Path(os.path.realpath(real_root / path))
     if real != real_root and real_root not in real.parents:
-        raise UnsafePathError(f"the path {path[:200]!r} leads out of its folder")
+        raise UnsafePathError(f"the path {quoted(path, 200)} leads out of its folder")
     return real
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.datasets import fields
 from app.errors import DatasetFormatError, GeometryError
+from app.finite import quoted
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY, LENSES
@@ -133,7 +134,7 @@ def _lens(reader: _Fields) -> tuple[str, tuple[float, ...]]:
         k1, k2, k3, k4, k5, k6 = radial
         return BROWN_CONRADY, (k1, k2, *tangential, k3, k4, k5, k6, *prism)
     if not isinstance(name, str) or name not in LENSES:
-        raise reader.error(LENS, f"is {str(name)[:40]!r}; lenses are {_lens_names()}")
+        raise reader.error(LENS, f"is {quoted(str(name), 40)}; lenses are {_lens_names()}")
     for other, count in _DISTORTION:
         if any(reader.distortion(other, count)):
             raise reader.error(other, f"contradicts the lens {name}, which has none")

@@ -5,7 +5,7 @@ Views from which no detector should learn lie in ``outside_<split>.json`` beside
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -132,7 +132,7 @@ def _image(record: ExportRecord, view: View, identity: int, everything: bool) ->
     jac = solved.calibration.jac if solved else None
     computed = {
         "camera": None if camera is None else camera_to_json(camera),
-        "jac": None if jac is None else dict(zip(map(str, GAMMAS_PERCENT), jac, strict=True)),
+        "jac": None if jac is None else _by_gamma(jac),
         "ball_3d": list(record.point) if fit is not None and record.point else None,
         "verdict": record.verdict_text,
     }
@@ -149,6 +149,14 @@ def _image(record: ExportRecord, view: View, identity: int, everything: bool) ->
             "position": record.group.views.index(view),
             **view_to_json(view),
         },
+    }
+
+
+def _by_gamma(jac: Sequence[float]) -> dict[str, float]:
+    """JaC by tolerance, as REST spells it; also as it was spelt before, which is deprecated."""
+    pairs = list(zip(GAMMAS_PERCENT, jac, strict=True))
+    return {f"{gamma:g}": value for gamma, value in pairs} | {
+        str(gamma): value for gamma, value in pairs
     }
 
 

@@ -11,6 +11,7 @@ from typing import IO, Any
 
 from app.datasets.archive import Limits
 from app.errors import DatasetFormatError
+from app.finite import quoted
 
 MAX_CELL = 1024 * 1024
 """Longest cell, characters; a camera takes about a thousand."""
@@ -124,7 +125,7 @@ def numbers_in(text: str, count: int) -> tuple[float, ...]:
     bare = _WORDS.sub(" ", text)
     parts = [part for part in _BETWEEN.split(bare) if part]
     if not all(_NUMBER.fullmatch(part) for part in parts):
-        raise ValueError(f"is {text[:60]!r}, not a list of numbers")
+        raise ValueError(f"is {quoted(text, 60)}, not a list of numbers")
     if len(parts) != count:
         raise ValueError(f"has {len(parts)} numbers, not {count}")
     values = tuple(map(float, parts))

@@ -6,6 +6,8 @@ import math
 import re
 from typing import Any
 
+from app.finite import quoted
+
 MAX_PIXEL = 1e6
 """No annotated coordinate is further than this from the image's origin, pixels."""
 
@@ -36,7 +38,7 @@ def _number_of_text(text: str) -> float:
     if not stripped:
         raise ValueError("is blank")
     if len(stripped) > 400 or not _NUMBER.fullmatch(stripped):
-        raise ValueError(f"is {stripped[:40]!r}, not a number")
+        raise ValueError(f"is {quoted(stripped, 40)}, not a number")
     result = float(stripped)
     if not math.isfinite(result):
         raise ValueError("is too large for a number")

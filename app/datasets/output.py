@@ -7,6 +7,7 @@ import os
 import shutil
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,8 @@ from app.datasets.manifest import MANIFEST, SOFTWARE
 from app.durable import PARTIAL, sync
 from app.errors import InputError, StorageError
 
+MAX_MANIFEST = 1 << 30
+"""Bytes of a manifest that is read; that of a hundred thousand frames has a tenth of it."""
 _DATE = (1980, 1, 1, 0, 0, 0)
 """Of every zip entry, so that the same content makes the same file."""
 
@@ -58,26 +61,49 @@ def _check_free(out: Path) -> None:
     if out.suffix.lower() == ".zip":
         if out.is_dir():
             raise InputError(f"{out} is a folder, not a zip file")
+        if os.path.lexists(out) and not _is_earlier_zip(out):
+            raise _foreign(f"{out} is there already and is no earlier export")
         return
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; name a folder or a file that ends in .zip")
     if out.is_dir() and any(out.iterdir()) and not _is_earlier_export(out):
-        raise InputError(
-            f"{out} holds other files and is no earlier export",
-            hint="Name a new folder; an earlier export would be replaced.",
-        )
+        raise _foreign(f"{out} holds other files and is no earlier export")
+
+
+def _foreign(sentence: str) -> InputError:
+    return InputError(sentence, hint="Name another place; an earlier export would be replaced.")
 
 
 def _is_earlier_export(out: Path) -> bool:
     """Whether the folder holds what its manifest lists and nothing else."""
-    try:
-        manifest = json.loads((out / MANIFEST).read_bytes())
-        ours = manifest["software"]["name"] == SOFTWARE
-        listed = {MANIFEST, *(item["path"] for item in manifest["files"])}
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return False
     present = {path.relative_to(out).as_posix() for path in out.rglob("*") if not path.is_dir()}
-    return ours and present <= listed
+    try:
+        return present <= _listed((out / MANIFEST).read_bytes())
+    except OSError:
+        return False
+
+
+def _is_earlier_zip(out: Path) -> bool:
+    """The same of a zip; a link is somebody's own."""
+    try:
+        with zipfile.ZipFile(out) as archive:
+            if archive.getinfo(MANIFEST).file_size > MAX_MANIFEST:
+                return False
+            listed = _listed(archive.read(MANIFEST))
+            return not out.is_symlink() and set(archive.namelist()) <= listed
+    except (OSError, KeyError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error):
+        return False
+
+
+def _listed(manifest: bytes) -> set[str]:
+    """The files that a manifest of ours lists; none where it is of somebody else."""
+    try:
+        value = json.loads(manifest)
+        if value["software"]["name"] != SOFTWARE:
+            return set()
+        return {MANIFEST, *(item["path"] for item in value["files"])}
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return set()
 
 
 def _publish_zip(staging: Path, out: Path) -> None:

@@ -15,6 +15,7 @@ from app.datasets.report import Report
 from app.datasets.soccernet_record import MAX_SIDE
 from app.datasets.soccernet_v3d import SPLIT_FILES, TABLE
 from app.errors import DatasetFormatError, UnsafePathError
+from app.finite import quoted
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImageSize
@@ -170,7 +171,7 @@ class _Cells:
     def _flag(self, name: str) -> bool:
         text = self._cells.get(name, "").strip().lower()
         if text not in (*_TRUE, *_FALSE):
-            raise self._error(name, f"is {text[:20]!r}, neither True nor False")
+            raise self._error(name, f"is {quoted(text, 20)}, neither True nor False")
         return text in _TRUE
 
     def _ball(self) -> BallAnnotation | None:

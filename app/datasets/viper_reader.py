@@ -17,6 +17,7 @@ from app.datasets import fields
 from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
+from app.finite import quoted
 
 MAX_SPAN = 10_000
 """Most frames that one framespan may cover; ISSIA's longest covers its 3,029 frames."""
@@ -197,7 +198,7 @@ def _frames(span: Any) -> list[int]:
     for part in re.split(r"[\s,]+", span.strip()):
         found = _SPAN.fullmatch(part)
         if found is None:
-            raise ValueError(f"the framespan {part[:40]!r} is not first:last")
+            raise ValueError(f"the framespan {quoted(part, 40)} is not first:last")
         first, last = int(found[1]), int(found[2])
         if last < first:
             raise ValueError(f"the framespan {part} ends before it begins")

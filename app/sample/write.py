@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -11,13 +12,16 @@ from dataclasses import dataclass
 from itertools import groupby
 from multiprocessing import get_context
 from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import TypeVar
 
 import cv2
 
-from app.child import end_with_parent
+from app.child import abandon, end_with_parent
 from app.datasets.match_frames import ARCHIVE
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
+from app.durable import PARTIAL
 from app.errors import InputError
 from app.finite import json_text
 from app.progress import Progress
@@ -99,15 +103,37 @@ def write_sample(
         raise InputError("a sample needs at least one group and a seed from 0")
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; the sample needs a folder")
-    out.mkdir(parents=True, exist_ok=True)
     counts = group_counts(groups)
-    whole = [_Job(i, n, 0, n, seed, faults, out) for i, n in enumerate(counts)]
-    with _mapper(workers, len(whole) if labels_only else groups) as run:
-        # With frames, drawing them is nearly all of the work, so it alone is reported.
-        report = _write_labels(out, whole, run, groups, progress if labels_only else None)
-        if not labels_only:
-            _write_frames(out, whole, run, groups, progress)
+    with _staged(out) as folder:
+        whole = [_Job(i, n, 0, n, seed, faults, folder) for i, n in enumerate(counts)]
+        with _mapper(workers, len(whole) if labels_only else groups) as run:
+            # With frames, drawing them is nearly all of the work, so it alone is reported.
+            report = _write_labels(folder, whole, run, groups, progress if labels_only else None)
+            if not labels_only:
+                _write_frames(folder, whole, run, groups, progress)
     return report
+
+
+@contextmanager
+def _staged(out: Path) -> Iterator[Path]:
+    """A folder beside ``out``, whose files go there when all is done; else nothing is left."""
+    out = Path.cwd() / out
+    above = [path for path in out.parents if not path.exists()]
+    out.parent.mkdir(parents=True, exist_ok=True)
+    folder = Path(mkdtemp(prefix=f".{out.name}.", suffix=PARTIAL, dir=out.parent))
+    done = False
+    try:
+        yield folder
+        for path in sorted(folder.rglob("*")):
+            if path.is_file():
+                target = out / path.relative_to(folder)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                path.replace(target)
+        done = True
+    finally:
+        rmtree(folder, ignore_errors=True)
+        for path in () if done else above:
+            path.rmdir()
 
 
 def _write_labels(
@@ -198,9 +224,15 @@ def _mapper(workers: int | None, jobs: int) -> Iterator[_Mapper]:
         return
     # Spawned, not forked: a fork of a process with threads may hang.
     with ProcessPoolExecutor(count, get_context("spawn"), _settle) as pool:
-        yield _Mapper(pool)
+        try:
+            yield _Mapper(pool)
+        except BaseException:
+            abandon(pool)
+            raise
 
 
 def _settle() -> None:
+    """Ctrl+C reaches every process of a terminal, where the parent alone decides."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
     cv2.setNumThreads(1)

@@ -191,6 +191,19 @@ TOUCHLINE = Policy(name="touchline", calibration=CalibrationPolicy(source="paint
 POLICIES = {policy.name: policy for policy in (PAPER, STRICT, TOUCHLINE)}
 
 
+Asks = Literal["more than", "at least", "at most"]
+_ASKS: dict[str, Asks] = {
+    "min_jac": "more than",
+    "tau_percent": "at most",
+    "min_baseline_m": "at least",
+    "min_parallax_degrees": "at least",
+    "max_sigma_m": "at most",
+    "min_p_value": "at least",
+}
+"""What equals its threshold passes; JaC alone must exceed it, as in the paper, because 6 of 8 lines
+are common and shall not do."""
+
+
 @dataclass(frozen=True)
 class Threshold:
     """What one threshold is called, measured in, about, and between which ends it makes sense.
@@ -232,9 +245,15 @@ class Threshold:
         return self.subject if self.subject in GATES else None
 
     @property
+    def asks(self) -> Asks | None:
+        """How a value compares with it to pass its gate; None: it is compared with no value."""
+        return _ASKS.get(self.name)
+
+    @property
     def text(self) -> str:
         """What it is, in a line."""
-        return f"{self.label}, {self.unit}" if self.unit else self.label
+        text = f"{self.label}, {self.unit}" if self.unit else self.label
+        return f"{text}; must be exceeded" if self.asks == "more than" else text
 
     @property
     def optional(self) -> bool:

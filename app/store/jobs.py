@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from sqlalchemy import delete, func, insert, select, update
+from sqlalchemy import case, delete, func, insert, select, update
 from sqlalchemy.orm import Session
 
 from app.finite import finite
@@ -30,7 +30,8 @@ class Job:
     """A piece of background work as it stands.
 
     Attributes:
-        dataset: Name of its dataset; None where it has none, or that is gone.
+        dataset: Name of its dataset; None where it has none, or that is gone. Of an import the
+            name that it was asked for, until the dataset is there.
         state: ``waiting``, ``running``, ``done``, ``failed`` or ``cancelled``.
         total: How much there is to do; None while that is unknown.
         sentence: What it is at, for people.
@@ -143,6 +144,11 @@ def count_jobs(session: Session) -> dict[tuple[str, str], int]:
     return {(kind, state): number for kind, state, number in rows}
 
 
+def delete_job(session: Session, job_id: int) -> None:
+    """Forget one job."""
+    session.execute(delete(JobModel).where(JobModel.id == job_id))
+
+
 def trim_jobs(session: Session, kind: str, keep: int) -> None:
     """Forget the oldest jobs of a kind that are over, so that the table does not grow forever."""
     oldest = (
@@ -181,6 +187,12 @@ def _job(row: Any) -> Job:
     return Job(**values)
 
 
-_SELECT = select(*JobModel.__table__.columns, DatasetModel.name.label("dataset")).outerjoin(
-    DatasetModel, DatasetModel.id == JobModel.dataset_id
+_TO_BE = case(
+    (
+        (JobModel.kind == "import") & JobModel.dataset_id.is_(None),
+        func.json_extract(JobModel.request, "$.dataset"),
+    )
 )
+_SELECT = select(
+    *JobModel.__table__.columns, func.coalesce(DatasetModel.name, _TO_BE).label("dataset")
+).outerjoin(DatasetModel, DatasetModel.id == JobModel.dataset_id)

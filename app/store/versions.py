@@ -38,6 +38,11 @@ class VersionGroup:
     frames: Mapping[str, Mapping[str, Any]] | None
 
 
+def all_versions(session: Session) -> Sequence[Any]:
+    """The versions of every dataset, newest first, each with the name of its ``dataset``."""
+    return session.execute(_VERSIONS.order_by(VersionModel.id.desc())).all()
+
+
 def dataset_versions(session: Session, dataset_id: int) -> Sequence[Any]:
     """The versions of a dataset, newest first, each with the name of its ``dataset``."""
     statement = _VERSIONS.where(VersionModel.dataset_id == dataset_id)

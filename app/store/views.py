@@ -82,6 +82,14 @@ def dataset_views(
     return _views(session, *where)
 
 
+def frame_files(session: Session, dataset_id: int) -> list[str]:
+    """The files that the frames of a dataset lie in, each once."""
+    statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
+    statement = statement.join(GroupModel, GroupModel.id == ViewModel.group_id)
+    found = session.scalars(statement.where(GroupModel.dataset_id == dataset_id))
+    return [path for path in found if path is not None]
+
+
 def group_views(session: Session, group_id: int) -> list[StoredView]:
     """The views of a group in their order."""
     return _views(session, ViewModel.group_id == group_id)

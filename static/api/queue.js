@@ -31,6 +31,23 @@ import { idempotencyKey, queryText, request } from './client.js';
  */
 
 /**
+ * @typedef {object} QueryField   what a query can ask of a group
+ * @property {string} name
+ * @property {'number' | 'flag' | 'choice' | 'text' | 'ids' | 'order'} kind
+ * @property {string} meaning
+ * @property {string} unit
+ * @property {string[]} operators
+ * @property {string[]} values
+ * @property {boolean} several whether a,b means either
+ * @property {string[]} also other names that are understood
+ */
+
+/** @returns {Promise<{items: QueryField[], sorts: {name: string, meaning: string}[]}>} */
+export function getQueryFields() {
+	return request('/query-fields');
+}
+
+/**
  * Rows from a place of the list on, as it is at this moment.
  *
  * @param {{dataset: string, q: string, from: number, limit: number}} options @param {AbortSignal} signal

@@ -127,7 +127,7 @@ function solvePair(a, b, policy) {
 	const apart = baseline(a.camera, b.camera);
 	let failed = a.dropped ?? b.dropped;
 	if (!failed && apart < policy.min_baseline_m) failed = 'baseline';
-	const close = first < a.tau && second < b.tau;
+	const close = first <= a.tau && second <= b.tau;
 	const inFront = isInFront(a.camera, point) && isInFront(b.camera, point);
 	if (!failed && !(close && inFront)) failed = 'reprojection';
 	return {

@@ -38,14 +38,14 @@ export function gradeOfResidual(largest, gamma) {
 }
 
 /**
- * The grade of a number that must stay below a limit.
+ * The grade of a number that may be as large as a limit, and no larger.
  *
  * @param {number | null | undefined} value @param {number} limit
  * @returns {Grade}
  */
 export function gradeBelow(value, limit) {
 	if (value === null || value === undefined) return 'unseen';
-	if (value >= limit) return 'bad';
+	if (value > limit) return 'bad';
 	return value >= limit / 2 ? 'warn' : 'ok';
 }
 

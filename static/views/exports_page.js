@@ -41,7 +41,7 @@ function Row({ row, remove }) {
 			<td><${When} at=${row.created} /></td>
 			<td><span class="table__actions">
 				${row.content ? html`<a class="button button--small" href=${row.content} download>Download<span class="hidden-text"> export ${row.id}</span></a>` : null}
-				${open ? html`<a class="button button--small" href="/jobs">Job<span class="hidden-text"> of export ${row.id}</span></a>` : row.status === 'ready' ? html`<button class="button button--small" type="button" onClick=${remove}>Delete<span class="hidden-text"> export ${row.id}</span></button>` : null}
+				${open ? html`<a class="button button--small" href="/jobs">Job<span class="hidden-text"> of export ${row.id}</span></a>` : ['ready', 'failed', 'cancelled'].includes(row.status) ? html`<button class="button button--small" type="button" onClick=${remove}>Delete<span class="hidden-text"> export ${row.id}</span></button>` : null}
 			</span></td>
 		</tr>
 	`;

@@ -27,7 +27,7 @@ export function gateLabel(gate, policy) {
 		two_views: 'At least 2 views left',
 		ball: 'Ball in ≥ 2 views',
 		baseline: `Baseline ≥ ${policy.min_baseline_m} m`,
-		reprojection: `Reprojection < ${policy.tau_percent} %`,
+		reprojection: `Reprojection ≤ ${policy.tau_percent} %`,
 		parallax: threshold === null ? 'Parallax' : `Parallax ≥ ${threshold}°`,
 		sigma: threshold === null ? 'σ' : `σ ≤ ${threshold} m`,
 		chi_square: threshold === null ? 'Residuals by chance' : `Residuals by chance ≥ ${sharePercent(threshold)}`,

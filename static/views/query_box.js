@@ -6,7 +6,7 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 
 import { param } from '../lib/router.js';
 import { complete } from '../state/completion.js';
-import { facets, loadFacets } from '../state/facets.js';
+import { facets, loadFacets, queryFields } from '../state/facets.js';
 
 /** @import {Completion, Offer} from '../state/completion.js' */
 
@@ -50,15 +50,16 @@ export function QueryBox({ field, invalid, onQuery }) {
 	}, [text]);
 
 	const known = facets.value;
+	const fields = queryFields.value;
 	useEffect(() => {
-		// Values that arrive while somebody waits for them.
-		if (document.activeElement === field.current && /:\S*$/.test(text)) offer(text);
-	}, [known]);
+		// What arrives while somebody waits for it.
+		if (document.activeElement === field.current && /\S$/.test(text)) offer(text);
+	}, [known, fields]);
 
 	/** @param {string} now */
 	function offer(now) {
 		setActive(-1);
-		setCompletion(complete(now, field.current?.selectionStart ?? now.length, facets.value));
+		setCompletion(complete(now, field.current?.selectionStart ?? now.length, facets.value, queryFields.value));
 	}
 	/** @param {Offer} chosen */
 	function choose(chosen) {
@@ -66,7 +67,7 @@ export function QueryBox({ field, invalid, onQuery }) {
 		caret.current = completion.from + chosen.text.length;
 		setText(next);
 		setActive(-1);
-		setCompletion(complete(next, caret.current, facets.value));
+		setCompletion(complete(next, caret.current, facets.value, queryFields.value));
 	}
 	/** @param {KeyboardEvent} event */
 	function key(event) {

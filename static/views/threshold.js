@@ -7,6 +7,11 @@ import { html } from 'htm/preact';
 
 const OFF = 'This threshold is off: tick the box to use it';
 
+/** What becomes of a value that equals its threshold. */
+const ASKED = /** @type {{[asks: string]: string}} */ ({
+	'more than': 'Passes above this value; one that equals it does not, as in the paper', 'at least': 'Passes from this value on', 'at most': 'Passes up to this value',
+});
+
 /** Units that stand beside a number in few characters. */
 const UNITS = /** @type {{[unit: string]: string}} */ ({ '% of diagonal': '%', degrees: '°', share: '' });
 
@@ -45,7 +50,7 @@ function Slider({ field, value, id, change }) {
 		/>
 		<input
 			class="field threshold__number" id=${id} type="number" min=${low} max=${high} step="any" value=${off ? '' : shown} disabled=${off} title=${off ? OFF : ''}
-			onChange=${(/** @type {Event} */ event) => { if (Number.isFinite(number(event))) change(number(event)); }}
+			onChange=${(/** @type {Event} */ event) => { if (Number.isFinite(number(event))) change(Math.max(low, Math.min(high, number(event)))); }}
 		/>
 		<${Unit} unit=${field.unit} />
 	`;
@@ -84,7 +89,7 @@ export function Threshold({ field, value, present, switched, change, idle }) {
 	}
 	return html`
 		<div class="threshold" data-changed=${changed}>
-			<label class="threshold__label" for=${id}>${field.label}${idle ? html`<small class="threshold__idle">${idle}</small>` : null}</label>
+			<label class="threshold__label" for=${id} title=${ASKED[field.asks ?? ''] ?? ''}>${field.label}${idle ? html`<small class="threshold__idle">${idle}</small>` : null}</label>
 			${field.optional ? html`
 				<label class="threshold__switch">
 					<input type="checkbox" checked=${value !== null} onChange=${(/** @type {Event} */ event) => change(checked(event) ? switched : null)} />

@@ -30,7 +30,7 @@ export function gradeOfView(picture) {
 	if (view.balls.some(({ inferred }) => inferred)) return { grade: 'warn', sentence: 'ball placed, not counted' };
 	// A ball that no other view confirms is not well, wherever the camera comes from.
 	const error = errorOf(picture).px;
-	if (error !== null && error >= tau) return { grade: 'bad', sentence: given };
+	if (error !== null && error > tau) return { grade: 'bad', sentence: given };
 	// What is wrong is not to be seen in this view: it has nobody to agree with.
 	if (apart !== null || (solved.ball && !solved.included)) return { grade: 'warn', sentence: 'no pair' };
 	return { grade: 'ok', sentence: given };

@@ -1,10 +1,13 @@
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { describe, it } from 'node:test';
 
 import { complete } from '../../static/state/completion.js';
 import { optionValue } from '../../static/state/import_formats.js';
 
-const labels = (text, facets = {}) => complete(text, text.length, facets).offers.map(({ label }) => label);
+/** As `/api/v1/query-fields` says. */
+const fields = JSON.parse(readFileSync(new URL('golden.json', import.meta.url), 'utf8')).query_fields;
+const labels = (text, facets = {}) => complete(text, text.length, facets, fields).offers.map(({ label }) => label);
 
 describe('complete', () => {
 	it('offers the fields that begin with what is typed, with their operators', () => {
@@ -18,23 +21,33 @@ describe('complete', () => {
 	});
 
 	it('replaces the last word alone, and keeps a minus and chosen values', () => {
-		const { from, to, offers } = complete('jac<0.5 -status:accepted,rej', 28, {});
+		const { from, to, offers } = complete('jac<0.5 -status:accepted,rej', 28, {}, fields);
 		assert.deepEqual([from, to, offers[0].text], [8, 28, '-status:accepted,rejected ']);
 	});
 
 	it('completes in the middle of the text', () => {
-		const { from, to, offers } = complete('stat jac<0.5', 4, {});
+		const { from, to, offers } = complete('stat jac<0.5', 4, {}, fields);
 		assert.deepEqual([from, to, offers[0].text], [0, 4, 'status:']);
 	});
 
 	it('quotes values with spaces, and knows those of the dataset', () => {
-		const { offers } = complete('match:"ea', 9, { match: ['Eastmere - Skarvik'] });
+		const { offers } = complete('match:"ea', 9, { match: ['Eastmere - Skarvik'] }, fields);
 		assert.deepEqual(offers.map(({ text }) => text), ['match:"Eastmere - Skarvik" ']);
 	});
 
 	it('knows that groups can be named', () => {
 		assert.deepEqual(labels('i'), ['id:']);
 		assert.deepEqual(labels('id:12,'), []);
+	});
+
+	it('knows fields by their other names, and says in what a number is counted', () => {
+		assert.deepEqual(labels('first_failing:ja'), ['jac']);
+		assert.match(complete('sig', 3, {}, fields).offers[0].hint, /, m$/);
+		assert.deepEqual(labels('-sort'), []);
+	});
+
+	it('offers nothing before it knows the fields', () => {
+		assert.deepEqual(complete('stat', 4, {}, []).offers, []);
 	});
 
 	it('offers no value for a number', () => {

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from app.api.schemas.query_field import QueryFieldDocument
 from app.api.schemas.solution import SolutionDocument
 from app.datasets.camera_json import camera_to_json
 from app.errors import DegenerateGeometryError
@@ -22,6 +23,7 @@ from app.geometry.lens import BROWN_CONRADY, FISHEYE, LENSES
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.geometry.sphere import optimal_diameter, tight_box
 from app.geometry.triangulation import parallax_angle, triangulate_pairs
+from app.review.queue.fields import FIELDS
 from app.sample.scene import Scene
 from app.soccer.annotation import BallAnnotation
 from app.soccer.policy import PAPER
@@ -43,6 +45,7 @@ def golden() -> dict[str, Any]:
     points = _points()
     return {
         "ball_diameter_m": DIAMETER,
+        "query_fields": [QueryFieldDocument.model_validate(item).model_dump() for item in FIELDS],
         "cameras": {name: camera_to_json(camera) for name, camera in cameras.items()},
         "projections": [_projection(name, cameras[name], points) for name in cameras],
         "triangulations": _triangulations(cameras, points),

@@ -86,6 +86,22 @@ class TestHelp:
         )
         assert told.split() == [b"backup"]
 
+    @pytest.mark.parametrize("words", [("--help",), ("policy", "show", "--dataset", "sn")])
+    def test_a_reader_that_has_gone_is_no_error(
+        self, run: Run, line_files: Path, tmp_path: Path, words: tuple[str, ...]
+    ) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "sn")
+        end, pipe = os.pipe()
+        os.close(end)
+        done = subprocess.run(
+            [sys.executable, "-c", "from app.cli import main; main()", *words],
+            stdout=pipe,
+            stderr=subprocess.PIPE,
+            env={**os.environ, "TOUCHLINE_HOME": str(tmp_path / "home")},
+        )
+        os.close(pipe)
+        assert (done.returncode, done.stderr) == (141, b"")
+
     def test_an_unknown_command_is_wrong_usage(self, run: Run) -> None:
         assert run("fly")[0] == 2
 

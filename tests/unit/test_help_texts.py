@@ -7,19 +7,23 @@ from pathlib import Path
 
 import pytest
 
+from app.review.queue.fields import BY_NAME
 from app.soccer.policy import STRICT
 from tests.docs.pages import (
     GLOSSARY_PAGE,
     GUIDE,
+    QUERIES_PAGE,
     ROOT,
     glossary_page,
     guide_text,
+    queries_page,
     sections,
 )
 from tests.docs.settings import SETTINGS_PAGE, settings_page
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
+    actor actors
     candidate proposal propose scoring search straight
     3d accept action actions address adjust adjustments advice ahead anchor annotate answers app
     application archive archives arrays arrival ask axis backup bar bars batches best binned bodies
@@ -73,6 +77,9 @@ class TestPages:
     def test_the_glossary_page_is_the_glossary(self):
         assert GLOSSARY_PAGE.read_text(encoding="utf-8") == glossary_page(), AGAIN
 
+    def test_the_page_of_queries_is_what_the_parser_knows(self):
+        assert QUERIES_PAGE.read_text(encoding="utf-8") == queries_page(), AGAIN
+
     def test_the_guide_in_the_product_is_the_guide_page(self):
         assert GUIDE.read_text(encoding="utf-8") == guide_text(), AGAIN
 
@@ -109,11 +116,9 @@ class TestGlossary:
         assert asked | {f"column:{name}" for name in sorts} <= ids()
 
     def test_every_kind_of_finding_is_explained(self):
-        source = (ROOT / "static" / "state" / "completion.js").read_text(encoding="utf-8")
-        kinds = set(re.findall(r"'([a-z]+_[a-z_]+)'", source))
+        kinds = {*BY_NAME["finding"].values} - {"any", "none"} | {"pitch_size"}
         assert "upstream_changed" in kinds
-        missing = {kind for kind in kinds if f"finding:{kind}" not in ids()}
-        assert not {kind for kind in missing if kind in _finding_kinds()}
+        assert not {kind for kind in kinds if f"finding:{kind}" not in ids()}
 
     @pytest.mark.parametrize("tree", ["app", "static"])
     def test_every_domain_word_of_a_file_name_is_explained(self, tree: str):
@@ -129,11 +134,6 @@ class TestGlossary:
     @pytest.mark.parametrize("word", ["carry", "spare", "lineage", "ledger", "upstream"])
     def test_the_words_of_moving_data_are_explained(self, word: str):
         assert word in ids()
-
-
-def _finding_kinds() -> set[str]:
-    text = (ROOT / "app" / "solving" / "findings.py").read_text(encoding="utf-8")
-    return set(re.findall(r'"([a-z]+_[a-z_]+)"', text))
 
 
 class TestArchitecture:

@@ -31,6 +31,7 @@ from app.evaluation.result import NUMBERS
 from app.evaluation.table import TABLES
 from app.review.evaluating import evaluation as review
 from app.review.jobs.evaluations import request_evaluation
+from app.review.versions.version import version_called
 from app.store.evaluations import StoredEvaluation
 
 router = APIRouter(tags=["evaluations"])
@@ -90,7 +91,10 @@ def start_evaluation(
 
     The job's result names the evaluation.
     """
-    job = request_evaluation(services.jobs, services.store, dataset, request.value(), actor=actor)
+    store, named = services.store, request.version
+    version = None if named is None else version_called(store, str(named), dataset)
+    wanted = request.value(version)
+    job = request_evaluation(services.jobs, store, dataset, wanted, actor=actor)
     return accepted(job, response)
 
 

@@ -100,12 +100,14 @@ def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     responses={**responses(404, 409), 204: {"description": "It is gone."}},
 )
 def delete_export(export: ExportId, services: AppServices) -> Response:
-    """Delete the file of an export; 409 while it is being written, which its job can end."""
+    """Delete the file of an export, or one that failed altogether; 409 while it is being written."""
     document = _document(services, export)
-    if document.status in ("waiting", "running"):
+    if document.state in ("waiting", "running"):
         raise _not_ready(document)
-    if document.status == "gone":
+    if document.state == "gone":
         raise NotFoundError("there is no such export")
+    if document.state in ("failed", "cancelled"):
+        services.jobs.forget(int(export))
     services.exports.forget(export)
     return Response(status_code=204)
 
@@ -132,9 +134,9 @@ def get_content(export: Annotated[str, Depends(written)], services: AppServices)
     """
     document = _document(services, export)
     path = services.exports.content(document.id)
-    if document.status == "gone" or (document.status == "ready" and not path.is_file()):
+    if document.state == "gone" or (document.state == "done" and not path.is_file()):
         raise NotFoundError("the file of this export is gone", hint="Make the export again.")
-    if document.status != "ready":
+    if document.state != "done":
         raise _not_ready(document)
     return FileResponse(
         path,
@@ -161,7 +163,7 @@ def _document(services: Services, export: str) -> ExportDocument:
 
 
 def _not_ready(document: ExportDocument) -> ConflictError:
-    if document.status in ("waiting", "running"):
+    if document.state in ("waiting", "running"):
         return ConflictError(
             "the export is still being written",
             hint=f"GET /api/v1/jobs/{document.id} says how far it is.",

@@ -19,7 +19,7 @@ from app.api.schemas.policy import (
 from app.errors import InputError
 from app.review.jobs.solve import Judged, request_policy
 from app.review.policies.policy import read_policy
-from app.review.policies.text import CUSTOM, policy_from_yaml, policy_with
+from app.review.policies.text import CUSTOM, policy_from_yaml, policy_with, unknown_policy
 from app.soccer.policy import POLICIES, THRESHOLDS, Policy
 
 router = APIRouter(tags=["policies"])
@@ -117,6 +117,8 @@ def wanted(change: PolicyChange, present: Policy) -> Policy:
         raise InputError("name a policy, give thresholds, or send a YAML text")
     if not change.values and change.name in POLICIES:
         return POLICIES[change.name]
+    if not change.values and change.name != present.name:
+        raise unknown_policy(change.name or "", "it brings no values", pointer="/name")
     # A shipped policy with another threshold is no longer the one of that name.
     name = change.name or (CUSTOM if present.name in POLICIES else present.name)
     return policy_with(present, change.values or {}, name=name, pointer="/values")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Depends, Path, Query, Response
 
-from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, DryRun, Id
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun
 from app.api.jobs import ACCEPTED, job_answer
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
@@ -27,6 +27,26 @@ from app.review.versions.freeze import plan_freeze
 from app.review.versions.manifest import version_manifest
 
 router = APIRouter(tags=["versions"])
+
+
+def called(
+    store: AppStore,
+    version: Annotated[
+        str, Path(min_length=1, max_length=100, description="Id, name or hash of the version.")
+    ],
+    dataset: Annotated[
+        str | None,
+        Query(
+            max_length=200,
+            description="Name or id of its dataset, where several have a version of that name.",
+        ),
+    ] = None,
+) -> int:
+    """Id of the version that the address names."""
+    return versions.version_called(store, version, dataset)
+
+
+VersionId = Annotated[int, Depends(called)]
 
 
 @router.get("/datasets/{dataset}/versions", operation_id="listVersions", responses=responses(404))
@@ -76,7 +96,7 @@ def freeze_version(
     response_model=VersionDocument,
     responses=responses(404),
 )
-def get_version(version: Id, store: AppStore) -> versions.Version:
+def get_version(version: VersionId, store: AppStore) -> versions.Version:
     """One version."""
     return versions.get_version(store, version)
 
@@ -84,29 +104,35 @@ def get_version(version: Id, store: AppStore) -> versions.Version:
 @router.get(
     "/versions/{version}/manifest", operation_id="getVersionManifest", responses=responses(404)
 )
-def get_manifest(version: Id, store: AppStore) -> VersionManifest:
+def get_manifest(version: VersionId, store: AppStore) -> VersionManifest:
     """What a version says of itself: counts, settings, licence, overrides, changelog."""
     return VersionManifest.model_validate(version_manifest(store, version))
 
 
 @router.get("/versions/{version}/changelog", operation_id="getChangelog", responses=responses(404))
-def get_changelog(version: Id, store: AppStore) -> Changelog:
+def get_changelog(version: VersionId, store: AppStore) -> Changelog:
     """What changed since the version before, in sentences."""
     found = versions.get_version(store, version)
-    return Changelog(version=found.name, lines=changelog(store, version))
+    return Changelog(id=found.id, version=found.name, lines=changelog(store, version))
 
 
 @router.get("/versions/{version}/diff", operation_id="diffVersions", responses=responses(404))
 def get_diff(
-    version: Id,
+    version: VersionId,
     store: AppStore,
-    against: Annotated[int, Query(ge=1, le=MAX_ID, description="Id of the older version.")],
+    against: Annotated[
+        str,
+        Query(min_length=1, max_length=100, description="Id, name or hash of the older version."),
+    ],
     limit: Annotated[
         int, Query(ge=0, le=10_000, description="Largest number of items in each list.")
     ] = 500,
 ) -> VersionDiffDocument:
     """What changed in a version against another: groups added, dropped, moved, and why."""
-    return VersionDiffDocument.of(diff_versions(store, against, version), limit)
+    older = versions.version_called(
+        store, against, str(versions.get_version(store, version).dataset_id)
+    )
+    return VersionDiffDocument.of(diff_versions(store, older, version), limit)
 
 
 @router.post(
@@ -116,7 +142,9 @@ def get_diff(
     response_model=JobDocument,
     responses={**responses(404), **ACCEPTED},
 )
-def verify_version(version: Id, services: AppServices, actor: Actor, asked: AskedUnder) -> Response:
+def verify_version(
+    version: VersionId, services: AppServices, actor: Actor, asked: AskedUnder
+) -> Response:
     """Compute a version from scratch and compare it bit for bit; the job's result reports."""
     reply = Reply(asked, job_answer)
     job = version_jobs.request_verify(

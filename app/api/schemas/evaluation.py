@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from app.api.schemas.document import Document
+from app.api.schemas.version import VersionId
 from app.evaluation.table import Cell
 from app.review.evaluating.evaluation import (
     Comparison,
@@ -31,8 +32,9 @@ class EvaluationBody(BaseModel):
     careful: SetId | None = Field(
         default=None, description="Careful boxes, for the table of boxes (the paper's table 1)."
     )
-    version: SetId | None = Field(
-        default=None, description="A frozen version; null: the dataset as it is now."
+    version: VersionId | None = Field(
+        default=None,
+        description="Id, name or hash of a frozen version; null: the dataset as it is now.",
     )
     groups: Literal["passing", "accepted", "all"] = Field(
         default="passing", description="Without a version: which groups take part."
@@ -53,9 +55,9 @@ class EvaluationBody(BaseModel):
             raise ValueError("give predictions, careful boxes, or both")
         return self
 
-    def value(self) -> EvaluationRequest:
-        """The request as the review floor takes it."""
-        return EvaluationRequest(**self.model_dump())
+    def value(self, version: int | None) -> EvaluationRequest:
+        """The request as the review floor takes it; ``version`` is the id of the one it names."""
+        return EvaluationRequest(**{**self.model_dump(), "version": version})
 
 
 class CellDocument(Document):

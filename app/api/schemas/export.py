@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.api.schemas.job import JobDocument
+from app.api.schemas.version import VersionId
 from app.datasets.format_names import ExportFormat
 from app.review.exporting.folder import ExportEntry
 from app.store.jobs import DONE, Job
@@ -15,7 +16,6 @@ from app.store.jobs import DONE, Job
 Boxes = Literal["optimized", "annotated", "exact"]
 Images = Literal["none", "copy"]
 Views = Literal["valid", "all"]
-VersionId = Annotated[int, Field(ge=1, le=2**63 - 1)] | Annotated[str, Field(max_length=100)]
 
 
 class ExportRequest(BaseModel):
@@ -59,7 +59,13 @@ class ExportDocument(BaseModel):
     """An export: what was asked for, how far it is, and, once it is ready, what came of it."""
 
     id: str
-    status: Literal["waiting", "running", "ready", "failed", "cancelled", "gone"]
+    state: Literal["waiting", "running", "done", "failed", "cancelled", "gone"] = Field(
+        description="As of its job; `gone`: it was written, and its file is deleted."
+    )
+    status: Literal["waiting", "running", "ready", "failed", "cancelled", "gone"] = Field(
+        description="The same in other words: `ready` is `done`. Read `state`.",
+        json_schema_extra={"deprecated": True},
+    )
     request: ExportRequest
     created: datetime
     content: str | None = Field(description="Address of the zip, once it is ready.")
@@ -79,6 +85,7 @@ class ExportDocument(BaseModel):
         return ExportDocument.model_validate(
             {
                 **vars(entry),
+                "state": "done",
                 "status": "ready",
                 "content": f"/api/v1/exports/{entry.id}/content",
                 "error": None,
@@ -95,6 +102,7 @@ class ExportDocument(BaseModel):
             {
                 **nothing,
                 "id": str(job.id),
+                "state": "gone" if job.state == DONE else job.state,
                 "status": "gone" if job.state == DONE else job.state,
                 "request": job.request,
                 "created": job.created,

@@ -10,7 +10,7 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field, create_model
 from app.api.schemas.document import Document
 from app.review.policies.policy import PolicyState
 from app.review.policies.text import MAX_CHARACTERS, policy_to_yaml, policy_values
-from app.soccer.policy import CalibrationPolicy, Policy, thresholds_of
+from app.soccer.policy import Asks, CalibrationPolicy, Policy, thresholds_of
 
 
 class _PolicyHead(Document):
@@ -131,6 +131,10 @@ class PolicyFieldDocument(Document):
         "no others."
     )
     gate: str | None = Field(description="The gate that asks for it.")
+    asks: Asks | None = Field(
+        description="How a value compares with it to pass. What equals a threshold passes, but for "
+        "`more than`: JaC must exceed it, as in the paper."
+    )
     optional: bool = Field(description="Whether it can be null.")
 
 

@@ -128,7 +128,7 @@ class ViewPrediction(Document):
     name: str = Field(description="Name of its set.")
     box: StoredBox
     score: float
-    scored: bool = Field(description="False: its set came without scores, each counts as 1.")
+    scored: bool = Field(description="`false`: its set came without scores, each counts as 1.")
 
     @staticmethod
     def of(found: PredictionSet, box: PredictedBox) -> ViewPrediction:

@@ -25,6 +25,11 @@ from app.store.verifications import Verification
 Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 SHOWN_DIFFERENCES = 40
 """Differences that a version's document names; all are counted."""
+VersionId = (
+    Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
+    | Annotated[str, Field(min_length=1, max_length=100)]
+)
+"""A version by its id, its name or its hash."""
 Camera = Annotated[str, Field(min_length=1, max_length=200)]
 
 
@@ -180,7 +185,8 @@ class VersionManifest(BaseModel):
 class Changelog(BaseModel):
     """What changed since the version before."""
 
-    version: str
+    id: int
+    version: str = Field(description="Its name.")
     lines: list[str]
 
 

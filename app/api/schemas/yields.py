@@ -10,9 +10,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, create_model
 from app.api.schemas.document import Document
 from app.api.schemas.policy import PolicyDocument
 from app.review.yields.funnel import UNSOLVED
-from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy, thresholds_of
-
-Number = Annotated[float, Field(ge=-1e6, le=1e6)]
+from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy, Threshold, thresholds_of
 
 LABELS = {
     UNSOLVED: "Solved",
@@ -31,15 +29,18 @@ LABELS = {
 
 def _tried(part: type[Policy | CalibrationPolicy]) -> Any:
     """A model in which every threshold of a part of the policy can stand or be absent."""
-    hints: dict[Any, Any] = {bool: bool | None}
     fields: dict[str, Any] = {
-        item.name: (
-            item.hint | None if item.is_word else hints.get(item.hint, Number | None),
-            Field(default=None, description=item.text),
-        )
+        item.name: (_hint(item) | None, Field(default=None, description=item.text))
         for item in thresholds_of(part)
     }
     return create_model(f"_{part.__name__}", __config__=ConfigDict(extra="forbid"), **fields)
+
+
+def _hint(item: Threshold) -> Any:
+    """The type of a threshold, and between which ends it lies."""
+    if item.is_word or item.minimum is None:
+        return item.hint
+    return Annotated[float, Field(ge=item.minimum, le=item.maximum)]
 
 
 class CalibrationValues(_tried(CalibrationPolicy)):  # type: ignore[misc]

@@ -13,6 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problem import make_problem, problem_response
 from app.api.security.origin import SAFE_METHODS
+from app.finite import quoted
 
 MAX_JSON_BYTES = 512 * 1024
 """A group with every line of six views is below 50 kB; what is longer is refused before it is read."""
@@ -91,7 +92,9 @@ def _without_repetition(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) < len(pairs):
         names = Counter(name for name, _ in pairs)
-        raise BodyError(400, f"the body names {names.most_common(1)[0][0][:80]!r} more than once")
+        raise BodyError(
+            400, f"the body names {quoted(names.most_common(1)[0][0], 80)} more than once"
+        )
     return found
 
 

@@ -5,7 +5,7 @@ Killed anywhere it loses nothing but the chunks in hand.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
@@ -34,9 +34,10 @@ from app.store.solutions import (
     unsolved_groups,
 )
 
-FIRST_CHUNK, CHUNK = 2, 40
+FIRST_CHUNK, CHUNK, CHUNK_HERE = 2, 40, 8
 """Groups a task: a second of work, or a few when lines must be calibrated. The first ones are
-small, so that a run that is killed early, again and again, comes to its end all the same."""
+small, so that a run that is killed early, again and again, comes to its end all the same. Without
+other processes a chunk is what Ctrl+C has to wait for."""
 
 
 @dataclass
@@ -80,6 +81,7 @@ def solve_dataset(
     dataset: str | int,
     executor: Executor | None = None,
     progress: Progress | None = None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> SolveReport:
     """Solve what is stale in a dataset.
 
@@ -89,25 +91,27 @@ def solve_dataset(
         executor: Where chunks are solved; None: here, one after the other.
         progress: Called after each chunk; an error that it raises ends the run, and nothing
             that was saved before is lost.
+        stop: Asked every now and then; once it says so, what is done is saved, and no more.
     """
     found, ids = get_dataset(store, dataset), stale_groups(store, dataset)
     report = SolveReport(total=len(ids))
     if progress is not None:
         progress(0, report.total)
     _calibrate_shared(store, found)
-    tasks = (_task(store, found, chunk) for chunk in _chunks(ids))
-    for results in fan_out(solve_task, tasks, executor):
+    largest = CHUNK if executor is not None else min(CHUNK, CHUNK_HERE)
+    tasks = (_task(store, found, chunk) for chunk in _chunks(ids, largest))
+    for results in fan_out(solve_task, tasks, executor, stop):
         _save(store, results, report)
         if progress is not None:
             progress(report.solved + len(report.failed), report.total)
     return report
 
 
-def _chunks(ids: Sequence[int]) -> Iterator[Sequence[int]]:
+def _chunks(ids: Sequence[int], largest: int) -> Iterator[Sequence[int]]:
     start, size = 0, FIRST_CHUNK
     while start < len(ids):
         yield ids[start : start + size]
-        start, size = start + size, min(2 * size, CHUNK)
+        start, size = start + size, min(2 * size, largest)
 
 
 def solve_task(task: Task) -> list[Result]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from app.datasets.export_record import ExportRecord
 from app.datasets.issia import FramePersons
@@ -26,7 +28,7 @@ from app.review.exporting.formats import (
     write_format,
 )
 from app.review.exporting.images import ExportImages, ReadPicture
-from app.review.exporting.source import ExportSource, LiveSource, VersionSource
+from app.review.exporting.source import ExportSource, Item, LiveSource, VersionSource
 from app.review.importing.carry import FORMAT as CARRY
 from app.review.importing.carry import carry_out
 from app.review.importing.spare import spare_persons
@@ -34,9 +36,12 @@ from app.review.versions.version import find_version
 from app.soccer.ball_boxes import BOX_KINDS
 from app.store.frames import make_picture
 from app.store.session import Session, Store
+from app.store.views import frame_files
 
 IMAGES = ("none", "copy", "link")
 VIEWS = ("valid", "all")
+TRIED = 100
+"""Groups that are tried before an export is promised."""
 
 
 @dataclass(frozen=True)
@@ -128,8 +133,9 @@ def export(
     """
     options = _Options(format, everything, boxes, images, views)
     options.check(out)
+    _require_plain(format, everything, version)
     if format == CARRY:
-        return _carry(store, dataset, out, version, progress)
+        return ExportReport(out, CARRY, carry_out(store, dataset, out, progress))
     with store.read() as session:
         source = _source(session, store, dataset, everything, version)
         with output_tree(out) as root:
@@ -145,19 +151,90 @@ def export(
     return ExportReport(out, format, counts, left_out, tuple(frames.missing))
 
 
+def require_possible(
+    store: Store,
+    dataset: str | int,
+    format: str,  # noqa: A002
+    *,
+    everything: bool = False,
+    boxes: str = "optimized",
+    images: str = "none",
+    views: str = "valid",
+    version: str | None = None,
+) -> None:
+    """Refuse, before anything is written, an export that cannot succeed.
+
+    Its first groups are written to a folder that is thrown away, so that whatever a format has no
+    place for is found by the writer itself.
+
+    Raises:
+        NotFoundError: There is no such dataset or version.
+        InputError: Nothing to export, none of the images that are wanted is there, or the groups
+            do not fit the format.
+    """
+    _require_plain(format, everything, version)
+    with store.read() as session, TemporaryDirectory(prefix="touchline-") as folder:
+        whole = _source(session, store, dataset, everything or format == CARRY, version)
+        if format == CARRY:
+            return
+        source = _First(whole)
+        options = _Options(format, everything, boxes, images, views)
+        frames = ExportImages(Path(folder), "none", _here(store), frame_layout(format))
+        counts = _Run(source, options, frames, None).write(Path(folder))
+        if images != "none" and not frames.media:
+            files = [] if source.is_all else frame_files(session, whole.dataset_id)
+            _require_frames(whole.dataset, files)
+    if source.is_all:
+        _require_content(whole.dataset, format, counts)
+
+
+def _require_frames(dataset: str, files: Iterable[str]) -> None:
+    """Raises InputError where images are wanted and no file of them is there."""
+    if not any(Path(file).exists() for file in files):
+        raise InputError(
+            f'none of the images of "{dataset}" is there, so none can go with it',
+            hint="Export without images, or import the dataset again with its frames.",
+            pointer="/images",
+        )
+
+
+def _require_plain(format: str, everything: bool, version: str | None) -> None:  # noqa: A002
+    """Raises InputError where a version is asked for together with what it cannot be."""
+    if version is None:
+        return
+    if format == CARRY:
+        raise InputError(
+            "the format touchline carries the whole dataset; choose another format to export a frozen version",
+            pointer="/version",
+        )
+    if everything:
+        raise InputError(
+            "a frozen version always exports exactly its own groups; leave out all, or export the dataset itself",
+            pointer="/all",
+        )
+
+
+class _First:
+    """The first groups of a source."""
+
+    def __init__(self, source: LiveSource | VersionSource):
+        self._source = source
+        self.dataset, self.version, self.licence = source.dataset, source.version, source.licence
+        self.count, self.date = min(source.count, TRIED), source.date
+        self.settings, self.stamp = source.settings, source.stamp
+
+    @property
+    def is_all(self) -> bool:
+        """Whether there are no more."""
+        return self.count == self._source.count
+
+    def items(self) -> Iterator[Item]:
+        """As many as are tried."""
+        return islice(self._source.items(), self.count)
+
+
 def _here(store: Store) -> ReadPicture:
     return lambda media, width, flipped: make_picture(media, width, flipped, store.settings)
-
-
-def _carry(
-    store: Store, dataset: str | int, out: Path, version: str | None, progress: Progress | None
-) -> ExportReport:
-    """Everything that was said about a dataset, for another installation of Touchline."""
-    if version is not None:
-        raise InputError(
-            "the format touchline carries the whole dataset; choose another format to export a frozen version"
-        )
-    return ExportReport(out, CARRY, carry_out(store, dataset, out, progress))
 
 
 def _source(
@@ -165,10 +242,6 @@ def _source(
 ) -> LiveSource | VersionSource:
     found = read_dataset(session, dataset)
     if version is not None:
-        if everything:
-            raise InputError(
-                "a frozen version always exports exactly its own groups; leave out all, or export the dataset itself"
-            )
         frozen = find_version(store, found.id, version)
         return VersionSource(session, frozen)
     source = LiveSource(session, found, everything)

@@ -51,7 +51,9 @@ class ExportImages:
         """
         self.placed, self._splits = {}, splits or {}
         for view in group.views:
-            if view.media is not None:
+            if view.media is None:
+                self._miss(group, view, "no picture came with it")
+            else:
                 then = None if frozen is None else frozen.get(view.key, {})
                 self._add(group, view, view.media, then)
 
@@ -64,12 +66,17 @@ class ExportImages:
         if self._images == "none":
             return
         if frozen and frozen != media_facts(media):
-            self.missing.append(f"{group.key}, {view.key}: not the file that was frozen")
+            self._miss(group, view, "not the file that was frozen")
             return
         try:
             self._place(group, view, media)
         except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
-            self.missing.append(f"{group.key}, {view.key}: {error.message}")
+            self._miss(group, view, error.message)
+
+    def _miss(self, group: Group, view: View, why: str) -> None:
+        """Name a frame that was wanted and cannot be had."""
+        if self._images != "none":
+            self.missing.append(f"{group.key}, {view.key}: {why}")
 
     def _place(self, group: Group, view: View, media: Media) -> None:
         is_file = media.member is None and media.frame is None

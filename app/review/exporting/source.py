@@ -67,6 +67,7 @@ class LiveSource:
         self._session, self._found, self._everything = session, dataset, everything
         self._ids = exported_groups(session, dataset.id, everything)
         self.dataset, self.count = dataset.name, len(self._ids)
+        self.dataset_id = dataset.id
         self.left_out = {} if everything else left_out_groups(session, dataset.id)
 
     @property
@@ -101,6 +102,7 @@ class VersionSource:
     def __init__(self, session: Session, version: Version):
         self._session, self._version = session, version
         self.dataset, self.version = version.dataset, version.name
+        self.dataset_id = version.dataset_id
         self.date, self.licence = version.created, version.licence or None
         self.count = int(version.counts["groups"])
 

@@ -6,13 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from app.review.datasets.dataset import get_dataset
-from app.review.exporting.export import export
+from app.review.exporting.export import export, require_possible
 from app.review.exporting.folder import ExportFolder
-from app.review.exporting.source import LiveSource
-from app.review.importing.carry import FORMAT as CARRY
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs
-from app.review.versions.version import find_version
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.frames import Frames
@@ -45,17 +42,21 @@ def request_export(
 
     Raises:
         NotFoundError: There is no such dataset or version.
-        InputError: There is nothing to export.
+        InputError: There is nothing to export, or it cannot be written as it is asked for.
         OverloadedError: Too many jobs wait.
     """
     found = get_dataset(store, request["dataset"])
     version = request.get("version")
-    with store.read() as session:
-        if version is None:
-            everything = bool(request["all"]) or request["format"] == CARRY
-            LiveSource(session, found, everything).require_some()
-        else:
-            find_version(store, found.id, str(version))
+    require_possible(
+        store,
+        found.id,
+        request["format"],
+        everything=request["all"],
+        boxes=request["boxes"],
+        images=request["images"],
+        views=request.get("views", "valid"),
+        version=None if version is None else str(version),
+    )
     asked = {**request, "dataset": found.name}
     return jobs.submit(
         KIND,

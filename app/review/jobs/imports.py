@@ -125,11 +125,16 @@ def import_work(
             progress=_step(progress, sentence),
             stop=progress.check,
         )
+        with store.read() as session:
+            found = find_dataset(session, request.dataset)
+        if found is not None:
+            jobs.belongs(progress.job_id, int(found.id))
         if outcome.nothing is not None:
             raise FailedWithReportError(*outcome.nothing, _result(outcome, request))
+        following = None
         if not request.dry_run and outcome.fresh:
-            _solve(jobs, store, request.dataset, actor)
-        return _result(outcome, request)
+            following = request_solve(jobs, store, dataset_id(store, request.dataset), actor=actor)
+        return _result(outcome, request, None if following is None else following.id)
 
     return work
 
@@ -141,17 +146,15 @@ def _step(progress: JobProgress, sentence: str) -> Progress:
     return step
 
 
-def _solve(jobs: Jobs, store: Store, dataset: str, actor: str) -> None:
-    request_solve(jobs, store, dataset_id(store, dataset), actor=actor)
-
-
-def _result(outcome: Outcome, request: ImportRequest) -> Json:
+def _result(outcome: Outcome, request: ImportRequest, solve_job: int | None = None) -> Json:
+    """The report; ``solve_job`` is the job that computes what is new, where there is one."""
     values = outcome.values
     hidden = max(len(values["skipped"]) - SHOWN, 0)
     return {
         **values,
         "dataset": request.dataset,
         "dry_run": request.dry_run,
+        "solve_job": solve_job,
         "skipped": values["skipped"][:SHOWN],
         "more_skipped": values["more_skipped"] + hidden,
     }

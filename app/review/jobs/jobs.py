@@ -35,6 +35,7 @@ from app.store.jobs import (
     WAITING,
     Job,
     NewJob,
+    delete_job,
     insert_job,
     read_job,
     read_jobs,
@@ -201,6 +202,25 @@ class Jobs:
         if run is not None:
             self._finish(run, state=CANCELLED, sentence="Cancelled before it began.")
         return self.get(job_id)
+
+    def forget(self, job_id: int) -> None:
+        """Delete the record of a job that is over.
+
+        Raises:
+            NotFoundError: There is none of that id.
+            ConflictError: It is not over.
+        """
+        with self._store.write() as session:
+            if _need(session, job_id).state in OPEN:
+                raise ConflictError(f"job {job_id} is not over yet", hint="Cancel it first.")
+            delete_job(session, job_id)
+
+    def belongs(self, job_id: int, dataset_id: int) -> None:
+        """Note whose a running job is, where its dataset came to be while it ran."""
+        self._save(job_id, dataset_id=dataset_id)
+        running = self._queue.running
+        if running is not None and running.id == job_id:
+            running.dataset_id = dataset_id
 
     def cancel_all(self, dataset_id: int, seconds: float = CLOSE_SECONDS) -> None:
         """End all jobs of a dataset and wait until none of them runs any more.

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import replace
+from difflib import get_close_matches
 from typing import Any
 
 import yaml
@@ -42,6 +43,17 @@ def policy_from_yaml(text: str) -> Policy:
         raise InputError("a policy in YAML consists of lines `name: value`")
     name = value.pop("name", CUSTOM)
     return policy_with(PAPER, value, name=name)
+
+
+def unknown_policy(name: str, otherwise: str, *, pointer: str | None = None) -> InputError:
+    """What to say of a name that no shipped policy has; ``otherwise``: what else it is not."""
+    nearest = get_close_matches(name.lower(), POLICIES, n=1)
+    meant = f"did you mean {nearest[0]}?" if nearest else f"there are {', '.join(POLICIES)}"
+    return InputError(
+        f'there is no policy "{name}", and {otherwise}; {meant}',
+        hint="A policy of one's own comes with its thresholds.",
+        pointer=pointer,
+    )
 
 
 def policy_to_yaml(policy: Policy) -> str:

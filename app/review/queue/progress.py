@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.review.queue.bins import ERROR_PERCENT, SIGMA_M, even, places
-from app.review.queue.query import NUMBERS, STATUSES, parse_query
+from app.review.queue.fields import STATUSES
+from app.review.queue.query import NUMBERS, parse_query
 from app.store.listing import Listing
 from app.store.session import Store
 

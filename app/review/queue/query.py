@@ -16,10 +16,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 
 from app.errors import InputError
-from app.soccer.solution import FINDING_KINDS, GATES
+from app.review.queue.fields import BY_NAME, FIELDS, ORDERS
 from app.store import conditions
 from app.store.conditions import Condition
 from app.store.order import Order
@@ -30,43 +31,13 @@ MAX_LISTED_LENGTH = 100_000
 MAX_TERMS = 30
 MAX_ID = 2**63 - 1
 
-NUMBERS = {
-    "jac": "min_jac",
-    "jac05": "min_jac",
-    "error": "error_px",
-    "error_percent": "error_percent",
-    "sigma": "sigma_m",
-    "parallax": "parallax_degrees",
-    "ratio": "size_ratio",
-    "size_ratio": "size_ratio",
-    "height": "height_m",
-    "distance": "distance_m",
-    "box": "box_px",
-    "x": "x_m",
-    "y": "y_m",
-    "margin": "margin",
-    "value": "value",
-    "views": "views",
-    "number": "number",
-}
+NUMBERS = {name: item.column for name, item in BY_NAME.items() if item.kind == "number"}
 """Fields that compare with < <= > >= = and with :, which is =, by the column that they mean;
 ``none`` is where there is no number."""
-
-STATUSES = ("unreviewed", "accepted", "rejected", "deferred")
-FLAGS = ("stale", "solved", "passes", "fixed")
-"""Fields that are ``yes`` or ``no``."""
-EXACT = ("split", "key", "reviewer", "reason", "override")
-"""Fields whose whole text must be the same; ``none`` is where there is none, ``any`` where there
-is one."""
-
-_SORTED = (
-    "number", "value", "sigma", "jac", "error", "error_percent", "parallax", "margin", "ratio",
-    "height", "distance", "box", "x", "y", "views", "findings", "gate", "status", "split",
-    "reviewer", "label",
-)  # fmt: skip
-SORTS = {**{name: NUMBERS.get(name, name) for name in _SORTED}, "newest": "changed"}
+SORTS = NUMBERS | {order.name: order.column for order in ORDERS}
 """What the queue can be sorted by, and the column of it."""
 
+_REVERSE = "sort:name-desc is the reverse."
 _TERM = re.compile(
     r"""\s*(?P<minus>-)?
         (?:(?P<field>[a-z_0-9]+)(?P<op><=|>=|<|>|=|:))?
@@ -111,7 +82,15 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
     found: list[Condition] = []
     sort, descending = "number", False
     for negative, term in _terms(text, longest):
+        if term.field:
+            _require_operator(term)
         if term.field == "sort":
+            if negative:
+                raise InputError(
+                    "an order cannot be turned round with a minus",
+                    hint=_REVERSE,
+                    pointer=term.pointer,
+                )
             sort, descending = _sort(term)
         else:
             condition = _condition(term)
@@ -143,31 +122,42 @@ def _sort(term: _Term) -> tuple[str, bool]:
     if name not in SORTS:
         raise InputError(
             f'the queue cannot be sorted by "{term.value}"',
-            hint=f"Sorts: {', '.join(SORTS)}, each also with -desc.",
+            hint=f"Sorts: {', '.join(order.name for order in ORDERS)}, each also with -desc.",
             pointer=term.pointer,
         )
     return name, term.value.endswith("-desc")
 
 
-def _condition(term: _Term) -> Condition:
-    if term.field in NUMBERS:
-        return _number(term)
-    if term.op not in (":", "="):
+def _require_operator(term: _Term) -> None:
+    """Refuse a field that there is not, and an operator that a field has not."""
+    field_ = BY_NAME.get(term.field)
+    if field_ is None:
+        nearest = get_close_matches(term.field, BY_NAME, n=1)
+        meant = f"; did you mean {nearest[0]}?" if nearest else ""
         raise InputError(
-            f'"{term.field}" has no order: it compares with : alone', pointer=term.pointer
-        )
-    if term.field == "id":
-        return _listed_groups(term)
-    if term.field in FLAGS:
-        return conditions.is_flag(term.field, _choice(term, term.value, ("yes", "no")) == "yes")
-    test = _TESTS.get(term.field)
-    if test is None:
-        fields = sorted({*NUMBERS, *FLAGS, *_TESTS, "id", "sort"} - {""})
-        raise InputError(
-            f'the queue has no field "{term.field}"',
-            hint=f"Fields: {', '.join(fields)}.",
+            f'the queue has no field "{term.field}"{meant}',
+            hint=f"Fields: {', '.join(item.name for item in FIELDS)}.",
             pointer=term.pointer,
         )
+    if term.op not in field_.operators:
+        raise InputError(
+            f"{term.field} cannot be compared with {term.op}; it has {' and '.join(field_.operators)}",
+            hint=f"For example {term.field}:{next(iter(field_.values), 'text')}.",
+            pointer=term.pointer,
+        )
+
+
+def _condition(term: _Term) -> Condition:
+    field_ = BY_NAME.get(term.field)
+    if field_ is not None and field_.name != term.field:
+        term = replace(term, field=field_.name)
+    if term.field in NUMBERS:
+        return _number(term)
+    if term.field == "id":
+        return _listed_groups(term)
+    if field_ is not None and field_.kind == "flag":
+        return conditions.is_flag(term.field, _choice(term, term.value) == "yes")
+    test = _TESTS[term.field]
     # A bare word may hold commas; a field's value is a list of choices.
     values = [term.value] if term.field == "" else term.value.split(",")
     return conditions.either(test(term, value) for value in values)
@@ -205,7 +195,8 @@ def _number(term: _Term) -> Condition:
     return conditions.compares(column, "=" if term.op == ":" else term.op, value)
 
 
-def _choice(term: _Term, value: str, choices: tuple[str, ...]) -> str:
+def _choice(term: _Term, value: str) -> str:
+    choices = BY_NAME[term.field].values
     if value not in choices:
         raise InputError(
             f'{term.field} cannot be "{value}"',
@@ -216,13 +207,13 @@ def _choice(term: _Term, value: str, choices: tuple[str, ...]) -> str:
 
 
 def _status(term: _Term, value: str) -> Condition:
-    return conditions.compares("status", "=", _choice(term, value, STATUSES))
+    return conditions.compares("status", "=", _choice(term, value))
 
 
 def _finding(term: _Term, value: str) -> Condition:
     if value in ("any", "none"):
         return conditions.compares("findings", "=" if value == "none" else ">", "")
-    return conditions.lists("findings", _choice(term, value, FINDING_KINDS))
+    return conditions.lists("findings", _choice(term, value))
 
 
 def _gate(term: _Term, value: str) -> Condition:
@@ -231,12 +222,12 @@ def _gate(term: _Term, value: str) -> Condition:
         return conditions.is_flag("solved", False)
     if value == "none":
         return conditions.is_flag("passes", True)
-    return conditions.compares("gate", "=", _choice(term, value, GATES))
+    return conditions.compares("gate", "=", _choice(term, value))
 
 
 def _pictures(term: _Term, value: str) -> Condition:
     """Whether views have a picture: ``none`` of them, ``any``, or ``all``."""
-    choice = _choice(term, value, ("none", "any", "all"))
+    choice = _choice(term, value)
     if choice == "all":
         return conditions.has_all_pictures()
     return conditions.compares("pictures", "=" if choice == "none" else ">", 0)
@@ -275,5 +266,5 @@ _TESTS: dict[str, Callable[[_Term, str], Condition]] = {
     "match": _match,
     "label": _text,
     "": _text,
-    **dict.fromkeys(EXACT, _exact),
+    **dict.fromkeys(("split", "key", "reviewer", "reason", "override"), _exact),
 }

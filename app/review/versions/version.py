@@ -8,6 +8,7 @@ from itertools import count
 from typing import Any
 
 from app.errors import InputError, NotFoundError, StorageError
+from app.finite import quoted
 from app.review.datasets.dataset import read_dataset
 from app.soccer.group import Group
 from app.soccer.policy import Policy
@@ -18,7 +19,10 @@ from app.store.frozen import CALIBRATION, json_of, named_texts, read_frozen, tha
 from app.store.session import Session, Store
 from app.store.solutions import decode_calibration, decode_solution
 from app.store.verifications import Verification, read_verifications
-from app.store.versions import VersionGroup, dataset_versions, version_row
+from app.store.versions import VersionGroup, all_versions, dataset_versions, version_row
+
+MIN_HASH = 8
+"""So many digits of a hash name a version."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +94,7 @@ def find_version(store: Store, dataset: str | int, version: str) -> Version:
     for item in found:
         if version in (item.name, str(item.id)):
             return item
-    fitting = [item for item in found if len(version) >= 8 and item.hash.startswith(version)]
+    fitting = [item for item in found if len(version) >= MIN_HASH and item.hash.startswith(version)]
     if len({item.hash for item in fitting}) > 1:
         raise InputError(f'several versions have a hash that starts with "{version}"')
     if not fitting:
@@ -100,6 +104,38 @@ def find_version(store: Store, dataset: str | int, version: str) -> Version:
             hint=f"There are: {known}." if known else "Freeze one first.",
         )
     return fitting[0]
+
+
+def version_called(store: Store, version: str, dataset: str | None = None) -> int:
+    """Id of the version that an address names: by its id, or by its name or hash.
+
+    Args:
+        store: The database.
+        version: Its id, its name, or the first eight or more digits of its hash.
+        dataset: Name or id of its dataset, where several have a version of that name.
+
+    Raises:
+        NotFoundError: There is none.
+        InputError: Versions of several datasets are called so.
+    """
+    if dataset is not None:
+        return find_version(store, dataset, version).id
+    with store.read() as session:
+        found = _versions(session, all_versions(session))
+    fitting = [item for item in found if version == str(item.id)]
+    fitting = fitting or [item for item in found if version == item.name]
+    if not fitting and len(version) >= MIN_HASH:
+        fitting = [item for item in found if item.hash.startswith(version)]
+    if not fitting:
+        raise NotFoundError(f"there is no version {quoted(version)}")
+    if len(fitting) > 1:
+        names = ", ".join(dict.fromkeys(item.dataset for item in fitting))
+        raise InputError(
+            f"several versions are called {quoted(version)} (of {names})",
+            hint="Name it by its id, or name its dataset, too: ?dataset=NAME.",
+            pointer="/version",
+        )
+    return fitting[0].id
 
 
 def newest_version(store: Store, dataset: str | int) -> Version:

@@ -79,6 +79,12 @@ class TestSet:
         assert "bad.yaml" in err and '"tau"' in err
         assert run("policy", "set", "--dataset", "demo", tmp_path / "none.yaml")[0] == 2
 
+    def test_a_name_that_does_not_exist_is_wrong_usage_with_the_nearest(self, run: Run) -> None:
+        code, _, err = run("policy", "set", "--dataset", "demo", "strictt")
+        assert code == 2
+        assert "did you mean strict?" in " ".join(err.replace("│", " ").split())
+        assert "name: paper" in run("policy", "show", "--dataset", "demo")[1]
+
 
 class TestSolveWithPolicy:
     def test_the_same_file_works(self, run: Run, tmp_path: Path) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
+import os
 import re
+import signal
 
 import pytest
 
@@ -11,9 +14,11 @@ from app.commands.terminal import (
     MAX_MISSING,
     complain,
     harmless,
+    held_interrupts,
     print_export,
     print_import,
     print_json,
+    spell_out,
 )
 
 STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
@@ -53,6 +58,28 @@ class TestHarmless:
     def test_lines_and_letters_of_the_world_stay(self) -> None:
         text = "Málaga 1 - 0 Эльче\n  足球 ⚽"
         assert harmless(text) == text
+
+
+class TestHeldInterrupts:
+    def test_ctrl_c_is_heard_and_is_no_exception_until_it_is_over(self) -> None:
+        with held_interrupts() as interrupted:
+            assert not interrupted()
+            os.kill(os.getpid(), signal.SIGINT)
+            assert interrupted()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+
+class TestSpellOut:
+    def test_what_an_encoding_lacks_is_spelt_as_json_spells_it(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        raw = io.BytesIO()
+        monkeypatch.setattr("sys.stdout", io.TextIOWrapper(raw, encoding="ascii"))
+        value = {"file": "Málaga – 1° ⚽ \udcff"}
+        spell_out()
+        print_json(value)
+        assert json.loads(raw.getvalue()) == value
 
 
 class TestPrintExport:

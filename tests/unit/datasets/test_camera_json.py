@@ -117,7 +117,7 @@ class TestCameraFromJson:
             ("x_focal_length", None, "is null, not a number"),
             ("principal_point", [1.0], "has 1 numbers, not 2"),
             ("position_meters", [1.0, float("inf"), 2.0], "not a finite number"),
-            ("position_meters", [1.0, "a", 2.0], "'a', not a number"),
+            ("position_meters", [1.0, "a", 2.0], '"a", not a number'),
             ("radial_distortion", [0.0] * 5, "has 5 numbers, not 6"),
             ("tangential_distortion", {}, "not a list"),
             ("rotation_matrix", [[1, 0, 0]], "has 1 rows, not 3"),

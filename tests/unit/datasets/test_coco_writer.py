@@ -70,7 +70,7 @@ class TestWriteCoco:
         assert (image["group_id"], image["view"]) == (f"{match}/7.png", "7_1.png")
         assert camera_from_json(image["camera"], "f") == camera
         assert image["ball_3d"] == [1.5, -2.25, -0.113]
-        assert image["jac"] == {"0.5": 0.9, "1.0": 1.0, "2.0": 1.0}
+        assert image["jac"] == {"0.5": 0.9, "1": 1.0, "2": 1.0, "1.0": 1.0, "2.0": 1.0}
         assert image["verdict"] == "accepted"
 
     def test_a_view_that_fell_says_nothing_of_the_3d_ball_unless_all_is_asked(

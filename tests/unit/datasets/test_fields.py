@@ -21,7 +21,7 @@ class TestNumber:
         [None, True, [], {}, "", " ", "abc", "nan", "inf", "1_0", "0x1", "1e999", 10**400],
     )
     def test_anything_else_is_refused(self, value: Any) -> None:
-        with pytest.raises(ValueError, match=r"is (null|a|an|blank|too|')"):
+        with pytest.raises(ValueError, match=r"is (null|a|an|blank|too|\")"):
             fields.number(value)
 
     @pytest.mark.parametrize("value", [float("nan"), float("inf")])

@@ -86,6 +86,26 @@ class TestOutputTree:
         with pytest.raises(InputError, match="is no earlier export"), output_tree(tmp_path):
             raise AssertionError("not reached")
 
+    @pytest.mark.parametrize("kind", ["text", "zip", "mixed", "link"])
+    def test_a_foreign_file_that_ends_in_zip_is_never_replaced(
+        self, tmp_path: Path, kind: str
+    ) -> None:
+        out = tmp_path / "out.zip"
+        if kind == "text":
+            out.write_text("my thesis")
+        elif kind == "link":
+            _export(tmp_path / "real.zip")
+            out.symlink_to(tmp_path / "real.zip")
+        else:
+            if kind == "mixed":
+                _export(out)
+            with zipfile.ZipFile(out, "a") as archive:
+                archive.writestr("thesis.txt", "mine")
+        before = out.read_bytes()
+        with pytest.raises(InputError, match="is no earlier export"), output_tree(out):
+            raise AssertionError("not reached")
+        assert out.read_bytes() == before
+
     def test_an_empty_folder_is_used(self, tmp_path: Path) -> None:
         (tmp_path / "out").mkdir()
         _export(tmp_path / "out")

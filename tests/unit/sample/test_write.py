@@ -89,6 +89,23 @@ class TestWriteSample:
         assert report.faults == 0
         assert not any(truth.faults for truth in read_truth(tmp_path).values())
 
+    @pytest.mark.parametrize("there", [False, True])
+    def test_an_interrupted_one_leaves_what_was_there_and_no_more(
+        self, tmp_path: Path, there: bool
+    ) -> None:
+        out = tmp_path / "deep" / "out"
+        if there:
+            out.mkdir(parents=True)
+            (out / "mine.txt").write_text("mine")
+        before = sorted(tmp_path.rglob("*"))
+
+        def interrupt(*_: object) -> None:
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            write_sample(out, 20, 3, labels_only=True, workers=1, progress=interrupt)
+        assert sorted(tmp_path.rglob("*")) == before
+
     def test_a_file_in_the_way_is_named(self, tmp_path: Path):
         file = tmp_path / "occupied"
         file.write_text("x")

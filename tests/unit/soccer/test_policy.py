@@ -61,6 +61,12 @@ class TestThresholds:
         inner = {f"{CALIBRATION}.{item.name}" for item in fields(CalibrationPolicy)}
         assert {threshold.name for threshold in THRESHOLDS} == own | inner
 
+    def test_each_that_a_gate_compares_with_says_how_and_jac_alone_must_be_exceeded(self):
+        asks = {threshold.name: threshold.asks for threshold in THRESHOLDS if threshold.asks}
+        compared = {item.name for item in THRESHOLDS if item.gate} - {"jac_gamma_percent"}
+        assert set(asks) == compared
+        assert [name for name, words in asks.items() if words == "more than"] == ["min_jac"]
+
     def test_thresholds_of_gates_come_first_and_in_the_order_of_the_gates(self):
         subjects = list(dict.fromkeys(threshold.subject for threshold in THRESHOLDS))
         assert subjects == [subject for subject in SUBJECTS if subject in subjects]

@@ -6,6 +6,7 @@ import io
 import threading
 import zipfile
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,7 +15,8 @@ from app.api.routers import exports as module
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
 from app.review.jobs.jobs import Jobs
-from app.soccer.group import Media
+from app.soccer.frames import ImageSize
+from app.soccer.group import Group, Media, Station, View
 from app.store.frames import Picture
 from tests.waiting import SECONDS
 
@@ -54,6 +56,7 @@ class TestMakeExport:
             assert "manifest.json" in archive.namelist()
         document = api.get(f"{API}/{job['id']}").json()
         assert (document["status"], document["counts"]["cameras"]) == ("ready", 2)
+        assert document["state"] == "done"
         assert document["bytes"] == len(content.content)
         done = api.get(f"/api/v1/jobs/{job['id']}").json()
         assert (done["state"], done["done"], done["total"]) == ("done", 3, 3)
@@ -73,6 +76,48 @@ class TestMakeExport:
         assert api.post(API, json={**ORDER, "all": False, "version": 7}).status_code == 404
         assert app.state.services.jobs.find() == []
 
+    @pytest.mark.parametrize(
+        ("order", "status", "pointer", "words"),
+        [
+            ({"images": "copy"}, 400, "/images", "none of the images"),
+            ({"version": "v1"}, 400, "/all", "its own groups"),
+            ({"format": "touchline", "version": 1}, 400, "/version", "whole dataset"),
+            ({"format": "issia-3d"}, 400, None, "is not from ISSIA"),
+            ({"all": False, "version": "v9"}, 404, None, "no version"),
+        ],
+    )
+    def test_what_could_only_fail_is_refused_and_no_job_begins(
+        self, app, api, order, status, pointer, words
+    ) -> None:
+        answer = api.post(API, json={**ORDER, **order})
+        assert (answer.status_code, answer.json()["pointer"]) == (status, pointer)
+        assert words in answer.json()["detail"]
+        assert app.state.services.jobs.find() == []
+
+    def test_the_images_of_many_groups_are_looked_for_beyond_the_first(
+        self, app, api, group, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.review.exporting.export.TRIED", 1)
+        framed = [
+            replace(group, key=f"{n}.png", views=tuple(
+                replace(view, media=Media(str(tmp_path / f"{n}.png"))) for view in group.views
+            ))
+            for n in range(3)
+        ]  # fmt: skip
+        ingest(app.state.services.store, "many", framed, source="test", actor="local")
+        order = {**ORDER, "dataset": "many", "images": "copy"}
+        assert api.post(API, json=order).status_code == 400
+        (tmp_path / "2.png").write_bytes(b"a picture")
+        assert api.post(API, json=order).status_code == 202
+
+    def test_a_format_without_room_for_anything_that_is_there_is_refused(self, app, api) -> None:
+        services = app.state.services
+        bare = Group("1.png", (View("1.png", Station("1.png", ImageSize(1280, 720))),), "m")
+        ingest(services.store, "bare", [bare], source="test", actor="local")
+        answer = api.post(API, json={**ORDER, "dataset": "bare"})
+        assert (answer.status_code, "camera" in answer.json()["detail"]) == (400, True)
+        assert services.jobs.find() == []
+
     def test_what_fails_while_it_is_written_says_why_and_leaves_nothing(
         self, app, api, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -90,6 +135,9 @@ class TestMakeExport:
         assert content.status_code == 409
         assert "No space left" in content.json()["detail"]
         assert list(app.state.services.exports.folder.iterdir()) == []
+        assert api.delete(f"{API}/{job['id']}").status_code == 204
+        assert api.get(f"{API}/{job['id']}").status_code == 404
+        assert api.get(API).json()["items"] == []
 
 
 class TestListExports:
@@ -129,11 +177,14 @@ class TestCancel:
         from app.review.exporting import export
 
         jobs: Jobs = app.state.services.jobs
-        plain, started = export.write_format, threading.Event()
+        plain, started, calls = export.write_format, threading.Event(), list[Any]()
 
         def slow(*arguments: Any, **options: Any) -> Any:
-            started.set()
-            assert cancelled.wait(SECONDS)
+            calls.append(arguments)
+            # The first call is that of the request, which tries whether it can be.
+            if len(calls) > 1:
+                started.set()
+                assert cancelled.wait(SECONDS)
             return plain(*arguments, **options)
 
         cancelled = threading.Event()
@@ -145,6 +196,8 @@ class TestCancel:
         assert jobs.wait(job["id"], SECONDS).state == "cancelled"
         assert list(app.state.services.exports.folder.iterdir()) == []
         assert api.get(f"{API}/{job['id']}").json()["status"] == "cancelled"
+        assert api.delete(f"{API}/{job['id']}").status_code == 204
+        assert api.get(API).json()["items"] == []
 
 
 class TestDeleteExport:
@@ -164,10 +217,12 @@ class TestDeleteExport:
 
 class TestRestart:
     def test_its_frames_are_read_by_other_processes(
-        self, app, api, group, monkeypatch: pytest.MonkeyPatch
+        self, app, api, group, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         services, read = app.state.services, list[str]()
-        views = [replace(view, media=Media(f"/frames/{view.key}")) for view in group.views]
+        views = [replace(view, media=Media(str(tmp_path / view.key))) for view in group.views]
+        for view in views:
+            (tmp_path / view.key).write_bytes(b"a picture")
         framed = replace(group, views=tuple(views))
         ingest(services.store, "framed", [framed], source="test", actor="local")
         solve_dataset(services.store, "framed")
@@ -182,7 +237,7 @@ class TestRestart:
         done = services.jobs.wait(job["id"], SECONDS)
         assert done.state == "done", done.problem
         assert done.result["missing_images"] == 0
-        assert read == ["/frames/7.png", "/frames/7_1.png"]
+        assert read == [str(tmp_path / "7.png"), str(tmp_path / "7_1.png")]
 
     def test_an_export_that_was_under_way_is_written_by_the_next_server(
         self, app, api, monkeypatch: pytest.MonkeyPatch

@@ -216,3 +216,35 @@ class TestVerdict:
     )
     def test_a_body_of_another_shape_is_422(self, api, document, verdict) -> None:
         assert put(api, document, verdict).status_code == 422
+
+
+class TestActor:
+    def test_a_script_that_says_its_name_is_remembered_as_one(self, api) -> None:
+        named = api.get(f"{API}/groups/1").json()
+        headers = {"If-Match": named["etag"], "X-Actor": "local"}
+        sent = api.put(f"{API}/groups/1/verdict", json={"state": "deferred"}, headers=headers)
+        assert sent.json()["verdict"]["by"] == "script:local"
+        found = api.get(
+            f"{API}/groups", params={"dataset": "broadcast", "q": "reviewer:script:local"}
+        )
+        assert [item["id"] for item in found.json()["items"]] == [1]
+
+    @pytest.mark.parametrize("name", ["", "a\tb", "<b>", "x" * 61, "Jos\u00e9".encode()])
+    def test_a_name_that_cannot_be_is_refused_and_nothing_is_done(self, api, name) -> None:
+        before = api.get(f"{API}/groups/1").json()
+        headers = {"If-Match": before["etag"], "X-Actor": name}
+        sent = api.put(f"{API}/groups/1/verdict", json={"state": "deferred"}, headers=headers)
+        assert (sent.status_code, sent.json()["pointer"]) == (400, "/X-Actor")
+        assert api.get(f"{API}/groups/1").json()["etag"] == before["etag"]
+
+    def test_the_same_key_under_another_name_is_another_request(self, api) -> None:
+        sent = {"name": "one", "q": ""}
+        answers = [
+            api.post(
+                f"{API}/datasets/broadcast/saved-views",
+                json=sent,
+                headers={"Idempotency-Key": "k", "X-Actor": name},
+            ).status_code
+            for name in ("a", "a", "b")
+        ]
+        assert answers == [201, 201, 422]

@@ -6,6 +6,7 @@ import io
 import zipfile
 from pathlib import Path
 from typing import Any
+from unittest.mock import ANY
 
 import cv2
 import numpy as np
@@ -61,7 +62,22 @@ class TestStartImport:
         jobs = app.state.services.jobs
         (solving,) = jobs.find(kinds=["solve"])
         jobs.wait(solving.id, SECONDS)
+        (job,) = jobs.find(kinds=["import"])
+        assert job.result["solve_job"] == solving.id
+        again = finished(app, api.post(API, json=body()))
+        assert again.result["solve_job"] is None
         assert get_dataset(app.state.services.store, "fresh").solved == 1
+
+    def test_its_job_carries_the_dataset_from_the_beginning(self, app, api, tree) -> None:
+        answer = api.post(API, json=body())
+        assert answer.json()["dataset"] == "fresh"
+        job = finished(app, answer)
+        found = get_dataset(app.state.services.store, "fresh")
+        assert (job.dataset, job.dataset_id) == ("fresh", found.id)
+        kinds = [item["kind"] for item in api.get("/api/v1/jobs?dataset=fresh").json()["items"]]
+        assert "import" in kinds
+        dry = finished(app, api.post(API, json=body(dataset="tried", dry_run=True)))
+        assert (dry.dataset, dry.dataset_id) == ("tried", None)
 
     def test_a_dry_run_says_the_same_and_keeps_nothing(self, app, api, tree) -> None:
         dry = finished(app, api.post(API, json=body(dry_run=True))).result
@@ -69,7 +85,8 @@ class TestStartImport:
             "broadcast", "static",
         ]  # fmt: skip
         done = finished(app, api.post(API, json=body())).result
-        assert {**dry, "dry_run": False} == done
+        assert {**dry, "dry_run": False, "solve_job": done["solve_job"]} == done
+        assert (dry["solve_job"], done["solve_job"]) == (None, ANY)
 
     def test_an_upload_is_read_in_place_and_stays(self, app, api, tree) -> None:
         packed = io.BytesIO()

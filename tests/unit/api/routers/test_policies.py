@@ -33,6 +33,7 @@ class TestListPolicies:
             "maximum": 5.0,
             "choices": [],
             "gate": "reprojection",
+            "asks": "at most",
             "optional": False,
         }
         assert fields["calibration.check_labels"]["default"] is True
@@ -107,6 +108,16 @@ class TestSetPolicy:
         assert stale.json()["current"]["name"] == "strict"
         assert stale.json()["current"]["etag"] == stale.headers["etag"]
 
+    def test_a_name_that_does_not_exist_is_answered_with_the_nearest(self, api) -> None:
+        answer = put(api, {"name": "strictt"}).json()
+        assert "did you mean strict?" in answer["detail"]
+        assert "there are paper, strict" in put(api, {"name": "mine"}).json()["detail"]
+
+    def test_its_own_name_alone_changes_nothing(self, api) -> None:
+        put(api, {"name": "ours", "values": {"tau_percent": 0.5}})
+        assert put(api, {"name": "ours"}).status_code == 202
+        assert api.get(POLICY).json()["version"] == 2
+
     @pytest.mark.parametrize(
         ("body", "pointer"),
         [
@@ -116,6 +127,8 @@ class TestSetPolicy:
             ({"values": {"calibration": {"x": 1}}}, "/values/calibration/x"),
             ({"name": "paper", "values": {"tau_percent": 2}}, "/name"),
             ({"name": "<b>"}, "/name"),
+            ({"name": "strictt"}, "/name"),
+            ({"name": "strictt", "values": {}}, "/name"),
             ({"yaml": "tau: 1"}, "/yaml"),
             ({"yaml": "name: x", "name": "x"}, "/yaml"),
             ({}, None),

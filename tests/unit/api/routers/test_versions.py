@@ -110,6 +110,33 @@ class TestVersions:
         answer = api.get(f"{API}/versions/{second.id}/diff", params={"against": version.id})
         assert (answer.json()["same"], answer.json()["counts"]["unchanged"]) == (True, 3)
 
+    def test_is_found_by_id_name_and_hash_wherever_one_is_asked_for(
+        self, api, services, version
+    ) -> None:
+        second = freeze(
+            services.store, "broadcast", FreezeRequest("v2", groups="passing"), actor="a"
+        )
+        by_id = api.get(f"{API}/versions/{second.id}").json()
+        for name in ("v2", second.name):
+            assert api.get(f"{API}/versions/{name}").json() == by_id
+            assert api.get(f"{API}/versions/{name}/manifest").status_code == 200
+            changes = api.get(f"{API}/versions/{name}/changelog").json()
+            assert (changes["id"], changes["version"]) == (second.id, "v2")
+        for older in (version.id, version.name):
+            answer = api.get(f"{API}/versions/v2/diff", params={"against": older})
+            assert answer.status_code == 200, answer.text
+        assert ended(services, api.post(f"{API}/versions/v2/verify"))["state"] == "done"
+
+    def test_a_name_of_several_datasets_asks_for_the_dataset(self, api, services, version) -> None:
+        other = freeze(
+            services.store, "static", FreezeRequest(version.name, groups="passing"), actor="a"
+        )
+        address = f"{API}/versions/{version.name}"
+        refused = api.get(address)
+        assert (refused.status_code, "broadcast" in refused.json()["detail"]) == (400, True)
+        assert api.get(address, params={"dataset": "static"}).json()["id"] == other.id
+        assert api.get(f"{API}/versions/{other.hash[:12]}").status_code in (200, 400)
+
     def test_verifying_is_a_job_that_reports(self, api, services, version) -> None:
         job = ended(services, api.post(f"{API}/versions/{version.id}/verify"))
         assert job["result"]["ok"], job

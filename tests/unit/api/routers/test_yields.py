@@ -40,16 +40,14 @@ class TestReadYield:
 
 class TestTryPolicy:
     def test_other_thresholds_are_tried_and_not_kept(self, api) -> None:
-        answer = api.post(PATH, json={"min_parallax_degrees": 179.0, "min_jac": 0.1})
+        answer = api.post(PATH, json={"max_sigma_m": 0.01, "min_jac": 0.1})
         assert answer.status_code == 200
         found = answer.json()
         assert (found["passing"], found["lost"], found["gained"]) == (0, 3, 0)
-        assert gates(answer)["parallax"] == 3
-        assert found["policy"]["min_parallax_degrees"] == 179.0
+        assert gates(answer)["sigma"] == 3
+        assert found["policy"]["max_sigma_m"] == 0.01
         assert api.get(PATH).json()["passing"] == 3
-        assert (
-            api.get("/api/v1/datasets/broadcast").json()["policy"]["min_parallax_degrees"] is None
-        )
+        assert api.get("/api/v1/datasets/broadcast").json()["policy"]["max_sigma_m"] is None
 
     def test_null_switches_an_optional_gate_off_and_is_refused_elsewhere(self, api) -> None:
         policy = "/api/v1/datasets/broadcast/policy"
@@ -70,10 +68,15 @@ class TestTryPolicy:
             ({"minimum": 1}, "/minimum"),
             ({"min_jac": "x"}, "/min_jac"),
             ({"tau_percent": 1e300}, "/tau_percent"),
+            ({"tau_percent": 5.1}, "/tau_percent"),
+            ({"min_jac": -0.5}, "/min_jac"),
+            ({"min_parallax_degrees": 179}, "/min_parallax_degrees"),
+            ({"point": "median"}, "/point"),
+            ({"calibration": {"distortion_sigma": 0}}, "/calibration/distortion_sigma"),
             ({"calibration": {"x": 1}}, "/calibration/x"),
         ],
     )
-    def test_an_unknown_threshold_is_422(self, api, body: Any, pointer: str) -> None:
+    def test_a_threshold_that_cannot_be_is_422(self, api, body: Any, pointer: str) -> None:
         answer = api.post(PATH, json=body)
         assert (answer.status_code, answer.json()["pointer"]) == (422, pointer)
 

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 
 from app.review.datasets.fan_out import AHEAD, fan_out
+from tests.waiting import SECONDS
 
 
 class TestFanOut:
@@ -26,3 +28,23 @@ class TestFanOut:
             next(results)
             assert len(made) <= AHEAD + 1
             results.close()
+
+    def test_once_told_to_stop_what_is_done_is_given_and_nothing_is_waited_for(self) -> None:
+        held, stopped = Event(), Event()
+
+        def work(number: int) -> int:
+            if number:
+                assert held.wait(SECONDS)
+            return number
+
+        with ThreadPoolExecutor(3) as executor:
+            results = fan_out(work, range(5), executor, stopped.is_set)
+            found = [next(results)]
+            stopped.set()
+            found += list(results)
+            held.set()
+        assert found == [0]
+
+    def test_without_an_executor_it_stops_before_the_next_task(self) -> None:
+        stops = iter([False, False, True])
+        assert list(fan_out(abs, [-1, -2, -3], None, lambda: next(stops))) == [1, 2]

@@ -83,6 +83,12 @@ class TestSolveDataset:
         assert stale_groups(store, "demo") == ids[4:]
         assert solve_dataset(store, "demo").solved == 2
 
+    def test_a_run_that_is_told_to_stop_keeps_what_is_done(self, store, ids, small_chunks) -> None:
+        asked = iter([False, False, True])
+        report = solve_dataset(store, "demo", stop=lambda: next(asked, True))
+        assert (report.total, report.solved) == (6, 4)
+        assert stale_groups(store, "demo") == ids[4:]
+
     def test_a_group_that_breaks_the_solver_stops_no_other(self, store, ids, monkeypatch) -> None:
         monkeypatch.setattr(module, "solve_encoded", stumbling)
         report = solve_dataset(store, "demo")

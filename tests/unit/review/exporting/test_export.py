@@ -283,6 +283,20 @@ class TestImages:
         assert len(report.missing_images) == 1
         assert "7_1.png" in report.missing_images[0]
 
+    def test_views_that_came_without_a_picture_are_named_once_where_images_are_wanted(
+        self, store, fill, make_group, tmp_path
+    ) -> None:
+        group = make_group(7)
+        (tmp_path / "7.png").write_bytes(cv2.imencode(".png", np.zeros((9, 16, 3)))[1].tobytes())
+        first, second = group.views
+        first = replace(first, media=Media(str(tmp_path / "7.png")))
+        fill(group.with_view(first).with_view(replace(second, media=None)))
+        for images, named in (("copy", 1), ("none", 0)):
+            out = tmp_path / images
+            report = export(store, "demo", "yolo", out, everything=True, images=images)
+            assert len(report.missing_images) == named
+            assert all("no picture came with it" in line for line in report.missing_images)
+
     def test_labels_name_the_images_that_were_copied(self, store, framed, tmp_path) -> None:
         _, data = framed
         for form in ("yolo", "coco", "parquet"):

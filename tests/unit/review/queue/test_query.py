@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.errors import InputError
+from app.review.queue.fields import BY_NAME, COMPARED, FIELDS, QueryField
 from app.review.queue.query import MAX_LENGTH, MAX_LISTED_LENGTH, NUMBERS, SORTS, parse_query
 
 
@@ -93,3 +94,44 @@ class TestParseQuery:
         except InputError as error:
             assert error.pointer is not None
             assert error.pointer.startswith("/q")
+
+
+class TestFields:
+    @pytest.mark.parametrize("field", FIELDS, ids=lambda field: field.name)
+    def test_has_just_the_operators_that_its_table_says(self, field: QueryField) -> None:
+        value = {"number": "1.5", "ids": "12"}.get(field.kind) or next(iter(field.values), "x")
+        for name in (field.name, *field.also):
+            for op in COMPARED:
+                if op in field.operators:
+                    parse_query(f"{name}{op}{value}")
+                else:
+                    with pytest.raises(InputError) as refused:
+                        parse_query(f"jac<1 {name}{op}{value}")
+                    assert (refused.value.pointer, "it has : and =" in refused.value.message) == (
+                        "/q/6",
+                        True,
+                    )
+
+    @pytest.mark.parametrize("field", FIELDS, ids=lambda field: field.name)
+    def test_takes_every_value_of_its_table(self, field: QueryField) -> None:
+        for value in field.values:
+            parse_query(f"{field.name}:{value}")
+        if field.several and len(field.values) > 1:
+            parse_query(f"{field.name}:{','.join(field.values)}")
+
+    @pytest.mark.parametrize(
+        "text", ["status<accepted", "passes>yes", "match>=a", "id<12", "sort<x"]
+    )
+    def test_only_numbers_have_an_order(self, text: str) -> None:
+        assert pointer(text) == "/q/0"
+
+    def test_one_that_there_is_not_is_answered_with_the_nearest(self) -> None:
+        with pytest.raises(InputError, match="did you mean sigma"):
+            parse_query("sigmaa<0.1")
+
+    def test_an_order_has_no_opposite(self) -> None:
+        assert pointer("-sort:value") == "/q/0"
+
+    def test_columns_and_queries_speak_of_the_same_by_both_names(self) -> None:
+        for row, asked in (("min_jac", "jac"), ("error_px", "error"), ("first_failing", "gate")):
+            assert BY_NAME[row] is BY_NAME[asked]

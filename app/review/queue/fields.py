@@ -1,0 +1,152 @@
+"""Fields: what a query can ask of a group, in one table for the parser, the documents and the browser."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from app.soccer.reasons import REASONS
+from app.soccer.solution import FINDING_KINDS, GATES
+
+Kind = Literal["number", "flag", "choice", "text", "ids", "order"]
+COMPARED = (":", "=", "<", "<=", ">", ">=")
+NAMED = (":", "=")
+
+
+@dataclass(frozen=True)
+class QueryField:
+    """One field of a query.
+
+    Attributes:
+        kind: ``number`` compares, ``flag`` is yes or no, ``choice`` one of ``values``, ``text`` any
+            text, ``ids`` numbers of groups, ``order`` says how the groups are listed.
+        unit: Of a number.
+        values: What it can be, or, of a text, words that mean something of their own.
+        also: Other names that are understood.
+        column: Of the queue.
+    """
+
+    name: str
+    kind: Kind
+    meaning: str
+    unit: str = ""
+    values: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
+    column: str = ""
+
+    @property
+    def operators(self) -> tuple[str, ...]:
+        """The operators that it has; ``:`` and ``=`` mean the same."""
+        return COMPARED if self.kind == "number" else NAMED
+
+    @property
+    def several(self) -> bool:
+        """Whether ``a,b`` means either."""
+        return self.kind in ("choice", "text", "ids")
+
+
+@dataclass(frozen=True)
+class QueryOrder:
+    """One order of a list; ``name-desc`` is its reverse. What has no value comes last in both."""
+
+    name: str
+    column: str
+    meaning: str
+
+
+STATUSES = ("unreviewed", "accepted", "rejected", "deferred")
+YES_NO = ("yes", "no")
+WHETHER = ("any", "none")
+
+
+def _number(name: str, column: str, meaning: str, unit: str = "", *also: str) -> QueryField:
+    others = (*also, column) if column != name else also
+    return QueryField(name, "number", meaning, unit, ("none",), others, column)
+
+
+def _text(name: str, meaning: str, values: tuple[str, ...] = WHETHER) -> QueryField:
+    return QueryField(name, "text", meaning, values=values)
+
+
+def _flag(name: str, meaning: str) -> QueryField:
+    return QueryField(name, "flag", meaning, values=YES_NO)
+
+
+_ASKED = (
+    QueryField("status", "choice", "verdict", values=STATUSES, also=("state",)),
+    QueryField("finding", "choice", "what was noticed", values=(*WHETHER, *FINDING_KINDS)),
+    QueryField(
+        "gate", "choice", "first failing gate; none: it passes", values=("none", "unsolved", *GATES),
+        also=("first_failing",),
+    ),
+    QueryField("reason", "text", "why it was rejected", values=(*WHETHER, *REASONS)),
+    _flag("stale", "changed after its verdict"),
+    _flag("solved", "has numbers"),
+    _flag("passes", "passes every gate"),
+    _flag("fixed", "edited before it was accepted"),
+    QueryField("pictures", "choice", "whether its views have a picture", values=("none", "any", "all")),
+    _text("split", "train, test and so on, all of it"),
+    _text("match", "part of the match's name", ()),
+    _text("reviewer", "who decided"),
+    _text("view", "key of a view, or how many views there are", ()),
+    _text("label", "part of the label or of the key, as a bare word", ()),
+    _text("key", "key of the group, all of it"),
+    _text("override", "gate that an acceptance overrides"),
+    QueryField("id", "ids", "groups one by one: id:12,15,19"),
+    _number("jac", "min_jac", "smallest JaC of the views at the policy's tolerance, 0 to 1", "", "jac05"),
+    _number("error", "error_px", "largest reprojection error of the ball", "px"),
+    _number("error_percent", "error_percent", "the same", "% of the image diagonal"),
+    _number("sigma", "sigma_m", "standard deviation of the ball along its worst axis", "m"),
+    _number("parallax", "parallax_degrees", "largest angle between two rays at the ball", "degrees"),
+    _number("size_ratio", "size_ratio", "diameter of the ball's box by the expected one", "", "ratio"),
+    _number("height", "height_m", "ball above the grass", "m"),
+    _number("distance", "distance_m", "from the camera of the first view to the ball", "m"),
+    _number("box", "box_px", "diameter of the ball's box in the first view that shows it", "px"),
+    _number("x", "x_m", "ball along the pitch, from its centre to the right", "m"),
+    _number("y", "y_m", "ball across the pitch, from its centre to the main camera", "m"),
+    _number(
+        "margin", "margin",
+        "how far the deciding gate is from its threshold: 0.1 is 10 % of it, below 0 fails", "share",
+    ),
+    _number(
+        "value", "value", "the margin without its sign: small where a small mistake decides", "share"
+    ),
+    _number("views", "views", "how many views"),
+    _number("number", "number", "place in the dataset, from 1"),
+)  # fmt: skip
+
+ORDERS = (
+    QueryOrder("value", "value", "closest to a gate's threshold first"),
+    QueryOrder("newest", "changed", "changed last first; `newest-desc` the other way round"),
+    QueryOrder("sigma", "sigma_m", "most certain first"),
+    QueryOrder("jac", "min_jac", "smallest first"),
+    QueryOrder("error", "error_px", "smallest first"),
+    QueryOrder("error_percent", "error_percent", "smallest first"),
+    QueryOrder("parallax", "parallax_degrees", "smallest first"),
+    QueryOrder("margin", "margin", "failing by most first"),
+    QueryOrder("ratio", "size_ratio", "box smallest beside what is expected first"),
+    QueryOrder("height", "height_m", "lowest first"),
+    QueryOrder("distance", "distance_m", "nearest first"),
+    QueryOrder("box", "box_px", "smallest first"),
+    QueryOrder("x", "x_m", "leftmost first"),
+    QueryOrder("y", "y_m", "farthest from the main camera first"),
+    QueryOrder("views", "views", "fewest first"),
+    QueryOrder("findings", "findings", "fewest kinds of findings first"),
+    QueryOrder("gate", "gate", "by the first failing gate, in the order in which they are judged"),
+    QueryOrder("status", "status", "by letters"),
+    QueryOrder("split", "split", "by letters"),
+    QueryOrder("reviewer", "reviewer", "by letters"),
+    QueryOrder("label", "label", "by letters"),
+    QueryOrder("number", "number", "as in the dataset; the order where none is asked"),
+)
+"""Equal groups stand as in the dataset."""
+
+FIELDS = (
+    *_ASKED,
+    QueryField(
+        "sort", "order", "order of the list",
+        values=tuple(text for order in ORDERS for text in (order.name, f"{order.name}-desc")),
+    ),
+)  # fmt: skip
+BY_NAME = {name: field for field in FIELDS for name in (field.name, *field.also)}
+"""Fields by every name that is understood."""
