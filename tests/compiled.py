@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from app.paint.view_paint import paint_of
+from app.paint.view_proposal import proposal_of
 from app.sample.render import render
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
@@ -10,11 +14,14 @@ from tests.scenes import make_scenes
 
 
 def compile_all() -> None:
-    """Solve a group and draw one of its pictures; what was compiled before is loaded."""
+    """Solve a group, draw one of its pictures and read it; what was compiled before is loaded."""
     warm_up()
     scene = make_scenes(groups=1, seed=3, faults=False)[0]
-    solve(scene.group, PAPER)
-    render(scene, scene.group.views[0].key)
+    first = solve(scene.group, PAPER).views[0].calibration
+    view, pitch, policy = scene.group.views[0], scene.group.pitch, PAPER.calibration
+    image = np.ascontiguousarray(render(scene, view.key)[:, :, ::-1])
+    assert paint_of(image, view.size, first, pitch, policy).outcome == "snapped"
+    assert proposal_of(image, view.size, (), pitch, policy).lines
 
 
 if __name__ == "__main__":

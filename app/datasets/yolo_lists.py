@@ -11,6 +11,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO
 
+from app.finite import json_text
+
 LISTS = ("train", "val", "test")
 HELD_OUT = 10
 """Where no split validates, one in so many training images does."""
@@ -66,7 +68,7 @@ class ImageLists:
             self._newest, self._groups = (match, group), self._groups + 1
         self._matches[match] += 1
         # Which of them train is known once all have been seen.
-        self._waiting.write(json.dumps([match, self._groups, image]) + "\n")
+        self._waiting.write(json_text([match, self._groups, image]) + "\n")
 
     def _finish(self) -> None:
         held_out = self._held_out()

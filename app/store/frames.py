@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.child import Allowance, ChildEnded
-from app.child_pool import ChildPool, Explain, PoolTask
+from app.child_pool import ChildPool, PoolTask
 from app.config import Settings
 from app.errors import ImageError, ReviewError, TooLargeError
 from app.soccer.group import Media
@@ -24,6 +24,10 @@ from app.store.neighbours import neighbours
 
 ALLOWANCE = Allowance(memory=1024 * 2**20, processor=10.0, silence=60.0)
 """For one picture: one of 50 megapixels takes a few hundred MiB and two seconds."""
+READING = Allowance(memory=2 * 2**30, processor=60.0, silence=180.0)
+"""For reading what a picture shows; the first time it is compiled, which takes half a minute."""
+READERS = 2
+"""Pictures that are read at once; apart from those that are made, so that nobody's view waits."""
 WAITING = 64
 """Pictures that may wait; one more is told to come back."""
 REMEMBERED = 256
@@ -58,6 +62,7 @@ class Frames:
     def __init__(self, settings: Settings):
         self._settings = settings
         self._pool = ChildPool(ALLOWANCE, settings.image_workers, WAITING, "pictures")
+        self._readers = ChildPool(READING, READERS, WAITING, "pictures")
         self._refused: OrderedDict[str, ReviewError] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -108,6 +113,7 @@ class Frames:
     def close(self) -> None:
         """End the processes."""
         self._pool.close()
+        self._readers.close()
 
     def ask_of(
         self, media: Media, flipped: bool, work: Callable[..., Any], *arguments: Any
@@ -120,9 +126,12 @@ class Frames:
             NotFoundError: The file is not there.
             OverloadedError: Too many wait.
         """
-        explain = self._explain(media)
-        return self._pool.submit(
-            work, media, flipped, self._settings, *arguments, explain=explain, bounded=True
+
+        def explain(error: ChildEnded) -> ReviewError:
+            return _refusal(media, error)
+
+        return self._readers.submit(
+            work, media, flipped, self._settings, *arguments, explain=explain
         )
 
     def ask_to(self, work: Callable[..., Any], *arguments: Any) -> PoolTask:
@@ -133,34 +142,29 @@ class Frames:
         Raises:
             OverloadedError: Too many wait.
         """
-        return self._pool.submit(work, *arguments, self._settings)
+        return self._readers.submit(work, *arguments, self._settings)
 
     def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
-        return self._pool.submit(
-            make_picture,
-            media,
-            width,
-            flipped,
-            self._settings,
-            explain=self._explain(media),
-            bounded=bounded,
-        )
-
-    def _explain(self, media: Media) -> Explain:
         def explain(error: ChildEnded) -> ReviewError:
-            kind = ImageError if error.reason == "crash" else TooLargeError
-            refusal = kind(f"{frame_name(media)} {error}")
+            refusal = _refusal(media, error)
             if error.reason in LIMITS:
                 self._remember(media, refusal)
             return refusal
 
-        return explain
+        return self._pool.submit(
+            make_picture, media, width, flipped, self._settings, explain=explain, bounded=bounded
+        )
 
     def _remember(self, media: Media, refusal: ReviewError) -> None:
         with self._lock:
             self._refused[frame_stamp(media)] = refusal
             while len(self._refused) > REMEMBERED:
                 self._refused.popitem(last=False)
+
+
+def _refusal(media: Media, error: ChildEnded) -> ReviewError:
+    kind = ImageError if error.reason == "crash" else TooLargeError
+    return kind(f"{frame_name(media)} {error}")
 
 
 def make_picture(media: Media, width: int | None, flipped: bool, settings: Settings) -> Picture:

@@ -39,6 +39,7 @@ from app.review.policies.policy import read_policy
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.store.session import Store
 from app.store.uploads import UploadWriter
+from tests.waiting import SECONDS
 
 EXAMPLES = 5
 EVALUATION, DELETED_EVALUATION = "1", "2"
@@ -97,6 +98,7 @@ def api_schema(application: FastAPI) -> schemathesis.BaseSchema:
     """The document as the service gives it."""
     project = ProjectConfig(
         base_url="http://127.0.0.1",
+        request_timeout=SECONDS,
         generation=GenerationConfig(deterministic=True),
         checks=ChecksConfig(
             positive_data_acceptance=PositiveDataAcceptanceConfig(expected_statuses=REFUSALS)
