@@ -33,6 +33,7 @@ MAX_ID = 2**63 - 1
 NUMBERS = {
     "jac": "min_jac",
     "jac05": "min_jac",
+    "agreement": "agreement",
     "error": "error_px",
     "error_percent": "error_percent",
     "sigma": "sigma_m",
@@ -61,7 +62,7 @@ is one."""
 
 _SORTED = (
     "number", "value", "sigma", "jac", "error", "error_percent", "parallax", "margin", "ratio",
-    "height", "distance", "box", "x", "y", "views", "findings", "gate", "status", "split",
+    "agreement", "height", "distance", "box", "x", "y", "views", "findings", "gate", "status", "split",
     "reviewer", "label",
 )  # fmt: skip
 SORTS = {**{name: NUMBERS.get(name, name) for name in _SORTED}, "newest": "changed"}
