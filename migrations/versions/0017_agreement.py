@@ -15,4 +15,4 @@ depends_on: str | Sequence[str] | None = None
 
 
 def upgrade() -> None:
-    op.add_column("queue", sa.Column("agreement", sa.Float(), nullable=True))
+    op.add_column("queue", sa.Column("agreement", sa.Double(), nullable=True))

@@ -6,8 +6,8 @@
 /** @typedef {{[field: string]: string[]}} Facets   values that a dataset has: split, match, reviewer */
 
 const NUMBERS = /** @type {{[field: string]: string}} */ ({
-	jac: 'smallest JaC of the views, 0 to 1', error: 'ball reprojection error, px',
-	error_percent: 'the same, % of the diagonal', sigma: 'uncertainty of the ball, m',
+	jac: 'smallest JaC of the views, 0 to 1', agreement: 'least agreement of a camera with its paint, 0 to 1',
+	error: 'ball reprojection error, px', error_percent: 'the same, % of the diagonal', sigma: 'uncertainty of the ball, m',
 	parallax: 'largest angle between rays, °', size_ratio: 'box against expected diameter',
 	height: 'ball above the grass, m', distance: 'from the first view to the ball, m', box: 'diameter of the ball’s box, px',
 	x: 'ball along the pitch, m', y: 'ball across the pitch, m', margin: 'how far the deciding gate is from its threshold: 0.1 is 10 % of it, below 0 fails', value: 'the margin without its sign: small where a small mistake decides',
@@ -18,8 +18,8 @@ const FINDINGS = [
 	'view_disagrees', 'views_contradict', 'not_synchronous', 'ball_size', 'low_parallax', 'high_uncertainty', 'implausible_ball',
 	'implausible_camera', 'picture_geometry', 'paint_disagrees', 'no_paint', 'several_balls', 'upstream_changed', 'pitch_size',
 ];
-const GATES = ['none', 'calibratable', 'jac', 'two_views', 'ball', 'baseline', 'reprojection', 'parallax', 'sigma', 'chi_square'];
-const SORTS = ['value', 'newest', 'sigma', 'jac', 'error', 'error_percent', 'parallax', 'margin', 'ratio', 'height', 'distance', 'box', 'views', 'findings', 'gate', 'status', 'split', 'reviewer', 'label', 'number'];
+const GATES = ['none', 'calibratable', 'jac', 'agreement', 'two_views', 'ball', 'baseline', 'reprojection', 'parallax', 'sigma', 'chi_square'];
+const SORTS = ['value', 'newest', 'sigma', 'jac', 'agreement', 'error', 'error_percent', 'parallax', 'margin', 'ratio', 'height', 'distance', 'box', 'views', 'findings', 'gate', 'status', 'split', 'reviewer', 'label', 'number'];
 const VALUES = /** @type {{[field: string]: string[]}} */ ({
 	status: ['unreviewed', 'accepted', 'rejected', 'deferred'],
 	finding: FINDINGS,
