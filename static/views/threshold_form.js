@@ -21,7 +21,7 @@ function switchedOn(field, shipped) {
  */
 export function ThresholdForm({ fields, shipped, present, values, change, idle = '' }) {
 	const source = values['calibration.source'] ?? present['calibration.source'];
-	const unread = source === 'paint' ? '' : 'Cameras are found from lines: no paint to agree with.';
+	const unread = source === 'paint' ? '' : 'no effect: cameras are found from lines';
 	/** @param {PolicyField} field */
 	const one = (field) => html`
 		<${Threshold}
