@@ -174,6 +174,15 @@ class TestJudge:
         asked = judged(found, replace(PAPER, min_agreement=0.4))
         assert failing(asked)[0] == "jac" and "agreement" not in failing(asked)
 
+    def test_the_gate_that_leaves_too_few_views_is_to_blame(self):
+        policy = replace(PAPER, min_agreement=0.4)
+        one_line = np.array([*[1.0] * 4, *[1.0] * 4, *[6.0] * 4])
+        paint = three(mark_px=one_line, view_agreement=np.array([0.9, 0.1, np.nan]))
+        assert failing(judged(paint, policy))[:2] == ["agreement", "two_views"]
+        two_lines = np.array([*[1.0] * 4, *[6.0] * 4, *[6.0] * 4])
+        lines = three(mark_px=two_lines, view_agreement=np.array([0.1, 0.9, np.nan]))
+        assert failing(judged(lines, policy))[:2] == ["jac", "two_views"]
+
     def test_what_is_left_after_a_view_that_disagrees_is_judged(self):
         found = three(view_agreement=np.array([0.9, 0.8, 0.1]))
         asked = judged(found, replace(PAPER, min_agreement=0.4))

@@ -31,6 +31,7 @@ class TestStatistics:
         found = statistics(spread, 1)
         assert found.groups == 12
         assert len(found.histograms) == len(MEASURES) == 9
+        assert len({NUMBERS[measure.field] for measure in MEASURES}) == 9
         for histogram in found.histograms:
             assert len(histogram.queries) == len(histogram.measure.edges) - 1
             for place, query in enumerate(histogram.queries):
