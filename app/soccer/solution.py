@@ -138,8 +138,8 @@ class PaintFit:
 
     @property
     def agreement(self) -> float | None:
-        """Supported times explained, 0 to 1; None where too little paint is seen to judge by."""
-        if self.supported is None or self.explained is None or self.reason == "no_paint":
+        """Supported times explained, 0 to 1; None where nothing was measured."""
+        if self.supported is None or self.explained is None:
             return None
         return self.supported * self.explained
 

@@ -198,7 +198,7 @@ class TestSummary:
         # The second view is left out.
         fits = PaintFit(0.9, 0.8, 90), PaintFit(0.1, 0.2, 90), PaintFit(0.5, 0.5, 90)
         assert summarize(group, painted_views(solution, fits)).agreement == pytest.approx(0.25)
-        unseen = painted_views(solution, (PaintFit(0.1, 0.1, 4, reason="no_paint"), None, None))
+        unseen = painted_views(solution, (PaintFit(None, None, 0, reason="no_frame"), None, None))
         assert summarize(group, unseen).agreement is None
 
     def test_without_a_ball_the_best_pair_speaks(self, group, solution) -> None:
