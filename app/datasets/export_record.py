@@ -13,7 +13,7 @@ from app.soccer.frames import Box
 from app.soccer.group import Group, View
 from app.soccer.solution import BallFit, Solution, ViewSolution
 
-_NOT_CALIBRATED = ("calibratable", "jac")
+_NOT_CALIBRATED = ("calibratable", "jac", "agreement")
 
 
 @dataclass(frozen=True)

@@ -262,6 +262,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("jac_1", NUMBER, _jac(1)),
     ("jac_2", NUMBER, _jac(2)),
     ("line_error_px", NUMBER, _solved(lambda solved: solved.calibration.error_px)),
+    ("agreement", NUMBER, _solved(lambda solved: solved.calibration.agreement)),
     ("ball_x", NUMBER, _center(0)),
     ("ball_y", NUMBER, _center(1)),
     *((f"annotated_{side}", NUMBER, _box(_annotated, side)) for side in _SIDES),

@@ -98,6 +98,10 @@ class Policy:
     )
     min_jac: float = _threshold(0.75, "jac", "Share of field lines that fit", "", 0.0, 1.0)
     """A view qualifies strictly above."""
+    min_agreement: float | None = _threshold(
+        None, "agreement", "Smallest agreement with the paint", "", 0.0, 1.0, later=True
+    )
+    """Supported times explained of a view whose paint was read; a view falls below."""
     tau_percent: float = _threshold(
         1.0, "reprojection", "Largest reprojection error", "% of diagonal", 0.05, 5.0
     )

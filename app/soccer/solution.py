@@ -20,6 +20,7 @@ GAMMAS_PERCENT = (0.5, 1.0, 2.0)
 GATES = (
     "calibratable",
     "jac",
+    "agreement",
     "two_views",
     "ball",
     "baseline",
@@ -135,6 +136,13 @@ class PaintFit:
     error_px: float | None = None
     reason: str | None = None
 
+    @property
+    def agreement(self) -> float | None:
+        """Supported times explained, 0 to 1; None where nothing was measured."""
+        if self.supported is None or self.explained is None:
+            return None
+        return self.supported * self.explained
+
 
 @dataclass(frozen=True)
 class Calibration:
@@ -175,6 +183,11 @@ class Calibration:
     def is_bare(self) -> bool:
         """Whether the camera came with the data and nobody says how exact it is."""
         return self.source == "given" and not self.is_known
+
+    @property
+    def agreement(self) -> float | None:
+        """Of the camera with its paint, 0 to 1; None where none was read for the same clicks."""
+        return None if self.paint is None or self.camera is None else self.paint.agreement
 
     @property
     def position_sigma_m(self) -> float | None:
@@ -430,7 +443,7 @@ class Solution:
         """The gate to name to a person, or None when the group passes.
 
         The solver orders it: where a group is short of views because some fell at the first
-        two gates, that earlier gate is the one that failed.
+        gates of views, that earlier gate is the one that failed.
         """
         return next((gate for gate in self.gates if gate.active and not gate.passed), None)
 

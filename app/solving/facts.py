@@ -45,6 +45,7 @@ class Facts:
         view_slope: How far a point one metre deep on the ray of the ball moves in the picture,
             pixels per metre, NaN where the view has no such ray, shape (V, 2, 3).
         view_axis: Direction of depth, NaN likewise, shape (V, 3).
+        view_agreement: Of its camera with its paint, NaN where none was read.
         mark_view: Row of the view, shape (M,).
         mark_px: Largest distance of an annotated point of the marking, infinite without one.
         pair_group: Row of the group, shape (P,), like ``pair_...``.
@@ -72,6 +73,7 @@ class Facts:
     view_ball_px: FloatArray
     view_slope: FloatArray
     view_axis: FloatArray
+    view_agreement: FloatArray
     mark_view: IntArray
     mark_px: FloatArray
     pair_group: IntArray
@@ -132,8 +134,9 @@ COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
     "pair_parallax": (np.float64, ()),
     "pair_point": (np.float64, (3,)),
     "pair_moved": (np.float64, (2, 2, 2, 3)),
+    "view_agreement": (np.float64, ()),
 }
-"""Type of each array, and shape of one row of it."""
+"""Type of each array, and shape of one row of it; what came later stands last."""
 
 NOTHING = Facts(0, **{name: np.empty((0, *shape), kind) for name, (kind, shape) in COLUMNS.items()})
 """The facts of no group."""
@@ -198,6 +201,9 @@ def facts_of(
         view_ball_px=np.array([box.diameter if box is not None else 0.0 for box in boxes], float),
         view_slope=slopes,
         view_axis=axes,
+        view_agreement=np.array(
+            [np.nan if item.agreement is None else item.agreement for item in calibrations], float
+        ),
         mark_view=np.array([place for place, _ in marks], np.int64),
         mark_px=np.array([np.inf if apart is None else apart for _, apart in marks], float),
         pair_group=np.zeros(len(meetings), np.int64),

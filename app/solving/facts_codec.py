@@ -13,12 +13,17 @@ from app.solving.facts import COLUMNS, Facts
 
 _NUMBERS = "<f8"
 _ROWS = ("view", "mark", "pair")
+LATER = "view_agreement"
+"""A column that facts of before do not have: NaN there."""
 
 
 def facts_to_bytes(facts: Facts) -> bytes:
-    """Compressed little-endian doubles: how many views, markings and pairs, then each column."""
+    """Compressed little-endian doubles: how many views, markings and pairs, then each column.
+
+    Without any agreement its column, the last, is left out: the bytes are those of before it came.
+    """
     counts = [len(facts.view_group), len(facts.mark_view), len(facts.pair_group)]
-    columns = [getattr(facts, name).ravel() for name in COLUMNS]
+    columns = [getattr(facts, name).ravel() for name in COLUMNS if not _is_silent(facts, name)]
     return zlib.compress(np.concatenate([counts, *columns]).astype(_NUMBERS).tobytes())
 
 
@@ -41,6 +46,13 @@ def _facts(numbers: FloatArray) -> Facts:
     at = len(_ROWS)
     for name, (kind, shape) in COLUMNS.items():
         rows = counts[name.partition("_")[0]]
+        if name == LATER and at == len(numbers):
+            arrays[name] = np.full(rows, np.nan)
+            continue
         end = at + rows * int(np.prod(shape))
         arrays[name], at = numbers[at:end].reshape(rows, *shape).astype(kind), end
     return Facts(1, **arrays)
+
+
+def _is_silent(facts: Facts, name: str) -> bool:
+    return name == LATER and bool(np.isnan(facts.view_agreement).all())

@@ -1,11 +1,11 @@
 """Gates: what a group must pass to enter the dataset, in order and in words.
 
-The first two drop views; the others judge the group from the views that are left.
+The first three drop views; the others judge the group from the views that are left.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan
 
@@ -72,6 +72,8 @@ def describe(
 ) -> tuple[Gate, ...]:
     """All gates in order, those that the policy does not ask for as not active.
 
+    Agreement is there only where it is asked for: solutions of other policies stay as they were.
+
     Args:
         views: The included views.
         left_out: Letters of the views that a person left out.
@@ -86,6 +88,7 @@ def describe(
     return (
         _calibratable(group),
         _jac(group, policy),
+        *_agreement(group, policy),
         _two_views(group),
         _ball(group),
         _baseline(group, float(verdict.baseline[0]), policy),
@@ -130,7 +133,32 @@ def _jac(group: _Group, policy: Policy) -> Gate:
     return _gate("jac", not blamed, jac, policy.min_jac, sentence, view=key)
 
 
-_FALLEN_AT = {"calibratable": "no camera", "jac": "lines do not fit"}
+def _agreement(group: _Group, policy: Policy) -> Iterator[Gate]:
+    threshold = policy.min_agreement
+    if threshold is None:
+        return
+    found = [(view.calibration.agreement, view) for view in group.views]
+    measured = [(value, view) for value, view in found if value is not None]
+    if not measured:
+        yield Gate("agreement", True, None, threshold, None, "no paint was read")
+        return
+    blamed = "agreement" in group.failed
+    fallen = [item for item in measured if item[1].failed == "agreement"]
+    shown = fallen if blamed else [item for item in measured if item[1].failed is None] or measured
+    value, view = min(shown, key=lambda item: item[0])
+    worst = "worst " if len(shown) > 1 else ""
+    sentence = f"{worst}{_beside(value, threshold)} · {view.letter}"
+    if fallen and not blamed:
+        sentence += f"; {_letters([view for _, view in fallen])} below, not used"
+    key = view.key if blamed else None
+    yield _gate("agreement", not blamed, value, threshold, sentence, view=key)
+
+
+_FALLEN_AT = {
+    "calibratable": "no camera",
+    "jac": "lines do not fit",
+    "agreement": "paint does not agree",
+}
 """Why a view does not count."""
 
 

@@ -21,6 +21,7 @@ PASSES = len(GATES)
 (
     _CALIBRATABLE,
     _JAC,
+    _AGREEMENT,
     _TWO_VIEWS,
     _BALL,
     _BASELINE,
@@ -39,7 +40,7 @@ class Verdict:
         jac: Of each view at the policy's gamma, NaN where it cannot be measured, shape (V,).
         view_failed: First gate that drops an included view, or ``PASSES``, shape (V,).
         pair_failed: First gate that makes a pair invalid, or ``PASSES``, shape (P,).
-        failed: Whether a group fails a gate that the policy asks for, shape (9, G).
+        failed: Whether a group fails a gate that the policy asks for, shape (10, G).
         baseline: Widest of the views that are left, metres, 0 where one camera sees the ball
             twice, NaN where no two see it, shape (G,).
         point: Mean of the valid pairs, pitch frame, metres, NaN without one, shape (G, 3).
@@ -126,6 +127,8 @@ def view_jac(facts: Facts, gamma_percent: float) -> FloatArray:
 def _view_failed(facts: Facts, jac: FloatArray, policy: Policy) -> IntArray:
     failed = np.full(len(facts.view_group), PASSES)
     # NaN where there is nothing to measure, and then nothing falls.
+    if policy.min_agreement is not None:
+        failed[facts.view_agreement < policy.min_agreement] = _AGREEMENT
     failed[jac <= policy.min_jac] = _JAC
     failed[~facts.view_camera] = _CALIBRATABLE
     failed[~facts.view_included] = PASSES
@@ -143,22 +146,25 @@ def _pair_failed(facts: Facts, view_failed: IntArray, policy: Policy) -> IntArra
 
 
 def _view_gates(facts: Facts, view_failed: IntArray, left: BoolArray) -> BoolArray:
-    """The gates that are judged from views: which groups fail them, shape (4, G)."""
-    included, bare, fallen, remaining, shown = (
+    """The gates that are judged from views: which groups fail them, shape (5, G)."""
+    included, bare, fallen, apart, remaining, shown = (
         np.bincount(facts.view_group[chosen], minlength=facts.groups)
         for chosen in (
             facts.view_included,
             view_failed == _CALIBRATABLE,
             view_failed == _JAC,
+            view_failed == _AGREEMENT,
             left,
             left & facts.view_ball,
         )
     )
     too_few, cameras = remaining < MIN_VIEWS, included - bare
+    fitting = cameras - fallen
     return np.stack(
         [
             too_few & (bare > 0) & (cameras < MIN_VIEWS),
-            too_few & (fallen > 0) & (cameras >= MIN_VIEWS),
+            too_few & (fallen > 0) & (cameras >= MIN_VIEWS) & (fitting < MIN_VIEWS),
+            too_few & (apart > 0) & (fitting >= MIN_VIEWS),
             too_few,
             shown < MIN_VIEWS,
         ]

@@ -33,6 +33,7 @@ KNOWN_REVISIONS = (
     "0014",
     "0015",
     "0016",
+    "0017",
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]

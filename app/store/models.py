@@ -307,3 +307,4 @@ class QueueModel(Base):
     box_px: Mapped[float | None]
     x_m: Mapped[float | None]
     y_m: Mapped[float | None]
+    agreement: Mapped[float | None]

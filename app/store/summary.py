@@ -28,6 +28,7 @@ class Summary:
         box_px: Diameter of the ball in that view, as annotated, else (a point) as optimised;
             without a ball that of the first view that has an annotated box.
         x_m: Of the ball in the pitch frame, like ``y_m``.
+        agreement: The lowest of the views in use whose paint was read.
     """
 
     passes: bool
@@ -48,6 +49,7 @@ class Summary:
     box_px: float | None = None
     x_m: float | None = None
     y_m: float | None = None
+    agreement: float | None = None
 
 
 def summarize(group: Group, solution: Solution) -> Summary:
@@ -75,6 +77,7 @@ def summarize(group: Group, solution: Solution) -> Summary:
         box_px=_box(group, solution),
         x_m=ball.point[0] if ball else None,
         y_m=ball.point[1] if ball else None,
+        agreement=_agreement(group, solution),
     )
 
 
@@ -100,6 +103,12 @@ def _min_jac(solution: Solution) -> float | None:
     # The first of GAMMAS_PERCENT is the one that curation speaks of.
     measured = (view.calibration.jac for view in solution.views)
     return min((jac[0] for jac in measured if jac), default=None)
+
+
+def _agreement(group: Group, solution: Solution) -> float | None:
+    used = {view.key for view in group.views if view.included}
+    found = (view.calibration.agreement for view in solution.views if view.view in used)
+    return min((value for value in found if value is not None), default=None)
 
 
 def _error(group: Group, solution: Solution) -> tuple[float | None, float | None]:

@@ -109,6 +109,7 @@
  * @typedef {object} PaintFitJson
  * @property {number | null} supported
  * @property {number | null} explained
+ * @property {number | null} [agreement] supported times explained
  * @property {number} points
  * @property {number | null} error_px
  * @property {string | null} reason
@@ -249,6 +250,7 @@
  * @property {number} jac_gamma_percent
  * @property {number} min_baseline_m
  * @property {number} ball_diameter_m
+ * @property {{source?: string}} [calibration]
  */
 
 /**
@@ -281,6 +283,7 @@
  * @property {boolean | null} passes
  * @property {FailingJson | null} first_failing
  * @property {number | null} min_jac
+ * @property {number | null} [agreement] the least of its views whose paint was read
  * @property {number | null} error_px
  * @property {number | null} sigma_m
  * @property {number | null} parallax_degrees

@@ -41,7 +41,7 @@ const OF_FINDING = /** @type {Record<string, string>} */ ({
 });
 /** The reason that fits when nothing but the gate is known. */
 const OF_GATE = /** @type {Record<string, string>} */ ({
-	calibratable: 'bad_field_lines', jac: 'bad_field_lines', two_views: 'bad_field_lines', ball: 'ball_not_visible',
+	calibratable: 'bad_field_lines', jac: 'bad_field_lines', agreement: 'bad_field_lines', two_views: 'bad_field_lines', ball: 'ball_not_visible',
 	baseline: 'duplicate_view', reprojection: 'not_same_instant', parallax: 'duplicate_view', sigma: 'bad_calibration', chi_square: 'not_same_instant',
 });
 

@@ -31,6 +31,11 @@ export const dataset = computed(() => {
 	return all.find((one) => one.name === remembered.value) ?? first ?? null;
 });
 
+/** Whether the policy of a dataset finds cameras from paint: then there may be an agreement to show. @param {DatasetJson | null} one */
+export function isPainted(one) {
+	return one?.policy.calibration?.source === 'paint';
+}
+
 /** Read the list again. */
 export async function loadDatasets() {
 	try {

@@ -12,7 +12,7 @@ import { isUnmeasured } from './yield_cards.js';
 
 /** What the step asks, with its threshold. @param {FunnelStep} step @param {any} policy */
 function labelOf({ gate, label }, policy) {
-	const thresholds = /** @type {{[gate: string]: number | null}} */ ({ parallax: policy.min_parallax_degrees, sigma: policy.max_sigma_m, chi_square: policy.min_p_value });
+	const thresholds = /** @type {{[gate: string]: number | null}} */ ({ agreement: policy.min_agreement, parallax: policy.min_parallax_degrees, sigma: policy.max_sigma_m, chi_square: policy.min_p_value });
 	const asked = gateLabel(/** @type {any} */ ({ name: gate, threshold: thresholds[gate] ?? null }), policy);
 	return asked === gate ? label : asked;
 }

@@ -9,6 +9,7 @@ import { sharePercent } from '../lib/format.js';
 export const GATE_TITLES = /** @type {Record<string, string>} */ ({
 	calibratable: 'Too few views have a camera',
 	jac: 'Field lines do not fit',
+	agreement: 'The paint does not agree with the cameras',
 	two_views: 'Fewer than two views are left',
 	ball: 'The ball is drawn in fewer than two views',
 	baseline: 'The cameras stand too close together',
@@ -24,6 +25,7 @@ export function gateLabel(gate, policy) {
 	const labels = /** @type {Record<string, string>} */ ({
 		calibratable: 'Cameras found',
 		jac: `JaC ${policy.jac_gamma_percent} % > ${policy.min_jac}`,
+		agreement: threshold === null ? 'Agreement with the paint' : `Agreement with the paint ≥ ${threshold}`,
 		two_views: 'At least 2 views left',
 		ball: 'Ball in ≥ 2 views',
 		baseline: `Baseline ≥ ${policy.min_baseline_m} m`,

@@ -13,6 +13,7 @@ import { BinAxis, endsOf, short } from './bin_axis.js';
 
 const COLUMNS = [
 	{ name: 'jac', field: 'jac', label: 'min JaC 0.5 %', title: 'The lowest share of field lines that fit, of the views of a group', none: 'JaC is measured from drawn field lines, and no group here has any.' },
+	{ name: 'agreement', field: 'agreement', label: 'agreement with paint', title: 'The least agreement of a camera with the paint of its picture, of the views of a group: supported times explained', none: 'No paint was read of these groups.' },
 	{ name: 'error_percent', field: 'error_percent', label: 'ball error, % diagonal', title: 'Reprojection error of the ball, in per cent of the picture’s diagonal; logarithmic' },
 	{ name: 'sigma', field: 'sigma', label: 'σ, m', title: 'Uncertainty of the ball’s position, metres; logarithmic' },
 	{ name: 'parallax', field: 'parallax', label: 'parallax, °', title: 'The largest angle between two rays to the ball' },
@@ -115,11 +116,11 @@ function OneHistogram({ column, data, q, onQuery }) {
 	`;
 }
 
-/** @param {{q: string, onQuery: (q: string) => void}} props */
-export function Histograms({ q, onQuery }) {
+/** @param {{q: string, painted: boolean, onQuery: (q: string) => void}} props `painted`: cameras are found from paint */
+export function Histograms({ q, painted, onQuery }) {
 	const histograms = summary.value?.histograms ?? {};
 	return html`
-		${COLUMNS.map((column) => {
+		${COLUMNS.filter(({ name }) => painted || name !== 'agreement').map((column) => {
 			const data = histograms[column.name];
 			return data
 				? html`<${OneHistogram} key=${column.name} column=${column} data=${data} q=${q} onQuery=${onQuery} />`

@@ -59,8 +59,8 @@ function Tick({ row, index, active, ticked }) {
 	`;
 }
 
-/** @param {{row: GroupRow, index: number, q: string, active: boolean, ticked: boolean}} props */
-function Cells({ row, index, q, active, ticked }) {
+/** @param {{row: GroupRow, index: number, q: string, painted: boolean, active: boolean, ticked: boolean}} props */
+function Cells({ row, index, q, painted, active, ticked }) {
 	const { status, text } = statusOf(row);
 	const { title, detail } = gateOf(row);
 	return html`
@@ -81,6 +81,7 @@ function Cells({ row, index, q, active, ticked }) {
 		</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true" data-short=${row.margin !== null && row.margin < 0}>${marginText(row.margin)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.min_jac, 2)}</div>
+		${painted ? html`<div role="gridcell" class="queue-cell" data-numeric="true" data-number="agreement">${fixed(row.agreement, 2)}</div>` : null}
 		<div role="gridcell" class="queue-cell" data-numeric="true">${pixels(row.error_px)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.sigma_m, 2)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.parallax_degrees, 0, '°')}</div>
@@ -102,8 +103,8 @@ function Waiting() {
 	`;
 }
 
-/** @param {{row: GroupRow | null, index: number, start: number, q: string, active: boolean, ticked: boolean}} props */
-export function QueueRow({ row, index, start, q, active, ticked }) {
+/** @param {{row: GroupRow | null, index: number, start: number, q: string, painted: boolean, active: boolean, ticked: boolean}} props */
+export function QueueRow({ row, index, start, q, painted, active, ticked }) {
 	/** @param {MouseEvent} event */
 	function open(event) {
 		const pressed = event.target instanceof Element && event.target.closest('a, label, input');
@@ -115,7 +116,7 @@ export function QueueRow({ row, index, start, q, active, ticked }) {
 			tabindex=${active ? 0 : -1} style=${{ transform: `translateY(${start}px)` }}
 			onFocusIn=${() => { activeRow.value = index; }} onClick=${open}
 		>
-			${row ? html`<${Cells} row=${row} index=${index} q=${q} active=${active} ticked=${ticked} />` : html`<${Waiting} />`}
+			${row ? html`<${Cells} row=${row} index=${index} q=${q} painted=${painted} active=${active} ticked=${ticked} />` : html`<${Waiting} />`}
 		</div>
 	`;
 }

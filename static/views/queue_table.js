@@ -28,6 +28,7 @@ const COLUMNS = [
 	{ label: 'First failing gate', sort: 'gate' },
 	{ label: 'margin', sort: 'margin', numeric: true, value: true },
 	{ label: 'min JaC', sort: 'jac', numeric: true },
+	{ label: 'paint', sort: 'agreement', numeric: true, paint: true },
 	{ label: 'px', sort: 'error', numeric: true },
 	{ label: 'σ m', sort: 'sigma', numeric: true },
 	{ label: 'β', sort: 'parallax', numeric: true },
@@ -154,8 +155,8 @@ function useRovingFocus(scroller, there) {
 	}, [active, there]);
 }
 
-/** @param {{q: string, onQuery: (q: string) => void}} props */
-export function QueueTable({ q, onQuery }) {
+/** @param {{q: string, painted: boolean, onQuery: (q: string) => void}} props `painted`: cameras are found from paint */
+export function QueueTable({ q, painted, onQuery }) {
 	const scroller = useRef(/** @type {HTMLDivElement | null} */ (null));
 	const { pages, total, loaded, shown } = queue.value;
 	const rows = loaded ? total : UNKNOWN;
@@ -172,10 +173,10 @@ export function QueueTable({ q, onQuery }) {
 		if (shown && scroller.current) remember(shown, scroller.current.scrollTop / ROW);
 	}
 	return html`
-		<section class="card queue-table" role="grid" aria-label="Groups" aria-multiselectable="true" aria-rowcount=${loaded ? total + 1 : -1} aria-busy=${!loaded}>
+		<section class="card queue-table" role="grid" data-painted=${painted} aria-label="Groups" aria-multiselectable="true" aria-rowcount=${loaded ? total + 1 : -1} aria-busy=${!loaded}>
 			<div class="queue-row queue-row--head" role="row" aria-rowindex="1">
 				<${HeadTick} />
-				${COLUMNS.map((column) => html`<${HeadCell} key=${column.label} column=${column} q=${q} onQuery=${onQuery} />`)}
+				${COLUMNS.filter(({ paint }) => painted || !paint).map((column) => html`<${HeadCell} key=${column.label} column=${column} q=${q} onQuery=${onQuery} />`)}
 			</div>
 			<div class="queue-table__rows" role="rowgroup" ref=${scroller} tabindex="0" aria-label="Rows" onScroll=${scrolled}>
 				<div role="presentation" class="queue-table__space" style=${{ height: `${list.getTotalSize()}px` }}>
@@ -183,7 +184,7 @@ export function QueueTable({ q, onQuery }) {
 						const row = rowAt(pages, index);
 						return html`
 							<${QueueRow}
-								key=${index} index=${index} start=${start} row=${row} q=${q} active=${loaded && index === active}
+								key=${index} index=${index} start=${start} row=${row} q=${q} painted=${painted} active=${loaded && index === active}
 								ticked=${row !== null && isTicked(ticks.value, row.id)}
 							/>`;
 					})}

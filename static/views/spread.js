@@ -26,6 +26,7 @@ function queryOf({ field, queries }, bin, q) {
 /** Why nobody has a number, where that is known. */
 const NONE = /** @type {{[name: string]: string}} */ ({
 	jac: 'JaC is measured from drawn field lines, and none of these groups has any.',
+	agreement: 'No paint was read of the pictures of these groups.',
 	size_ratio: 'Only balls drawn as boxes have a size to compare; none of these is.',
 });
 

@@ -59,13 +59,18 @@ function Matches({ matches, dataset, q }) {
 	`;
 }
 
+/** Whether there is anything to show: few datasets have paint that was read. @param {StatisticsJson['histograms'][number]} spread */
+function isWorthIt({ name, series }) {
+	return name !== 'agreement' || series.some(({ counts }) => counts.some((count) => count > 0));
+}
+
 /** @param {{found: StatisticsJson, dataset: string, q: string}} props */
 function Body({ found, dataset, q }) {
 	const names = found.histograms[0]?.series.map(({ split }) => split) ?? [];
 	return html`
 		<div class="page__title"><p>${plural(found.groups, 'group')}${q ? (found.groups === 1 ? ' matches' : ' match') : ''}. Choose a bar to open its groups in the queue.</p><${SplitLegend} names=${names} /></div>
 		<div class="statistics__grid">
-			${found.histograms.map((spread) => html`<${Spread} key=${spread.name} spread=${spread} dataset=${dataset} q=${q} />`)}
+			${found.histograms.filter(isWorthIt).map((spread) => html`<${Spread} key=${spread.name} spread=${spread} dataset=${dataset} q=${q} />`)}
 		</div>
 		<div class="statistics__rest">
 			<${HeatMap} positions=${found.positions} dataset=${dataset} q=${q} />

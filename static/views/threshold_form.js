@@ -20,12 +20,14 @@ function switchedOn(field, shipped) {
  * }} props `values` are those that differ from `present`; `idle`: why the thresholds of JaC change nothing
  */
 export function ThresholdForm({ fields, shipped, present, values, change, idle = '' }) {
+	const source = values['calibration.source'] ?? present['calibration.source'];
+	const unread = source === 'paint' ? '' : 'no effect: cameras are found from lines';
 	/** @param {PolicyField} field */
 	const one = (field) => html`
 		<${Threshold}
 			key=${field.name} field=${field} present=${present[field.name] ?? null}
 			value=${field.name in values ? values[field.name] : present[field.name] ?? null}
-			idle=${field.gate === 'jac' ? idle : ''} switched=${switchedOn(field, shipped)} change=${(/** @type {Value} */ value) => change(field.name, value)}
+			idle=${field.gate === 'jac' ? idle : field.gate === 'agreement' ? unread : ''} switched=${switchedOn(field, shipped)} change=${(/** @type {Value} */ value) => change(field.name, value)}
 		/>`;
 	return html`
 		${fields.filter(({ gate }) => gate).map(one)}

@@ -3,6 +3,7 @@
 
 import { diagonal } from '../geometry/preview.js';
 import { gradeBelow, gradeOfJac } from '../geometry/residual.js';
+import { sharePercent } from '../lib/format.js';
 import { leftOutText } from '../state/reasons.js';
 
 /** @import {PolicyJson, ViewSolutionJson} from '../api/types.js' */
@@ -10,12 +11,31 @@ import { leftOutText } from '../state/reasons.js';
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
 const FAILED = /** @type {Record<string, string>} */ ({
-	calibratable: 'no camera', jac: 'not counted', ball: 'no ball', reprojection: '', baseline: 'same place',
+	calibratable: 'no camera', jac: 'not counted', agreement: 'paint does not agree', ball: 'no ball', reprojection: '', baseline: 'same place',
+});
+
+/** Why the camera is that of the clicks. */
+const REASONS = /** @type {Record<string, string>} */ ({
+	no_paint: 'too little paint', paint_disagrees: 'paint disagrees', no_frame: 'no picture',
 });
 
 /** JaC at 0.5 %, or null when it was not measured. @param {ViewSolutionJson | null} solved */
 export function jacOf(solved) {
 	return solved?.calibration.jac?.['0.5'] ?? null;
+}
+
+/**
+ * How the camera and the paint of its picture agree, or null where none was read for its lines.
+ *
+ * @param {ViewSolutionJson | null} solved
+ * @returns {{supported: string, explained: string, reason: string} | null} shares or –, and why the camera is that of the clicks
+ */
+export function paintOf(solved) {
+	const fit = solved?.calibration.paint;
+	if (!fit) return null;
+	const share = (/** @type {number | null} */ value) => (value === null ? '–' : sharePercent(value));
+	const reason = fit.reason === null ? '' : REASONS[fit.reason] ?? fit.reason;
+	return { supported: share(fit.supported), explained: share(fit.explained), reason };
 }
 
 /** @param {ViewPicture} picture @returns {{grade: Grade, sentence: string}} */

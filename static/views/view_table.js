@@ -10,7 +10,7 @@ import { leftOutText } from '../state/reasons.js';
 import { focused, focusView } from '../state/workspace.js';
 import { Letter } from './letter.js';
 import { Term } from './term.js';
-import { errorOf, gradesOf, jacOf } from './view_state.js';
+import { errorOf, gradesOf, jacOf, paintOf } from './view_state.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
@@ -45,6 +45,19 @@ export function ViewTable({ group, pictures }) {
 	`;
 }
 
+/** How the camera and the paint of its picture agree, where that was read. @param {{solved: ViewPicture['solved'], view: ViewPicture['view']}} props */
+function PaintLine({ solved, view }) {
+	const paint = paintOf(solved);
+	if (!paint) return null;
+	return html`
+		<tr class="numbers__aside" data-paint=${view.letter}>
+			<td colspan="7">
+				paint: <${Term} word="supported">supported<//> ${paint.supported} · <${Term} word="explained">explained<//> ${paint.explained}${paint.reason ? ` · ${paint.reason}` : ''}
+			</td>
+		</tr>
+	`;
+}
+
 /** @param {{group: GroupDocument, picture: ViewPicture}} props */
 function ViewRow({ group, picture }) {
 	const { view, solved, ball } = picture;
@@ -70,6 +83,7 @@ function ViewRow({ group, picture }) {
 				/>
 			</td>
 		</tr>
+		<${PaintLine} solved=${solved} view=${view} />
 		${view.left_out ? html`
 			<tr class="numbers__aside" data-why=${view.left_out.reason}>
 				<td colspan="7">View ${view.letter} is ${leftOutText(view.left_out)}</td>

@@ -25,6 +25,7 @@ from app.paint.agreement import agreement
 from app.paint.grass import field_of_play
 from app.paint.ridges import line_like
 from app.paint.snap import Snapped, snap
+from app.paint.view_paint import paint_of
 from app.review.editing.paint import get_paint, read_paint
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load
@@ -276,6 +277,8 @@ def _print_detector(shots: list[Shot]) -> None:
     """Agreement tells right cameras from shifted ones, and from those of wrong labels."""
     rng = np.random.default_rng(SEED)
     right, times = [], []
+    kept = [found for shot in shots if (found := _agreement(shot.solved)) is not None]
+    kept_wrong: list[float] = []
     wrong: dict[str, list[float]] = {f"turned by {px:g} px": [] for px in SHIFTS_PX}
     wrong["a label exchanged, labels trusted"] = []
     for shot in shots:
@@ -288,13 +291,15 @@ def _print_detector(shots: list[Shot]) -> None:
             camera = _turned(shot.truth, px, rng)
             wrong[f"turned by {px:g} px"].append(agreement(camera, shot.field, paint).product)
         planted = _mislabelled(shot, rng)
-        if planted is not None:
+        if planted is not None and planted.camera is not None:
             name = "a label exchanged, labels trusted"
-            wrong[name].append(agreement(planted, shot.field, paint).product)
-    area = [
-        [name, float((np.array(right)[:, None] > np.array(values)[None]).mean()), len(values)]
-        for name, values in wrong.items()
-    ]
+            wrong[name].append(agreement(planted.camera, shot.field, paint).product)
+            read = paint_of(shot.image, shot.size, planted, PITCH, PAPER.calibration)
+            if read.supported is not None:
+                kept_wrong.append(read.supported * (read.explained or 0.0))
+    area = [[name, _roc_area(right, values), len(values)] for name, values in wrong.items()]
+    name = "the same, as a dataset keeps it (snapped where the paint allows)"
+    area.append([name, _roc_area(kept, kept_wrong), len(kept_wrong)])
     print_table("Agreement as a detector", ("against true cameras", "ROC area", "views"), area)
     median = np.median(times, axis=0)
     rows = [
@@ -302,6 +307,14 @@ def _print_detector(shots: list[Shot]) -> None:
         ["agreement of a camera", float(median[1])],
     ]
     print_table("Agreement, CPU time", ("what", "ms median"), rows)
+
+
+def _agreement(found: Calibration | None) -> float | None:
+    return None if found is None else found.agreement
+
+
+def _roc_area(right: Sequence[float], wrong: Sequence[float]) -> float:
+    return float((np.array(right)[:, None] > np.array(wrong)[None]).mean())
 
 
 def _turned(camera: Camera, px: float, rng: np.random.Generator) -> Camera:
@@ -314,8 +327,8 @@ def _turned(camera: Camera, px: float, rng: np.random.Generator) -> Camera:
     )
 
 
-def _mislabelled(shot: Shot, rng: np.random.Generator) -> Camera | None:
-    """The camera of clicks with one label exchanged for a free one, trusted as it stands."""
+def _mislabelled(shot: Shot, rng: np.random.Generator) -> Calibration | None:
+    """The calibration of clicks with one label exchanged for a free one, trusted as it stands."""
     straight = [name for name in shot.lines if name not in CIRCLES and not name.startswith("Goal")]
     free = [
         name
@@ -327,7 +340,7 @@ def _mislabelled(shot: Shot, rng: np.random.Generator) -> Camera | None:
     old, new = str(rng.choice(straight)), str(rng.choice(free))
     lines = make_lines({new if name == old else name: at for name, at in shot.lines.items()})
     trusting = replace(PAPER.calibration, check_labels=False)
-    return calibrate(lines, PITCH, shot.size, trusting).camera
+    return calibrate(lines, PITCH, shot.size, trusting)
 
 
 def _print_real(folder: Path) -> None:

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { errorOf, gradeOfView } from '../../static/views/view_state.js';
+import { errorOf, gradeOfView, paintOf } from '../../static/views/view_state.js';
 
 const box = { box: [10, 10, 8, 8], point: null, out_of_view: false, occluded: false };
 
@@ -15,6 +15,22 @@ function picture({ view = {}, solved = {}, apart = null, error = 3200 } = {}) {
 		},
 	};
 }
+
+describe('paintOf', () => {
+	const fit = { supported: 0.872, explained: 0.041, points: 90, error_px: 0.2, reason: null };
+	const found = (paint) => paintOf(picture({ solved: { calibration: { camera: {}, paint } } }).solved);
+
+	it('says both shares, and nothing where no paint was read', () => {
+		assert.deepEqual(found(fit), { supported: '87 %', explained: '4.1 %', reason: '' });
+		assert.equal(found(null), null);
+		assert.equal(paintOf(null), null);
+	});
+
+	it('says why the camera is that of the clicks, and a dash where nothing was measured', () => {
+		const unseen = { ...fit, supported: null, explained: null, reason: 'no_frame' };
+		assert.deepEqual(found(unseen), { supported: '–', explained: '–', reason: 'no picture' });
+	});
+});
 
 describe('gradeOfView', () => {
 	it('does not call a given camera well whose ball no other view confirms', () => {
@@ -31,6 +47,11 @@ describe('gradeOfView', () => {
 	it('says that a ball was placed and does not count', () => {
 		const placed = picture({ view: { balls: [{ ...box, inferred: true }] }, solved: { included: false } });
 		assert.deepEqual(gradeOfView(placed), { grade: 'warn', sentence: 'ball placed, not counted' });
+	});
+
+	it('says that a view whose paint does not agree is not counted', () => {
+		const { grade, sentence } = gradeOfView(picture({ solved: { failed: 'agreement', included: false } }));
+		assert.deepEqual([grade, sentence], ['bad', 'paint does not agree']);
 	});
 
 	it('tells a view without a camera from one without a ball', () => {

@@ -101,7 +101,7 @@ class TestGlossary:
         titles = re.search(r"GATE_TITLES = .*?\({(.*?)}\);", labels, re.S)
         assert titles is not None
         gates = re.findall(r"^\t(\w+):", titles[1], re.M)
-        assert len(gates) == 9
+        assert len(gates) == 10
         assert STRICT.max_sigma_m is not None
         assert {f"gate:{gate}" for gate in gates} <= ids()
 

@@ -57,6 +57,10 @@ class GroupRow(Document):
     box_px: float | None = Field(
         description="Diameter of the ball there: annotated, or, of a point, as optimised."
     )
+    agreement: float | None = Field(
+        description="Of the view in use whose camera agrees least with its paint: supported times "
+        "explained; null where no paint was read."
+    )
     x_m: float | None
     y_m: float | None
     views: int

@@ -121,6 +121,7 @@ class PaintFitDocument(Document):
     explained: float | None = Field(
         description="Share of the line-like paint that lies near a marking; null: not measured."
     )
+    agreement: float | None = Field(description="Supported times explained; null: not measured.")
     points: int = Field(description="Places of paint that were read along the markings.")
     error_px: float | None = Field(
         description="Median distance of the paint from the markings; null where it places no camera."

@@ -16,6 +16,7 @@ LABELS = {
     UNSOLVED: "Solved",
     "calibratable": "Calibrated",
     "jac": "Field lines fit",
+    "agreement": "Paint agrees",
     "two_views": "Two calibrated views",
     "ball": "Ball in two of them",
     "baseline": "Cameras apart",
@@ -50,8 +51,8 @@ class CalibrationValues(_tried(CalibrationPolicy)):  # type: ignore[misc]
 class WhatIf(_tried(Policy)):  # type: ignore[misc]
     """Thresholds to try; those that are absent stay as they are.
 
-    `null` switches a gate off (`min_parallax_degrees`, `max_sigma_m`,
-    `min_p_value`) and says nothing elsewhere.
+    `null` switches a gate off (`min_agreement`, `min_parallax_degrees`,
+    `max_sigma_m`, `min_p_value`) and says nothing elsewhere.
     """
 
     model_config = ConfigDict(

@@ -66,6 +66,7 @@ class GroupRow:
     box_px: float | None
     x_m: float | None
     y_m: float | None
+    agreement: float | None
     findings: tuple[str, ...]
 
 

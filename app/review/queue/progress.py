@@ -35,6 +35,7 @@ COLUMNS = {
     "sigma": Column(SIGMA_M, log=True),
     "parallax": Column(even(0, 180, 20), open_high=False),
     "size_ratio": Column(even(0, 2, 20)),
+    "agreement": Column(even(0, 1, 20), open_high=False),
 }
 """The bins are fixed, so that they stay put while one filters."""
 

@@ -95,6 +95,14 @@ MEASURES = (
         "error", "Reprojection error", "% of the diagonal", "error_percent", ERROR_PERCENT, log=True
     ),
     Measure("jac", "Lowest JaC of the views", "", "jac", even(0, 1, 20), open_high=False),
+    Measure(
+        "agreement",
+        "Lowest agreement with the paint",
+        "",
+        "agreement",
+        even(0, 1, 20),
+        open_high=False,
+    ),
 )
 
 X_EDGES = even(-60, 60, 24)

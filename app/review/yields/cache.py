@@ -18,7 +18,7 @@ from app.durable import replace_file
 from app.review.yields.table import EMPTY, YieldTable
 from app.solving.facts import COLUMNS, Facts
 
-FORMAT = "3"
+FORMAT = "4"
 """Raised with every change of ``Facts``."""
 
 log = structlog.get_logger("touchline.yields")

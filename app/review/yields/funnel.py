@@ -153,6 +153,7 @@ def _answer(
 def _funnel(snapshot: Snapshot, first: IntArray, policy: Policy) -> tuple[Step, ...]:
     """Gates that the policy asks for, in order, after the groups that are not solved."""
     inactive = {
+        "agreement": policy.min_agreement is None,
         "parallax": policy.min_parallax_degrees is None,
         "sigma": policy.max_sigma_m is None,
         "chi_square": policy.min_p_value is None,

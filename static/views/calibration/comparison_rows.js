@@ -2,7 +2,7 @@
 /** Before and after: what the staged lines change, number by number. */
 
 import { gradeBelow, gradeOfJac } from '../../geometry/residual.js';
-import { fixed, pixels } from '../../lib/format.js';
+import { fixed, pixels, sharePercent } from '../../lib/format.js';
 import { ballError } from '../../overlays/scene.js';
 
 /** @import {GroupDocument, SolutionJson, ViewSolutionJson} from '../../api/types.js' */
@@ -18,6 +18,7 @@ import { ballError } from '../../overlays/scene.js';
  * @property {(value: number | null | undefined) => string} say
  * @property {1 | -1 | 0} better 1: more is better, -1: less is better
  * @property {number} step changes below this are none
+ * @property {boolean} [rare] no row where neither side has the number
  */
 
 /** @param {ViewSolutionJson | null} solved */
@@ -29,6 +30,9 @@ function worstLine(solved) {
 /** @param {number} digits @param {string} [unit] @returns {Measure['say']} */
 const to = (digits, unit = '') => (value) => fixed(value, digits, unit);
 
+/** @type {Measure['say']} */
+const share = (value) => (value === null || value === undefined ? fixed(null, 0) : sharePercent(value));
+
 /** @type {Measure[]} */
 const MEASURES = [
 	...['0.5', '1', '2'].map((gamma) => /** @type {Measure} */ ({
@@ -37,6 +41,8 @@ const MEASURES = [
 	})),
 	{ name: 'median', label: 'Median point', read: (_, solved) => solved?.calibration.error_px, say: to(2, ' px'), better: -1, step: 0.005 },
 	{ name: 'worst', label: 'Worst point', read: (_, solved) => worstLine(solved), say: to(1, ' px'), better: -1, step: 0.05 },
+	{ name: 'supported', label: 'Markings with paint', read: (_, solved) => solved?.calibration.paint?.supported, say: share, better: 1, step: 0.005, rare: true },
+	{ name: 'explained', label: 'Paint with a marking', read: (_, solved) => solved?.calibration.paint?.explained, say: share, better: 1, step: 0.005, rare: true },
 	{ name: 'ball', label: 'Ball here', read: (solution, solved) => (solved ? ballError(solved.view, solution) : null), say: (value) => (value === null || value === undefined ? pixels(value) : `${pixels(value)} px`), better: -1, step: 0.05 },
 	{ name: 'ratio', label: 'Ball Ø ratio', read: (_, solved) => solved?.ball?.size_ratio, say: to(2, '×'), better: 0, step: 0.005 },
 	{ name: 'gates', label: 'Gates passed', read: (solution) => solution?.gates.filter(({ active, passed }) => active && passed).length, say: to(0), better: 1, step: 0.5 },
@@ -57,11 +63,12 @@ export function comparedRows(view, before, after) {
 	/** @param {SolutionJson | null} solution */
 	const solvedOf = (solution) => solution?.views.find((one) => one.view === view) ?? null;
 	const [old, next] = [solvedOf(before), solvedOf(after)];
-	return MEASURES.map((measure) => {
+	return MEASURES.flatMap((measure) => {
 		const [a, b] = [measure.read(before, old), measure.read(after, next)];
-		return {
+		if (measure.rare && (a ?? b ?? null) === null) return [];
+		return [{
 			name: measure.name, label: measure.label, before: measure.say(a), after: measure.say(b), change: changeOf(measure, a, b),
-		};
+		}];
 	});
 }
 

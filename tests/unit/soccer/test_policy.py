@@ -29,6 +29,7 @@ class TestHash:
         assert (PAPER.hash, STRICT.hash) == ("b6b4891b3d9960d2", "172d8def1c011aaa")
         assert replace(PAPER, point="best").hash != PAPER.hash
         assert replace(PAPER, min_p_value=0.001).hash != PAPER.hash
+        assert replace(PAPER, min_agreement=0.4).hash != PAPER.hash
         sharing = replace(PAPER, calibration=CalibrationPolicy(share_position=True))
         assert sharing.hash != PAPER.hash
         assert sharing.calibration_hash != PAPER.calibration_hash

@@ -11,7 +11,7 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Station, View
 from app.soccer.policy import PAPER, Policy
-from app.soccer.solution import Calibration, MarkingFit
+from app.soccer.solution import Calibration, MarkingFit, PaintFit
 from tests.cameras import FULL_HD, looking
 
 
@@ -46,6 +46,7 @@ def random_policy(seed: int) -> Policy:
         min_p_value=rng.choice([None, 0.002, 0.2]),
         click_sigma_px=float(rng.choice([0.3, 1.0, 4.0])),
         box_sigma_share=float(rng.choice([0.0, 0.04, 0.2])),
+        min_agreement=rng.choice([None, 0.3, 0.6]),
     )
 
 
@@ -67,6 +68,13 @@ def _random_calibration(rng: np.random.Generator, camera: Camera) -> Calibration
         for mark in range(rng.integers(0, 7))
     ]
     covariance = tuple((root.T @ root / 12).ravel().tolist())
+    seen = rng.spawn(1)[0]
+    paint = PaintFit(float(seen.random()), 0.8, 90) if seen.random() < 0.4 else None
     return Calibration(
-        "lines", camera, jac=(0.5, 0.5, 0.5), markings=tuple(marks), covariance=covariance
+        "lines",
+        camera,
+        jac=(0.5, 0.5, 0.5),
+        markings=tuple(marks),
+        covariance=covariance,
+        paint=paint,
     )

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from app.soccer.policy import PAPER, Policy
-from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, Pair
+from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, PaintFit, Pair
 from app.solving.gates import JudgedView, chance, describe
 from app.solving.verdict import Verdict
+from tests.cameras import looking
 
 ASKED = replace(PAPER, min_parallax_degrees=5.0, max_sigma_m=0.5)
 BALL = Ball3D((1.0, 2.0, -0.5), (0.0,) * 9, 0.25, 20.0, ("a", "b"))
@@ -64,10 +65,12 @@ def gates(
         distance=nothing,
     )
     found = describe(views, left_out, pairs, ball, verdict, policy, chi_square)
-    assert tuple(gate.name for gate in found) == GATES
+    unasked = () if policy.min_agreement is not None else ("agreement",)
+    assert tuple(gate.name for gate in found) == tuple(n for n in GATES if n not in unasked)
     return {gate.name: gate for gate in found}
 
 
+MEASURED = Calibration("paint", looking((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), 2000.0))
 NO_CAMERA = {"failed": "calibratable", "jac": None}
 LOW = {"failed": "jac", "jac": 0.5}
 
@@ -128,6 +131,46 @@ class TestJac:
 
     def test_one_measured_view_is_enough_to_speak(self):
         assert gates([given("A"), seen("B")])["jac"].value == 0.875
+
+
+class TestAgreement:
+    POLICY = replace(PAPER, min_agreement=0.4)
+
+    @staticmethod
+    def painted(letter: str, value: float, **changes: object) -> JudgedView:
+        """A view with a camera that agrees with its paint so far."""
+        calibration = replace(MEASURED, paint=PaintFit(value, 1.0, 80))
+        return seen(letter, calibration=calibration, **changes)
+
+    def test_is_no_gate_where_it_is_not_asked(self):
+        assert "agreement" not in gates([self.painted("A", 0.1)])
+
+    def test_says_the_worst_of_the_views_that_are_left(self):
+        views = [self.painted("A", 0.9), self.painted("B", 0.6)]
+        found = gates(views, policy=self.POLICY)["agreement"]
+        assert (found.passed, found.value, found.view) == (True, 0.6, None)
+        assert found.margin == pytest.approx(0.5)
+        assert found.sentence == "worst 0.60 · B"
+
+    def test_names_the_one_to_blame(self):
+        views = [self.painted("A", 0.9), self.painted("B", 0.2, failed="agreement")]
+        found = gates(views, ("agreement", "two_views"), policy=self.POLICY)
+        assert (found["agreement"].passed, found["agreement"].view) == (False, "b")
+        assert found["agreement"].sentence == "0.20 · B"
+        assert "B not counted (paint does not agree)" in found["two_views"].sentence
+
+    def test_one_below_that_is_not_needed_is_said(self):
+        views = [
+            self.painted("A", 0.9),
+            self.painted("B", 0.8),
+            self.painted("C", 0.1, failed="agreement"),
+        ]
+        found = gates(views, policy=self.POLICY)["agreement"]
+        assert found.sentence == "worst 0.80 · B; C below, not used"
+
+    def test_where_no_paint_was_read_it_is_not_judged(self):
+        found = gates([seen("A"), given("B")], policy=self.POLICY)["agreement"]
+        assert found == Gate("agreement", True, None, 0.4, None, "no paint was read")
 
 
 class TestTwoViews:

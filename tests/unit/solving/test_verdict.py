@@ -39,6 +39,7 @@ def facts(views: int = 2, **changes: object) -> Facts:
         view_ball_px=np.zeros(views),
         view_slope=np.full((views, 2, 3), np.nan),
         view_axis=np.full((views, 3), np.nan),
+        view_agreement=np.full(views, np.nan),
         mark_view=np.repeat(np.arange(views), 4),
         mark_px=np.tile([1.0, 2.0, 3.0, 4.0], views),
         pair_group=np.zeros(pairs, np.int64),
@@ -169,6 +170,39 @@ class TestJudge:
         assert failing(verdict)[:2] == ["jac", "two_views"]
         assert verdict.view_failed.tolist() == [PASSES, 1, 1]
         assert verdict.pair_failed.tolist() == [1]
+
+    def test_an_agreement_below_is_to_blame_where_the_lines_of_two_fit(self):
+        found = facts(view_agreement=np.array([0.9, 0.3]))
+        asked = judged(found, replace(PAPER, min_agreement=0.4))
+        assert failing(asked)[:2] == ["agreement", "two_views"]
+        assert asked.view_failed.tolist() == [PASSES, GATES.index("agreement")]
+        assert failing(judged(found)) == []
+
+    def test_an_agreement_may_be_just_what_is_asked_and_one_that_was_not_read_passes(self):
+        found = facts(view_agreement=np.array([0.4, np.nan]))
+        assert failing(judged(found, replace(PAPER, min_agreement=0.4))) == []
+        assert failing(judged(found, replace(PAPER, min_agreement=1.0)))[0] == "agreement"
+
+    def test_lines_that_do_not_fit_go_before_paint_that_does_not_agree(self):
+        low = np.array([1.0, 2.0, 3.0, 4.0, *[6.0] * 4])
+        found = facts(mark_px=low, view_agreement=np.array([0.9, 0.3]))
+        asked = judged(found, replace(PAPER, min_agreement=0.4))
+        assert failing(asked)[0] == "jac" and "agreement" not in failing(asked)
+
+    def test_the_gate_that_leaves_too_few_views_is_to_blame(self):
+        policy = replace(PAPER, min_agreement=0.4)
+        one_line = np.array([*[1.0] * 4, *[1.0] * 4, *[6.0] * 4])
+        paint = three(mark_px=one_line, view_agreement=np.array([0.9, 0.1, np.nan]))
+        assert failing(judged(paint, policy))[:2] == ["agreement", "two_views"]
+        two_lines = np.array([*[1.0] * 4, *[6.0] * 4, *[6.0] * 4])
+        lines = three(mark_px=two_lines, view_agreement=np.array([0.1, 0.9, np.nan]))
+        assert failing(judged(lines, policy))[:2] == ["jac", "two_views"]
+
+    def test_what_is_left_after_a_view_that_disagrees_is_judged(self):
+        found = three(view_agreement=np.array([0.9, 0.8, 0.1]))
+        asked = judged(found, replace(PAPER, min_agreement=0.4))
+        assert failing(asked) == []
+        assert asked.valid.tolist() == [True, False, False]
 
     def test_jac_must_lie_above_its_threshold(self):
         """At gamma 0.35 % of 1000 px, three of four markings are found."""

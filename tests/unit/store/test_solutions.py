@@ -161,6 +161,16 @@ class TestValueCodec:
             value_codec.to_json({"a": 1})
 
 
+def painted_views(solution: Solution, fits: tuple[PaintFit | None, ...]) -> Solution:
+    """The solution with what the paint says of its views, each with a camera."""
+    camera = solution.views[0].calibration.camera
+    views = [
+        replace(view, calibration=replace(view.calibration, camera=camera, paint=fit))
+        for view, fit in zip(solution.views, fits, strict=True)
+    ]
+    return replace(solution, views=tuple(views))
+
+
 class TestSummary:
     def test_names_the_first_failing_gate_with_its_margin(self, group, solution) -> None:
         found = summarize(group, solution)
@@ -178,6 +188,18 @@ class TestSummary:
         assert (found.sigma_m, found.parallax_degrees, found.height_m) == (0.3, 75.0, 0.5)
         assert found.min_jac == 0.9
         assert found.findings == ("low_parallax", "bad_point")
+
+    def test_agreement_is_the_lowest_of_the_views_in_use_whose_paint_was_read(
+        self, group, solution
+    ) -> None:
+        assert summarize(group, solution).agreement is None
+        painted = painted_views(solution, (PaintFit(0.9, 0.8, 90), None, None))
+        assert summarize(group, painted).agreement == pytest.approx(0.72)
+        # The second view is left out.
+        fits = PaintFit(0.9, 0.8, 90), PaintFit(0.1, 0.2, 90), PaintFit(0.5, 0.5, 90)
+        assert summarize(group, painted_views(solution, fits)).agreement == pytest.approx(0.25)
+        unseen = painted_views(solution, (PaintFit(None, None, 0, reason="no_frame"), None, None))
+        assert summarize(group, unseen).agreement is None
 
     def test_without_a_ball_the_best_pair_speaks(self, group, solution) -> None:
         found = summarize(group, replace(solution, ball=None))

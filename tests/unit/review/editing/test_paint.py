@@ -24,8 +24,11 @@ from app.review.editing.submit import history, load, submit, undo
 from app.review.importing.carry import carried_group
 from app.review.importing.ingest import ingest
 from app.review.policies.policy import change_policy
+from app.review.queue.listing import list_groups
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.review.versions.verify import verify
+from app.review.yields.funnel import get_yield
+from app.review.yields.store import YieldStore
 from app.sample.render import render
 from app.sample.scene import Scene
 from app.soccer.annotation import BallAnnotation
@@ -162,6 +165,33 @@ class TestReadPaint:
                 assert found.paint.supported > 0.5 and found.paint.error_px < 0.2
                 assert np.linalg.norm(found.camera.position - truth.position) < 0.25
         assert kinds(painted) == []
+
+    def test_the_least_agreement_of_a_groups_views_is_in_the_queue(self, painted):
+        for row in list_groups(painted, 1).items:
+            least = min(item.paint.agreement for item in calibrations(painted, row.id))
+            assert row.agreement == least and 0.2 < least <= 1
+        page = list_groups(painted, 1, "sort:agreement-desc agreement>0.2")
+        assert [row.agreement for row in page.items] == sorted(
+            (row.agreement for row in page.items), reverse=True
+        )
+        assert page.total == 2
+        change_policy(painted, "demo", PAPER, if_match=None, actor="ann")
+        solve_dataset(painted, "demo")
+        assert list_groups(painted, 1, "agreement:none").total == 2
+
+    def test_a_policy_may_ask_for_agreement_and_what_if_says_what_it_costs(self, painted):
+        first, second = sorted(row.agreement for row in list_groups(painted, 1).items)
+        yields = YieldStore(painted)
+        for asked, passing in ((first, 2), (second, 1), (1.0, 0)):
+            found = get_yield(yields, 1, {"min_agreement": asked})
+            assert (found.passing, found.needs_solving) == (passing, ())
+        assert "agreement" not in [step.gate for step in get_yield(yields, 1).funnel]
+        strict = replace(TOUCHLINE, name="strict", min_agreement=1.0)
+        change_policy(painted, "demo", strict, if_match=None, actor="ann")
+        solve_dataset(painted, "demo")
+        rows = list_groups(painted, 1, "gate:agreement").items
+        assert [row.gate for row in rows] == ["agreement"] * 2
+        assert load(painted, 1).solution.view(rows[0].gate_view).failed == "agreement"
 
     def test_what_was_read_is_not_read_again(self, painted, here, looked, monkeypatch):
         monkeypatch.setattr(media, "_pixels", lambda *_: pytest.fail("it was decoded again"))

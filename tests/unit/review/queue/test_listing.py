@@ -66,6 +66,7 @@ def queue_rows(count: int, seed: int = 5) -> list[dict[str, object]]:
             "box_px": number(8.0, 14.0),
             "x_m": number(-30.0, 0.0),
             "y_m": number(5.0, 20.0),
+            "agreement": number(0.5, 0.9),
         }
         for index in range(1, count + 1)
     ]

@@ -30,7 +30,8 @@ class TestStatistics:
     def test_each_bar_opens_the_groups_that_it_counts(self, spread: Store) -> None:
         found = statistics(spread, 1)
         assert found.groups == 12
-        assert len(found.histograms) == len(MEASURES) == 8
+        assert len(found.histograms) == len(MEASURES) == 9
+        assert len({NUMBERS[measure.field] for measure in MEASURES}) == 9
         for histogram in found.histograms:
             assert len(histogram.queries) == len(histogram.measure.edges) - 1
             for place, query in enumerate(histogram.queries):

@@ -23,7 +23,8 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Group
 from app.soccer.policy import PAPER, STRICT, THRESHOLDS, CalibrationPolicy, Policy
-from app.soccer.solution import GATES, Solution
+from app.soccer.solution import GATES, PaintFit, Solution
+from app.solving.facts import group_facts, join
 from app.solving.solve import solve
 from app.solving.spread import MeanSpread
 from app.solving.verdict import PASSES, Verdict, judge, view_jac
@@ -106,6 +107,16 @@ def solved_again(group: Group, solution: Solution, policy: Policy) -> Solution:
     return solve(group, policy, known)
 
 
+def with_paint(solution: Solution) -> Solution:
+    """The solution as if paint had been read in two of three pictures, and agreed or not."""
+    views = []
+    for view in solution.views:
+        rng = random.Random(view.calibration_key)
+        paint = PaintFit(rng.random(), 1.0, 90) if rng.random() < 0.7 else None
+        views.append(replace(view, calibration=replace(view.calibration, paint=paint)))
+    return replace(solution, views=tuple(views))
+
+
 class TestJudgeTable:
     @pytest.mark.parametrize("seed", range(SEEDS))
     def test_judges_as_solve_does(self, filled, solutions, seed: int) -> None:
@@ -130,7 +141,37 @@ class TestJudgeTable:
     ) -> None:
         table = YieldStore(filled).snapshot(1).table
         found = np.concatenate([judge_table(table, random_policy(n)).first for n in range(SEEDS)])
-        assert set(found.tolist()) == set(range(PASSES + 1))
+        # No picture of these was read.
+        assert set(found.tolist()) == {*range(PASSES + 1)} - {GATES.index("agreement")}
+
+    @pytest.mark.parametrize("seed", range(3))
+    def test_agreement_is_judged_as_solve_does(self, solutions, seed: int) -> None:
+        painted = [(group, with_paint(solution)) for group, solution in solutions]
+        table = join(
+            [
+                group_facts(group.views, [view.calibration for view in solution.views])
+                for group, solution in painted
+            ]
+        )
+        policy = replace(random_policy(seed), min_agreement=0.5, min_jac=0.5, tau_percent=1.0)
+        judged = judge(table, policy, MeanSpread(table))
+        assert GATES.index("agreement") in judged.first and judged.passes.any()
+        for place, (group, old) in enumerate(painted):
+            failing = solved_again(group, old, policy).first_failing
+            name = None if judged.first[place] == PASSES else GATES[judged.first[place]]
+            assert name == (failing.name if failing else None), (group.key, failing)
+
+    def test_without_a_threshold_agreement_changes_no_bit_of_what_is_solved(
+        self, solutions
+    ) -> None:
+        for group, old in solutions:
+            bare, painted = (solved_again(group, one, PAPER) for one in (old, with_paint(old)))
+            assert (painted.gates, painted.pairs, painted.ball) == (
+                bare.gates,
+                bare.pairs,
+                bare.ball,
+            )
+            assert "agreement" not in [gate.name for gate in painted.gates]
 
     def test_sigma_is_that_of_the_solution(self, filled, solutions) -> None:
         """The gate at the very value, a billionth to either side."""
@@ -189,7 +230,9 @@ class TestGetYield:
         assert found.passing == list_groups(filled, 1, "passes:yes").total > 0
         for step in found.funnel:
             assert step.dropped == list_groups(filled, 1, f"gate:{step.gate}").total
-        assert [step.gate for step in found.funnel] == list(GATES[:6])
+        assert [step.gate for step in found.funnel] == [
+            name for name in GATES[:7] if name != "agreement"
+        ]
         assert (found.gained, found.lost, found.needs_solving) == (0, 0, ())
 
     @pytest.mark.parametrize("seed", range(3))
