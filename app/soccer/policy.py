@@ -198,6 +198,7 @@ POLICIES = {policy.name: policy for policy in (PAPER, STRICT, TOUCHLINE)}
 Asks = Literal["more than", "at least", "at most"]
 _ASKS: dict[str, Asks] = {
     "min_jac": "more than",
+    "min_agreement": "at least",
     "tau_percent": "at most",
     "min_baseline_m": "at least",
     "min_parallax_degrees": "at least",

@@ -94,7 +94,10 @@ _ASKED = (
     _text("override", "gate that an acceptance overrides"),
     QueryField("id", "ids", "groups one by one: id:12,15,19"),
     _number("jac", "min_jac", "smallest JaC of the views at the policy's tolerance, 0 to 1", "", "jac05"),
-    _number("agreement", "agreement", "least agreement of a camera with its paint, 0 to 1"),
+    _number(
+        "agreement", "agreement",
+        "least agreement of the views' cameras with their paint, 0 to 1; none: no paint was read",
+    ),
     _number("error", "error_px", "largest reprojection error of the ball", "px"),
     _number("error_percent", "error_percent", "the same", "% of the image diagonal"),
     _number("sigma", "sigma_m", "standard deviation of the ball along its worst axis", "m"),
