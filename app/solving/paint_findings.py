@@ -18,8 +18,8 @@ READ_AGAIN = (
 )
 SENTENCES = {
     NO_PAINT: (
-        f"Too little paint is seen in this view's picture, {STAYS}. Nothing is wrong with it; a "
-        "sharper picture would make it more exact."
+        f"Too little paint is seen near the lines of this view, {STAYS}. Where the picture shows its "
+        "markings well, look whether each line has the right label."
     ),
     NO_FRAME: (
         f"The picture of this view is missing or cannot be read, {STAYS}. Put it where it was "
