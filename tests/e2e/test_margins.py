@@ -147,7 +147,8 @@ class TestUnmeasuredJac:
         expect(curves).to_contain_text("JaC was not measured here: the cameras were given.")
         expect(curves.locator("canvas")).to_have_count(0)
         expect(given.locator('.funnel [data-measured="false"]')).to_contain_text("not measured")
-        expect(given.locator(".threshold__idle")).to_have_count(2)
+        # JaC and its tolerance were not measured, and no paint was read.
+        expect(given.locator(".threshold__idle")).to_have_count(3)
         assert collisions(given, "body") == []
 
     def test_the_queue_says_why_it_has_no_bars(self, given: Page) -> None:

@@ -7,6 +7,7 @@ import json
 import os
 import re
 import signal
+from collections.abc import Iterator
 
 import pytest
 
@@ -60,8 +61,16 @@ class TestHarmless:
         assert harmless(text) == text
 
 
+@pytest.fixture
+def default_ctrl_c() -> Iterator[None]:
+    """Python's own way with Ctrl+C: processes that run tests side by side ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 class TestHeldInterrupts:
-    def test_ctrl_c_is_heard_and_is_no_exception_until_it_is_over(self) -> None:
+    def test_ctrl_c_is_heard_and_is_no_exception_until_it_is_over(self, default_ctrl_c) -> None:
         with held_interrupts() as interrupted:
             assert not interrupted()
             os.kill(os.getpid(), signal.SIGINT)

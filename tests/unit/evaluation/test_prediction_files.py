@@ -158,7 +158,7 @@ class TestYolo:
         [
             ("0 0.5 0.5 0.01", "has 4 numbers"),
             ("0 640 360 12 14 0.5", "in pixels"),
-            ("0 0.5 0.5 x 0.1", "'x'"),
+            ("0 0.5 0.5 x 0.1", '"x"'),
             ("0.5 0.5 0.5 0.1 0.1", "whole number"),
             ("0 0.5 0.5 0 0.1", "above zero"),
             ("0 0.5 0.5 1.5 0.1", "wider or higher than the image"),
@@ -208,7 +208,7 @@ class TestCsv:
         ("text", "field", "words"),
         [
             ("image,score\n7.png,0.5\n", "ball_bbox", "missing"),
-            ("image,x,y,w,h\n7.png,1,2,a,4\n", "w", "'a'"),
+            ("image,x,y,w,h\n7.png,1,2,a,4\n", "w", '"a"'),
             ("image,x,y,w,h\n7.png,1,2,3e9,4\n", "x, y, w, h", "wider or higher"),
             ('image,ball_bbox\n7.png,"[1, 2, 3, 4e9]"\n', "ball_bbox", "wider or higher"),
             ("x,y,w,h\n1,2,3,4\n", "frame", "missing"),
