@@ -69,10 +69,13 @@ class Screen:
         for key in keys:
             self.page.keyboard.press(key)
 
+    def drawn(self) -> None:
+        """Wait until what a key has done is drawn; until then the page says what was."""
+        self.page.evaluate(TWO_FRAMES)
+
     def saved(self) -> None:
         """Wait until the last write was answered."""
-        # What a key has done is drawn with the next frame; until then the page says what was.
-        self.page.evaluate(TWO_FRAMES)
+        self.drawn()
         # The first edit of a server may have to wait for its compiled solver.
         patient = expect(self.page.locator('.save[data-unsaved="0"]'))
         patient.to_contain_text("Saved")

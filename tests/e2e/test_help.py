@@ -327,14 +327,16 @@ class TestFiveKeys:
         before = screen.document()["etag"]
         screen.press("Enter")
         keys = 1
+        chip = page.locator(".drawing-chip")
         if lesson.kind == "missing_ball":
+            expect(chip).to_be_visible()
             screen.press("0")
+            screen.drawn()
             view = screen.document()["views"][lesson.view]
             box = scene.truth.views[lesson.view].ball_box
             page.mouse.click(*screen.place(view, *box.center))
             keys += 2
         if lesson.kind == "undrawn_line":
-            chip = page.locator(".drawing-chip")
             expect(chip).to_be_visible()
             # Two clicks on the paint.
             view = screen.document()["views"][lesson.view]
@@ -342,6 +344,7 @@ class TestFiveKeys:
             seen = project_markings(scene.truth.views[lesson.view].camera, Pitch(), size)
             line = seen[chip.locator("strong").inner_text()]
             screen.press("0")
+            screen.drawn()
             for share in (0.2, 0.8):
                 page.mouse.click(*screen.place(view, *line[int(share * len(line))]))
             screen.press("Escape")

@@ -212,6 +212,8 @@ class TestTicks:
         assert serious(page) == []
         page.keyboard.press("b")
         expect(page.get_by_label("2 ticked")).to_be_checked()
+        # The dialog grows with the answer: what is clicked before may have moved.
+        expect(page.locator(".bulk__outcome")).to_be_visible()
         page.get_by_label("Defer").check()
         expect(page.locator(".bulk__outcome")).to_contain_text("2 of 2 groups change")
         assert serious(page) == []
