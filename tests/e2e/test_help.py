@@ -326,6 +326,8 @@ class TestFiveKeys:
         page = screen.page
         before = screen.document()["etag"]
         screen.press("Enter")
+        # It may lead to a place, which it shows with the next frame.
+        screen.drawn()
         keys = 1
         chip = page.locator(".drawing-chip")
         if lesson.kind == "missing_ball":
