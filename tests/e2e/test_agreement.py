@@ -58,6 +58,9 @@ def test_agreement_is_told_of_views_and_finds_groups_and_may_be_asked_for(
     expect(page.locator(".yield__difference")).to_be_visible()
     expect(step).to_have_count(0)
     page.get_by_label("Smallest agreement with the paint is asked").check()
+    # Asked for as it is first offered: another number goes in once that is answered.
+    first = page.locator(".funnel").get_by_role("row", name="Agreement with the paint ≥")
+    expect(first).to_contain_text(re.compile(r"\d"))
     asked = page.get_by_label("Smallest agreement with the paint", exact=True)
     asked.fill("1")
     asked.press("Enter")
