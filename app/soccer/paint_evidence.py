@@ -22,8 +22,6 @@ EXTRACTOR_VERSION = "1"
 NO_PAINT, PAINT_DISAGREES, NO_FRAME = "no_paint", "paint_disagrees", "no_frame"
 """Why a camera stays that of its clicks: too little paint, paint that contradicts them, and a
 picture that is missing or cannot be read."""
-
-
 POINTS_PER_MARKING = 12
 """Points that lines have of each marking of evidence; more say nothing more."""
 

@@ -25,7 +25,7 @@ from app.store.neighbours import neighbours
 ALLOWANCE = Allowance(memory=1024 * 2**20, processor=10.0, silence=60.0)
 """For one picture: one of 50 megapixels takes a few hundred MiB and two seconds."""
 READING = Allowance(memory=2 * 2**30, processor=60.0, silence=180.0)
-"""For reading what a picture shows; the first time it is compiled, which takes half a minute."""
+"""For reading what a picture shows; the first time it is compiled, which takes eleven seconds."""
 READERS = 2
 """Pictures that are read at once; apart from those that are made, so that nobody's view waits."""
 WAITING = 64

@@ -11,7 +11,6 @@ from app.api.schemas.document import Document
 from app.paint.view_paint import ViewPaint
 from app.paint.view_proposal import ViewProposal
 
-Share = float
 Spot = Annotated[list[float], Field(min_length=2, max_length=2)]
 """x and y."""
 Place = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -51,8 +50,8 @@ class PaintDocument(Document):
     line_like: list[Spot] = Field(
         description="Places of everything in the frame that looks like painted lines."
     )
-    supported: Share | None = Field(description="Share of the visible markings that has paint.")
-    explained: Share | None = Field(description="Share of line-like paint that has a marking.")
+    supported: float | None = Field(description="Share of the visible markings that has paint.")
+    explained: float | None = Field(description="Share of line-like paint that has a marking.")
     error_px: float | None = Field(description="Median distance of the paint to its marking.")
     moved_px: float | None = Field(
         description="How far the markings moved onto the paint, or would have, in the median."
@@ -79,8 +78,8 @@ class ProposalDocument(Document):
     lines: dict[str, list[Point]] = Field(
         description="Points on the paint, pixels of the annotated size; none unless proposed."
     )
-    supported: Share | None = Field(description="Share of the visible markings that has paint.")
-    explained: Share | None = Field(description="Share of line-like paint that has a marking.")
+    supported: float | None = Field(description="Share of the visible markings that has paint.")
+    explained: float | None = Field(description="Share of line-like paint that has a marking.")
     runner_up: float | None = Field(
         description="How much less the next best camera agrees; null where there is no other."
     )

@@ -70,7 +70,12 @@ def _stale(
     """Views whose paint was read for other clicks than they have."""
     for view in group.views:
         reading = wanted_paint(group, view, policy)
-        key = "" if reading is None else clicks_key(group, view, policy)
-        if reading is not None and reading.sought_for != key:
+        if reading is None:
+            continue
+        key = clicks_key(group, view, policy)
+        clicked = known.get(key)
+        # Clicks that were seen to make no camera say nowhere where to look.
+        is_lost = clicked is not None and clicked.camera is None
+        if reading.sought_for != key and not is_lost:
             alone = replace(group, views=(view,), paint={})
-            yield PaintTask(alone, policy, key, known.get(key), reading)
+            yield PaintTask(alone, policy, key, clicked, reading)

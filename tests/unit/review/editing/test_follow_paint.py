@@ -122,6 +122,16 @@ class TestFollow:
         change(painted, paint, without_a_line(painted))
         assert looked == []
 
+    def test_lines_that_make_no_camera_are_not_looked_for_again_and_again(
+        self, painted, paint, monkeypatch
+    ):
+        view = load(painted, 1).group.views[0]
+        gone = SetLines(view.key, dict.fromkeys([*view.station.lines][1:]))
+        after = change(painted, paint, gone)
+        assert after.solution.views[0].calibration.camera is None
+        monkeypatch.setattr(Frames, "ask_to", lambda *_: pytest.fail("a picture was asked for"))
+        change(painted, paint, SetBall(view.key, None))
+
     def test_what_nobody_asked_for_is_not_read(self, painted, paint, looked):
         take_back_paint(painted, "demo", actor="ann")
         change(painted, paint, without_a_line(painted))
