@@ -60,14 +60,15 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
 
 
 def read_pixels(
-    media: Media, settings: Settings, known: str = ""
+    media: Media, flipped: bool, settings: Settings, known: str = ""
 ) -> tuple[str, npt.NDArray[np.uint8] | None]:
-    """Digest of a frame's bytes, and its pixels: red green blue, shape (H, W, 3).
+    """Digest of a frame's bytes, and what ``decode_frame`` gives of them.
 
     The frame of a video has no bytes of its own; its pixels are digested.
 
     Args:
         media: Where it lies.
+        flipped: Turn the mirrored picture of this camera right.
         settings: Limits.
         known: A digest; the frame of these bytes is not decoded, its pixels are None.
 
@@ -85,7 +86,7 @@ def read_pixels(
             picture = _pixels(data, settings, frame_name(media))
     if digest == known:
         return digest, None
-    return digest, np.ascontiguousarray(picture[:, :, ::-1])
+    return digest, _as_annotated(picture, flipped)
 
 
 def _digest(data: bytes) -> str:
@@ -193,7 +194,11 @@ def decode_frame(media: Media, flipped: bool, settings: Settings) -> npt.NDArray
         TooLargeError: It is larger than the limits, in bytes or in declared pixels.
     """
     _require_contained(Path(media.path), settings)
-    picture = _decode(media, settings)
+    return _as_annotated(_decode(media, settings), flipped)
+
+
+def _as_annotated(picture: Any, flipped: bool) -> npt.NDArray[np.uint8]:
+    """Red green blue, and turned right where it is mirrored."""
     return np.ascontiguousarray((cv2.flip(picture, 1) if flipped else picture)[:, :, ::-1])
 
 

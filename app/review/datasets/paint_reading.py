@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import cv2
-import numpy as np
-
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.paint.evidence import Image
@@ -75,16 +72,15 @@ def read_view_paint(task: PaintTask, settings: Settings) -> PaintReading | None:
     if media is None:
         return fitting or task.without_frame
     try:
-        digest, image = read_pixels(media, settings, "" if fitting is None else fitting.frame)
+        known = "" if fitting is None else fitting.frame
+        digest, image = read_pixels(media, task.view.station.flipped, settings, known)
     except NotFoundError:
         return fitting or task.without_frame
     except (ImageError, StorageError, TooLargeError):
         return task.without_frame
     if image is None:
         return fitting
-    if task.view.station.flipped:
-        image = np.ascontiguousarray(cv2.flip(image, 1))
-    return _read(task, digest, np.asarray(image, np.uint8))
+    return _read(task, digest, image)
 
 
 def _read(task: PaintTask, digest: str, image: Image) -> PaintReading | None:
