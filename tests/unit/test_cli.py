@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from app.cli import app, main
+from app.cli import app
 from app.datasets.manifest import software_version
 from app.datasets.sn_calibration_writer import lines_to_json
 from tests.scenes import make_scenes
@@ -24,20 +24,9 @@ Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+def run(touchline: Run) -> Run:
     """Run a command in a home of its own: exit code, stdout, stderr."""
-    for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
-
-    def command(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["touchline", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return command
+    return touchline
 
 
 @pytest.fixture

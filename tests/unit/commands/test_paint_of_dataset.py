@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
-import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from app.cli import main
 from app.config import Settings
 from app.review.importing.ingest import ingest
 from app.review.policies.policy import change_policy
@@ -22,25 +20,14 @@ Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+def run(touchline: Run, tmp_path: Path) -> Run:
     """Run the command in a home with a match without pictures, as ``demo`` and as ``paper``."""
-    for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
     store = Store.open(Settings(home=tmp_path / "home"))
     for dataset in ("demo", "paper"):
         ingest(store, dataset, match(), source="files", actor="ann")
     change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
     store.close()
-
-    def command(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["touchline", "paint", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return command
+    return partial(touchline, "paint")
 
 
 class TestPaint:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from app.cli import main
 from app.config import Settings
 from app.review.importing.ingest import ensure_dataset
 from app.soccer.policy import PAPER, STRICT
@@ -20,23 +17,12 @@ Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+def run(touchline: Run, tmp_path: Path) -> Run:
     """Run a command in a home with an empty dataset ``demo``: exit code, stdout, stderr."""
-    for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
     store = Store.open(Settings(home=tmp_path / "home"))
     ensure_dataset(store, "demo", "ann")
     store.close()
-
-    def command(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["touchline", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return command
+    return touchline
 
 
 class TestShow:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from app.cli import main
 from app.config import Settings
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.review.verdicts.bulk import list_batches
@@ -28,24 +25,11 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def run(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path, tree: Path
-) -> Run:
+def run(touchline: Run, tree: Path) -> Run:
     """Run a command in a home with the solved dataset ``demo``: exit code, stdout, stderr."""
-    for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
-
-    def command(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["touchline", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    command("import", "soccernet-v3", tree, "--dataset", "demo")
-    command("solve", "--dataset", "demo", "--workers", "1")
-    return command
+    touchline("import", "soccernet-v3", tree, "--dataset", "demo")
+    touchline("solve", "--dataset", "demo", "--workers", "1")
+    return touchline
 
 
 def accepted(run: Run) -> int:
