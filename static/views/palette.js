@@ -43,20 +43,20 @@ function datasetItems() {
 	}));
 }
 
-/** The groups that answer to what is typed. @param {string} text @returns {{groups: Item[], answered: boolean}} */
-function useGroups(text) {
+/** The groups of a dataset that answer to what is typed. @param {DatasetJson | null} one @param {string} text @returns {{groups: Item[], answered: boolean}} */
+function useGroups(one, text) {
 	const [{ groups, to }, setGroups] = useState({ groups: /** @type {Item[]} */ ([]), to: '' });
+	const about = one?.name ?? '';
 	const asking = useMemo(() => latest(PAUSE, async (/** @type {string} */ asked, signal) => {
-		const one = present();
 		const found = one && asked ? await groupItems(one, asked, signal) : [];
-		if (!signal.aborted) setGroups({ groups: found, to: asked });
-	}), []);
+		if (!signal.aborted) setGroups({ groups: found, to: `${about} ${asked}` });
+	}), [about]);
 	useEffect(() => {
 		asking.run(text.trim());
 		// A search that the server never answers must not keep the next one waiting.
 		return asking.cancel;
-	}, [text]);
-	return { groups, answered: to === text.trim() };
+	}, [asking, text]);
+	return { groups, answered: to === `${about} ${text.trim()}` };
 }
 
 /** @param {{items: Item[], active: string, choose: (item: Item) => void}} props */
@@ -88,7 +88,7 @@ export function Palette() {
 	const [text, setText] = useState('');
 	const [place, setPlace] = useState(0);
 	const [chosen, setChosen] = useState(false);
-	const { groups, answered } = useGroups(text);
+	const { groups, answered } = useGroups(present(), text);
 	// The keys of the page below, as they were when the palette came up.
 	const actions = useMemo(actionItems, []);
 	useLayoutEffect(() => {
