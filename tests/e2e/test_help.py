@@ -100,6 +100,7 @@ class TestFound:
             page.keyboard.type("lp")
             page.keyboard.press("Enter")
         expect(page.locator(".palette__field")).to_have_value("help")
+        until(page, lambda: held)
         held[0].continue_()
         expect(page.get_by_role("tablist")).to_be_visible()
 
@@ -264,8 +265,8 @@ class TestPractice:
         expect(page).to_have_url(re.compile(rf"/review/{second['group']}"))
         # The card goes with the first group, and comes with the second.
         expect(card).to_have_count(0)
-        for route in held:
-            route.continue_()
+        until(page, lambda: held)
+        held[0].continue_()
         expect(card).to_contain_text("Lesson 2 of 8")
         expect(card).to_contain_text("Right: nothing is wrong with this group")
 

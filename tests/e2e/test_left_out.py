@@ -12,7 +12,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
 from tests.e2e.film import write_film
-from tests.e2e.screen import Screen, withdraw_verdict
+from tests.e2e.screen import Screen, until, withdraw_verdict
 from tests.e2e.service import run_touchline, serving
 from tests.homes import copy_home
 
@@ -103,12 +103,12 @@ class TestInstants:
         screen.press("1", ".")
         expect(chip).to_contain_text("1 frame later: view only")
         expect(stage).to_have_attribute("data-offset", "1")
-        assert colours(page) == {180}
+        until(page, lambda: colours(page) == {180})
         screen.press(".")
         expect(page.locator(".bar")).to_contain_text("There is no frame after this one")
         screen.press(",")
         expect(chip).to_have_count(0)
-        assert len(colours(page)) > 1
+        until(page, lambda: len(colours(page)) > 1)
         panel.get_by_role("button", name="View A one frame before").click()
         expect(chip).to_contain_text("1 frame before: view only")
         screen.press("Escape")

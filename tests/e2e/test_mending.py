@@ -256,7 +256,10 @@ class TestMissingBall:
         one.change(1, "/ball", None)
         screen = one.open()
         expect(one.card).to_contain_text("ray of another view")
-        screen.press("Enter", "0")
+        screen.press("Enter")
+        screen.drawn()
+        screen.press("0")
+        screen.drawn()
         view = one.document()["views"][1]
         one.page.mouse.click(*screen.place(view, x + width / 2, y + height / 2))
         screen.saved()

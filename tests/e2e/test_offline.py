@@ -86,7 +86,7 @@ class TestOutbox:
             else:
                 route.continue_()
 
-        page.route("**/api/v1/views/**", lose_the_first)
+        page.route("**/api/v1/views/*/ball", lose_the_first)
         screen.press("1", "q")
         while occluded() == before:
             page.wait_for_timeout(50)

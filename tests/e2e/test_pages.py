@@ -12,6 +12,7 @@ import httpx
 import pytest
 from playwright.sync_api import Page, Route, expect
 
+from tests.e2e.screen import until
 from tests.e2e.service import delete_dataset
 from tests.e2e.test_access import (
     BEYOND_ITS_FRAME,
@@ -113,8 +114,7 @@ class TestNavigation:
         page.keyboard.press("Backspace")
         page.keyboard.type("cs")
         page.keyboard.press("Enter")
-        while not held:
-            page.wait_for_timeout(20)
+        until(page, lambda: held)
         held[0].continue_()
         page.wait_for_url("**/datasets/sample/statistics")
         assert page.request.get("/api/v1/groups/1").json()["verdict"] == before

@@ -117,7 +117,7 @@ class TestMarks:
     def test_predictions_are_drawn_pointed_at_listed_and_hidden(self, predicted: Predicted) -> None:
         screen = predicted.open()
         page, view = predicted.page, screen.document()["views"][0]
-        page.wait_for_function(f"{COUNT_PREDICTED} > 20")
+        page.wait_for_function(f"() => {COUNT_PREDICTED} > 20")
         x, y, width, height = predicted.boxes[view["key"]]
         place = screen.place(view, x + width / 2, y + height / 2)
         page.mouse.move(*place)
@@ -133,7 +133,7 @@ class TestMarks:
         assert serious_in_both(page) == []
         screen.press("b")
         expect(objects.get_by_role("button", name="Predicted by detector")).to_have_count(0)
-        page.wait_for_function(f"{COUNT_PREDICTED} === 0")
+        page.wait_for_function(f"() => {COUNT_PREDICTED} === 0")
         screen.press("y")
         expect(page.locator(".bars")).to_contain_text("Predictions are hidden. B shows")
         assert screen.document()["views"][0]["balls"] == []

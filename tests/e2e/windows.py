@@ -6,6 +6,7 @@ kept for itself (storage, databases, cookies) does not.
 
 from __future__ import annotations
 
+import os
 from collections import defaultdict
 from collections.abc import Mapping
 from contextlib import suppress
@@ -15,11 +16,38 @@ from urllib.parse import urlsplit
 from playwright.sync_api import Browser, BrowserContext, CDPSession, Error, Page
 
 SIZE = {"width": 1440, "height": 900}
-TIMEOUT_MS = 120_000
+SLOW = int(os.environ.get("TOUCHLINE_SLOW_PAGES", "0"))
+"""Milliseconds by which pages are late at most, to find tests that do not wait for them."""
+TIMEOUT_MS = 30_000 if SLOW else 120_000
 """What a machine that does much else may take for anything a page waits for."""
 NOTHING_ON_ITS_WAY = """() => {
   const save = document.querySelector('.save[data-unsaved]');
   return !save || save.dataset.unsaved === '0' || ['away', 'failed'].includes(save.dataset.state);
+}"""
+LATE = """(most) => {
+  const late = (value) => new Promise((go) => setTimeout(go, Math.random() * most, value));
+  const { fetch, requestAnimationFrame: frame, createImageBitmap: decode } = window;
+  window.fetch = (...asked) => late().then(() => fetch(...asked)).then(late);
+  window.createImageBitmap = (...asked) => decode(...asked).then(late);
+  // One delay for all that ask for the same frame, which keeps their order.
+  let waiting = null;
+  window.requestAnimationFrame = (draw) => {
+    waiting ??= late().then(() => { waiting = null; });
+    const own = {};
+    waiting.then(() => { own.number = frame((now) => { if (!own.ended) draw(now); }); });
+    drawn.set(++last, own);
+    return last;
+  };
+  const drawn = new Map();
+  let last = 0;
+  window.cancelAnimationFrame = (number) => { (drawn.get(number) ?? {}).ended = true; };
+  const { addEventListener } = EventSource.prototype;
+  EventSource.prototype.addEventListener = function (kind, hear, ...more) {
+    const heard = (event) => setTimeout(() => {
+      if (this.readyState !== EventSource.CLOSED) hear.call(this, event);
+    }, most / 2);
+    addEventListener.call(this, kind, heard, ...more);
+  };
 }"""
 KEPT_BY_PAGES = "cookies,indexeddb,local_storage,service_workers,cache_storage"
 
@@ -76,6 +104,8 @@ class Windows:
         window = free.pop() if free else _Window.new(self.browser, address)
         self._taken.append(window)
         page = window.context.new_page()
+        if SLOW:
+            page.add_init_script(f"({LATE})({SLOW})")
         page.set_viewport_size(size or SIZE)  # type: ignore[arg-type]
         page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
         page.set_default_timeout(TIMEOUT_MS)
