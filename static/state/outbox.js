@@ -91,23 +91,34 @@ export function claimTab() {
 	navigator.locks?.request(lockOf(tab), () => new Promise(() => {}));
 }
 
+/** Tabs whose end is waited for. @type {Set<string>} */
+const watched = new Set();
+
+/** @param {string} other @param {() => void} then */
+function hearEnd(other, then) {
+	if (watched.has(other)) return;
+	watched.add(other);
+	navigator.locks.request(lockOf(other), () => { watched.delete(other); }).then(then);
+}
+
 /**
  * Take over what tabs have left that are gone, a reload's predecessor among them.
  *
- * @returns {Promise<number>} how many
+ * @param {() => void} again called when one is gone that still lives and looks after writes
  */
-export async function adopt() {
+export async function adopt(again) {
 	const db = await database();
 	const kept = /** @type {Item[]} */ ((await db?.getAll(STORE).catch(() => [])) ?? []);
 	const held = (await navigator.locks?.query())?.held ?? [];
 	const alive = new Set(held.map(({ name }) => name));
 	const own = new Set(outbox.value.map(({ id }) => id));
-	const orphans = kept.filter((item) => item.tab !== tab && !own.has(item.id) && !alive.has(lockOf(item.tab)));
-	if (orphans.length === 0) return 0;
+	const others = kept.filter((item) => item.tab !== tab && !own.has(item.id));
+	for (const { tab: other } of others) if (alive.has(lockOf(other))) hearEnd(other, again);
+	const orphans = others.filter((item) => !alive.has(lockOf(item.tab)));
+	if (orphans.length === 0) return;
 	const adopted = orphans.map((item) => ({ ...item, tab })).sort((a, b) => a.at - b.at);
 	outbox.value = [...adopted, ...outbox.value];
 	await inDatabase((one) => Promise.all(adopted.map((item) => one.put(STORE, item))));
-	return adopted.length;
 }
 
 /** @param {string} name */

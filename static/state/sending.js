@@ -49,12 +49,11 @@ export function startSending() {
 	claimTab();
 	addEventListener('online', takeUp);
 	takeUp();
-	// The page before this one may not be quite gone yet.
-	setTimeout(takeUp, 2000);
 }
 
 async function takeUp() {
-	await adopt();
+	// The page before this one may not be quite gone yet.
+	await adopt(takeUp);
 	pause = FIRST_RETRY;
 	wake();
 }

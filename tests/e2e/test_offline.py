@@ -66,6 +66,23 @@ class TestOutbox:
         assert screen.document()["views"][0]["balls"][0]["box"][0] == box[0] - 5
         leave_as_found(page, [], edited=chain[0])
 
+    def test_what_a_window_leaves_is_sent_by_another_when_it_closes(
+        self, open_page: OpenPage, console: Any
+    ) -> None:
+        screen, chain = at_last_groups(open_page, console)
+        page, box = screen.page, screen.document()["views"][0]["balls"][0]["box"]
+        page.route("**/api/v1/views/**", lambda route: route.abort())
+        screen.press("i", "Shift+ArrowLeft")
+        expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
+        other = Screen(page.context.new_page())
+        other.page.goto(f"/review/{chain[0]}")
+        expect(other.page.locator(".save")).to_contain_text("No changes")
+        other.page.wait_for_timeout(2500)
+        page.close()
+        other.saved()
+        assert other.document()["views"][0]["balls"][0]["box"][0] == box[0] - 5
+        leave_as_found(other.page, [], edited=chain[0])
+
     def test_an_answer_that_comes_again_brings_nothing_old_back(
         self, open_page: OpenPage, console: Any
     ) -> None:
