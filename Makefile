@@ -10,7 +10,7 @@ export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 unexport PYTHONDONTWRITEBYTECODE
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
-.PHONY: setup run test test-python test-browser check audit release bench mutate torture fuzz paper chromium clean
+.PHONY: setup run test test-python test-browser test-late check audit release bench mutate torture fuzz paper chromium clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready static/node_modules/.ready
@@ -49,6 +49,10 @@ test-python:
 
 test-browser:
 	@{ $(BIN)/npm --prefix static test && $(PYTEST) tests/e2e; } 2>&1 | sed -u 's/^/browser | /'
+
+# The browser tests before pages whose every request, frame, picture and event is late: who does not wait falls.
+test-late: setup chromium
+	@TOUCHLINE_SLOW_PAGES=$(or $(MS),300) $(PYTEST) tests/e2e
 
 check: setup
 	$(BIN)/ruff format --check .
