@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
+from playwright.sync_api import ConsoleMessage, Page, Playwright, expect, sync_playwright
 
 from tests.e2e.homes import build_film, build_sample, build_season
 from tests.e2e.install_chromium import ADVICE, find_chromium
@@ -15,15 +16,6 @@ from tests.e2e.screen import Screen, passing
 from tests.e2e.service import ROOT, serving
 from tests.e2e.windows import TIMEOUT_MS, Windows
 from tests.homes import copy_home, once_for_all
-
-CONTEXTS = 4
-"""3D contexts that the browser keeps at a time."""
-SOFTWARE_GRAPHICS = [
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    f"--max-active-webgl-contexts={CONTEXTS}",
-]
 
 FEW_PROCESSES = [
     "--disable-gpu",
@@ -87,18 +79,28 @@ def season(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield address
 
 
-@pytest.fixture(scope="module")
-def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
-    """Chromium, for one module: while Playwright runs, no other test can run an event loop."""
+@pytest.fixture(scope="package")
+def playwright() -> Iterator[Playwright]:
+    """What drives browsers, for the tests of this folder: while it runs, no event loop can."""
     # On a busy machine five seconds are little.
     expect.set_options(timeout=TIMEOUT_MS)
-    with sync_playwright() as playwright:
-        # Where there is no graphics card the 3D view is drawn by the processor, which costs time.
-        drawn = request.module.__name__.endswith("scene3d")
-        arguments = SOFTWARE_GRAPHICS if drawn else FEW_PROCESSES
-        launched = playwright.chromium.launch(executable_path=_chromium(), args=arguments)
-        yield launched
-        launched.close()
+    with sync_playwright() as running:
+        yield running
+
+
+@contextmanager
+def windows_of(playwright: Playwright, arguments: list[str]) -> Iterator[Windows]:
+    """Windows of a Chromium of their own, which know nothing of earlier tests."""
+    browser = playwright.chromium.launch(executable_path=_chromium(), args=arguments)
+    yield Windows(browser)
+    browser.close()
+
+
+@pytest.fixture(scope="package")
+def windows(playwright: Playwright) -> Iterator[Windows]:
+    """Windows of one browser, for all modules that need no other."""
+    with windows_of(playwright, FEW_PROCESSES) as opened:
+        yield opened
 
 
 @dataclass
@@ -136,12 +138,6 @@ def console() -> Iterator[Console]:
 
 
 OpenPage = Callable[..., Page]
-
-
-@pytest.fixture(scope="module")
-def windows(browser: Browser) -> Windows:
-    """Windows of the browser, which know nothing of earlier tests."""
-    return Windows(browser)
 
 
 @pytest.fixture

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Playwright, expect
 
-from tests.e2e.conftest import CONTEXTS
+from tests.e2e.conftest import windows_of
 from tests.e2e.screen import Screen, passing
 from tests.e2e.test_access import serious
+from tests.e2e.windows import Windows
 
 OpenPage = Callable[..., Page]
+CONTEXTS = 4
+"""3D contexts that the browser keeps at a time."""
+SOFTWARE_GRAPHICS = [
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    f"--max-active-webgl-contexts={CONTEXTS}",
+]
+"""Where there is no graphics card the 3D view is drawn by the processor, which costs time."""
 MORE_THAN_CHROMIUM_KEEPS = CONTEXTS + 2
 """Times the view is opened: more contexts that nobody gave back make Chromium complain."""
 
@@ -23,6 +33,13 @@ LABELS = """() => [...document.querySelectorAll('.scene3d__camera')].map((label)
   const { x, y, width, height } = label.getBoundingClientRect();
   return { x: x + width / 2, y: y + height / 2, hidden: label.hidden };
 })"""
+
+
+@pytest.fixture(scope="module")
+def windows(playwright: Playwright) -> Iterator[Windows]:
+    """Windows of a browser that draws in three dimensions."""
+    with windows_of(playwright, SOFTWARE_GRAPHICS) as opened:
+        yield opened
 
 
 def show(page: Page) -> None:

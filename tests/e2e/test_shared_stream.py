@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page
+from playwright.sync_api import BrowserContext, Page
+
+from tests.e2e.windows import Windows
 
 WINDOWS = 8
 READ = """async () => {
@@ -28,8 +30,8 @@ def streams() -> list[str]:
 
 
 @pytest.fixture
-def context(browser: Browser, streams: list[str]) -> Iterator[BrowserContext]:
-    context = browser.new_context()
+def context(windows: Windows, streams: list[str]) -> Iterator[BrowserContext]:
+    context = windows.browser.new_context()
     context.on(
         "request", lambda request: streams.append(request.url) if "/events" in request.url else None
     )
