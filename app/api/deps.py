@@ -25,6 +25,7 @@ from app.review.jobs.exports import resume_exports
 from app.review.jobs.imports import resume_imports
 from app.review.jobs.jobs import Jobs, Pool
 from app.review.jobs.paint import resume_reading
+from app.review.jobs.proposals import resume_proposals
 from app.review.jobs.solve import resume_solving, solve_leftovers
 from app.review.jobs.upkeep import Upkeep
 from app.review.jobs.versions import resume_versions
@@ -92,6 +93,7 @@ class Services:
         self.frames.warm()
         resume_solving(self.jobs, self.store)
         resume_reading(self.jobs, self.store)
+        resume_proposals(self.jobs, self.store)
         resume_exports(self.jobs, self.store, self.exports, self.frames)
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)

@@ -73,6 +73,7 @@ def view_to_json(view: View) -> dict[str, Any]:
         **({} if covariance is None else {"given_covariance": [*map(float, covariance)]}),
         **({} if station.picture is None else {"picture": picture_to_json(station.picture)}),
         "lines": lines_to_json(station.lines),
+        **({"proposed": [*station.proposed]} if station.proposed else {}),
         "balls": [ball_to_json(ball) for ball in view.balls],
     }
 
@@ -195,15 +196,16 @@ class StateReader:
         calibration = self.text("calibration", "given")
         if calibration not in CALIBRATIONS:
             raise self.error("calibration", f"is none of {' and '.join(CALIBRATIONS)}")
-        given = self.value.get("given")
+        given, lines = self.value.get("given"), self.lines()
         station = Station(
             key=self.key("station"),
             size=size,
             shared=self.flag("shared", False),
-            lines=self.lines(),
+            lines=lines,
             calibration=calibration,
             flipped=self.flag("flipped", False),
             picture=self.picture(),
+            proposed=self.proposed(lines),
         )
         camera = None if given is None else camera_from_json(given, self.path, self.record)
         try:
@@ -265,6 +267,14 @@ class StateReader:
         except ValueError as error:
             raise self.error("lines", str(error)) from error
         return make_lines(lines)
+
+    def proposed(self, lines: Lines) -> tuple[str, ...]:
+        """Names of the lines that were accepted as they were proposed."""
+        try:
+            found = set(fields.sequence(self.value.get("proposed") or []))
+        except (TypeError, ValueError) as error:
+            raise self.error("proposed", "is no list of markings") from error
+        return tuple(name for name in lines if name in found)
 
     def balls(self) -> tuple[BallAnnotation, ...]:
         """Back from ``ball_to_json``."""

@@ -33,6 +33,7 @@ class ViewProposal:
         supported, explained: As of ``ViewPaint``.
         runner_up: How much less the next best camera agrees; None where there is no other.
         error_px: Median distance of the paint to its marking.
+        points: How many places of paint the camera lies on.
     """
 
     outcome: Literal["proposed", "unsure", "nothing"]
@@ -42,6 +43,7 @@ class ViewProposal:
     explained: float | None = None
     runner_up: float | None = None
     error_px: float | None = None
+    points: int = 0
 
 
 def propose_lines(
@@ -91,4 +93,5 @@ def proposal_of(
         None if seen is None else seen.explained,
         found.runner_up,
         None if snapped is None or snapped.error_px is None else snapped.error_px / scale.x,
+        0 if snapped is None else snapped.points,
     )

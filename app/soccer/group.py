@@ -29,6 +29,8 @@ class Station:
             row; None where nothing is known of it.
         picture: What was done to its pictures since they were taken; None: nothing. The camera
             that is found from its lines follows.
+        proposed: Markings whose points a person accepted as they were proposed from the paint,
+            sorted; what is drawn or moved later is not among them.
     """
 
     key: str
@@ -41,6 +43,7 @@ class Station:
     """The frames of this camera are mirrored; annotations and calibration are not."""
     given_covariance: tuple[float, ...] | None = None
     picture: PictureGeometry | None = None
+    proposed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.given is not None and self.given.is_wide and self.given_covariance is not None:
@@ -55,6 +58,7 @@ class Station:
         return replace(
             self,
             lines=other.lines,
+            proposed=other.proposed,
             given=other.given,
             given_covariance=other.given_covariance,
             calibration=other.calibration,

@@ -61,6 +61,10 @@ class PaintEvidence:
         return make_lines(lines)
 
 
+PROPOSAL_OUTCOMES = ("proposed", "unsure", "nothing")
+"""What can become of a picture without lines whose paint is looked at."""
+
+
 @dataclass(frozen=True)
 class PaintReading:
     """What was read of the paint in the picture of one view.

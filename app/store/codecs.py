@@ -228,8 +228,8 @@ def picture_from_json(value: Mapping[str, Any] | None) -> PictureGeometry | None
 def station_to_json(station: Station) -> Json:
     """A station with everything that was said about it.
 
-    ``given_covariance`` and ``picture`` stand there only where they say something, so that
-    digests of all other stations are what they always were.
+    ``given_covariance``, ``picture`` and ``proposed`` stand there only where they say something,
+    so that digests of all other stations are what they always were.
     """
     return {
         "key": station.key,
@@ -241,6 +241,7 @@ def station_to_json(station: Station) -> Json:
         "flipped": station.flipped,
         **_known_covariance(station, "given_covariance"),
         **({} if station.picture is None else {"picture": picture_to_json(station.picture)}),
+        **({"proposed": [*station.proposed]} if station.proposed else {}),
     }
 
 
@@ -263,6 +264,7 @@ def station_from_json(value: Mapping[str, Any]) -> Station:
         flipped=value["flipped"],
         given_covariance=covariance_from_json(covariance),
         picture=picture_from_json(value.get("picture")),
+        proposed=tuple(value.get("proposed", ())),
     )
 
 

@@ -11,6 +11,7 @@ from sqlalchemy.orm import InstrumentedAttribute
 
 from app.finite import json_text
 from app.store.models import QueueModel
+from app.store.proposals import groups_with_open
 
 Condition = ColumnElement[bool]
 """Whether a group is meant; made and combined by the functions here."""
@@ -70,6 +71,11 @@ def is_one_of(ids: Iterable[int]) -> Condition:
     # One parameter, however many there are: a statement takes a limited number of them.
     listed = func.json_each(json_text(list(ids))).table_valued("value")
     return QueueModel.group_id.in_(select(listed.c.value))
+
+
+def has_open_proposal(outcome: str | None = None) -> Condition:
+    """A view without lines was looked at for a proposal; with that outcome, where one is named."""
+    return QueueModel.group_id.in_(groups_with_open(outcome))
 
 
 def either(conditions: Iterable[Condition]) -> Condition:

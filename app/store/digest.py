@@ -25,13 +25,18 @@ def digest(value: Json) -> str:
 
 
 def station_digest(station: Station) -> str:
-    """Digest of size, lines, given camera, which of the two counts, and the picture."""
+    """Digest of size, lines, given camera, which of the two counts, and the picture.
+
+    Which lines were proposed counts as the origin of a ball does: who says so is part of it.
+    """
     value = station_to_json(station)
     parts = [value["size"], value["lines"], value["given"], value["calibration"]]
     if station.given_covariance is not None:
         parts.append(value["given_covariance"])
     if station.picture is not None:
         parts.append(value["picture"])
+    if station.proposed:
+        parts.append({"proposed": value["proposed"]})
     return digest(parts)
 
 

@@ -32,6 +32,7 @@ def station_values(station: Station) -> dict[str, Any]:
         "picture": None
         if station.picture is None
         else codecs.canonical(codecs.picture_to_json(station.picture)),
+        "proposed": codecs.canonical([*station.proposed]) if station.proposed else None,
         "digest": station_digest(station),
     }
 

@@ -240,6 +240,7 @@ def stored_station(row: Any) -> StoredStation:
         flipped=row.flipped,
         given_covariance=None if row.given is None else _covariance(row.given),
         picture=None if row.picture is None else _picture(row.picture),
+        proposed=() if row.proposed is None else _proposed(row.proposed),
     )
     return StoredStation(
         row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
@@ -290,6 +291,12 @@ def _camera(text: str) -> Camera:
 def _covariance(text: str) -> tuple[float, ...] | None:
     with codecs.as_written():
         return codecs.covariance_from_json(codecs.parse(text).get("covariance"))
+
+
+@lru_cache(maxsize=256)
+def _proposed(text: str) -> tuple[str, ...]:
+    with codecs.as_written():
+        return tuple(map(str, codecs.parse(text)))
 
 
 @lru_cache(maxsize=256)

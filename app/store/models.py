@@ -31,6 +31,8 @@ class DatasetModel(Base):
 class StationModel(Base):
     """A camera: its lines, its given camera and its picture (JSON), and which camera counts.
 
+    ``proposed`` (JSON list) names the lines that were accepted as they were proposed.
+
     ``digest`` is that of what solving reads; ``source_digest`` the same of what the dataset last
     brought, so a person edited the station exactly when the two differ.
     """
@@ -58,6 +60,7 @@ class StationModel(Base):
     lines: Mapped[str]
     given: Mapped[str | None]
     picture: Mapped[str | None]
+    proposed: Mapped[str | None]
     revision: Mapped[int]
     digest: Mapped[str]
     source_digest: Mapped[str]

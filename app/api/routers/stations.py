@@ -84,7 +84,8 @@ def patch_lines(
 
     The group that is answered is solved at once, the others in the background.
     """
-    change = partial(submit_station, edit=SetStationLines(lines.points()))
+    edit = SetStationLines(lines.points(), tuple(lines.proposed))
+    change = partial(submit_station, edit=edit)
     return _change(services, station, group, change, if_match, actor, asked)
 
 

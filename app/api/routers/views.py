@@ -83,8 +83,9 @@ def patch_lines(
     asked: AskedUnder,
 ) -> Response:
     """Draw, move or delete markings; 409 names the station when the camera is static."""
+    points, proposed = lines.points(), tuple(lines.proposed)
     return _submit(
-        services, view, lambda key: SetLines(key, lines.points()), if_match, actor, asked
+        services, view, lambda key: SetLines(key, points, proposed), if_match, actor, asked
     )
 
 

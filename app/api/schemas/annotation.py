@@ -80,6 +80,11 @@ class LinesEdit(BaseModel):
     )
 
     lines: LineEdits
+    proposed: Annotated[list[Marking], Field(max_length=len(MARKINGS))] = Field(
+        default_factory=list,
+        description="Those of them whose points are as they were proposed from the paint: their "
+        "source is `proposed`, until somebody moves them.",
+    )
 
     def points(self) -> dict[str, tuple[ImagePoint, ...] | None]:
         """The edit in values of the pitch's vocabulary."""

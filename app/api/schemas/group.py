@@ -96,6 +96,10 @@ class ViewDocument(Document):
     )
     station: StationDocument
     lines: LineDocuments
+    proposed: list[str] = Field(
+        description="Markings whose source is `proposed`: a person accepted their points as they "
+        "were proposed from the paint."
+    )
     balls: list[Ball]
     image: str | None = Field(description="Address of the frame, where there is one.")
     neighbours: str | None = Field(
@@ -192,6 +196,7 @@ def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument
         left_out=None if why is None else LeftOutDocument.model_validate(why),
         station=_station(state, view),
         lines=lines_document(view.station.lines),
+        proposed=[*view.station.proposed],
         balls=[Ball.of(ball, edited=view.key in state.stored.edited_views) for ball in view.balls],
         image=None if view.media is None else image_address(view_id),
         neighbours=_neighbours(state.key, view, view_id),

@@ -27,6 +27,9 @@ class StationDetail(BaseModel):
     )
     flipped: bool
     lines: LineDocuments
+    proposed: list[str] = Field(
+        description="Markings whose points were accepted as they were proposed from the paint."
+    )
     groups: int = Field(description="How many groups it takes part in.")
     revision: int
     etag: str
@@ -49,6 +52,7 @@ class StationDetail(BaseModel):
             "has_given_covariance": station.given_covariance is not None,
             "flipped": station.flipped,
             "lines": lines_document(station.lines),
+            "proposed": [*station.proposed],
             "groups": len(state.groups),
             "revision": state.revision,
             "etag": state.etag,

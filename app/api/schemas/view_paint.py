@@ -84,6 +84,7 @@ class ProposalDocument(Document):
         description="How much less the next best camera agrees; null where there is no other."
     )
     error_px: float | None = Field(description="Median distance of the paint to its marking.")
+    points: int = Field(description="How many places of paint the best camera lies on.")
 
     @classmethod
     def of(cls, found: ViewProposal) -> ProposalDocument:

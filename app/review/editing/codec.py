@@ -42,8 +42,9 @@ from app.store.codecs import (
 def edit_to_json(edit: Edit | StationEdit) -> Json:
     """An edit with its name under ``edit``."""
     match edit:
-        case SetLines(view, lines):
-            return {"edit": "set_lines", "view": view, "lines": _lines_to_json(lines)}
+        case SetLines(view, lines, proposed):
+            said = {"lines": _lines_to_json(lines), **_source(proposed)}
+            return {"edit": "set_lines", "view": view, **said}
         case SetBalls(view, balls):
             return {"edit": "set_balls", "view": view, "balls": [*map(ball_to_json, balls)]}
         case SetBall(view, ball):
@@ -62,8 +63,9 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
             return {"edit": "set_positions", "positions": positions_to_json(positions)}
         case SetPaint(paint):
             return {"edit": "set_paint", "paint": paint_to_json(paint)}
-        case SetStationLines(lines):
-            return {"edit": "set_station_lines", "lines": _lines_to_json(lines)}
+        case SetStationLines(lines, proposed):
+            said = {"lines": _lines_to_json(lines), **_source(proposed)}
+            return {"edit": "set_station_lines", **said}
         case SetStationCalibration(calibration):
             return {"edit": "set_station_calibration", "calibration": calibration}
         case SetStationCamera(given, covariance, calibration):
@@ -80,7 +82,7 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
     """Back from ``edit_to_json``, for edits of a group."""
     match value["edit"]:
         case "set_lines":
-            return SetLines(value["view"], _lines_from_json(value["lines"]))
+            return SetLines(value["view"], _lines_from_json(value["lines"]), _proposed(value))
         case "set_balls":
             return SetBalls(value["view"], tuple(map(ball_from_json, value["balls"])))
         case "include_view":
@@ -101,7 +103,7 @@ def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
     """Back from ``edit_to_json``, for edits of a station."""
     match value["edit"]:
         case "set_station_lines":
-            return SetStationLines(_lines_from_json(value["lines"]))
+            return SetStationLines(_lines_from_json(value["lines"]), _proposed(value))
         case "set_station_calibration":
             return SetStationCalibration(value["calibration"])
         case "set_station_camera":
@@ -112,6 +114,15 @@ def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
                 value["calibration"],
             )
     raise ValueError(f"the log holds an unknown edit: {value['edit']}")
+
+
+def _source(proposed: tuple[str, ...]) -> Json:
+    """Where lines come from, only where there is something to say: all other entries are as ever."""
+    return {"source": dict.fromkeys(proposed, "proposed")} if proposed else {}
+
+
+def _proposed(value: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(value.get("source", ()))
 
 
 def _lines_to_json(lines: LineChanges) -> Json:

@@ -60,21 +60,28 @@ class SetStationLines:
     """Draw, move or delete markings as one camera sees them."""
 
     lines: LineChanges
+    proposed: tuple[str, ...] = ()
+    """Those of the markings whose points are as they were proposed."""
 
     def apply(self, station: Station) -> Station:
         """The station with these markings."""
-        lines = dict(station.lines)
+        lines, accepted = dict(station.lines), set(map(canonical_marking, self.proposed))
+        own = set(station.proposed)
         for name, points in self.lines.items():
             marking = canonical_marking(name)
             if points:
                 lines[marking] = _checked_points(marking, points)
             else:
                 lines.pop(marking, None)
-        return replace(station, lines=make_lines(lines))
+            own.discard(marking)
+            if points and marking in accepted:
+                own.add(marking)
+        return replace(station, lines=make_lines(lines), proposed=tuple(sorted(own)))
 
     def inverse(self, station: Station) -> SetStationLines:
         """Each changed marking as it was before."""
-        return SetStationLines(_before(station.lines, self.lines))
+        before = _before(station.lines, self.lines)
+        return SetStationLines(before, tuple(item for item in station.proposed if item in before))
 
 
 @dataclass(frozen=True)
@@ -130,16 +137,22 @@ class SetLines:
 
     view: str
     lines: LineChanges
+    proposed: tuple[str, ...] = ()
+    """Those of the markings whose points are as they were proposed."""
 
     def apply(self, group: Group) -> Group:
         """The group with these markings in the view (and in others that share its station)."""
         view = need_view(group, self.view)
-        return with_station(group, view, SetStationLines(self.lines).apply(view.station))
+        return with_station(group, view, self._of_station.apply(view.station))
 
     def inverse(self, group: Group) -> SetLines:
         """Each changed marking as it was before."""
-        lines = need_view(group, self.view).station.lines
-        return SetLines(self.view, _before(lines, self.lines))
+        before = self._of_station.inverse(need_view(group, self.view).station)
+        return SetLines(self.view, before.lines, before.proposed)
+
+    @property
+    def _of_station(self) -> SetStationLines:
+        return SetStationLines(self.lines, self.proposed)
 
 
 @dataclass(frozen=True)

@@ -98,7 +98,7 @@ def proposal_question(store: Store, view_id: int) -> PaintQuestion:
     """
     with store.read() as session:
         stored, view = _find(session, view_id)
-        known = _known_cameras(session, stored)
+        known = known_cameras(session, stored)
     calibration = stored.policy.calibration
     return PaintQuestion(stored.group, view, _media(view), calibration, known=known)
 
@@ -120,7 +120,7 @@ def _media(view: View) -> Media:
     return view.media
 
 
-def _known_cameras(session: Session, stored: StoredGroup) -> tuple[Camera, ...]:
+def known_cameras(session: Session, stored: StoredGroup) -> tuple[Camera, ...]:
     """Cameras of the main views of the groups of the match that are nearest by their number."""
     ids = groups_of_match(session, stored.dataset_id, stored.group.match)
     near = sorted(ids, key=lambda number: abs(number - stored.id))[:MOST_KNOWN]

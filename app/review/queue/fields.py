@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 from app.soccer.reasons import REASONS
 from app.soccer.solution import FINDING_KINDS, GATES
 
@@ -85,6 +86,10 @@ _ASKED = (
     _flag("passes", "passes every gate"),
     _flag("fixed", "edited before it was accepted"),
     QueryField("pictures", "choice", "whether its views have a picture", values=("none", "any", "all")),
+    QueryField(
+        "proposal", "choice", "what was proposed from the paint for a view without lines",
+        values=(*WHETHER, *PROPOSAL_OUTCOMES),
+    ),
     _text("split", "train, test and so on, all of it"),
     _text("match", "part of the match's name", ()),
     _text("reviewer", "who decided"),

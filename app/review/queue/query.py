@@ -233,6 +233,15 @@ def _pictures(term: _Term, value: str) -> Condition:
     return conditions.compares("pictures", "=" if choice == "none" else ">", 0)
 
 
+def _proposal(term: _Term, value: str) -> Condition:
+    """What was proposed for a view that has no lines yet."""
+    choice = _choice(term, value)
+    if choice in ("any", "none"):
+        some = conditions.has_open_proposal()
+        return some if choice == "any" else conditions.opposite(some)
+    return conditions.has_open_proposal(choice)
+
+
 def _view(_term: _Term, value: str) -> Condition:
     """A view's key (``cam3``, ``7_1.png``), or how many views there are."""
     if value.isascii() and value.isdigit():
@@ -263,6 +272,7 @@ _TESTS: dict[str, Callable[[_Term, str], Condition]] = {
     "gate": _gate,
     "view": _view,
     "pictures": _pictures,
+    "proposal": _proposal,
     "match": _match,
     "label": _text,
     "": _text,

@@ -118,7 +118,7 @@ class TestOldHomes:
             "add_column = Operations.add_column\n"
             "def killed(self, table, column, **options):\n"
             "    add_column(self, table, column, **options)\n"
-            "    column.name == 'agreement' and os.kill(os.getpid(), 9)\n"
+            "    column.name == 'proposed' and os.kill(os.getpid(), 9)\n"
             "Operations.add_column = killed\n"
             "migrate(Settings(home=Path(sys.argv[1])))\n"
         )

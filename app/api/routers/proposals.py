@@ -1,0 +1,100 @@
+"""Proposals for views without lines: looked for in a dataset, shown, taken back."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
+from app.api.jobs import ACCEPTED, job_answer
+from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document
+from app.api.schemas.job import JobDocument
+from app.api.schemas.proposals import (
+    DatasetProposalsDocument,
+    DatasetProposalsRequest,
+    ForgottenProposalsDocument,
+    GroupProposal,
+    GroupProposals,
+    ProposalPlanDocument,
+)
+from app.review.editing.proposals import (
+    forget_proposals,
+    get_group_proposals,
+    get_proposals,
+    require_matches,
+)
+from app.review.jobs.proposals import request_proposals
+
+router = APIRouter(tags=["datasets"])
+
+
+@router.get(
+    "/datasets/{dataset}/proposals", operation_id="listDatasetProposals", responses=responses(404)
+)
+def list_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalsDocument:
+    """For how many views of each match something is proposed; nothing of it counts."""
+    return DatasetProposalsDocument.model_validate(get_proposals(store, dataset))
+
+
+@router.post(
+    "/datasets/{dataset}/proposals",
+    operation_id="proposeDatasetLines",
+    status_code=202,
+    response_model=JobDocument,
+    responses={
+        **responses(404, 413, 415),
+        **ACCEPTED,
+        200: {
+            "model": ProposalPlanDocument,
+            "description": "After a dry run: how many views would be looked at.",
+        },
+    },
+)
+def propose_lines(
+    dataset: DatasetPath,
+    request: DatasetProposalsRequest,
+    services: AppServices,
+    actor: Actor,
+    asked: AskedUnder,
+    dry_run: DryRun = False,
+) -> Response:
+    """Look at the pictures of views that have neither lines nor a given camera.
+
+    What is found is kept as predictions: nothing counts before a person saves the lines of one.
+    Views that were looked at are left alone, unless their picture is another, or more is known of
+    their match and nothing was proposed. The job's result counts the outcomes.
+    """
+    if dry_run or request.dry_run:
+        matches = None if request.match is None else [request.match]
+        found = require_matches(services.store, dataset, matches)
+        counts = {name: found.count(name, matches) for name in ("views", "looked")}
+        return document(ProposalPlanDocument(**counts))
+    reply = Reply(asked, job_answer)
+    job = request_proposals(
+        services.jobs, services.store, dataset, request.match, actor=actor, keep=reply.keep
+    )
+    return reply.of(job)
+
+
+@router.delete(
+    "/datasets/{dataset}/proposals",
+    operation_id="forgetDatasetProposals",
+    response_model=ForgottenProposalsDocument,
+    responses=responses(404),
+)
+def forget(dataset: DatasetPath, store: AppStore, asked: AskedUnder) -> Response:
+    """Forget everything that was proposed for a dataset; lines that were accepted stay."""
+    reply = Reply[int](asked, lambda gone: document(ForgottenProposalsDocument(forgotten=gone)))
+    return reply.of(forget_proposals(store, dataset, keep=reply.keep))
+
+
+@router.get(
+    "/groups/{group}/proposals",
+    operation_id="getGroupProposals",
+    tags=["groups"],
+    responses=responses(404),
+)
+def group_proposals(group: Id, store: AppStore) -> GroupProposals:
+    """What was proposed for the views of a group, with its lines and scores."""
+    found = get_group_proposals(store, group)
+    return GroupProposals(items=[GroupProposal.of(*item) for item in found])

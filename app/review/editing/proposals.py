@@ -1,0 +1,247 @@
+"""Proposals of a dataset: cameras for views without lines, as predictions that nobody said yet.
+
+They are kept beside the groups and no solve reads them. A person accepts one as lines, an edit
+like any other whose source is ``proposed``. A run can be killed anywhere; the next one leaves
+alone what was looked at, and goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from typing import Any
+
+from app.child import Allowance, ChildEnded
+from app.child_pool import ChildPool
+from app.errors import ImageError, NotFoundError
+from app.progress import Progress
+from app.review.datasets.dataset import Dataset, read_dataset
+from app.review.datasets.proposal_reading import (
+    MISSING,
+    UNREADABLE,
+    ProposalTask,
+    read_proposal,
+)
+from app.review.editing.etags import read_head
+from app.review.editing.view_paint import known_cameras
+from app.store.answers import Keep, keep_nothing
+from app.store.codecs import camera_to_json
+from app.store.digest import digest
+from app.store.groups import StoredGroup, read_groups
+from app.store.proposals import (
+    MatchProposals,
+    Proposal,
+    delete_proposals,
+    group_proposals,
+    match_proposals,
+    read_proposals,
+    save_proposals,
+    views_to_look_at,
+)
+from app.store.session import Store
+
+ALLOWANCE = Allowance(memory=2 * 2**30, processor=120.0, silence=240.0)
+"""For one picture; the first one of a process may have to wait for kernels to be compiled."""
+_A_CHILD = 4
+"""Groups that each child gets before they are written."""
+
+
+@dataclass(frozen=True)
+class DatasetProposals:
+    """What was proposed for a dataset's views, by match."""
+
+    dataset_id: int
+    dataset: str
+    items: tuple[MatchProposals, ...]
+
+    def count(self, name: str, matches: Collection[str] | None = None) -> int:
+        """Sum of a count over the matches."""
+        found = (item for item in self.items if matches is None or item.match in matches)
+        return sum(getattr(item, name) for item in found)
+
+
+@dataclass(frozen=True)
+class ProposalRun:
+    """What one run did.
+
+    Attributes:
+        views: Views without lines and camera that have a picture on record.
+        left: Whose proposal still stood.
+        proposed, unsure, nothing: What became of the others.
+        changed: Whose picture is another one than when it was looked at before.
+        missing: Whose picture is missing or cannot be read; they are among ``nothing``.
+    """
+
+    views: int = 0
+    left: int = 0
+    proposed: int = 0
+    unsure: int = 0
+    nothing: int = 0
+    changed: int = 0
+    missing: int = 0
+
+    def then(self, task: ProposalTask, found: Proposal | None) -> ProposalRun:
+        """With one view more."""
+        if found is None:
+            return replace(self, views=self.views + 1, left=self.left + 1)
+        before = "" if task.old is None else task.old.frame
+        return replace(
+            self,
+            views=self.views + 1,
+            **{found.outcome: getattr(self, found.outcome) + 1},
+            changed=self.changed + (before not in ("", found.frame) and found.frame != ""),
+            missing=self.missing + (found.sentence in (MISSING, UNREADABLE)),
+        )
+
+
+def get_proposals(store: Store, dataset: str | int) -> DatasetProposals:
+    """What was proposed for the views of a dataset's matches.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        return DatasetProposals(found.id, found.name, tuple(match_proposals(session, found.id)))
+
+
+def get_group_proposals(store: Store, group_id: int) -> list[tuple[str, bool, Proposal]]:
+    """Key of the view, whether it still has no lines, and what was proposed for it.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    with store.read() as session:
+        if read_head(session, group_id) is None:
+            raise NotFoundError(f"there is no group {group_id}")
+        return group_proposals(session, group_id)
+
+
+def require_matches(
+    store: Store, dataset: str | int, matches: Collection[str] | None = None
+) -> DatasetProposals:
+    """``get_proposals``, for these matches.
+
+    Raises:
+        NotFoundError: There is no such dataset or match.
+    """
+    found = get_proposals(store, dataset)
+    known = {item.match for item in found.items}
+    for match in matches or ():
+        if match not in known:
+            raise NotFoundError(f'"{found.dataset}" has no match {match}')
+    return found
+
+
+def propose_views(
+    store: Store,
+    dataset: str | int,
+    matches: Collection[str] | None = None,
+    *,
+    children: int | None = None,
+    progress: Progress | None = None,
+) -> ProposalRun:
+    """Look at the pictures of all views that have neither lines nor a given camera.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        matches: By name; None: all.
+        children: How many pictures are looked at at once; None: as the settings say.
+        progress: Called with views done and in all; an error that it raises ends the run.
+
+    Raises:
+        NotFoundError: There is no such dataset or match.
+    """
+    require_matches(store, dataset, matches)
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        asked = views_to_look_at(session, found.id, matches)
+    count, total = children or store.settings.image_workers, sum(len(views) for _, views in asked)
+    run = ProposalRun()
+    with closing(ChildPool(ALLOWANCE, count, 0, "pictures")) as pool:
+        for start in range(0, len(asked), _A_CHILD * count):
+            tasks = _tasks(store, found, dict(asked[start : start + _A_CHILD * count]))
+            answers = _answers(store, pool, tasks)
+            with store.write() as session:
+                save_proposals(session, [item for item in answers if item is not None])
+            for task, answer in zip(tasks, answers, strict=True):
+                run = run.then(task, answer)
+            if progress is not None:
+                progress(run.views, total)
+    return run
+
+
+def forget_proposals(store: Store, dataset: str | int, *, keep: Keep[int] = keep_nothing) -> int:
+    """Forget everything that was proposed for a dataset; what was accepted stays what it is.
+
+    Returns how many proposals there were.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.write() as session:
+        gone = delete_proposals(session, read_dataset(session, dataset).id)
+        keep(gone)(session)
+    return gone
+
+
+def _tasks(store: Store, dataset: Dataset, asked: dict[int, list[int]]) -> list[ProposalTask]:
+    tasks = []
+    with store.read() as session:
+        old = read_proposals(session, [view for views in asked.values() for view in views])
+        for stored in read_groups(session, list(asked), extras=False).values():
+            # The replays of a group look from elsewhere, but its main camera may be known, too.
+            known = known_cameras(session, stored)
+            for key, number in stored.view_ids.items():
+                if number in asked[stored.id]:
+                    tasks.append(_task(stored, key, known, dataset, old.get(number)))
+    return [task for task in tasks if task is not None]
+
+
+def _task(
+    stored: StoredGroup, key: str, known: Sequence[Any], dataset: Dataset, old: Proposal | None
+) -> ProposalTask | None:
+    view, policy = stored.group.view(key), dataset.policy.calibration
+    if view is None or view.media is None:
+        return None
+    station, pitch = view.station, stored.group.pitch
+    said = [
+        [camera_to_json(camera) for camera in known],
+        [float(pitch.length), float(pitch.width)],
+        [view.size.width, view.size.height, station.flipped],
+        [float(policy.distortion_mean), float(policy.distortion_sigma)],
+    ]
+    return ProposalTask(
+        view_id=stored.view_ids[key],
+        media=view.media,
+        flipped=station.flipped,
+        size=view.size,
+        known=tuple(known),
+        pitch=pitch,
+        policy=policy,
+        sought_with=digest(said),
+        old=old,
+    )
+
+
+def _answers(store: Store, pool: ChildPool, tasks: Sequence[ProposalTask]) -> list[Proposal | None]:
+    asked = [
+        pool.submit(read_proposal, task, store.settings, explain=_refusal, bounded=False)
+        for task in tasks
+    ]
+    return [_result(task, waiting.future) for task, waiting in zip(tasks, asked, strict=True)]
+
+
+def _result(task: ProposalTask, future: Any) -> Proposal | None:
+    try:
+        found: Proposal | None = future.result()
+    except ImageError:
+        # Its process ended over it: to this service that picture is unreadable.
+        return task.without_picture(UNREADABLE)
+    return found
+
+
+def _refusal(error: ChildEnded) -> ImageError:
+    return ImageError(f"the picture {error}")

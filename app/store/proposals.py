@@ -1,0 +1,202 @@
+"""Proposals in the database: what was proposed for views without lines, and which are open.
+
+A proposal is open while its view has neither lines nor a given camera. What was accepted stays,
+so that undo opens it again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any, cast
+
+from sqlalchemy import ColumnElement, Select, Table, and_, case, delete, func, or_, select
+from sqlalchemy.dialects.sqlite import insert
+from sqlalchemy.orm import Session, aliased
+
+from app.soccer.annotation import Lines
+from app.store.codecs import as_written, canonical, lines_from_json, lines_to_json, parse
+from app.store.models import GroupModel, StationModel, ViewModel
+from app.store.proposal_models import ProposalModel
+
+_PROPOSAL = cast(Table, ProposalModel.__table__)
+_BATCH = 500
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What was proposed for one view when its picture was looked at last.
+
+    Attributes:
+        outcome: ``proposed``, ``unsure`` or ``nothing``.
+        sentence: Why nothing is proposed; empty where something is.
+        lines: Points on the paint, pixels of the annotated size; none unless proposed.
+        supported, explained, points, error_px, runner_up: As of ``paint.view_proposal``.
+        frame: Digest of the picture's bytes; empty where there were none.
+        sought_with: Digest of what else was known then.
+        version: Of what read the picture.
+    """
+
+    view_id: int
+    outcome: str
+    sentence: str
+    lines: Lines
+    supported: float | None
+    explained: float | None
+    points: int
+    error_px: float | None
+    runner_up: float | None
+    frame: str
+    sought_with: str
+    version: str
+
+
+@dataclass(frozen=True)
+class MatchProposals:
+    """How far the views of one match are.
+
+    Attributes:
+        views: Without lines and camera, and with a picture; static cameras count once.
+        looked: How many of them were looked at; ``proposed``, ``unsure`` and ``nothing`` add up to it.
+        accepted: Views whose lines are as they were proposed, at least in part.
+    """
+
+    match: str
+    views: int
+    looked: int
+    proposed: int
+    unsure: int
+    nothing: int
+    accepted: int
+
+
+def _is_open() -> ColumnElement[bool]:
+    return and_(StationModel.lines == "{}", StationModel.given.is_(None))
+
+
+def _is_asked() -> ColumnElement[bool]:
+    """Whether a view is one to look at: of a static camera that is the first with a picture."""
+    other = aliased(ViewModel)
+    first = (
+        select(func.min(other.id))
+        .where(other.station_id == StationModel.id, other.media_path.is_not(None))
+        .scalar_subquery()
+    )
+    alone = or_(StationModel.shared.is_(False), ViewModel.id == first)
+    return and_(_is_open(), ViewModel.media_path.is_not(None), alone)
+
+
+def groups_with_open(outcome: str | None = None) -> Select[Any]:
+    """Ids of the groups with an open proposal, of that outcome where one is named."""
+    statement = (
+        select(ViewModel.group_id)
+        .join(ProposalModel, ProposalModel.view_id == ViewModel.id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(_is_open())
+    )
+    return statement if outcome is None else statement.where(ProposalModel.outcome == outcome)
+
+
+def views_to_look_at(
+    session: Session, dataset_id: int, matches: Collection[str] | None = None
+) -> list[tuple[int, list[int]]]:
+    """Groups with the ids of those of their views that have no lines and no camera but a picture.
+
+    Args:
+        session: Any session.
+        dataset_id: The dataset.
+        matches: By name; None: all.
+    """
+    statement = (
+        select(ViewModel.group_id, ViewModel.id)
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(GroupModel.dataset_id == dataset_id, _is_asked())
+        .order_by(GroupModel.match, GroupModel.number, ViewModel.position)
+    )
+    if matches is not None:
+        statement = statement.where(GroupModel.match.in_(matches))
+    found: dict[int, list[int]] = {}
+    for group, view in session.execute(statement):
+        found.setdefault(group, []).append(view)
+    return list(found.items())
+
+
+def match_proposals(session: Session, dataset_id: int) -> list[MatchProposals]:
+    """How far each match of a dataset is, by name."""
+    asked, outcome = _is_asked(), ProposalModel.outcome
+
+    def number(*conditions: ColumnElement[bool]) -> ColumnElement[int]:
+        return func.coalesce(func.sum(case((and_(*conditions), 1), else_=0)), 0)
+
+    statement = (
+        select(
+            GroupModel.match,
+            number(asked),
+            number(asked, outcome.is_not(None)),
+            *(number(asked, outcome == name) for name in ("proposed", "unsure", "nothing")),
+            number(outcome == "proposed", StationModel.proposed.is_not(None)),
+        )
+        .join(ViewModel, ViewModel.group_id == GroupModel.id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .outerjoin(ProposalModel, ProposalModel.view_id == ViewModel.id)
+        .where(GroupModel.dataset_id == dataset_id)
+        .group_by(GroupModel.match)
+        .order_by(GroupModel.match)
+    )
+    rows: Iterable[Any] = session.execute(statement)
+    return [MatchProposals(*row) for row in rows]
+
+
+def read_proposals(session: Session, views: Iterable[int]) -> dict[int, Proposal]:
+    """What was proposed for views, by id; those that nobody looked at are left out."""
+    wanted, found = sorted(set(views)), {}
+    for start in range(0, len(wanted), _BATCH):
+        some = wanted[start : start + _BATCH]
+        for row in session.execute(select(_PROPOSAL).where(_PROPOSAL.c.view_id.in_(some))):
+            found[row.view_id] = _of_row(row)
+    return found
+
+
+def group_proposals(session: Session, group_id: int) -> list[tuple[str, bool, Proposal]]:
+    """Key of the view, whether it is open, and the proposal, in the order of a group's views."""
+    statement = (
+        select(ViewModel.key, _is_open().label("open"), *_PROPOSAL.columns)
+        .join(_PROPOSAL, _PROPOSAL.c.view_id == ViewModel.id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(ViewModel.group_id == group_id)
+        .order_by(ViewModel.position)
+    )
+    return [(row.key, bool(row.open), _of_row(row)) for row in session.execute(statement)]
+
+
+def save_proposals(session: Session, proposals: Sequence[Proposal]) -> None:
+    """Put proposals in the place of what their views had; views that are gone are passed over."""
+    ids = select(ViewModel.id).where(ViewModel.id.in_([item.view_id for item in proposals]))
+    present = set(session.scalars(ids))
+    rows = [
+        {**asdict(item), "lines": canonical(lines_to_json(item.lines))}
+        for item in proposals
+        if item.view_id in present
+    ]
+    if rows:
+        statement = insert(_PROPOSAL)
+        changed = {name: statement.excluded[name] for name in rows[0] if name != "view_id"}
+        session.execute(statement.on_conflict_do_update(["view_id"], set_=changed), rows)
+
+
+def delete_proposals(session: Session, dataset_id: int) -> int:
+    """Forget what was proposed for a dataset's views; how many that were."""
+    mine = (
+        select(ViewModel.id)
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
+        .where(GroupModel.dataset_id == dataset_id)
+    )
+    gone = session.execute(delete(_PROPOSAL).where(_PROPOSAL.c.view_id.in_(mine)))
+    return int(cast(Any, gone).rowcount)
+
+
+def _of_row(row: Any) -> Proposal:
+    values = {item.name: getattr(row, item.name) for item in fields(Proposal)}
+    with as_written():
+        return Proposal(**{**values, "lines": lines_from_json(parse(row.lines))})

@@ -1,0 +1,292 @@
+"""Proposals of a dataset: looked for, kept as predictions, accepted, and forgotten."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.child_pool import PoolTask
+from app.errors import InputError, JobCancelled, NotFoundError
+from app.paint.view_proposal import ViewProposal
+from app.review.datasets import proposal_reading
+from app.review.datasets.proposal_reading import MISSING
+from app.review.editing import proposals as editing
+from app.review.editing.edit import SetLines
+from app.review.editing.ledger import read_ledger
+from app.review.editing.proposals import (
+    ProposalRun,
+    forget_proposals,
+    get_group_proposals,
+    get_proposals,
+    propose_views,
+)
+from app.review.editing.recompute import solve_dataset
+from app.review.editing.replay import replay
+from app.review.editing.submit import history, load, submit, undo
+from app.review.importing.carry import carried_group
+from app.review.importing.ingest import ingest
+from app.review.queue.listing import list_groups
+from app.soccer.group import Group, Media, Station, View
+from app.store.frozen import freeze_said, thaw_group
+from app.store.log import verify_chain
+from app.store.session import Store
+from tests.cameras import SIZE
+from tests.unit.api.conftest import lines_of
+from tests.unit.paint.lawns import TRUE, drawn, lawn
+
+CAMERA = TRUE.scaled(4 / 3, 4 / 3)
+"""Of the annotated size; the pictures are smaller."""
+
+
+@cache
+def picture(empty: bool) -> bytes:
+    """The markings on grass, or grass alone, as PNG."""
+    mask = np.zeros((540, 960), np.bool_) if empty else drawn(TRUE, 3)
+    return bytes(cv2.imencode(".png", lawn(mask)[:, :, ::-1])[1])
+
+
+def draw(file: Path, *, empty: bool = False) -> Media:
+    """A picture of the markings, or of grass alone."""
+    file.write_bytes(picture(empty))
+    return Media(str(file))
+
+
+def view(name: str, media: Media | None, **station: object) -> View:
+    return View(name, Station(name, SIZE, **station), media=media)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def groups(tmp_path: Path) -> list[Group]:
+    """Two instants of a match: one that is annotated, and one with a picture and lines nowhere."""
+    known = view("a.png", draw(tmp_path / "a.png"), lines=lines_of(CAMERA))
+    fresh = view("b.png", draw(tmp_path / "b.png"))
+    bare = view("c.png", None)
+    given = view("d.png", draw(tmp_path / "d.png", empty=True), given=CAMERA)
+    return [
+        Group("1", (known,), match="m"),
+        Group("2", (fresh, bare, given), match="m"),
+    ]
+
+
+@pytest.fixture(autouse=True)
+def here(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """In place of processes: pictures are looked at where the test is."""
+
+    class Here:
+        def __init__(self, *_: object) -> None: ...
+
+        def submit(self, work, *arguments, explain, bounded):  # type: ignore[no-untyped-def]
+            task = PoolTask(explain)
+            task.future.set_result(work(*arguments))
+            return task
+
+        def close(self) -> None: ...
+
+    monkeypatch.setattr(editing, "ChildPool", Here)
+    yield
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[object, ...]]:
+    """What was asked for each picture that was looked at; the markings are always found."""
+    seen: list[tuple[object, ...]] = []
+
+    def look(image, size, known, pitch, policy):  # type: ignore[no-untyped-def]
+        seen.append(tuple(known))
+        if image.max() < 200:
+            return ViewProposal("nothing", "No straight line is seen on the grass.", {})
+        return ViewProposal("proposed", "", lines_of(CAMERA), 0.9, 0.8, 0.3, 0.25, 500)
+
+    monkeypatch.setattr(proposal_reading, "proposal_of", look)
+    return seen
+
+
+@pytest.fixture
+def filled(store: Store, groups: list[Group]) -> Store:
+    ingest(store, "demo", groups, source="files", actor="ann")
+    solve_dataset(store, "demo")
+    return store
+
+
+def counts(store: Store) -> tuple[int, ...]:
+    (item,) = get_proposals(store, "demo").items
+    return item.views, item.looked, item.proposed, item.unsure, item.nothing, item.accepted
+
+
+def found(store: Store, q: str) -> list[int]:
+    return [row.id for row in list_groups(store, 1, q).items]
+
+
+def accept(store: Store, number: int = 2) -> str:
+    """Save what is proposed for a group's first view; its key."""
+    (key, is_open, item), *_ = get_group_proposals(store, number)
+    assert is_open and item.outcome == "proposed"
+    edit = SetLines(key, item.lines, tuple(item.lines))
+    submit(store, number, edit, if_match=load(store, number).etag, actor="bob")
+    return key
+
+
+class TestProposeViews:
+    def test_lines_are_found_from_the_picture_and_the_match_and_nothing_is_said(self, filled):
+        before, kinds = load(filled, 2).etag, [entry.kind for entry in history(filled, 2)]
+        assert counts(filled) == (1, 0, 0, 0, 0, 0)
+        run = propose_views(filled, "demo")
+        assert run == ProposalRun(views=1, proposed=1)
+        ((key, is_open, item),) = get_group_proposals(filled, 2)
+        assert (key, is_open, item.outcome, item.sentence) == ("b.png", True, "proposed", "")
+        assert item.supported > 0.9 and item.points > 100 and item.error_px < 0.5
+        assert item.frame and item.version
+        curve = CAMERA.project(load(filled, 2).group.pitch.sample("Side line right", 0.05, 0.05))
+        for point in item.lines["Side line right"]:
+            assert np.hypot(*(curve - point).T).min() < 1.5
+        assert load(filled, 2).etag == before
+        assert [entry.kind for entry in history(filled, 2)] == kinds
+
+    def test_what_the_match_knows_is_handed_on(self, filled, asked):
+        propose_views(filled, "demo")
+        ((camera,),) = asked
+        assert np.linalg.norm(camera.position - CAMERA.position) < 1.0
+
+    def test_once_more_compares_pictures_and_looks_at_none(self, filled, asked):
+        propose_views(filled, "demo")
+        assert propose_views(filled, "demo") == ProposalRun(views=1, left=1)
+        assert len(asked) == 1
+
+    def test_another_picture_and_a_missing_one_are_said(self, filled, asked, tmp_path: Path):
+        propose_views(filled, "demo")
+        draw(tmp_path / "b.png", empty=True)
+        assert propose_views(filled, "demo") == ProposalRun(views=1, nothing=1, changed=1)
+        (tmp_path / "b.png").unlink()
+        run = propose_views(filled, "demo")
+        assert run == ProposalRun(views=1, nothing=1, missing=1)
+        ((_, _, item),) = get_group_proposals(filled, 2)
+        assert (item.sentence, item.frame, dict(item.lines)) == (MISSING, "", {})
+
+    def test_where_nothing_was_found_more_of_the_match_is_worth_another_look(
+        self, store, groups, asked, tmp_path: Path
+    ):
+        draw(tmp_path / "b.png", empty=True)
+        ingest(store, "demo", groups, source="files", actor="ann")
+        propose_views(store, "demo")
+        solve_dataset(store, "demo")
+        assert propose_views(store, "demo") == ProposalRun(views=1, nothing=1)
+        assert propose_views(store, "demo") == ProposalRun(views=1, left=1)
+
+    def test_a_static_camera_is_looked_at_once(self, store, asked, tmp_path: Path):
+        media = draw(tmp_path / "s.png")
+        shared = [
+            Group(str(number), (view("cam1", media, shared=True),), match="m") for number in (1, 2)
+        ]
+        ingest(store, "demo", shared, source="files", actor="ann")
+        assert propose_views(store, "demo") == ProposalRun(views=1, proposed=1)
+        assert counts(store) == (1, 1, 1, 0, 0, 0)
+
+    def test_killed_midway_it_goes_on_where_it_was(self, store, asked, tmp_path, monkeypatch):
+        monkeypatch.setattr(editing, "_A_CHILD", 1)
+        many = [
+            Group(str(number), (view(f"{number}.png", draw(tmp_path / f"{number}.png")),))
+            for number in range(3)
+        ]
+        ingest(store, "demo", many, source="files", actor="ann")
+
+        def stop(_done, _total):
+            raise JobCancelled
+
+        with pytest.raises(JobCancelled):
+            propose_views(store, "demo", children=1, progress=stop)
+        told = []
+        run = propose_views(store, "demo", children=1, progress=lambda *at: told.append(at))
+        assert (run.left, run.proposed, len(asked)) == (1, 2, 3)
+        assert told == [(1, 3), (2, 3), (3, 3)]
+
+    def test_a_match_that_is_not_there_is_refused(self, filled):
+        with pytest.raises(NotFoundError, match="no match final"):
+            propose_views(filled, "demo", ["final"])
+
+
+class TestAccepting:
+    def test_the_source_stands_in_log_state_and_frozen_text_and_undo_takes_all_back(
+        self, filled, asked
+    ):
+        propose_views(filled, "demo")
+        before = load(filled, 2)
+        key = accept(filled)
+        state = load(filled, 2)
+        station = state.group.view(key).station
+        assert station.proposed == tuple(station.lines)
+        edit = history(filled, 2)[-1].body["edit"]
+        assert set(edit["source"].values()) == {"proposed"} and edit["edit"] == "set_lines"
+        said = freeze_said(state.group)
+        assert '"proposed":["' in said.texts[said.key]
+        back = undo(filled, 2, if_match=state.etag, actor="bob")
+        assert back.group == before.group and back.group.view(key).station.proposed == ()
+
+    def test_a_frozen_group_and_a_carried_one_keep_it(self, filled, asked):
+        propose_views(filled, "demo")
+        key = accept(filled)
+        group = load(filled, 2).group
+        said = freeze_said(group)
+        texts = {name: json.loads(text) for name, text in said.texts.items()}
+        thawed = thaw_group(texts[said.key], texts)
+        assert thawed.view(key).station.proposed == group.view(key).station.proposed
+        assert carried_group(group)["views"][0]["station"]["proposed"] == [
+            *thawed.view(key).station.proposed
+        ]
+
+    def test_the_log_makes_the_same_tables(self, filled, asked):
+        propose_views(filled, "demo")
+        accept(filled)
+        with filled.read() as session:
+            verify_chain(session)
+            assert replay(session) == read_ledger(session)
+
+    def test_a_marking_that_is_moved_is_a_person_s_again(self, filled, asked):
+        propose_views(filled, "demo")
+        key = accept(filled)
+        state = load(filled, 2)
+        first, *rest = state.group.view(key).station.proposed
+        moved = SetLines(key, {first: state.group.view(key).station.lines[first][:-1]})
+        after = submit(filled, 2, moved, if_match=state.etag, actor="bob")
+        assert after.group.view(key).station.proposed == tuple(rest)
+        back = undo(filled, 2, if_match=after.etag, actor="bob")
+        assert back.group.view(key).station.proposed == (first, *rest)
+
+    def test_what_is_accepted_is_no_longer_open_and_undo_opens_it(self, filled, asked):
+        propose_views(filled, "demo")
+        assert found(filled, "proposal:proposed") == [2]
+        accept(filled)
+        assert counts(filled) == (0, 0, 0, 0, 0, 1)
+        assert found(filled, "proposal:any") == []
+        undo(filled, 2, if_match=load(filled, 2).etag, actor="bob")
+        assert found(filled, "proposal:any") == [2]
+
+
+class TestQuery:
+    def test_finds_groups_by_what_became_of_their_views(self, filled, asked, tmp_path: Path):
+        assert found(filled, "proposal:none") == [1, 2]
+        propose_views(filled, "demo")
+        assert found(filled, "proposal:proposed,unsure") == [2]
+        assert found(filled, "-proposal:any") == found(filled, "proposal:none") == [1]
+        draw(tmp_path / "b.png", empty=True)
+        propose_views(filled, "demo")
+        assert (found(filled, "proposal:nothing"), found(filled, "proposal:proposed")) == ([2], [])
+
+    def test_refuses_what_it_does_not_know(self, filled):
+        with pytest.raises(InputError, match="proposal cannot be"):
+            found(filled, "proposal:perhaps")
+
+
+class TestForget:
+    def test_takes_all_back_at_once_and_leaves_what_was_accepted(self, filled, asked):
+        propose_views(filled, "demo")
+        accept(filled)
+        assert forget_proposals(filled, "demo") == 1
+        assert counts(filled) == (0, 0, 0, 0, 0, 0)
+        assert load(filled, 2).group.view("b.png").station.proposed
+        assert forget_proposals(filled, "demo") == 0
