@@ -22,6 +22,7 @@ JobKind = Literal[
     "rig",
     "positions",
     "paint",
+    "proposals",
 ]
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -11,6 +12,11 @@ import numpy as np
 import pytest
 
 from app.cli import main
+from app.config import Settings
+from app.review.importing.ingest import ingest
+from app.soccer.group import Group, Media, Station, View
+from app.store.session import Store
+from tests.cameras import SIZE
 from tests.unit.paint.lawns import TRUE, drawn, lawn
 
 
@@ -63,3 +69,41 @@ class TestPropose:
         (tmp_path / "in").mkdir()
         assert run(monkeypatch, tmp_path / "in", tmp_path / "out") == 1
         assert "no pictures" in capsys.readouterr().err
+
+
+class TestOfDataset:
+    @pytest.fixture
+    def home(self, touchline, tmp_path: Path):
+        store = Store.open(Settings(home=tmp_path / "home"))
+        media = Media(str(tmp_path / "gone.png"))
+        group = Group("1", (View("a", Station("a", SIZE), media=media),), match="m")
+        ingest(store, "demo", [group], source="files", actor="ann")
+        store.close()
+        return partial(touchline, "propose", "--dataset", "demo")
+
+    def test_looks_shows_and_forgets(self, home):
+        assert home("--show")[1] == (
+            "m: 0 of 1 views looked at: 0 proposed, 0 unsure, 0 nothing, 0 accepted\n"
+        )
+        found = json.loads(home("--workers", "1", "--json")[1])
+        assert (found["views"], found["nothing"], found["missing"]) == (1, 1, 1)
+        (row,) = json.loads(home("--show", "--match", "m", "--json")[1])
+        assert (row["looked"], row["nothing"]) == (1, 1)
+        assert "forgotten  1" in home("--undo")[1]
+
+    @pytest.mark.parametrize(
+        ("words", "code", "sentence"),
+        [
+            (("--match", "final"), 1, "has no match final"),
+            (("--show", "--undo"), 2, "one at a time"),
+            (("--size", "960x540"), 2, "name nothing else"),
+            (("--undo", "--match", "m"), 2, "all of a dataset"),
+        ],
+    )
+    def test_what_cannot_be_is_said(self, home, words, code: int, sentence: str):
+        found, _, err = home(*words)
+        assert (found, sentence in err) == (code, True)
+
+    def test_without_pictures_and_dataset_nothing_is_done(self, touchline):
+        code, _, err = touchline("propose")
+        assert (code, "name IMAGES and OUT" in err) == (2, True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -11,7 +10,6 @@ import cv2
 import numpy as np
 import pytest
 
-from app.child_pool import PoolTask
 from app.errors import InputError, JobCancelled, NotFoundError
 from app.paint.view_proposal import ViewProposal
 from app.review.datasets import proposal_reading
@@ -39,6 +37,7 @@ from app.store.session import Store
 from tests.cameras import SIZE
 from tests.unit.api.conftest import lines_of
 from tests.unit.paint.lawns import TRUE, drawn, lawn
+from tests.unit.review.editing.test_paint import Here
 
 CAMERA = TRUE.scaled(4 / 3, 4 / 3)
 """Of the annotated size; the pictures are smaller."""
@@ -75,21 +74,9 @@ def groups(tmp_path: Path) -> list[Group]:
 
 
 @pytest.fixture(autouse=True)
-def here(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
     """In place of processes: pictures are looked at where the test is."""
-
-    class Here:
-        def __init__(self, *_: object) -> None: ...
-
-        def submit(self, work, *arguments, explain, bounded):  # type: ignore[no-untyped-def]
-            task = PoolTask(explain)
-            task.future.set_result(work(*arguments))
-            return task
-
-        def close(self) -> None: ...
-
     monkeypatch.setattr(editing, "ChildPool", Here)
-    yield
 
 
 @pytest.fixture
