@@ -64,6 +64,7 @@
  * @property {LeftOutJson | null} [left_out] why a person left it out
  * @property {StationJson} station
  * @property {LinesJson} lines
+ * @property {string[]} [proposed] markings that a person accepted as they were proposed
  * @property {BallJson[]} balls
  * @property {string | null} image
  * @property {string | null} [neighbours] where the frames before and after are listed
@@ -175,7 +176,7 @@
  */
 
 /**
- * @typedef {{edit: 'set_lines', view: string, lines: {[marking: string]: PairJson[] | null}}
+ * @typedef {{edit: 'set_lines', view: string, lines: {[marking: string]: PairJson[] | null}, source?: {[marking: string]: 'proposed'}}
  *   | {edit: 'set_balls', view: string, balls: BallJson[]}
  *   | {edit: 'set_picture', view: string, picture: PictureJson | null}
  *   | {edit: 'include_view', view: string, included: boolean}} EditJson   as the history writes edits

@@ -25,6 +25,7 @@ import { pinsOf } from '../lib/pins.js';
  * @property {Draw} draw whiskers from the markings to their paint
  * @property {(marking: string) => ImagePoint[]} places of the paint of a marking
  */
+/** @typedef {{item: import('../api/proposals.js').ViewProposalJson, draw: Draw}} ViewProposal   its code is loaded with it */
 /**
  * @typedef {object} ViewPicture
  * @property {ViewJson} view
@@ -39,6 +40,7 @@ import { pinsOf } from '../lib/pins.js';
  * @property {Pin[]} pins notes that stand at a place of this view
  * @property {ViewPredictions} [predictions] once they are known
  * @property {ViewPaint} [paint] once it is read, while it is shown
+ * @property {ViewProposal} [proposal] lines that are proposed, where there are none
  */
 /**
  * @typedef {object} Scene

@@ -13,7 +13,8 @@ import { group, groupDocument, solution, submit } from './group.js';
 import { redo as redoSaved, undo as undoSaved } from './history.js';
 import { sameLines } from './line_changes.js';
 import { announce } from './notice.js';
-import { begin, changesOf, linesOf, rebase, stage, stepBack, stepForward } from './staging.js';
+import { asProposed } from './proposed_lines.js';
+import { begin, changesOf, linesOf, proposedLines, rebase, stage, stepBack, stepForward } from './staging.js';
 
 /** @import {LinesJson, SolutionJson} from '../api/types.js' */
 /** @import {Staging} from './staging.js' */
@@ -159,7 +160,8 @@ export function commit() {
 		announce('Nothing is staged.');
 		return false;
 	}
-	const edit = { kind: /** @type {const} */ ('lines'), view: at.key, lines: changes.value };
+	const proposed = asProposed(changes.value, proposedLines(staging.value));
+	const edit = { kind: /** @type {const} */ ('lines'), view: at.key, lines: changes.value, ...(proposed.length ? { proposed } : {}) };
 	batch(() => {
 		held.value = null;
 		keep(begin(at.lines));

@@ -5,7 +5,7 @@ import { leftOutText } from './reasons.js';
 
 /** @import {BallJson, EditJson, GroupDocument, LeftOutJson, PictureJson, PointJson, ViewJson} from '../api/types.js' */
 
-/** @typedef {{kind: 'lines', view: string, lines: Record<string, PointJson[] | null>}} LinesEdit */
+/** @typedef {{kind: 'lines', view: string, lines: Record<string, PointJson[] | null>, proposed?: string[]}} LinesEdit   proposed: those whose points are as they were proposed */
 /** @typedef {{kind: 'ball', view: string, ball: BallJson | null, prediction?: {id: number, replace: boolean}}} BallEdit   prediction: that this ball is accepted from */
 /** @typedef {{kind: 'include', view: string, included: boolean, reason?: string | null, note?: string | null}} IncludeEdit   reason: why it is left out, one of REASONS */
 /** @typedef {{kind: 'picture', view: string, picture: PictureJson | null}} PictureEdit   what was done to the picture since it was taken */
@@ -34,7 +34,8 @@ function editView(view, edit) {
 		if (points) lines[marking] = points;
 		else delete lines[marking];
 	}
-	return { ...view, lines };
+	const proposed = [...(view.proposed ?? []).filter((marking) => !(marking in edit.lines)), ...(edit.proposed ?? [])].sort();
+	return { ...view, lines, proposed };
 }
 
 /**
@@ -57,7 +58,7 @@ export function requestOf(group, edit) {
 	if (edit.kind === 'ball') {
 		return { path: `/views/${view.id}/ball`, body: edit.ball && ballBody(edit.ball), etag: group.etag };
 	}
-	const body = { lines: edit.lines };
+	const body = { lines: edit.lines, ...(edit.proposed?.length ? { proposed: edit.proposed } : {}) };
 	// The lines of a static camera belong to its station, which has a state of its own.
 	if (!view.station.shared) return { path: `/views/${view.id}/lines`, body, etag: group.etag };
 	const etag = view.station.etag ?? group.etag;
@@ -129,6 +130,7 @@ export function describe(group, edit) {
 	if (edit.kind === 'picture') return `Picture of ${letter} ${edit.picture ? 'taken as stretched or cropped' : 'taken as it is'}`;
 	const drawn = Object.keys(edit.lines).filter((marking) => edit.lines[marking]);
 	const markings = drawn.length ? drawn : Object.keys(edit.lines);
+	if (edit.proposed?.length === markings.length) return `Lines of ${letter} accepted as proposed`;
 	return `${markings.length > FEW ? `${markings.length} markings` : markings.join(', ')} of ${letter} changed`;
 }
 
@@ -167,7 +169,8 @@ export function editOf(said) {
 	if (said.edit === 'set_picture') return { kind: 'picture', view, picture: said.picture };
 	if (said.edit === 'set_balls') return { kind: 'ball', view, ball: said.balls[0] ?? null };
 	const lines = Object.entries(said.lines).map(([marking, points]) => [marking, points?.length ? points.map(([x, y]) => ({ x, y })) : null]);
-	return { kind: 'lines', view, lines: Object.fromEntries(lines) };
+	const proposed = Object.keys(said.source ?? {});
+	return { kind: 'lines', view, lines: Object.fromEntries(lines), ...(proposed.length ? { proposed } : {}) };
 }
 
 /** Every marking of a view under its twin's name. @param {ViewJson} view @returns {LinesEdit} */
@@ -175,5 +178,6 @@ export function swapSides(view) {
 	/** @type {Record<string, PointJson[] | null>} */
 	const lines = Object.fromEntries(Object.keys(view.lines).map((marking) => [marking, null]));
 	for (const [marking, points] of Object.entries(view.lines)) lines[twinMarking(marking)] = points;
-	return { kind: 'lines', view: view.key, lines };
+	const proposed = (view.proposed ?? []).map(twinMarking);
+	return { kind: 'lines', view: view.key, lines, ...(proposed.length ? { proposed } : {}) };
 }

@@ -12,7 +12,8 @@ import { page } from '../lib/router.js';
 import { changes, lines, staging, stageLines, view } from './calibration.js';
 import { sameLines } from './line_changes.js';
 import { announce, complain } from './notice.js';
-import { linesOf } from './staging.js';
+import { proposals } from './proposals.js';
+import { linesOf, PROPOSED } from './staging.js';
 
 /** @import {LinesJson, ViewJson} from '../api/types.js' */
 /** @import {PaintJson} from '../api/paint.js' */
@@ -131,19 +132,27 @@ export async function proposeFromPaint() {
 		announce('Lines are proposed where there are none: this view has some.');
 		return;
 	}
+	const known = proposals.peek().get(at.key);
+	if (known?.outcome === 'proposed') {
+		stageProposed(known.lines);
+		return;
+	}
 	asking.value = 'lines';
 	try {
 		const found = await proposeLines(at.id);
 		if (view.value?.id !== at.id || Object.keys(lines.value).length > 0) return;
 		if (found.outcome !== 'proposed') complain(`No lines are proposed. ${found.sentence}`);
-		else {
-			stageLines(found.lines, 'Lines proposed from the paint');
-			announce(`${plural(Object.keys(found.lines).length, 'marking')} proposed: check the sides, then save. Swap sides (M) turns them round.`);
-		}
+		else stageProposed(found.lines);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		complain(`Nothing can be proposed: ${error.message}`);
 	} finally {
 		asking.value = null;
 	}
+}
+
+/** @param {LinesJson} proposed */
+function stageProposed(proposed) {
+	stageLines(proposed, 'Lines proposed from the paint', PROPOSED);
+	announce(`${plural(Object.keys(proposed).length, 'marking')} proposed: check the sides, then save. Swap sides (M) turns them round.`);
 }

@@ -52,6 +52,14 @@ export function changesOf(staging) {
 	return changesBetween(staging.base, linesOf(staging));
 }
 
+/** Run of the step that stages proposed lines. */
+export const PROPOSED = 'proposed';
+
+/** The lines as they were proposed, where a step in force has staged such. @param {Staging} staging @returns {LinesJson} */
+export function proposedLines({ steps, at }) {
+	return steps.slice(0, at).findLast(({ run }) => run === PROPOSED)?.lines ?? {};
+}
+
 /**
  * The same changes on top of what somebody else has saved meanwhile. Markings that were not
  * changed here are theirs.

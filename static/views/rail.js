@@ -9,6 +9,7 @@ import { Findings } from './findings.js';
 import { Gates } from './gates.js';
 import { PairTable } from './pair_table.js';
 import { PredictionCard } from './prediction_parts.js';
+import { ProposalCard } from './proposal_parts.js';
 import { VerdictButtons } from './verdict_buttons.js';
 import { VerdictCard } from './verdict_card.js';
 import { ViewLines } from './view_lines.js';
@@ -34,6 +35,7 @@ export function Rail({ group, solution, pictures, live }) {
 				${solution ? html`<${Gates} group=${group} solution=${solution} />` : null}
 				<${ViewTable} group=${group} pictures=${pictures} />
 				${pictures.some(({ predictions }) => predictions) ? html`<${PredictionCard} group=${group} />` : null}
+				${pictures.some(({ proposal }) => proposal) ? html`<${ProposalCard} pictures=${pictures} />` : null}
 				${solution ? html`
 					<${PairTable} group=${group} solution=${solution} />
 					<${Findings} group=${group} solution=${solution} />

@@ -27,6 +27,7 @@ import { deleteSelected, nudge, nudgeDiameter } from '../tools/nudge.js';
 import { EDITOR_DOOR } from './calibration/open.js';
 import { mendNow, placeExpected } from './mend_actions.js';
 import { acceptAll, acceptInHand, hasPredictions } from './prediction_parts.js';
+import { acceptProposed } from './proposal_parts.js';
 import { SCENE_KEYS } from './scene3d/scene3d.js';
 
 /** @import {Binding} from '../lib/keys.js' */
@@ -310,6 +311,7 @@ const EDIT = [
 	},
 	{ keys: ['y'], label: 'Take the predicted ball, else place it where the other views see it', group: 'Edit', run: takeBall },
 	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', run: acceptAll },
+	{ keys: ['Shift+p'], label: 'Accept the lines that are proposed for the view', group: 'Edit', run: acceptProposed },
 	{ keys: ['u'], label: 'Give the selected object back what it was', group: 'Edit', run: () => { revertSelected(); } },
 	{ keys: ['m'], label: 'Swap left and right, in the view that a finding names', group: 'Edit', run: swap },
 	{ keys: ['Ctrl+z'], label: 'Undo', group: 'Edit', run: undo },

@@ -16,6 +16,7 @@ import { estimator, focused, loupe, maximised } from '../state/workspace.js';
 import { NoticeBar } from './bars.js';
 import { ImageGrid, ReviewMain } from './image_grid.js';
 import { usePredictions, withPredictions } from './prediction_parts.js';
+import { useProposals } from './proposal_parts.js';
 import { Rail } from './rail.js';
 import { ReviewHeader } from './review_header.js';
 import { REVIEW_KEYS } from './review_keys.js';
@@ -54,7 +55,7 @@ function Workspace() {
 	const plain = useMemo(() => (shown ? picturesOf(shown, solved, saved) : []), [shown, solved, saved]);
 	const predicted = usePredictions(shown !== null);
 	const marked = useMemo(() => withPredictions(plain, predicted), [plain, predicted]);
-	const pictures = usePaint(marked, saved);
+	const pictures = useProposals(usePaint(marked, saved), saved);
 	useEffect(() => keepWithin(pictures.map(({ view }) => view.letter)), [pictures]);
 	if (!shown) return html`<${Absent} />`;
 	return html`

@@ -16,6 +16,7 @@ import { NoiseCard } from './noise_card.js';
 import { Loading, Trouble } from './page_frame.js';
 import { Pitches } from './pitches.js';
 import { Positions } from './positions.js';
+import { Proposals } from './proposals.js';
 import { QueryBox } from './query_box.js';
 import { seriesColour, Spread } from './spread.js';
 
@@ -92,7 +93,8 @@ function StatisticsOf({ one }) {
 			<h2 class="statistics__whole">Of the whole dataset</h2>
 			<${NoiseCard} dataset=${one.id} />
 			<${Pitches} dataset=${one.id} />
-			<${Positions} dataset=${one.id} />` : found.error ? null : html`<${Loading} what="statistics" />`}
+			<${Positions} dataset=${one.id} />
+			<${Proposals} dataset=${one.id} name=${one.name} />` : found.error ? null : html`<${Loading} what="statistics" />`}
 	`;
 }
 

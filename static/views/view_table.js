@@ -84,6 +84,10 @@ function ViewRow({ group, picture }) {
 			</td>
 		</tr>
 		<${PaintLine} solved=${solved} view=${view} />
+		${view.proposed?.length ? html`
+			<tr class="numbers__aside" data-proposed=${view.letter}>
+				<td colspan="7">lines: ${view.proposed.length} of ${Object.keys(view.lines).length} accepted as <${Term} word="proposal">proposed<//></td>
+			</tr>` : null}
 		${view.left_out ? html`
 			<tr class="numbers__aside" data-why=${view.left_out.reason}>
 				<td colspan="7">View ${view.letter} is ${leftOutText(view.left_out)}</td>

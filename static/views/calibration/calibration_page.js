@@ -11,13 +11,15 @@ import { useResource } from '../../lib/resource.js';
 import { navigate, page } from '../../lib/router.js';
 import { picturesOf } from '../../overlays/scene.js';
 import {
-	changed, resetForView, shown, shownSolution, startAsking, view,
+	changed, lines, resetForView, shown, shownSolution, startAsking, view,
 } from '../../state/calibration.js';
 import { editorAddress } from '../../state/editor_address.js';
 import { groupDocument, open, pending } from '../../state/group.js';
 import { queueAddress, reviewAddress } from '../../state/navigation.js';
 import { complain } from '../../state/notice.js';
 import { followPaint } from '../../state/paint.js';
+import { proposalDrawing } from '../../overlays/proposal.js';
+import { followProposals, proposals } from '../../state/proposals.js';
 import { watchSolving } from '../../state/solving.js';
 import { NoticeBar } from '../bars.js';
 import { ConflictBar } from '../conflict_bar.js';
@@ -87,7 +89,9 @@ function Workspace({ group, at }) {
 	const after = shownSolution.value;
 	const saved = groupDocument.value;
 	const before = saved?.solution ?? null;
-	const picture = useMemo(() => picturesOf(group, after, saved).find(({ view: { key } }) => key === at.key), [group, after, saved, at.key]);
+	const plain = useMemo(() => picturesOf(group, after, saved).find(({ view: { key } }) => key === at.key), [group, after, saved, at.key]);
+	const item = Object.keys(lines.value).length === 0 ? proposals.value.get(at.key) : undefined;
+	const picture = useMemo(() => (plain && item ? { ...plain, proposal: { item, draw: proposalDrawing(item.lines) } } : plain), [plain, item]);
 	const solved = before?.views.find((one) => one.view === at.key)?.calibration ?? null;
 	const readInfluence = useCallback((/** @type {AbortSignal} */ signal) => getInfluence(at.id, signal), [at.id]);
 	const influence = useResource(readInfluence, [at.id, saved?.etag]);
@@ -126,6 +130,7 @@ export function CalibrationPage() {
 	useEffect(() => { if (wanted !== null) enter(wanted); }, [wanted]);
 	useEffect(() => startAsking(), []);
 	useEffect(() => followPaint(), []);
+	useEffect(() => followProposals(), []);
 	useEffect(() => {
 		/** @param {BeforeUnloadEvent} event */
 		const ask = (event) => { if (changed.value) event.preventDefault(); };

@@ -15,6 +15,7 @@ import { drawPins } from '../../overlays/pins.js';
 import { drawPixelGrid } from '../../overlays/pixel_grid.js';
 import { drawPoints, drawSelectedPoint, drawWhiskers } from '../../overlays/points.js';
 import { drawPredictions } from '../../overlays/predictions.js';
+import { proposalDrawing } from '../../overlays/proposal.js';
 import { drawUndrawn } from '../../overlays/undrawn.js';
 import { drawCurve } from '../timeline/drawing.js';
 import { ballAt, circle, drawGrass, gradeAt, HEIGHT, KEY, lineOf, sceneOf, WIDTH } from './legend_scene.js';
@@ -71,6 +72,7 @@ const PICTURES = {
 		{ name: 'Point of a wrong line', meaning: 'The ring is red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12)] }), drawMarkings, drawPoints) },
 		{ name: 'Point that is not used', meaning: 'The solver left its line out because it contradicts all others. Filled red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { used: false })] }), drawPoints) },
 		{ name: 'Whisker', meaning: 'Leads from the line to the annotated point; W makes it 1, 5 or 20 times as long as it is.', tokens: 'canvas-warn canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf(gradeAt(12), 12)] }), drawMarkings, drawWhiskers, drawPoints) },
+		{ name: 'Proposed line', meaning: 'Read from the paint of a picture without lines, and said by nobody. It counts for nothing until a person accepts it (Shift P). Violet, dashed, its name with a question mark.', tokens: 'canvas-predicted', draw: onGrass(sceneOf({}), proposalDrawing({ 'Side line': [{ x: 6, y: 34 }, { x: 40, y: 30 }, { x: 126, y: 20 }] })) },
 		{ name: 'Selected point', meaning: 'The yellow ring: arrows move this point.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('ok', 2, { marking: 'Side' })] }, { ...solid, viewport: { scale: 1, left: -50, top: 9 } }), drawPoints, drawSelectedPoint) },
 		{ name: 'Note', meaning: 'A remark that somebody left at this place.', tokens: 'canvas-warn canvas-point canvas-plate', draw: onGrass(sceneOf({ pins: [{ at: { x: 22, y: 40 }, text: 'check this' }] }), drawPins) },
 	],

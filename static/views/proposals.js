@@ -1,0 +1,95 @@
+// @ts-check
+/** Lines proposed for the views of a dataset that have none: looked for, counted, forgotten. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { forgetProposals, getProposals, proposeForDataset } from '../api/proposals.js';
+import { count, plural } from '../lib/format.js';
+import { matchName } from '../lib/match_name.js';
+import { sentenceOf } from '../lib/resource.js';
+import { queueAddress } from '../state/navigation.js';
+import { announce } from '../state/notice.js';
+import { JobProgress } from './job_progress.js';
+import { useMatchCard } from './match_card.js';
+import { Trouble } from './page_frame.js';
+import { Term } from './term.js';
+
+/** @import {MatchProposalsJson} from '../api/proposals.js' */
+/** @import {JobJson} from '../api/jobs.js' */
+
+/** Changes of groups after which other views have lines. */
+const CONCERNED = ['import', 'edit', 'undo', 'redo', 'camera', 'station_edit'];
+const OUTCOMES = /** @type {const} */ (['proposed', 'unsure', 'nothing']);
+
+/** @param {{one: MatchProposalsJson, dataset: string}} props */
+function MatchProposals({ one, dataset }) {
+	const { name, aside } = matchName(one.match);
+	return html`
+		<tr data-match=${one.match}>
+			<th scope="row">${name || 'no match'}${aside ? html`<small>${aside}</small>` : null}</th>
+			<td data-numeric="true">${count(one.views)}</td>
+			${OUTCOMES.map((outcome) => html`
+				<td key=${outcome} data-numeric="true" data-number=${outcome}>${one[outcome] ? html`
+					<a href=${queueAddress(dataset, `proposal:${outcome} match:"${one.match}"`)}>${count(one[outcome])}</a>` : '0'}</td>`)}
+			<td data-numeric="true" data-number="accepted">${count(one.accepted)}</td>
+		</tr>`;
+}
+
+/** What a search that is over did, in words. @param {{job: JobJson}} props */
+function Outcome({ job }) {
+	const found = job.state === 'done' ? job.result : null;
+	if (!found) return null;
+	const parts = [
+		`${plural(found.views, 'view')}: ${count(found.proposed)} proposed, ${count(found.unsure)} unsure, ${count(found.nothing)} nothing`,
+		found.left ? `${count(found.left)} as before` : '',
+		found.changed ? `${plural(found.changed, 'picture')} changed` : '',
+		found.missing ? `${plural(found.missing, 'picture')} missing or unreadable` : '',
+	];
+	return html`<p role="status" data-result="proposals">${parts.filter(Boolean).join(' · ')}.</p>`;
+}
+
+/** @param {{dataset: number, name: string}} props */
+export function Proposals({ dataset, name }) {
+	const { value, error, reload, card, saving } = useMatchCard(getProposals, dataset, CONCERNED);
+	const { job, busy, error: refused, send } = saving;
+	const [problem, setProblem] = useState('');
+	if (error) return html`<${Trouble} title="The proposals cannot be shown" error=${error} retry=${reload} />`;
+	const items = (value?.items ?? []).filter(({ views, accepted }) => views || accepted);
+	if (!value || (!items.length && !job)) return null;
+	const [views, looked] = [sum(items, 'views'), sum(items, 'looked')];
+	const why = busy ? 'Under way' : views ? '' : 'Every view with a picture has lines or a camera';
+	async function forget() {
+		if (busy || !looked) return;
+		setProblem('');
+		try {
+			const { forgotten } = await forgetProposals(dataset);
+			announce(`${plural(forgotten, 'proposal')} forgotten; lines that were accepted stay.`);
+			card.current?.querySelector('h2')?.focus();
+			reload();
+		} catch (failed) {
+			setProblem(sentenceOf(failed));
+		}
+	}
+	return html`
+		<section class="card card--flush statistics__matches" aria-labelledby="proposals-title" ref=${card}>
+			<h2 id="proposals-title" tabindex="-1"><${Term} word="proposal">Proposed lines<//></h2>
+			<p>Views without lines and camera, whose painted lines may show where the camera stands. What is found counts for nothing until a person accepts it, under review or in the calibration editor.</p>
+			<table class="table">
+				<thead><tr><th>match</th><th data-numeric="true">without lines</th><th data-numeric="true">proposed</th><th data-numeric="true">unsure</th><th data-numeric="true">nothing</th><th data-numeric="true">accepted</th></tr></thead>
+				<tbody>${items.map((one) => html`<${MatchProposals} key=${one.match} one=${one} dataset=${name} />`)}</tbody>
+			</table>
+			<p class="table__actions">
+				<button class="button button--primary" type="button" aria-disabled=${why !== ''} title=${why || 'Those that were looked at before are only compared'} onClick=${() => { if (!why) send(() => proposeForDataset(dataset)); }}>Propose lines for ${plural(views, 'view')}</button>
+				<button class="button" type="button" aria-disabled=${busy || !looked} title=${busy ? 'Under way' : looked ? 'Lines that were accepted stay' : 'Nothing was proposed yet'} onClick=${forget}>Forget all proposals</button>
+			</p>
+			${job ? html`<${JobProgress} job=${job} /><${Outcome} job=${job} />` : null}
+			${refused || problem ? html`<p class="form__error" role="alert">${refused || problem}</p>` : null}
+		</section>
+	`;
+}
+
+/** @param {MatchProposalsJson[]} items @param {'views' | 'looked'} what */
+function sum(items, what) {
+	return items.reduce((total, one) => total + one[what], 0);
+}

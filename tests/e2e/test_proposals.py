@@ -1,0 +1,90 @@
+"""Lines that are proposed from the paint: looked for, drawn unlike any other, accepted with a key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.screen import Document, Screen, passing, until
+from tests.e2e.test_access import serious_in_both
+from tests.e2e.test_predictions import COUNT_PREDICTED
+
+OpenPage = Callable[..., Page]
+
+API = "/api/v1"
+PROPOSALS = f"{API}/datasets/sample/proposals"
+
+
+@pytest.fixture
+def bare(open_page: OpenPage) -> Iterator[tuple[Page, int]]:
+    """A page and a group whose main view has no lines; they are put back afterwards."""
+    page = open_page(None)
+    number = passing(page, 1)
+
+    def draw(lines: Document) -> None:
+        document = page.request.get(f"{API}/groups/{number}").json()
+        answer = page.request.patch(
+            f"{API}/views/{document['views'][0]['id']}/lines",
+            data={"lines": lines},
+            headers={"If-Match": document["etag"]},
+        )
+        assert answer.ok, answer.text()
+
+    before = page.request.get(f"{API}/groups/{number}").json()["views"][0]["lines"]
+    draw(dict.fromkeys(before))
+    yield page, number
+    now = page.request.get(f"{API}/groups/{number}").json()["views"][0]["lines"]
+    draw({**dict.fromkeys(now), **before})
+    assert page.request.delete(PROPOSALS).ok
+
+
+def test_they_are_looked_for_drawn_and_accepted_with_one_key(bare: tuple[Page, int]) -> None:
+    page, number = bare
+    page.goto("/datasets/sample/statistics")
+    card = page.locator('section[aria-labelledby="proposals-title"]')
+    button = card.get_by_role("button", name="Propose lines for 1 view")
+    button.focus()
+    page.keyboard.press("Enter")
+    expect(card.locator('[data-result="proposals"]')).to_contain_text("1 view: 1 proposed")
+    link = card.locator('[data-number="proposed"] a')
+    expect(link).to_have_text("1")
+    assert serious_in_both(page) == []
+    link.click()
+    # The head of the table is a row, too.
+    expect(page.locator(".queue-table")).to_have_attribute("aria-rowcount", "2")
+
+    page.goto(f"/review/{number}")
+    screen = Screen(page)
+    screen.ready()
+    row = page.locator('.proposals [data-proposal="A"]')
+    expect(row).to_contain_text("supported")
+    expect(row).to_have_attribute("data-outcome", "proposed")
+    until(page, lambda: page.evaluate(COUNT_PREDICTED) > 100)
+    assert screen.document()["views"][0]["lines"] == {}
+    page.keyboard.press("Shift+P")
+    screen.saved()
+    view = screen.document()["views"][0]
+    assert view["proposed"] == sorted(view["lines"]) != []
+    expect(page.locator('[data-proposed="A"]')).to_contain_text("accepted as")
+    expect(row).to_be_hidden()
+    page.keyboard.press("Control+z")
+    expect(row).to_be_visible()
+    screen.saved()
+    assert screen.document()["views"][0]["lines"] == {}
+
+    page.goto(f"/review/{number}/calibration?view={view['key']}")
+    note = page.locator(".marking-card .proposals")
+    expect(note).to_contain_text("proposed")
+    page.keyboard.press("Shift+P")
+    expect(page.locator(".commit__state")).to_contain_text("Lines proposed")
+    page.keyboard.press("Control+s")
+    expect(page.locator('.save[data-unsaved="0"]')).to_contain_text("Saved")
+    until(page, lambda: screen_document(page, number)["views"][0]["proposed"] == view["proposed"])
+
+
+def screen_document(page: Page, number: int) -> Document:
+    """The group as the server has it."""
+    document: Document = page.request.get(f"{API}/groups/{number}").json()
+    return document
