@@ -76,13 +76,15 @@ def _is_open() -> ColumnElement[bool]:
 
 def _is_asked() -> ColumnElement[bool]:
     """Whether a view is one to look at: of a static camera that is the first with a picture."""
-    other = aliased(ViewModel)
+    view, station = aliased(ViewModel), aliased(StationModel)
+    # One look at all of them: asked view by view, a camera of many views would cost their square.
     first = (
-        select(func.min(other.id))
-        .where(other.station_id == StationModel.id, other.media_path.is_not(None))
-        .scalar_subquery()
+        select(func.min(view.id))
+        .join(station, station.id == view.station_id)
+        .where(station.shared, station.lines == "{}", view.media_path.is_not(None))
+        .group_by(view.station_id)
     )
-    alone = or_(StationModel.shared.is_(False), ViewModel.id == first)
+    alone = or_(StationModel.shared.is_(False), ViewModel.id.in_(first))
     return and_(_is_open(), ViewModel.media_path.is_not(None), alone)
 
 

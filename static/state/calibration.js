@@ -13,7 +13,7 @@ import { group, groupDocument, solution, submit } from './group.js';
 import { redo as redoSaved, undo as undoSaved } from './history.js';
 import { sameLines } from './line_changes.js';
 import { announce } from './notice.js';
-import { asProposed } from './proposed_lines.js';
+import { asProposed } from './proposal_lines.js';
 import { begin, changesOf, linesOf, proposedLines, rebase, stage, stepBack, stepForward } from './staging.js';
 
 /** @import {LinesJson, SolutionJson} from '../api/types.js' */

@@ -9,7 +9,7 @@ import { plural } from '../lib/format.js';
 import { page } from '../lib/router.js';
 import { group, groupDocument, submit } from './group.js';
 import { announce, complain } from './notice.js';
-import { bareViews, isBare } from './proposed_lines.js';
+import { bareViews, isBare } from './proposal_lines.js';
 import { focused, overlaysHidden } from './workspace.js';
 
 /** @import {ViewProposalJson} from '../api/proposals.js' */

@@ -6,7 +6,7 @@ import { useEffect, useMemo } from 'preact/hooks';
 
 import { lazy } from '../lib/lazy.js';
 import { announce } from '../state/notice.js';
-import { bareViews } from '../state/proposed_lines.js';
+import { bareViews } from '../state/proposal_lines.js';
 
 /** @import {ViewProposalJson} from '../api/proposals.js' */
 /** @import {GroupDocument} from '../api/types.js' */

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
 import { applyEdit, describe as describe_, editOf, requestOf, swapSides } from '../../static/state/edits.js';
-import { asProposed, isBare } from '../../static/state/proposed_lines.js';
+import { asProposed, isBare } from '../../static/state/proposal_lines.js';
 import { begin, PROPOSED, proposedLines, stage, stepBack } from '../../static/state/staging.js';
 
 const SIDE = [{ x: 0, y: 0 }, { x: 0, y: 90 }];
