@@ -47,6 +47,7 @@ class TestStateReader:
             flipped=True,
             shared=True,
             picture=PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5)),
+            proposed=(min(group.views[0].station.lines),),
         )
         why = LeftOut("duplicate_view", "as camera 2")
         view = replace(group.views[0], balls=balls, included=False, station=station, left_out=why)
@@ -73,6 +74,8 @@ class TestStateReader:
             ("given_covariance", [1.0] * 63),
             ("given_covariance", [0.0] * 64),
             ("given_covariance", [1.0] * 64),
+            ("proposed", "Middle line"),
+            ("proposed", [["Middle line"]]),
             ("picture", [1.0]),
             ("picture", {"aspect": 1.0, "shift": [0.0], "sigma": [0.0, 0.0, 0.0]}),
             ("picture", {"aspect": 9.0, "shift": [0.0, 0.0], "sigma": [0.0, 0.0, 0.0]}),

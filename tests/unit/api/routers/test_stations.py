@@ -55,6 +55,17 @@ class TestStations:
             assert other["views"][0]["lines"][name] == body["lines"][name]
             assert other["solution"]["views"][0] == after["solution"]["views"][0]
 
+    def test_lines_that_were_proposed_say_so_until_they_are_undone(self, api, document) -> None:
+        path = f"{API}/stations/{document['views'][0]['station']['id']}"
+        body = moved(document["views"][0]["lines"])
+        names = [*body["lines"]]
+        tag = {"If-Match": api.get(path).headers["etag"]}
+        answer = api.patch(f"{path}/lines", json={**body, "proposed": names}, headers=tag)
+        assert answer.json()["views"][0]["proposed"] == names
+        assert api.get(path).json()["proposed"] == names
+        back = {"If-Match": api.get(path).headers["etag"]}
+        assert api.post(f"{path}/undo", headers=back).json()["views"][0]["proposed"] == []
+
     def test_the_other_groups_are_solved_in_the_background(self, api, document) -> None:
         view = document["views"][0]
         api.patch(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -31,6 +32,7 @@ from app.review.importing.carry import carried_group
 from app.review.importing.ingest import ingest
 from app.review.queue.listing import list_groups
 from app.soccer.group import Group, Media, Station, View
+from app.store.digest import station_digest
 from app.store.frozen import freeze_said, thaw_group
 from app.store.log import verify_chain
 from app.store.session import Store
@@ -155,6 +157,12 @@ class TestProposeViews:
         ((_, _, item),) = get_group_proposals(filled, 2)
         assert (item.sentence, item.frame, dict(item.lines)) == (MISSING, "", {})
 
+    def test_what_another_extractor_found_is_looked_for_again(self, filled, asked, monkeypatch):
+        with monkeypatch.context() as patch:
+            patch.setattr(proposal_reading, "EXTRACTOR_VERSION", "0")
+            propose_views(filled, "demo")
+        assert propose_views(filled, "demo") == ProposalRun(views=1, proposed=1)
+
     def test_where_nothing_was_found_more_of_the_match_is_worth_another_look(
         self, store, groups, asked, tmp_path: Path
     ):
@@ -214,6 +222,12 @@ class TestAccepting:
         back = undo(filled, 2, if_match=state.etag, actor="bob")
         assert back.group == before.group and back.group.view(key).station.proposed == ()
 
+    def test_who_says_the_lines_is_part_of_what_is_said(self, filled, asked):
+        propose_views(filled, "demo")
+        key = accept(filled)
+        station = load(filled, 2).group.view(key).station
+        assert station_digest(station) != station_digest(replace(station, proposed=()))
+
     def test_a_frozen_group_and_a_carried_one_keep_it(self, filled, asked):
         propose_views(filled, "demo")
         key = accept(filled)
@@ -222,6 +236,7 @@ class TestAccepting:
         texts = {name: json.loads(text) for name, text in said.texts.items()}
         thawed = thaw_group(texts[said.key], texts)
         assert thawed.view(key).station.proposed == group.view(key).station.proposed
+        assert Station("x", SIZE).with_said(group.view(key).station).proposed
         assert carried_group(group)["views"][0]["station"]["proposed"] == [
             *thawed.view(key).station.proposed
         ]
@@ -277,3 +292,10 @@ class TestForget:
         assert counts(filled) == (0, 0, 0, 0, 0, 0)
         assert load(filled, 2).group.view("b.png").station.proposed
         assert forget_proposals(filled, "demo") == 0
+
+    def test_leaves_other_datasets_alone(self, filled, groups, asked):
+        ingest(filled, "other", groups, source="files", actor="ann")
+        propose_views(filled, "demo")
+        propose_views(filled, "other")
+        assert forget_proposals(filled, "other") == 1
+        assert counts(filled)[:3] == (1, 1, 1)
