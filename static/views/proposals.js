@@ -72,7 +72,7 @@ export function Proposals({ dataset, name }) {
 		}
 	}
 	return html`
-		<section class="card card--flush statistics__matches" aria-labelledby="proposals-title" ref=${card}>
+		<section class="card card--flush statistics__matches proposals-card" aria-labelledby="proposals-title" ref=${card}>
 			<h2 id="proposals-title" tabindex="-1"><${Term} word="proposal">Proposed lines<//></h2>
 			<p>Views without lines and camera, whose painted lines may show where the camera stands. What is found counts for nothing until a person accepts it, under review or in the calibration editor.</p>
 			<table class="table">

@@ -63,6 +63,7 @@ def test_they_are_looked_for_drawn_and_accepted_with_one_key(bare: tuple[Page, i
     expect(row).to_have_attribute("data-outcome", "proposed")
     until(page, lambda: page.evaluate(COUNT_PREDICTED) > 100)
     assert screen.document()["views"][0]["lines"] == {}
+    assert serious_in_both(page) == []
     page.keyboard.press("Shift+P")
     screen.saved()
     view = screen.document()["views"][0]
@@ -75,8 +76,9 @@ def test_they_are_looked_for_drawn_and_accepted_with_one_key(bare: tuple[Page, i
     assert screen.document()["views"][0]["lines"] == {}
 
     page.goto(f"/review/{number}/calibration?view={view['key']}")
-    note = page.locator(".marking-card .proposals")
+    note = page.locator(".proposal-chip")
     expect(note).to_contain_text("proposed")
+    assert serious_in_both(page) == []
     page.keyboard.press("Shift+P")
     expect(page.locator(".commit__state")).to_contain_text("Lines proposed")
     page.keyboard.press("Control+s")

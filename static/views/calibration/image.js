@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 
+import { plural } from '../../lib/format.js';
 import { useSize } from '../../lib/hooks.js';
 import Konva from '../../lib/konva.js';
 import { ImageStage } from '../../overlays/stage.js';
@@ -13,6 +14,7 @@ import { paint, paintShown } from '../../state/paint.js';
 import { fitPanel, panPanel, viewportOf, zoomPanel } from '../../state/viewports.js';
 import { gain, overlaysHidden, projections } from '../../state/workspace.js';
 import { PanelCaption } from '../panel_caption.js';
+import { ProposalScores } from '../proposal_card.js';
 import { drawEditorMarks } from './marks.js';
 import { PaintChip } from './paint_chip.js';
 import { panelKey } from './panel_key.js';
@@ -47,6 +49,17 @@ class EditorStage extends ImageStage {
 			},
 		}));
 	}
+}
+
+/** What was proposed for the view, over its picture. @param {{item: import('../../api/proposals.js').ViewProposalJson}} props */
+function ProposalChip({ item }) {
+	const found = item.outcome === 'proposed';
+	return html`
+		<div class="paint-chip proposal-chip" role="status" data-outcome=${item.outcome}>
+			<p>${found ? `${plural(Object.keys(item.lines).length, 'marking')} proposed` : `Looked at before: ${item.outcome}. ${item.sentence}`}</p>
+			<${ProposalScores} item=${item} />
+		</div>
+	`;
 }
 
 /** @param {{picture: ViewPicture, before: CalibrationJson | null}} props */
@@ -112,6 +125,7 @@ export function EditorImage({ picture, before }) {
 			${view.image ? null : html`<p class="image-panel__missing">No frame · the lines can be edited</p>`}
 			<${PanelCaption} picture=${picture} />
 			<${PaintChip} />
+			${picture.proposal && !paintShown.value ? html`<${ProposalChip} item=${picture.proposal.item} />` : null}
 			${drawing ? html`<p class="editor__hint" role="status">Click to set points on <strong>${chosen.marking}</strong> · Esc when done</p>` : null}
 		</figure>
 	`;

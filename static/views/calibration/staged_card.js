@@ -6,7 +6,6 @@ import { html } from 'htm/preact';
 import { fixed, pixels } from '../../lib/format.js';
 import { asking, proposeFromPaint, snapToPaint } from '../../state/paint.js';
 import { changed, changes, choice, discardStaged, lines, mode, redo, staging, undo } from '../../state/calibration.js';
-import { ProposalScores } from '../proposal_card.js';
 import { deleteChosen, deleteMarking, insertPoint, save, swapAllSides, toggleDrawing, toggleRelabelling } from './actions.js';
 
 /** @import {ViewPicture} from '../../overlays/scene.js' */
@@ -45,6 +44,7 @@ export function MarkingCard({ picture }) {
 	const chosen = choice.value;
 	const there = Boolean(chosen && lines.value[chosen.marking]);
 	const lined = Object.keys(lines.value).length > 0;
+	const proposed = picture.proposal?.item.outcome === 'proposed';
 	const frameless = picture.view.image ? null : 'This view has no frame';
 	const busy = asking.value ? 'The frame is being read' : null;
 	const none = chosen ? null : 'Choose a marking first';
@@ -63,12 +63,7 @@ export function MarkingCard({ picture }) {
 					? html`<${Action} label=${asking.value ? 'Reading…' : 'Snap to paint'} keys="K" run=${() => { snapToPaint(); }} off=${frameless ?? busy} />`
 					: html`<${Action} label=${asking.value ? 'Looking…' : 'Propose lines'} keys="⇧ P" run=${() => { proposeFromPaint(); }} off=${frameless ?? busy} />`}
 			</div>
-			${chosen ? null : html`<p class="note">${lined ? 'Click a line in the diagram, in the table or on the picture.' : 'Click a line in the diagram to draw it, or have lines proposed from the paint.'}</p>`}
-			${picture.proposal ? html`
-				<div class="proposals" data-outcome=${picture.proposal.item.outcome}>
-					<p>${picture.proposal.item.outcome === 'proposed' ? 'The violet dashed lines are proposed: ⇧ P stages them.' : `Looked at before: ${picture.proposal.item.outcome}. ${picture.proposal.item.sentence}`}</p>
-					<${ProposalScores} item=${picture.proposal.item} />
-				</div>` : null}
+			${chosen ? null : html`<p class="note">${lined ? 'Click a line in the diagram, in the table or on the picture.' : proposed ? 'The violet dashed lines are proposed: ⇧ P stages them.' : 'Click a line in the diagram to draw it, or have lines proposed from the paint.'}</p>`}
 			<${Points} picture=${picture} />
 		</section>
 	`;
