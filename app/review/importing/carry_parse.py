@@ -214,6 +214,8 @@ def _checked(station: Station) -> Station:
     for marking, points in station.lines.items():
         if canonical_marking(marking) != marking or len(points) > MAX_POINTS:
             raise InputError(f"has {marking}, which is not a pitch marking or has too many points")
+    if [*station.proposed] != [name for name in station.lines if name in station.proposed]:
+        raise InputError("has lines that were proposed and are not there")
     return station
 
 

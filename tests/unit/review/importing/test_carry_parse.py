@@ -10,10 +10,12 @@ import pytest
 
 from app.datasets.archive import open_tree
 from app.datasets.report import Report
-from app.errors import DatasetFormatError
-from app.review.importing.carry_parse import FORMAT, FORMAT_VERSION, HEAD, read_head
+from app.errors import DatasetFormatError, InputError
+from app.review.importing.carry_parse import FORMAT, FORMAT_VERSION, HEAD, _station, read_head
+from app.soccer.frames import ImageSize
+from app.soccer.group import Station
 from app.soccer.policy import PAPER
-from app.store.codecs import policy_to_json
+from app.store.codecs import policy_to_json, station_to_json
 
 
 class TestReadHead:
@@ -44,3 +46,13 @@ class TestReadHead:
         assert tree is not None
         with pytest.raises(DatasetFormatError, match=r"touchline\.json, policy: is not a policy"):
             read_head(tree)
+
+
+class TestStation:
+    def test_lines_that_were_proposed_are_lines_that_it_has(self) -> None:
+        lines = {"Middle line": [[1, 2], [3, 4]]}
+        value = {**station_to_json(Station("cam1", ImageSize(96, 54))), "lines": lines}
+        assert _station({**value, "proposed": ["Middle line"]}).proposed == ("Middle line",)
+        for wrong in (["Circle left"], "Middle line", ["Middle line", "Middle line"], [7]):
+            with pytest.raises(InputError, match="were proposed and are not there"):
+                _station({**value, "proposed": wrong})
