@@ -38,6 +38,7 @@ OPTIONAL = (
     "calibration",
     "given_covariance",
     "picture",
+    "proposed",
     "file_name",
 )
 _BATCH = 512
@@ -128,7 +129,7 @@ def _view(row: Mapping[str, Any], path: str, record: str) -> PlacedView:
         name: None
         if not isinstance(row.get(name), str)
         else read_json(row[name].encode(), path, record=f"{record}, {name}")
-        for name in ("lines", "balls", "given", "picture", "extras")
+        for name in ("lines", "balls", "given", "picture", "proposed", "extras")
     }
     pitch = [row.get("pitch_length"), row.get("pitch_width")]
     split = row.get("group_split") or row.get("split") or ""

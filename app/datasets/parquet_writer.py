@@ -215,9 +215,8 @@ def _said_json(name: str) -> Getter:
     return lambda row: json_text(row.said[name])
 
 
-def _picture(row: Row) -> str | None:
-    said = row.said.get("picture")
-    return None if said is None else json_text(said)
+def _if_said(name: str) -> Getter:
+    return lambda row: json_text(row.said[name]) if name in row.said else None
 
 
 _SIDES = ("x", "y", "width", "height")
@@ -297,7 +296,8 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("balls", TEXT, _said_json("balls")),
     ("given", TEXT, _said_json("given")),
     ("given_covariance", LIST, lambda row: row.said.get("given_covariance")),
-    ("picture", TEXT, lambda row: _picture(row)),
+    ("picture", TEXT, _if_said("picture")),
+    ("proposed", TEXT, _if_said("proposed")),
     ("extras", TEXT, lambda row: json_text(extras_to_json(row.view.extras))),
     *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
     ("solver_version", TEXT, lambda row: _solver(row)),

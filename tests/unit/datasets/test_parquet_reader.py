@@ -33,6 +33,7 @@ class TestReadParquet:
         why = LeftOut("other", "another match")
         known = replace(groups[0].views[0].station, given=camera, given_covariance=COVARIANCE)
         known = replace(known, picture=PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5)))
+        known = replace(known, proposed=(min(known.lines),))
         groups[0] = groups[0].with_view(replace(groups[0].views[0], station=known))
         groups[1] = groups[1].with_view(replace(groups[1].views[1], included=False, left_out=why))
         folder = tmp_path / "out"
