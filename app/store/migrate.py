@@ -34,6 +34,7 @@ KNOWN_REVISIONS = (
     "0015",
     "0016",
     "0017",
+    "0020",
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]
