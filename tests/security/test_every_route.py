@@ -119,7 +119,7 @@ class TestTable:
             assert not set(kind["classes"]) & set(kind["not"]), name
             assert all(map(str.strip, kind["not"].values())), name
         used = {word for words in TABLE["routes"].values() for word in words.split()}
-        assert used <= set(TABLE["classes"]) | set(TABLE["kinds"])
+        assert used <= set(TABLE["classes"]) | set(TABLE["kinds"]) | set(TABLE["roles"])
 
 
 @pytest.fixture(scope="module", autouse=True)
