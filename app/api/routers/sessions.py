@@ -113,7 +113,7 @@ def log_out(request: Request, response: Response, team: AppTeam) -> SessionDocum
     responses=responses(401, 409, 413, 415, 429),
 )
 def change_password(
-    change: PasswordEdit, me: Me, request: Request, response: Response, team: AppTeam
+    change: PasswordEdit, request: Request, response: Response, team: AppTeam, me: Me
 ) -> SessionDocument:
     """Give oneself another password; every session ends, and this browser gets a new one."""
     team.tries.count(team.address(request), me.name)

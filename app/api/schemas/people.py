@@ -66,7 +66,7 @@ class LinkUse(LinkLook):
 class LinkMeaning(Document):
     """Whom a link is for."""
 
-    name: str | None = Field(description="None: for the first admin, who chooses one.")
+    name: str | None = Field(description="Null: for the first admin, who chooses one.")
     joined: bool = Field(description="They have a password already; the link gives another one.")
 
 
@@ -74,7 +74,7 @@ class SessionDocument(Document):
     """Who asks."""
 
     team: bool = Field(description="People log in; else one person runs the server alone.")
-    name: str | None = Field(description="None: nobody is logged in.")
+    name: str | None = Field(description="Null: nobody is logged in.")
     role: Role | None
     may: list[Action] = Field(description="What the role lets them do.")
 
@@ -130,7 +130,7 @@ class UserDocument(Document):
     invited: bool = Field(description="A link waits for them with which they can.")
     created: datetime
     created_by: str
-    seen: datetime | None = Field(description="When a session was used last; None: none is open.")
+    seen: datetime | None = Field(description="When a session was used last; null: none is open.")
 
 
 class UserList(Document):
