@@ -115,7 +115,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None =
         StorageError: The database cannot be used.
     """
     services = Services.open(settings, pool)
-    site = Site(static)
+    site = Site(static, team=settings.team)
     app = FastAPI(
         title="Touchline",
         version=software_version(),
