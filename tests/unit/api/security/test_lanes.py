@@ -65,7 +65,8 @@ class TestLaneOf:
         assert [
             (method, path)
             for method, path in routes
-            if method != "GET" and lane_of(method, path) not in (CHANGES, PREVIEWS, UPLOADS, IMAGES, LOGINS)
+            if method != "GET"
+            and lane_of(method, path) not in (CHANGES, PREVIEWS, UPLOADS, IMAGES, LOGINS)
         ] == []
 
 
