@@ -23,6 +23,7 @@ from app.api.security import access
 from app.api.security.rules import OPEN, RULES
 from app.api.server import listen, make_server
 from app.config import Settings
+from app.review.importing.ingest import ensure_dataset
 from app.review.people import links, passwords
 from app.review.people.people import change_person, find_person, invite, renew_link
 from app.review.people.roles import LEAST, Role
@@ -347,6 +348,12 @@ class TestWhoActs:
         with team.store.read() as session:
             last = list(read_log(session))[-1]
         assert (last.actor, last.body["person"], last.body["did"]) == ("admin", "logged", "invited")
+
+    def test_what_is_made_is_its_makers(self, team: Team) -> None:
+        ensure_dataset(team.store, "made", "local")
+        body = {"name": "mine", "q": ""}
+        answer = team.ask("POST", f"{API}/datasets/made/saved-views", body, role="annotator")
+        assert (answer.status, json.loads(answer.body)["by"]) == (201, "annotator")
 
     def test_a_key_belongs_to_its_person(self, team: Team) -> None:
         """Two people may choose the same; neither is given the other's answer."""
