@@ -25,6 +25,7 @@ from app.review.people.names import checked_name
 from app.review.people.people import change_person, find_person, invite, list_people, renew_link
 from app.review.people.roles import Action, Role, may, require
 from app.store.log import read_log
+from app.store.people import update_person
 from app.store.session import Store
 
 SECRET = "correct horse battery"
@@ -250,6 +251,15 @@ class TestChangePerson:
             links.use(home, link.token, SECRET)
         with pytest.raises(ConflictError, match="is disabled"):
             renew_link(home, anna.id, actor="local")
+
+    def test_a_session_of_somebody_disabled_is_none_however_it_came_to_be(
+        self, home, logins
+    ) -> None:
+        join(home, "anna")
+        token = logins.log_in("anna", SECRET)
+        with home.write() as session:
+            update_person(session, find_person(home, "anna").id, disabled=True)
+        assert logins.find(token) is None
 
     def test_nobody_changes_their_own_rights(self, home) -> None:
         join(home, "anna", Role.ADMIN)
