@@ -146,6 +146,13 @@ class TestLinks:
         with pytest.raises(NotFoundError):
             links.use(home, link.token, SECRET, "eve")
 
+    def test_the_link_of_the_first_admin_ends_once_there_is_another(self, home) -> None:
+        link = links.make_first_link(home, actor="local")
+        assert link is not None
+        join(home, "anna", Role.ADMIN)
+        with pytest.raises(NotFoundError):
+            links.use(home, link.token, SECRET, "eve")
+
     def test_a_password_that_cannot_be_one_leaves_the_link_good(self, home) -> None:
         _, link = invite(home, "anna.of.the.north", Role.VIEWER, actor="local")
         for bad in ("short", "x" * 201, "Anna.of.the.North"):
@@ -251,6 +258,8 @@ class TestChangePerson:
             links.use(home, link.token, SECRET)
         with pytest.raises(ConflictError, match="is disabled"):
             renew_link(home, anna.id, actor="local")
+        change_person(home, anna.id, actor="local", disabled=False)
+        assert logins.find(token) is None, "an old session does not come back"
 
     def test_a_session_of_somebody_disabled_is_none_however_it_came_to_be(
         self, home, logins
