@@ -120,6 +120,30 @@ class TestTeam:
         until(page, lambda: verdict(page)["state"] == "deferred")
         assert verdict(page)["by"] == "rita"
 
+    def test_nobody_sends_what_another_person_left(
+        self, open_page: OpenPage, team: str, team_home: Path, console: Any
+    ) -> None:
+        console.expect(REFUSED)
+        for name in ("mine", "other"):
+            join(team_home, name, Role.REVIEWER)
+        page = open_page("/review/2", address=team)
+        log_in(page, "mine")
+        Screen(page).ready()
+        in_store(team_home, lambda store: end_sessions(store, "mine"))
+        page.keyboard.press("s")
+        expect(page.get_by_role("dialog", name="Your session has ended")).to_be_visible()
+        log_in(page, "other")
+        expect(page.get_by_role("link", name="other")).to_be_visible()
+        page.goto("/review/2")
+        Screen(page).ready()
+        assert verdict(page, 2)["state"] is None
+        page.goto("/account")
+        page.get_by_role("button", name="Log out").click()
+        log_in(page, "mine")
+        expect(page.get_by_role("link", name="mine")).to_be_visible()
+        until(page, lambda: verdict(page, 2)["state"] == "deferred")
+        assert verdict(page, 2)["by"] == "mine"
+
 
 def end_sessions(store: Store, name: str) -> None:
     person = find_person(store, name)
@@ -127,9 +151,9 @@ def end_sessions(store: Store, name: str) -> None:
         delete_logins(session, person.id)
 
 
-def verdict(page: Page) -> Any:
-    """The last word on the first group, as history has it."""
-    entries = page.request.get("/api/v1/groups/1/history").json()["items"]
+def verdict(page: Page, group: int = 1) -> Any:
+    """The last word on a group, as history has it."""
+    entries = page.request.get(f"/api/v1/groups/{group}/history").json()["items"]
     last = [entry for entry in entries if entry["kind"] == "verdict"]
     return (
         {"state": last[-1]["body"]["state"], "by": last[-1]["actor"]} if last else {"state": None}
