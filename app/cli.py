@@ -32,6 +32,7 @@ from app.commands import (
     sample,
     service,
     solving,
+    users,
     verdicts,
     versions,
 )
@@ -72,6 +73,7 @@ for part in PARTS:
     app.add_typer(part.commands)
 app.add_typer(datasets.commands, name="datasets")
 app.add_typer(policy.commands, name="policy")
+app.add_typer(users.commands, name="users")
 
 
 def _tell_version(asked: bool) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -40,6 +41,9 @@ def memory_bytes(
     return min(found)
 
 
+_URL = re.compile(r"https?://(?:[a-z0-9.-]+|\[[0-9a-f:]+\])(?::\d{1,5})?/?")
+
+
 class Settings(BaseSettings):
     """Everything an operator can set; the defaults are safe on one machine for one person."""
 
@@ -55,6 +59,13 @@ class Settings(BaseSettings):
     """Port the server listens on."""
     allowed_hosts: list[str] = ["127.0.0.1", "localhost", "[::1]"]
     """Host headers the server answers to, without the port."""
+    team: bool = False
+    """People log in; without it everybody who reaches the server is the one user ``local``."""
+    url: str | None = None
+    """The address that people open, such as https://touchline.example.org, where a proxy with TLS
+    stands in front."""
+    proxies: list[str] = ["127.0.0.1", "::1"]
+    """Addresses of proxies that are believed whom they forward (X-Forwarded-For), once ``url`` is set."""
     workers: int = Field(default_factory=lambda: os.cpu_count() or 1)
     """Processes that solve in batches."""
     image_workers: int = Field(default_factory=lambda: min(os.cpu_count() or 1, 4), ge=1)
@@ -93,6 +104,15 @@ class Settings(BaseSettings):
         if value.lstrip().startswith("["):
             return json.loads(value)
         return [part for part in value.split(os.pathsep) if part]
+
+    @field_validator("url")
+    @classmethod
+    def _address(cls, value: str | None) -> str | None:
+        if value is None or _URL.fullmatch(value.lower()):
+            return None if value is None else value.lower().rstrip("/")
+        raise ValueError(
+            "must be the beginning of an address, such as https://touchline.example.org"
+        )
 
     @property
     def uploads(self) -> Path:

@@ -18,6 +18,10 @@
         BusyError           another process writes for longer than one waits
         DamagedError        the database is not what was written
       OverloadedError       more work waits than is taken
+      AccessError           who asks may not
+        NotLoggedInError    nobody has said who asks
+        ForbiddenError      their role does not let them
+        TooManyTriesError   (seconds)
     ShapeError(ValueError)  our own mistake, outside the tree
     JobCancelled            no error at all: somebody wants the work to end
 
@@ -177,6 +181,32 @@ class DamagedError(StorageError):
 
 class OverloadedError(ReviewError):
     """The server has as much work as it takes; later it takes more."""
+
+
+class AccessError(ReviewError):
+    """Who asks may not have it."""
+
+
+class NotLoggedInError(AccessError):
+    """Nobody has said who asks, or the session that said it has ended."""
+
+
+class ForbiddenError(AccessError):
+    """The role of who asks does not let them."""
+
+
+class TooManyTriesError(AccessError):
+    """Too many tries to log in.
+
+    Args:
+        seconds: After so many the next one is looked at.
+    """
+
+    def __init__(self, seconds: int):
+        super().__init__(
+            "too many tries to log in", hint=f"Wait {seconds} seconds, then try again."
+        )
+        self.seconds = seconds
 
 
 class JobCancelled(Exception):  # noqa: N818

@@ -1,7 +1,7 @@
 // @ts-check
 /** Starts the browser application. */
 
-import '@preact/signals';
+import { effect, untracked } from '@preact/signals';
 
 import { html, render } from 'htm/preact';
 
@@ -11,6 +11,7 @@ import { startArrivals } from './state/arrival.js';
 import { draft } from './state/group.js';
 import { startInsight } from './state/insight.js';
 import { startLive } from './state/live.js';
+import { askWhoIsThere, isTeam, me } from './state/me.js';
 import { startMends } from './state/mends.js';
 import { lasting, outbox } from './state/outbox.js';
 import { startSending } from './state/sending.js';
@@ -20,11 +21,27 @@ addEventListener('beforeunload', (event) => {
 	// What is in the outbox comes back with the page; what is in hand does not.
 	if (draft.value || (!lasting.value && outbox.value.length > 0)) event.preventDefault();
 });
+
+/** What asks the server by itself. */
+function startWork() {
+	startArrivals();
+	startSending();
+	startInsight();
+	startMends();
+	startLive();
+}
+
 startRouter();
-startArrivals();
-startSending();
-startInsight();
-startMends();
-startLive();
 startKeys();
+if (isTeam) {
+	await askWhoIsThere();
+	let begun = false;
+	effect(() => {
+		if (!me.value || begun) return;
+		begun = true;
+		untracked(startWork);
+	});
+} else {
+	startWork();
+}
 render(html`<${App} />`, /** @type {HTMLElement} */ (document.querySelector('.app')));

@@ -40,21 +40,25 @@ from app.api.routers import (
     query_fields,
     rig,
     saved_views,
+    sessions,
     stations,
     statistics,
     timeline,
     uploads,
+    users,
     versions,
     view_paint,
     views,
     yields,
 )
+from app.api.security.access import Access, require_decided
 from app.api.security.bodies import MAX_JSON_BYTES, JsonBodies
 from app.api.security.headers import SecurityHeaders
 from app.api.security.lanes import THREADS, Doors, Lanes
 from app.api.security.origin import KnownHosts, SameOrigin
 from app.api.security.requests import HeadAsGet, OneLength, OneRange
 from app.api.site import STATIC, Site
+from app.api.team import Team, allowed_hosts
 from app.api.unknown_names import refuse_unknown_parameters
 from app.config import Settings
 from app.datasets.manifest import software_version
@@ -93,6 +97,8 @@ ROUTERS = (
     query_fields,
     statistics,
     practice,
+    sessions,
+    users,
 )
 
 
@@ -111,7 +117,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None =
         StorageError: The database cannot be used.
     """
     services = Services.open(settings, pool)
-    site = Site(static)
+    site = Site(static, team=settings.team)
     app = FastAPI(
         title="Touchline",
         version=software_version(),
@@ -124,25 +130,31 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None =
         lifespan=_lifespan,
     )
     app.state.services = services
+    team = app.state.team = Team.of(settings, services.store)
     install_handlers(app)
-    app.include_router(health.router)
+    app.include_router(health.router, dependencies=[Depends(require_decided)])
     # Before the API: nobody asks for as much at once as somebody who opens the first page.
     install_pages(app, site)
     for router in ROUTERS:
         app.include_router(
-            router.router, prefix=PREFIX, dependencies=[Depends(refuse_unknown_parameters)]
+            router.router,
+            prefix=PREFIX,
+            dependencies=[Depends(require_decided), Depends(refuse_unknown_parameters)],
         )
     describe(app)
-    _add_middleware(app, settings, site)
+    _add_middleware(app, settings, site, team)
     return app
 
 
-def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
+def _add_middleware(app: FastAPI, settings: Settings, site: Site, team: Team | None) -> None:
     """The first one added is the innermost."""
     doors = Doors()
     app.add_middleware(Lanes, doors=doors)
     # Outside of the lanes: a repetition that waits for the first answer takes nobody's place.
     app.add_middleware(Idempotency, actor=LOCAL_USER)
+    if team is not None:
+        # Inside of what makes HEAD a GET, outside of whatever could answer.
+        app.add_middleware(Access, logins=team.logins, cookie=team.cookie)
     app.add_middleware(OneRange)
     app.add_middleware(HeadAsGet)
     app.add_middleware(
@@ -151,8 +163,8 @@ def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
         streamed=frozenset({f"{PREFIX}/uploads"}),
     )
     app.add_middleware(OneLength)
-    app.add_middleware(SameOrigin)
-    app.add_middleware(KnownHosts, allowed=settings.allowed_hosts)
+    app.add_middleware(SameOrigin, url=settings.url, required=team is not None)
+    app.add_middleware(KnownHosts, allowed=allowed_hosts(settings))
     install_metrics(app, doors)
     app.add_middleware(RequestLog)
     app.add_middleware(SecurityHeaders, policy=site.policy)

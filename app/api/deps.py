@@ -15,6 +15,7 @@ from fastapi import Depends, Header, Path, Query, Request
 
 from app.api.errors import PreconditionRequiredError
 from app.api.events import Events
+from app.api.security.access import login_of
 from app.config import Settings
 from app.errors import BusyError, InputError
 from app.review.editing.follow_paint import PaintFollower
@@ -139,6 +140,7 @@ async def get_store(services: Annotated[Services, Depends(get_services)]) -> Sto
 
 
 async def get_actor(
+    request: Request,
     said: Annotated[
         str | None,
         Header(
@@ -149,11 +151,21 @@ async def get_actor(
         ),
     ] = None,
 ) -> str:
-    """Who acts: the single user of a local server until there are accounts, or a script by its name.
+    """Who acts: the person who is logged in; on a server without accounts its single user, or a script
+    by its name.
 
     Raises:
-        InputError: The name cannot be one.
+        InputError: The name cannot be one, or a person is known who would hide behind it.
     """
+    login = login_of(request.scope)
+    if login is not None:
+        if said is not None:
+            raise InputError(
+                f"on a server of a team {ACTOR_HEADER} names nobody",
+                hint="Leave it out: the log names the person who is logged in.",
+                pointer=f"/{ACTOR_HEADER}",
+            )
+        return login.name
     return LOCAL_USER if said is None else script_name(said, pointer=f"/{ACTOR_HEADER}")
 
 

@@ -11,16 +11,18 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
-from app.api.problem import TITLES, make_problem, problem_response
+from app.api.problem import SCHEME, TITLES, make_problem, problem_response
 from app.api.schemas.problem import FieldProblem
 from app.api.unknown_names import UNKNOWN, sentence_about
 from app.errors import (
     ConflictError,
     DamagedError,
+    ForbiddenError,
     GeometryError,
     ImageError,
     InputError,
     NotFoundError,
+    NotLoggedInError,
     OverloadedError,
     ReviewError,
     SharedStationError,
@@ -28,6 +30,7 @@ from app.errors import (
     StorageError,
     TooLargeError,
     TooManyPointsError,
+    TooManyTriesError,
 )
 
 log = structlog.get_logger("touchline.api")
@@ -37,12 +40,15 @@ STATUSES: tuple[tuple[type[ReviewError], int], ...] = (
     (TooManyPointsError, 422),
     (ImageError, 422),
     (InputError, 400),
+    (NotLoggedInError, 401),
+    (ForbiddenError, 403),
     (NotFoundError, 404),
     (StaleRevisionError, 412),
     (ConflictError, 409),
     (GeometryError, 422),
     (StorageError, 507),
     (OverloadedError, 503),
+    (TooManyTriesError, 429),
 )
 """The first branch that fits decides."""
 RETRY_SECONDS = "5"
@@ -101,6 +107,10 @@ async def _review_error(request: Request, error: Exception) -> Response:
         station=error.station if isinstance(error, SharedStationError) else None,
     )
     headers = {"Retry-After": RETRY_SECONDS} if status in (503, 507) else {}
+    if isinstance(error, TooManyTriesError):
+        headers["Retry-After"] = str(error.seconds)
+    if status == 401:
+        headers["WWW-Authenticate"] = SCHEME
     current = None
     if isinstance(error, StaleStateError):
         headers["ETag"], current = error.etag, error.current

@@ -21,6 +21,7 @@ from app.api.deps import ACTOR_HEADER
 from app.api.errors import RETRY_SECONDS, status_of
 from app.api.problem import make_problem, problem_response
 from app.api.reply import ASKED, KEPT_HEADERS, Asked
+from app.api.security.access import actor_of
 from app.api.security.bodies import BYTES, VALUE
 from app.api.security.origin import SAFE_METHODS
 from app.errors import OverloadedError, ReviewError, StorageError
@@ -39,6 +40,8 @@ MAX_ANSWER_BYTES = 8 * 1024 * 1024
 """Larger answers are not kept; no route that changes something gives one."""
 PATIENCE = 60.0
 """Seconds that a repetition waits for the first one to be answered."""
+UNKEPT = re.compile(r"/api/v\d+/(?:session|sessions|links|users)(?:/|$)")
+"""Answers that hold a secret are shown once, and kept nowhere."""
 THREADS = 4
 """So many answers are looked up at a time, and as many are kept."""
 
@@ -48,17 +51,20 @@ class Idempotency:
 
     Args:
         app: What answers for the first time.
-        actor: Whose keys they are.
+        actor: Whose keys they are, where nobody is logged in.
     """
 
     def __init__(self, app: ASGIApp, actor: str):
         self.app, self._actor = app, actor
-        self._under_way: dict[str, asyncio.Event] = {}
+        self._under_way: dict[tuple[str, str], asyncio.Event] = {}
         self._finding, self._keeping = CapacityLimiter(THREADS), CapacityLimiter(THREADS)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One request."""
         if scope["type"] != "http" or scope["method"] in SAFE_METHODS:
+            await self.app(scope, receive, send)
+            return
+        if UNKEPT.match(scope["path"]):
             await self.app(scope, receive, send)
             return
         keys = Headers(scope=scope).getlist(HEADER)
@@ -71,49 +77,46 @@ class Idempotency:
             await self._once(keys[0], scope, receive, send)
 
     async def _once(self, key: str, scope: Scope, receive: Receive, send: Send) -> None:
+        whose = (actor_of(scope, self._actor), key)
         try:
-            while (first := self._under_way.get(key)) is not None:
+            while (first := self._under_way.get(whose)) is not None:
                 await asyncio.wait_for(first.wait(), PATIENCE)
         except TimeoutError:
             error = OverloadedError("the first request of this key is still being answered")
             await _refuse(error, scope, receive, send)
             return
-        done = self._under_way[key] = asyncio.Event()
+        done = self._under_way[whose] = asyncio.Event()
         try:
-            await self._answer(key, _Request(scope, receive), send)
+            await self._answer(*whose, _Request(scope, receive), send)
         finally:
-            del self._under_way[key]
+            del self._under_way[whose]
             done.set()
 
-    async def _answer(self, key: str, request: _Request, send: Send) -> None:
+    async def _answer(self, actor: str, key: str, request: _Request, send: Send) -> None:
         try:
-            known = await run_sync(
-                find_first, request.store, key, self._actor, limiter=self._finding
-            )
+            known = await run_sync(find_first, request.store, key, actor, limiter=self._finding)
         except StorageError as error:
             await _refuse(error, request.scope, request.receive, send)
             return
         if known is not None and not (known.under_way and await request.asks_for(known)):
             await _again(known, request, send)
         else:
-            await self._carry_out(key, request, send)
+            await self._carry_out(actor, key, request, send)
 
-    async def _carry_out(self, key: str, request: _Request, send: Send) -> None:
+    async def _carry_out(self, actor: str, key: str, request: _Request, send: Send) -> None:
         if request.streamed:
             # What is asked for is known once its bytes have passed.
             asked = None
         else:
             await request.read()
-            asked = Asked(key, self._actor, request.digest())
+            asked = Asked(key, actor, request.digest())
             request.scope[ASKED] = asked
         recorded = _Recorded(send)
         await self.app(request.scope, request.receive, recorded.send)
         if recorded.is_kept and not (asked and asked.kept):
             try:
                 answer = recorded.answer(request.digest())
-                await run_sync(
-                    keep_first, request.store, key, self._actor, answer, limiter=self._keeping
-                )
+                await run_sync(keep_first, request.store, key, actor, answer, limiter=self._keeping)
             except StorageError as error:
                 # It is sent already; a repetition is answered with the state as it is then.
                 log.warning("an answer could not be kept", error=str(error))

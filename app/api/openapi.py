@@ -8,6 +8,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
 
+from app.api.idempotency import UNKEPT
 from app.api.schemas.event import EVENTS
 from app.api.schemas.problem import Problem
 
@@ -18,6 +19,9 @@ Everything that the browser does goes through these addresses.
   they build on: 428 without it, 412 (with the present document as `current`) when somebody else
   was faster.
 * **Names.** A script says its name in `X-Actor` and is remembered as `script:NAME`; nobody checks it.
+* **Who asks.** A server that one person runs alone asks nobody. On a server of a team everything but
+  `/healthz`, `/readyz` and logging in needs a session: `POST /api/v1/session` sets its cookie, and a
+  change must carry an `Origin` of this server. 401: there is none; 403: the role does not suffice.
 * **Problems.** Every answer that is not a success is `application/problem+json` (RFC 9457).
 * **Pages.** Lists take `limit` and `cursor`; `next` is the cursor of the next page, `total` says
   how many match.
@@ -44,6 +48,8 @@ TAGS = {
     "jobs": "Work that outlasts a request: how far it is and what came of it.",
     "events": "What changes, as it changes.",
     "pitch": "Names and shapes of the 26 markings.",
+    "sessions": "On a server of a team: who is logged in, and where.",
+    "users": "On a server of a team: who has an account, and which role.",
     "health": "For whoever runs the service.",
 }
 
@@ -85,7 +91,7 @@ def _document(app: FastAPI) -> dict[str, Any]:
 
 def _mend_operations(document: dict[str, Any]) -> None:
     """Say what the framework cannot know, and not what belongs to a newer OpenAPI."""
-    for operations in document["paths"].values():
+    for path, operations in document["paths"].items():
         for method, operation in operations.items():
             parameters = operation.setdefault("parameters", [])
             for parameter in parameters:
@@ -93,7 +99,8 @@ def _mend_operations(document: dict[str, Any]) -> None:
                 if parameter["name"] == "If-Match":
                     parameter |= {"required": True, "schema": {"type": "string"}}
             named = {parameter["name"] for parameter in parameters}
-            if method != "get" and KEY_PARAMETER["name"] not in named:
+            kept = method != "get" and not UNKEPT.match(path)
+            if kept and KEY_PARAMETER["name"] not in named:
                 parameters.append(KEY_PARAMETER)
             for answer in operation["responses"].values():
                 answer.get("content", {}).get("text/event-stream", {}).pop("itemSchema", None)

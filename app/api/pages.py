@@ -29,6 +29,9 @@ PAGES = (
     "/help/{tab}",
     "/import",
     "/jobs",
+    "/account",
+    "/people",
+    "/join",
 )
 """Addresses that the browser's own router understands."""
 

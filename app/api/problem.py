@@ -12,7 +12,8 @@ from app.api.schemas.problem import MEDIA_TYPE, FieldProblem, Problem
 
 TITLES: Mapping[int, tuple[str, str]] = {
     400: ("bad-request", "The request cannot be used"),
-    403: ("forbidden", "Another site sent this request"),
+    401: ("login", "Nobody is logged in"),
+    403: ("forbidden", "That is not allowed"),
     404: ("not-found", "There is no such thing"),
     405: ("method-not-allowed", "This resource does not do that"),
     408: ("timeout", "The request did not come in time"),
@@ -23,12 +24,15 @@ TITLES: Mapping[int, tuple[str, str]] = {
     416: ("range", "That part of the file does not exist"),
     422: ("invalid", "The request is not valid"),
     428: ("precondition-required", "If-Match is required"),
+    429: ("too-many-tries", "Too many tries"),
     500: ("internal", "The server made a mistake"),
     503: ("unavailable", "The service is not ready"),
     507: ("storage", "The server cannot store it"),
 }
 
 
+SCHEME = 'Session realm="Touchline"'
+"""How one logs in, for a 401: with POST /api/v1/session, which browsers are no help with."""
 Responses = dict[int | str, dict[str, Any]]
 """Answers of a route, by status, as the framework takes them."""
 
@@ -87,13 +91,13 @@ def problem_response(
 def responses(*statuses: int) -> Responses:
     """The ``responses`` of a route that may answer with these statuses, besides the common ones.
 
-    Every route can meet a bad request (400), a Host or Origin that is not ours (403), a busy
-    database (503); routes with a path or parameters can be asked for what is not there.
+    Every route can meet a bad request (400), on a server of a team nobody logged in (401) or a role
+    that does not suffice (403, as for an Origin that is not ours), a busy database (503); routes with a path or parameters can be asked for what is not there.
     """
     return {
         status: {
             "description": TITLES[status][1],
             "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
         }
-        for status in sorted({400, 422, 500, 503, *statuses})
+        for status in sorted({400, 401, 403, 422, 500, 503, *statuses})
     }

@@ -41,12 +41,13 @@ class IndexPage:
     """What the page asks for beside them: paths below the folder of the application."""
 
     @staticmethod
-    def make(folder: Path, version: str) -> IndexPage:
+    def make(folder: Path, version: str, *, team: bool = False) -> IndexPage:
         """The page of a folder, with the policy that admits its import map.
 
         Its modules are asked for below an address that names their version, so that browsers
         keep them for good and a start costs no question per module. Its style sheets come as
-        one, in the place of the last.
+        one, in the place of the last. On the server of a ``team`` it says so, and then asks who
+        is there before it shows anything.
 
         Raises:
             OSError: The page or one of its sheets cannot be read.
@@ -59,6 +60,8 @@ class IndexPage:
             html = _SHEET.sub(b"", html[:last]) + _ALL_SHEETS + html[last:]
         modules = tuple(found.decode() for found in _MODULE.findall(html))
         html = html.replace(b'"/static/', f'"/assets/{version}/'.encode())
+        if team:
+            html = html.replace(b"<html ", b"<html data-team ", 1)
         etag = f'"{hashlib.sha256(html).hexdigest()[:32]}"'
         return IndexPage(html, etag, content_security_policy(script_hashes(html)), styles, modules)
 
@@ -66,8 +69,8 @@ class IndexPage:
 class Site:
     """The folder of the browser application; index.html is read again when it has changed."""
 
-    def __init__(self, folder: Path = STATIC):
-        self.folder = folder
+    def __init__(self, folder: Path = STATIC, *, team: bool = False):
+        self.folder, self.team = folder, team
         self._version: str | None = None
         self._page: IndexPage | None = None
         self.index()
@@ -77,7 +80,7 @@ class Site:
         try:
             version = self._folder_version()
             if version != self._version:
-                self._page = IndexPage.make(self.folder, version)
+                self._page = IndexPage.make(self.folder, version, team=self.team)
                 self._version = version
         except OSError:
             self._version = self._page = None

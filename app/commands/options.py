@@ -111,13 +111,29 @@ def read_settings(**given: object) -> Settings:
         raise typer.BadParameter(f"{first['msg']} (TOUCHLINE_{name})") from None
 
 
-def require_local(settings: Settings) -> None:
-    """Refuse an address that other machines reach: there are no accounts that would keep them out."""
+def require_safe(settings: Settings) -> None:
+    """Refuse to serve where strangers could come in, or passwords would be read on their way."""
     from app.api.server import is_local
 
-    if not is_local(settings.host):
+    secure = (settings.url or "").startswith("https://")
+    if not is_local(settings.host) and not settings.team:
         raise typer.BadParameter(
-            f"{settings.host} can be reached by other machines, and this version has no accounts: "
-            "everybody who reaches it could change everything. Use 127.0.0.1, and a proxy that "
-            "asks who is there; TOUCHLINE_ALLOWED_HOSTS lists the names that it forwards."
+            f"{settings.host} can be reached by other machines, and without accounts everybody who "
+            "reaches it could change everything. Use 127.0.0.1, or serve a team with --team."
         )
+    if not is_local(settings.host) and not secure:
+        raise typer.BadParameter(
+            f"{settings.host} can be reached by other machines: passwords must not travel in the "
+            "clear. Put a proxy with TLS in front, and say with --url https://NAME what people open."
+        )
+    if settings.url and not secure and not is_local(_host_of(settings.url)):
+        raise typer.BadParameter(
+            f"{settings.url} is not encrypted: passwords must not travel in the clear. "
+            "Say --url https://NAME, and let a proxy with TLS answer there."
+        )
+
+
+def _host_of(url: str) -> str:
+    from urllib.parse import urlsplit
+
+    return urlsplit(url).hostname or ""

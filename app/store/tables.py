@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from app.store import installation as installation
 from app.store import job_models as job_models
+from app.store import people_models as people_models
 from app.store import pitch_models as pitch_models
 from app.store import prediction_models as prediction_models
 from app.store import proposal_models as proposal_models

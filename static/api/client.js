@@ -1,6 +1,8 @@
 // @ts-check
 /** Every request to the server. The only file with `fetch`. */
 
+import { signal } from '@preact/signals';
+
 import { ApiError } from './problem.js';
 
 /**
@@ -10,6 +12,15 @@ import { ApiError } from './problem.js';
  */
 
 const ROOT = '/api/v1';
+
+/** Whether the server has refused a request because nobody is logged in. */
+export const loggedOut = signal(false);
+
+/** @param {number} status @param {any} body @returns {ApiError} */
+function refusal(status, body) {
+	if (status === 401) loggedOut.value = true;
+	return new ApiError(status, body);
+}
 
 /** @typedef {{method?: string, body?: unknown, etag?: string, key?: string, signal?: AbortSignal}} RequestOptions */
 
@@ -44,7 +55,7 @@ export async function requestTagged(path, { method = 'GET', body, etag, key, sig
 		throw new ApiError(0, null);
 	}
 	const json = await response.json().catch(() => null);
-	if (!response.ok) throw new ApiError(response.status, json);
+	if (!response.ok) throw refusal(response.status, json);
 	const { headers: said } = response;
 	return { json, etag: said.get('etag') ?? '', replayed: said.get('idempotency-replayed') === 'true' };
 }
@@ -52,7 +63,7 @@ export async function requestTagged(path, { method = 'GET', body, etag, key, sig
 /** A frame, as it lies on the server. @param {string} url absolute @returns {Promise<Blob>} */
 export async function getFrame(url) {
 	const response = await fetch(url);
-	if (!response.ok) throw new ApiError(response.status, null);
+	if (!response.ok) throw refusal(response.status, null);
 	return response.blob();
 }
 
@@ -150,7 +161,7 @@ export function upload(path, file, progress, signal) {
 		sending.upload.onprogress = ({ loaded, total }) => progress(total ? loaded / total : 0);
 		sending.onload = () => {
 			if (sending.status < 400) resolve(sending.response);
-			else reject(new ApiError(sending.status, sending.response));
+			else reject(refusal(sending.status, sending.response));
 		};
 		sending.onerror = () => reject(new ApiError(0, null));
 		sending.onabort = () => reject(signal?.reason);

@@ -14,11 +14,12 @@ function here() {
 export const place = signal(here());
 
 /** @typedef {'yield' | 'policy' | 'statistics' | 'versions' | 'evaluation'} DatasetPage */
-/** @typedef {'queue' | 'datasets' | 'import' | 'jobs' | 'exports' | 'unknown'} PlainPage */
+/** @typedef {'queue' | 'datasets' | 'import' | 'jobs' | 'exports' | 'account' | 'people' | 'join' | 'unknown'} PlainPage */
 /** @typedef {{page: PlainPage} | {page: 'help', tab: string} | {page: 'review', group: number | null} | {page: 'calibration', group: number} | {page: DatasetPage, dataset: string}} Page */
 
 const PLAIN = /** @type {{[path: string]: PlainPage}} */ ({
 	'/': 'queue', '/groups': 'queue', '/datasets': 'datasets', '/import': 'import', '/jobs': 'jobs', '/exports': 'exports',
+	'/account': 'account', '/people': 'people', '/join': 'join',
 });
 /** A dataset without a page is its yield, which says most about it. */
 const OF_DATASET = /^\/datasets\/([^/]+)(?:\/(yield|policy|statistics|versions|evaluation))?\/?$/;

@@ -9,6 +9,8 @@ import { openDB } from 'idb';
 
 import { idempotencyKey } from '../api/client.js';
 
+import { myName } from './me.js';
+
 /** @import {BallJson, LeftOutJson, PointJson, VerdictJson} from '../api/types.js' */
 /** @import {Edit} from './edits.js' */
 
@@ -28,6 +30,7 @@ import { idempotencyKey } from '../api/client.js';
  * @property {Edit | null} edit
  * @property {Verdict | null} verdict
  * @property {Base | null} base what the edit or verdict found
+ * @property {string | null} person who made it; null where nobody logs in
  * @property {boolean} held somebody else was first; it waits for the person to choose
  */
 
@@ -60,10 +63,10 @@ async function inDatabase(work) {
 	if (db) await work(db).catch(() => { lasting.value = false; });
 }
 
-/** Put a write last. @param {Omit<Item, 'id' | 'tab' | 'at' | 'held'>} write @returns {Item} */
+/** Put a write last. @param {Omit<Item, 'id' | 'tab' | 'at' | 'person' | 'held'>} write @returns {Item} */
 export function enqueue(write) {
 	const at = performance.timeOrigin + performance.now();
-	const item = { ...write, id: idempotencyKey(), tab, at, held: false };
+	const item = { ...write, id: idempotencyKey(), tab, at, person: myName.value, held: false };
 	outbox.value = [...outbox.value, item];
 	inDatabase((db) => db.put(STORE, item));
 	return item;
@@ -112,7 +115,8 @@ export async function adopt(again) {
 	const held = (await navigator.locks?.query())?.held ?? [];
 	const alive = new Set(held.map(({ name }) => name));
 	const own = new Set(outbox.value.map(({ id }) => id));
-	const others = kept.filter((item) => item.tab !== tab && !own.has(item.id));
+	// What somebody else has left waits for them.
+	const others = kept.filter((item) => item.tab !== tab && (item.person ?? null) === myName.value && !own.has(item.id));
 	for (const { tab: other } of others) if (alive.has(lockOf(other))) hearEnd(other, again);
 	const orphans = others.filter((item) => !alive.has(lockOf(item.tab)));
 	if (orphans.length === 0) return;

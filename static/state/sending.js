@@ -1,10 +1,11 @@
 // @ts-check
 /** One write after the other to the server: each needs the state that the one before has made. */
 
-import { computed, signal } from '@preact/signals';
+import { computed, effect, signal, untracked } from '@preact/signals';
 
 import { getGroup, requestTagged } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
+import { mustLogIn } from './me.js';
 import { adopt, claimTab, outbox } from './outbox.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
@@ -48,6 +49,8 @@ export function hearFrom(one) {
 export function startSending() {
 	claimTab();
 	addEventListener('online', takeUp);
+	// Whoever logs in again finds their writes sent.
+	effect(() => { if (!mustLogIn.value) untracked(wake); });
 	takeUp();
 }
 
@@ -61,7 +64,7 @@ async function takeUp() {
 /** Send what waits, unless that is being done. */
 export async function wake() {
 	clearTimeout(timer);
-	if (isSending.value) return;
+	if (isSending.value || mustLogIn.value) return;
 	isSending.value = true;
 	try {
 		for (let next = waiting.value[0]; next; next = waiting.value[0]) {
@@ -87,6 +90,8 @@ async function send({ id, path, method, body, etag, ...rest }) {
 		return true;
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
+		// It waits for whoever logs in again; the page asks them to.
+		if (error.status === 401) return false;
 		if (AWAY.has(error.status)) {
 			tryLater();
 			return false;

@@ -7,11 +7,13 @@ import { useEffect } from 'preact/hooks';
 import { useKeys } from '../lib/hooks.js';
 import { lazy } from '../lib/lazy.js';
 import { page } from '../lib/router.js';
+import { me, mustLogIn } from '../state/me.js';
 import { openPalette, paletteOpen } from '../state/palette.js';
 import { helpOpen, openHelp } from '../state/workspace.js';
 import { Announcer } from './bars.js';
 import { Header } from './header.js';
 import { LazyPage, loadPage } from './lazy_page.js';
+import { LoginAgain, LoginPage } from './login.js';
 import { ReviewPage } from './review_page.js';
 import { explainTerms } from './term.js';
 
@@ -61,6 +63,11 @@ function fetchAhead() {
 }
 
 export function App() {
+	if (mustLogIn.value && me.value === null && page.value.page !== 'join') return html`<${LoginPage} />`;
+	return html`<${Everything} />${mustLogIn.value && me.value ? html`<${LoginAgain} />` : null}`;
+}
+
+function Everything() {
 	useKeys(GLOBAL_KEYS);
 	useEffect(explainTerms, []);
 	useEffect(() => {

@@ -6,6 +6,7 @@ import { useRef, useState } from 'preact/hooks';
 
 import { count } from '../lib/format.js';
 import { datasets, loadDatasets, useDataset } from '../state/datasets.js';
+import { isTeam, may } from '../state/me.js';
 import { queueAddress } from '../state/navigation.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
@@ -19,13 +20,23 @@ export const DATASET_PAGES = [
 	{ name: 'evaluation', label: 'Evaluation' },
 ];
 
-export const PLAIN_PAGES = [
+const PLAIN_PAGES = [
 	{ name: 'datasets', label: 'Datasets', href: '/datasets' },
 	{ name: 'import', label: 'Import', href: '/import' },
 	{ name: 'jobs', label: 'Jobs', href: '/jobs' },
 	{ name: 'exports', label: 'Exports', href: '/exports' },
 	{ name: 'help', label: 'Help', href: '/help' },
 ];
+
+const TEAM_PAGES = /** @type {const} */ ([
+	{ name: 'account', label: 'Account', href: '/account', action: 'account' },
+	{ name: 'people', label: 'People', href: '/people', action: 'administer' },
+]);
+
+/** Pages that belong to no dataset, for whoever is there. */
+export function plainPages() {
+	return [...PLAIN_PAGES, ...(isTeam ? TEAM_PAGES.filter(({ action }) => may(action)) : [])];
+}
 
 /** The address of a page of a dataset. @param {string} dataset @param {string} page */
 export function pageAddress(dataset, page) {
@@ -74,7 +85,7 @@ function MenuBody({ current, name }) {
 			</section>` : null}
 		<section aria-labelledby="menu-everywhere">
 			<h2 id="menu-everywhere">All datasets</h2>
-			<ul>${PLAIN_PAGES.map((page) => html`
+			<ul>${plainPages().map((page) => html`
 				<li key=${page.name}><a href=${page.href} aria-current=${mark(page.name)}>${page.label}</a></li>`)}
 			</ul>
 			<p class="empty-note"><kbd>Ctrl K</kbd> finds everything</p>

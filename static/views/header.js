@@ -5,6 +5,7 @@ import { html } from 'htm/preact';
 
 import { dataset } from '../state/datasets.js';
 import { groupDocument } from '../state/group.js';
+import { myName } from '../state/me.js';
 import { lastGroup, query, queueAddress, reviewAddress } from '../state/navigation.js';
 import { openHelp } from '../state/workspace.js';
 import { DatasetMenu, pageAddress } from './dataset_menu.js';
@@ -46,6 +47,7 @@ export function Header({ current, children }) {
 			<${DatasetMenu} current=${current} name=${name} />
 			<${Navigation} current=${current} name=${name} />
 			${children ?? html`<span class="header__middle"></span>`}
+			${myName.value ? html`<a class="header__person" href="/account" title="Your account, sessions and password" aria-current=${current === 'account' ? 'page' : undefined}>${myName.value}</a>` : null}
 			<button class="header__help" type="button" aria-label="Help" title="Help: keys, legend, words, guide, practice" onClick=${openHelp}><kbd>?</kbd></button>
 		</header>
 	`;

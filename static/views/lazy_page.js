@@ -21,6 +21,9 @@ const LOADERS = {
 	exports: async () => (await import('./exports_page.js')).ExportsPage,
 	import: async () => (await import('./import_page.js')).ImportPage,
 	help: async () => (await import('./help/help_page.js')).HelpPage,
+	account: async () => (await import('./account_page.js')).AccountPage,
+	people: async () => (await import('./people_page.js')).PeoplePage,
+	join: async () => (await import('./join_page.js')).JoinPage,
 	jobs: async () => (await import('./jobs_page.js')).JobsPage,
 };
 

@@ -11,7 +11,7 @@ import { dataset, datasets, loadDatasets, useDataset } from '../state/datasets.j
 import { groupDocument } from '../state/group.js';
 import { paletteOpen, takeTyped } from '../state/palette.js';
 import { actionItems, groupItems, helpItems, matching } from '../state/palette_items.js';
-import { DATASET_PAGES, pageAddress, PLAIN_PAGES } from './dataset_menu.js';
+import { DATASET_PAGES, pageAddress, plainPages } from './dataset_menu.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
 /** @import {Item} from '../state/palette_items.js' */
@@ -28,7 +28,7 @@ function present() {
 /** @param {DatasetJson | null} one @returns {Item[]} */
 function pageItems(one) {
 	const ofDataset = one ? DATASET_PAGES.map(({ name, label }) => ({ name, label, hint: one.name, href: pageAddress(one.name, name) })) : [];
-	const plain = PLAIN_PAGES.map(({ name, label, href }) => ({ name, label, hint: '', href }));
+	const plain = plainPages().map(({ name, label, href }) => ({ name, label, hint: '', href }));
 	const review = { name: 'review', label: 'Review', hint: 'first group of the queue', href: '/review' };
 	return [...ofDataset, review, ...plain].map(({ name, label, hint, href }) => ({
 		id: `page-${name}`, kind: 'Pages', label, hint, run: () => navigate(href),

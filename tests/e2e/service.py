@@ -42,13 +42,13 @@ def run_touchline(home: Path, *lines: str, seconds: float = COMMAND_SECONDS) -> 
 
 
 @contextmanager
-def serving(home: Path) -> Iterator[str]:
-    """Address of a server over a home."""
+def serving(home: Path, *options: str) -> Iterator[str]:
+    """Address of a server over a home, with further options of ``serve``."""
     port = free_port()
     address = f"http://127.0.0.1:{port}"
     with (home / "server.log").open("wb") as log:
         process = subprocess.Popen(
-            [sys.executable, "-c", SERVE, "serve"],
+            [sys.executable, "-c", SERVE, "serve", *options],
             cwd=ROOT,
             env=_environment(home, port),
             stdout=log,

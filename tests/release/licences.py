@@ -12,7 +12,7 @@ from tests.release.libraries import ROOT, pinned
 
 FREE = frozenset(
     {"0BSD", "Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "BSL-1.0", "CC0-1.0", "ISC", "MIT"}
-    | {"MIT-CMU", "PSF-2.0", "Python-2.0", "Unlicense", "Zlib"}
+    | {"MIT-0", "MIT-CMU", "PSF-2.0", "Python-2.0", "Unlicense", "Zlib"}
 )
 WEAK = frozenset(
     {"LGPL-2.1-only", "LGPL-2.1-or-later", "LGPL-3.0-only", "LGPL-3.0-or-later", "MPL-2.0"}

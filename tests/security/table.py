@@ -27,12 +27,14 @@ class Row:
         method: As it is asked.
         path: With its parameters in braces.
         kind: Of ``kinds`` in the table.
+        role: The least of ``roles`` that may ask it.
         classes: Of attacks that it is given.
     """
 
     method: str
     path: str
     kind: str
+    role: str
     classes: frozenset[str]
 
     @property
@@ -58,9 +60,9 @@ def rows(of: str = "") -> list[Row]:
     found = []
     for name, words in TABLE["routes"].items():
         method, path = name.split(" ", 1)
-        kind, *more = words.split()
+        kind, role, *more = words.split()
         classes = frozenset([*TABLE["kinds"][kind]["classes"], *more])
-        found.append(Row(method, _MOUNTED.get(path, path), kind, classes))
+        found.append(Row(method, _MOUNTED.get(path, path), kind, role, classes))
     return [row for row in found if not of or of in row.classes]
 
 

@@ -23,6 +23,8 @@ from tests.docs.settings import SETTINGS_PAGE, settings_page
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
+    access account accounts join link links login logins passwords people person roles team tokens
+    me rules tries users
     actor actors
     candidate proposal propose scoring search straight
     3d accept action actions address adjust adjustments advice ahead anchor annotate answers app

@@ -44,7 +44,9 @@ IMAGES = Lane("images", 6, 200)
 UPLOADS = Lane("uploads", 8, 8)
 ZIPS = Lane("zips", 16, 100)
 """Those of exports, which a request may find still being written."""
-LANES = (READS, CHANGES, PREVIEWS, IMAGES, UPLOADS, ZIPS)
+LOGINS = Lane("logins", 4, 50)
+"""Passwords, whose hashes take some tenths of a second of a processor."""
+LANES = (READS, CHANGES, PREVIEWS, IMAGES, UPLOADS, ZIPS, LOGINS)
 THREADS = sum(lane.width for lane in LANES) + 6
 """A thread for each request at work, and some for files of the browser application."""
 
@@ -53,6 +55,7 @@ _STREAM = re.compile(r"/events$")
 _IMAGE = re.compile(r"/(?:image|figures/[^/]+|views/[^/]+/(?:neighbours|paint|propose))$")
 _ZIP = re.compile(r"/exports/[^/]+/content$")
 _SOLVING = re.compile(r"/(?:preview|influence|remedies|yield|noise)$")
+_LOGIN = re.compile(r"/(?:session|session/password|links/use)$")
 _UPLOAD = re.compile(r"/uploads$")
 
 
@@ -66,6 +69,8 @@ def lane_of(method: str, path: str) -> Lane | None:
         return IMAGES
     if method in SAFE_METHODS:
         return ZIPS if _ZIP.search(path) else READS
+    if _LOGIN.search(path):
+        return LOGINS
     return UPLOADS if method == "POST" and _UPLOAD.search(path) else CHANGES
 
 

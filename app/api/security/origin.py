@@ -58,10 +58,17 @@ class KnownHosts:
 
 
 class SameOrigin:
-    """Refuses a request that changes something and comes from another site's page."""
+    """Refuses a request that changes something and comes from another site's page.
 
-    def __init__(self, app: ASGIApp):
+    Args:
+        app: Answers the others.
+        url: The address that people open, where a proxy stands in front.
+        required: A change must say where it comes from, as browsers always do.
+    """
+
+    def __init__(self, app: ASGIApp, url: str | None = None, *, required: bool = False):
         self.app = app
+        self.url, self.required = url, required
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http" and not self._is_ours(scope):
@@ -77,4 +84,9 @@ class SameOrigin:
         if headers.get("sec-fetch-site", "none") not in ("same-origin", "none"):
             return False
         host = headers.get("host", "")
-        return all(same_origin(origin, host, scheme) for origin in headers.getlist("origin"))
+        origins = headers.getlist("origin")
+        if self.required and not origins:
+            return False
+        return all(
+            same_origin(origin, host, scheme) or origin.lower() == self.url for origin in origins
+        )

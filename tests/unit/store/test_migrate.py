@@ -115,11 +115,12 @@ class TestOldHomes:
         script = (
             "import os, sys; from pathlib import Path; from alembic.operations import Operations\n"
             "from app.config import Settings; from app.store.migrate import migrate\n"
-            "add_column = Operations.add_column\n"
-            "def killed(self, table, column, **options):\n"
-            "    add_column(self, table, column, **options)\n"
-            "    column.name == 'proposed' and os.kill(os.getpid(), 9)\n"
-            "Operations.add_column = killed\n"
+            "create_table = Operations.create_table\n"
+            "def killed(self, table, *columns, **options):\n"
+            "    made = create_table(self, table, *columns, **options)\n"
+            "    table == 'login' and os.kill(os.getpid(), 9)\n"
+            "    return made\n"
+            "Operations.create_table = killed\n"
             "migrate(Settings(home=Path(sys.argv[1])))\n"
         )
         command = [sys.executable, "-c", script, str(settings.home)]

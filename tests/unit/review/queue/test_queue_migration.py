@@ -27,6 +27,8 @@ PLACES = ("distance_m", "box_px", "x_m", "y_m")
 def as_before(store: Store) -> None:
     """Take back what migration 0005 does, and what came after it."""
     with store.write() as session:
+        for table in ("login", "one_time_link", "person"):
+            session.execute(text(f"DROP TABLE {table}"))
         session.execute(text("DROP TABLE proposal"))
         session.execute(text("ALTER TABLE station DROP COLUMN proposed"))
         session.execute(text("ALTER TABLE queue DROP COLUMN agreement"))

@@ -1,0 +1,173 @@
+"""Sessions: who is logged in, logging in and out, and links with which one sets a password."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import structlog
+from fastapi import APIRouter, Depends, Request, Response
+
+from app.api.deps import Id
+from app.api.problem import responses
+from app.api.schemas.people import (
+    LinkLook,
+    LinkMeaning,
+    LinkUse,
+    NewSession,
+    OpenSessionDocument,
+    OpenSessionList,
+    PasswordEdit,
+    SessionDocument,
+)
+from app.api.security.access import login_of
+from app.api.team import AppTeam, Team
+from app.errors import NotLoggedInError
+from app.review.people import links
+from app.review.people.logins import Login
+from app.review.people.roles import Action, Role, may
+from app.soccer.actors import LOCAL_USER
+from app.store.session import Store
+
+router = APIRouter(tags=["sessions"])
+log = structlog.get_logger("touchline.access")
+
+
+async def get_login(request: Request) -> Login:
+    """Who is logged in, on a route that the table lets nobody else reach.
+
+    Raises:
+        NotLoggedInError: Nobody is.
+    """
+    login = login_of(request.scope)
+    if login is None:
+        raise NotLoggedInError("nobody is logged in here", hint="Log in first.")
+    return login
+
+
+Me = Annotated[Login, Depends(get_login)]
+
+
+def _session_of(name: str | None, role: Role | None, *, team: bool) -> SessionDocument:
+    allowed = [] if role is None else [action for action in Action if may(role, action)]
+    return SessionDocument(team=team, name=name, role=role, may=allowed)
+
+
+@router.get("/session", operation_id="getSession", responses=responses())
+def get_session(request: Request) -> SessionDocument:
+    """Who asks; nobody, before they have logged in."""
+    team: Team | None = request.app.state.team
+    if team is None:
+        return _session_of(LOCAL_USER, Role.ADMIN, team=False)
+    login = team.login(request)
+    if login is None:
+        return _session_of(None, None, team=True)
+    return _session_of(login.name, login.role, team=True)
+
+
+@router.post("/session", operation_id="createSession", responses=responses(401, 409, 413, 415, 429))
+def log_in(who: NewSession, request: Request, response: Response, team: AppTeam) -> SessionDocument:
+    """Log in; the answer sets the cookie of a new session.
+
+    A name that nobody has gets the same answer as a wrong password, and takes as long.
+    """
+    return _begin(team, request, response, who.name, who.password)
+
+
+def _begin(
+    team: Team, request: Request, response: Response, name: str, password: str
+) -> SessionDocument:
+    address = team.address(request)
+    team.tries.count(address, name)
+    try:
+        token = team.logins.log_in(
+            name,
+            password,
+            browser=request.headers.get("user-agent", ""),
+            address=address,
+            before=team.token(request),
+        )
+    except NotLoggedInError:
+        # Without the name: people type passwords into the wrong field.
+        log.warning("a login was refused", address=address)
+        raise
+    response.set_cookie(**team.cookie_values(token))
+    login = team.logins.find(token)
+    if login is None:
+        raise NotLoggedInError("the account was disabled meanwhile")
+    return _session_of(login.name, login.role, team=True)
+
+
+@router.delete("/session", operation_id="deleteSession", responses=responses(409))
+def log_out(request: Request, response: Response, team: AppTeam) -> SessionDocument:
+    """Log out: the session ends on the server, and the cookie goes."""
+    login = team.login(request)
+    if login is not None:
+        team.logins.end(login, login.id)
+    response.set_cookie(**team.cookie_values(None))
+    return _session_of(None, None, team=True)
+
+
+@router.put(
+    "/session/password",
+    operation_id="changePassword",
+    responses=responses(401, 409, 413, 415, 429),
+)
+def change_password(
+    change: PasswordEdit, request: Request, response: Response, team: AppTeam, me: Me
+) -> SessionDocument:
+    """Give oneself another password; every session ends, and this browser gets a new one."""
+    team.tries.count(team.address(request), me.name)
+    token = team.logins.change_password(me, change.old, change.new)
+    response.set_cookie(**team.cookie_values(token))
+    return _session_of(me.name, me.role, team=True)
+
+
+@router.get("/sessions", operation_id="listSessions", responses=responses(401, 409))
+def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
+    """One's own sessions, in this browser and others."""
+    items = [
+        OpenSessionDocument(this=item.id == me.id, **vars(item))
+        for item in team.logins.sessions(me)
+    ]
+    return OpenSessionList(items=items)
+
+
+@router.delete(
+    "/sessions", operation_id="deleteOtherSessions", status_code=204, responses=responses(401, 409)
+)
+def end_others(team: AppTeam, me: Me) -> None:
+    """End every session of one's own but this one."""
+    team.logins.end_others(me)
+
+
+@router.delete(
+    "/sessions/{session}",
+    operation_id="endSession",
+    status_code=204,
+    responses=responses(401, 404, 409),
+)
+def end_session(session: Id, team: AppTeam, me: Me) -> None:
+    """End a session of one's own."""
+    team.logins.end(me, session)
+
+
+def _store(request: Request) -> Store:
+    store: Store = request.app.state.services.store
+    return store
+
+
+@router.post("/links/look", operation_id="lookAtLink", responses=responses(404, 409, 413, 415, 429))
+def look_at_link(asked: LinkLook, request: Request, team: AppTeam) -> LinkMeaning:
+    """Whom a link is for; 404 when it is not good any more."""
+    team.tries.count(team.address(request))
+    return LinkMeaning(**vars(links.look(_store(request), asked.token)))
+
+
+@router.post("/links/use", operation_id="useLink", responses=responses(404, 409, 413, 415, 429))
+def use_link(
+    chosen: LinkUse, request: Request, response: Response, team: AppTeam
+) -> SessionDocument:
+    """Set the password that a link is for, and log in with it; the link is good no more."""
+    team.tries.count(team.address(request))
+    name = links.use(_store(request), chosen.token, chosen.password, chosen.name)
+    return _begin(team, request, response, name, chosen.password)

@@ -1,0 +1,68 @@
+"""Users: who has an account on a server of a team, and which role."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request
+
+from app.api.deps import AppStore, Id
+from app.api.problem import responses
+from app.api.routers.sessions import Me
+from app.api.schemas.people import NewUser, UserDocument, UserEdit, UserList, UserWithLink
+from app.api.team import AppTeam, Team
+from app.review.people import people
+from app.review.people.links import Link
+from app.review.people.people import Person
+
+router = APIRouter(prefix="/users", tags=["users"])
+
+
+def _with_link(team: Team, request: Request, person: Person, link: Link) -> UserWithLink:
+    user = UserDocument.model_validate(person)
+    return UserWithLink(user=user, link=link.address(team.base(request)), expires=link.expires)
+
+
+@router.get("", operation_id="listUsers", responses=responses(401, 409))
+def list_users(store: AppStore, _team: AppTeam, _me: Me) -> UserList:
+    """Everybody with an account, disabled ones too."""
+    return UserList(items=people.list_people(store))
+
+
+@router.post(
+    "",
+    operation_id="inviteUser",
+    status_code=201,
+    responses=responses(401, 409, 413, 415),
+)
+def invite_user(
+    new: NewUser, request: Request, store: AppStore, team: AppTeam, me: Me
+) -> UserWithLink:
+    """Make an account; the link with which its person chooses a password is shown this once."""
+    person, link = people.invite(store, new.name, new.role, actor=me.name)
+    return _with_link(team, request, person, link)
+
+
+@router.patch(
+    "/{user}",
+    operation_id="changeUser",
+    response_model=UserDocument,
+    responses=responses(401, 404, 409, 413, 415),
+)
+def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me: Me) -> Person:
+    """Give somebody another role, disable or enable them; who is disabled is logged out.
+
+    Nobody changes their own rights, and the last admin who can log in stays one.
+    """
+    return people.change_person(
+        store, user, actor=me.name, role=change.role, disabled=change.disabled
+    )
+
+
+@router.post(
+    "/{user}/link",
+    operation_id="renewUserLink",
+    responses=responses(401, 404, 409),
+)
+def renew_link(user: Id, request: Request, store: AppStore, team: AppTeam, me: Me) -> UserWithLink:
+    """A new link with which somebody sets their password; those before it are good no more."""
+    person, link = people.renew_link(store, user, actor=me.name)
+    return _with_link(team, request, person, link)

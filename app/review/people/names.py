@@ -1,0 +1,38 @@
+"""Names of people, and what the log says of their accounts."""
+
+from __future__ import annotations
+
+import re
+
+from app.errors import InputError
+from app.soccer.actors import LOCAL_USER
+from app.store.clock import now
+from app.store.log import Entry, append
+from app.store.session import Session
+
+PERSON = "person"
+"""Kind of the log's entries about accounts."""
+_NAME = re.compile(r"[a-z0-9](?:[a-z0-9._-]{0,38}[a-z0-9])?")
+_TAKEN = frozenset({LOCAL_USER, "script", "everybody", "nobody"})
+
+
+def checked_name(said: str) -> str:
+    """The name of a person, as the log will remember them.
+
+    Raises:
+        InputError: It cannot be one.
+    """
+    name = said.strip().lower()
+    if not _NAME.fullmatch(name) or name in _TAKEN:
+        raise InputError(
+            "a name is up to 40 small letters, digits and . _ - , and none that the log knows"
+            " otherwise",
+            pointer="/name",
+        )
+    return name
+
+
+def note(session: Session, actor: str, name: str, did: str, role: str) -> None:
+    """Write what became of an account into the log."""
+    body = {"person": name, "did": did, "role": str(role)}
+    append(session, [Entry(PERSON, actor, now(), body)])

@@ -1,0 +1,169 @@
+"""People: who has an account here, invited by an admin, never deleted, at most disabled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from app.errors import ConflictError, ForbiddenError, NotFoundError
+from app.review.people.links import Link, insert_new
+from app.review.people.names import checked_name, note
+from app.review.people.roles import Role
+from app.store.clock import now
+from app.store.logins import delete_logins
+from app.store.people import (
+    all_people,
+    count_able,
+    count_people,
+    forget_links,
+    insert_person,
+    people_with_links,
+    person_by_id,
+    person_by_name,
+    update_person,
+)
+from app.store.session import Session, Store
+
+
+@dataclass(frozen=True)
+class Person:
+    """Somebody with an account.
+
+    Attributes:
+        joined: They have chosen a password.
+        invited: A link waits for them with which they can.
+        seen: When a session of theirs was used last, in UTC; None: none is open.
+    """
+
+    id: int
+    name: str
+    role: Role
+    disabled: bool
+    joined: bool
+    invited: bool
+    created: str
+    created_by: str
+    seen: str | None
+
+
+def list_people(store: Store) -> list[Person]:
+    """Everybody, by name."""
+    with store.read() as session:
+        waiting = people_with_links(session, now())
+        return [_person(row, waiting) for row in all_people(session)]
+
+
+def has_people(store: Store) -> bool:
+    """Whether this home belongs to a team."""
+    with store.read() as session:
+        return count_people(session) > 0
+
+
+def has_admin(store: Store) -> bool:
+    """Whether some admin can log in."""
+    with store.read() as session:
+        return count_able(session, Role.ADMIN) > 0
+
+
+def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, Link]:
+    """Make an account, and the link with which its person chooses a password.
+
+    Raises:
+        InputError: The name cannot be one.
+        ConflictError: It is taken.
+    """
+    name = checked_name(name)
+    with store.write() as session:
+        if person_by_name(session, name) is not None:
+            raise ConflictError(
+                f"there is a {name} already", hint="A new link for them: reset their password."
+            )
+        person = insert_person(session, name, role, by=actor)
+        note(session, actor, name, "invited", role)
+        link = insert_new(session, person, by=actor, at=datetime.now(UTC))
+        return _read(session, person), link
+
+
+def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Link]:
+    """A new link for somebody; the password that they have stays good until they use it.
+
+    Raises:
+        NotFoundError: There is nobody of that id.
+        ConflictError: They are disabled.
+    """
+    with store.write() as session:
+        person = _read(session, person_id)
+        if person.disabled:
+            raise ConflictError(f"{person.name} is disabled", hint="Enable them first.")
+        note(session, actor, person.name, "link", person.role)
+        link = insert_new(session, person_id, by=actor, at=datetime.now(UTC))
+        return _read(session, person_id), link
+
+
+def change_person(
+    store: Store,
+    person_id: int,
+    *,
+    actor: str,
+    role: Role | None = None,
+    disabled: bool | None = None,
+) -> Person:
+    """Give somebody another role, disable or enable them; whoever is disabled is logged out.
+
+    Raises:
+        NotFoundError: There is nobody of that id.
+        ForbiddenError: It is oneself.
+        ConflictError: No admin would be left who can log in.
+    """
+    with store.write() as session:
+        person = _read(session, person_id)
+        if person.name == actor:
+            raise ForbiddenError(
+                "nobody changes their own rights", hint="Another admin of this server can."
+            )
+        wanted = person.role if role is None else role
+        off = person.disabled if disabled is None else disabled
+        loses = person.role is Role.ADMIN and (off or wanted is not Role.ADMIN)
+        if loses and not count_able(session, Role.ADMIN, but=person_id):
+            raise ConflictError(
+                f"{person.name} is the last admin who can log in", hint="Make another one first."
+            )
+        if wanted is not person.role:
+            note(session, actor, person.name, "role", wanted)
+        if off is not person.disabled:
+            note(session, actor, person.name, "disabled" if off else "enabled", wanted)
+        update_person(session, person_id, role=wanted, disabled=off)
+        if off:
+            delete_logins(session, person_id)
+            forget_links(session, person_id)
+        return _read(session, person_id)
+
+
+def find_person(store: Store, name: str) -> Person:
+    """Somebody by their name; raises NotFoundError when there is nobody."""
+    for person in list_people(store):
+        if person.name == name.strip().lower():
+            return person
+    raise NotFoundError(f"there is no {name}", hint="touchline users list shows everybody.")
+
+
+def _read(session: Session, person_id: int) -> Person:
+    row = person_by_id(session, person_id)
+    if row is None:
+        raise NotFoundError(f"there is nobody with id {person_id}")
+    return _person(row, people_with_links(session, now()))
+
+
+def _person(row: Any, waiting: set[int]) -> Person:
+    return Person(
+        row.id,
+        row.name,
+        Role(row.role),
+        row.disabled,
+        row.password is not None,
+        row.id in waiting,
+        row.created,
+        row.created_by,
+        getattr(row, "seen", None),
+    )

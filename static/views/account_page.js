@@ -1,0 +1,88 @@
+// @ts-check
+/** One's own account: where one is logged in, and the password. */
+
+import { html } from 'htm/preact';
+import { useEffect, useState } from 'preact/hooks';
+
+import { endSession, getSessions, putPassword } from '../api/people.js';
+import { ApiError } from '../api/problem.js';
+import { logOut, me } from '../state/me.js';
+import { FormError, useSessionForm } from './login.js';
+import { Loading, PageFrame, Trouble } from './page_frame.js';
+import { When } from './when.js';
+
+/** @import {OpenSessionJson} from '../api/people.js' */
+
+/** The browser and the system of a session, as far as they say. @param {string} text */
+function browserOf(text) {
+	const browser = /(Edg|OPR|Firefox|Chrome|Safari)\/(\d+)/.exec(text);
+	const system = /\((?:X11; )?([^;)]+)/.exec(text);
+	const names = /** @type {{[name: string]: string}} */ ({ Edg: 'Edge', OPR: 'Opera' });
+	if (!browser) return text.slice(0, 60) || 'A browser without a name';
+	return `${names[browser[1]] ?? browser[1]} ${browser[2]}${system ? `, ${system[1]}` : ''}`;
+}
+
+/** @param {{one: OpenSessionJson, end: (id: number | null) => void}} props */
+function SessionRow({ one, end }) {
+	return html`
+		<tr>
+			<th scope="row">${browserOf(one.browser)}${one.this ? html` <strong>(this one)</strong>` : null}<small>${one.address}</small></th>
+			<td><${When} at=${one.created} /></td>
+			<td><${When} at=${one.seen} /></td>
+			<td class="table__actions">${one.this ? null : html`<button class="button button--small" type="button" onClick=${() => end(one.id)}>End</button>`}</td>
+		</tr>
+	`;
+}
+
+/** @param {{changed: () => void}} props */
+function PasswordForm({ changed }) {
+	const [done, setDone] = useState(false);
+	const { error, busy, send } = useSessionForm(async (form) => {
+		setDone(false);
+		const session = await putPassword(String(form.get('old')), String(form.get('new')));
+		setDone(true);
+		changed();
+		return session;
+	});
+	return html`
+		<section class="card" aria-labelledby="account-password">
+			<h2 id="account-password">Password</h2>
+			<form class="form" onSubmit=${send}>
+				<input class="hidden-text" name="username" autocomplete="username" value=${me.value?.name ?? ''} readonly tabindex="-1" aria-hidden="true" />
+				<div class="form__row"><label for="password-old">Present password</label><input class="field" id="password-old" name="old" type="password" required maxlength="200" autocomplete="current-password" /></div>
+				<div class="form__row"><label for="password-new">New password</label><input class="field" id="password-new" name="new" type="password" required minlength="10" maxlength="200" autocomplete="new-password" /><small>At least 10 letters. Every other session of yours ends.</small></div>
+				<${FormError} error=${error} />
+				<p class="buttons"><button class="button" type="submit" aria-disabled=${busy}>Change the password</button><span role="status">${done ? 'It is changed.' : ''}</span></p>
+			</form>
+		</section>
+	`;
+}
+
+export function AccountPage() {
+	const [sessions, setSessions] = useState(/** @type {OpenSessionJson[] | null} */ (null));
+	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
+	const read = () => getSessions().then(({ items }) => { setSessions(items); setError(null); }, setError);
+	useEffect(() => { read(); }, []);
+	/** @param {number | null} id */
+	const end = (id) => { endSession(id).then(read, setError); };
+	return html`
+		<${PageFrame} current="account" title="Account" where=${html`<strong>Account</strong>`}
+			actions=${me.value ? html`<button class="button" type="button" onClick=${logOut}>Log out</button>` : null}
+		>
+			${error ? html`<${Trouble} title="The account cannot be shown" error=${error} retry=${read} />` : null}
+			${!sessions && !error ? html`<${Loading} what="sessions" />` : null}
+			${sessions ? html`
+				<div class="page__columns">
+					<section class="card card--flush" aria-labelledby="account-sessions">
+						<h2 id="account-sessions">Where ${me.value?.name} (${me.value?.role}) is logged in</h2>
+						<table class="table">
+							<thead><tr><th>Browser</th><th>Since</th><th>Used</th><td></td></tr></thead>
+							<tbody>${sessions.map((one) => html`<${SessionRow} key=${one.id} one=${one} end=${end} />`)}</tbody>
+						</table>
+						${sessions.length > 1 ? html`<p class="buttons"><button class="button" type="button" onClick=${() => end(null)}>End all others</button></p>` : null}
+					</section>
+					<${PasswordForm} changed=${read} />
+				</div>` : null}
+		<//>
+	`;
+}

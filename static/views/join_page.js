@@ -1,0 +1,63 @@
+// @ts-check
+/** Where a link leads that is good once: choosing a password. */
+
+import { html } from 'htm/preact';
+import { useEffect, useState } from 'preact/hooks';
+
+import { lookAtLink, postLink } from '../api/people.js';
+import { ApiError } from '../api/problem.js';
+import { navigate } from '../lib/router.js';
+import { FormError, useSessionForm } from './login.js';
+
+/** @typedef {{name: string | null, joined: boolean}} Meant */
+
+/** @param {Meant} meant */
+function titleOf({ name, joined }) {
+	if (name === null) return 'Become the first admin';
+	return joined ? `A new password for ${name}` : `Welcome, ${name}`;
+}
+
+/** @param {{meant: Meant, token: string}} props */
+function JoinForm({ meant, token }) {
+	const { error, busy, send } = useSessionForm(async (form) => {
+		const name = meant.name === null ? { name: String(form.get('name')) } : {};
+		const session = await postLink({ token, password: String(form.get('password')), ...name });
+		navigate('/groups', { replace: true });
+		return session;
+	});
+	return html`
+		<form class="form" onSubmit=${send}>
+			${meant.name === null
+				? html`<div class="form__row"><label for="join-name">Name</label><input class="field" id="join-name" name="name" required maxlength="40" autocomplete="username" autocapitalize="none" spellcheck=${false} /><small>Small letters and digits; history and verdicts will name you so.</small></div>`
+				: html`<input class="hidden-text" name="username" autocomplete="username" value=${meant.name} readonly tabindex="-1" aria-hidden="true" />`}
+			<div class="form__row"><label for="join-password">Password</label><input class="field" id="join-password" name="password" type="password" required minlength="10" maxlength="200" autocomplete="new-password" /><small>At least 10 letters. Three or four plain words do well.</small></div>
+			<${FormError} error=${error} />
+			<p><button class="button button--primary" type="submit" aria-disabled=${busy}>Set the password and log in</button></p>
+		</form>
+	`;
+}
+
+export function JoinPage() {
+	// The token leaves the address bar, and the history with it.
+	const [token] = useState(() => location.hash.slice(1));
+	const [meant, setMeant] = useState(/** @type {Meant | null} */ (null));
+	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
+	useEffect(() => {
+		document.title = 'Choose a password · Touchline';
+		history.replaceState(null, '', '/join');
+		lookAtLink(token || '-').then(setMeant, (problem) => {
+			if (!(problem instanceof ApiError)) throw problem;
+			setError(problem);
+		});
+	}, []);
+	return html`
+		<main class="login">
+			<section class="card" aria-labelledby="join-title">
+				<p class="login__brand">Touchline</p>
+				<h1 id="join-title">${meant ? titleOf(meant) : 'Choose a password'}</h1>
+				${meant ? html`<${JoinForm} meant=${meant} token=${token} />` : null}
+				${error ? html`<${FormError} error=${error} /><p><a class="button" href="/groups">Log in</a></p>` : null}
+			</section>
+		</main>
+	`;
+}

@@ -1,0 +1,408 @@
+"""Every route of a team's server with every role: who may not, is refused; and sessions themselves."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import re
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi import FastAPI
+from pwdlib import PasswordHash
+from pwdlib.hashers.argon2 import Argon2Hasher
+
+from app.api.application import create_app
+from app.api.pages import PAGES
+from app.api.security import access
+from app.api.security.rules import OPEN, RULES
+from app.api.server import listen, make_server
+from app.config import Settings
+from app.review.importing.ingest import ensure_dataset
+from app.review.people import links, passwords
+from app.review.people.people import change_person, find_person, invite, renew_link
+from app.review.people.roles import LEAST, Role
+from app.store.log import read_log
+from app.store.session import Store
+from tests.security.asking import Answer, Asker, assert_guarded
+from tests.security.table import MISSING, TABLE, Row, rows
+from tests.waiting import SECONDS
+
+API = "/api/v1"
+SECRET = "three plain words"
+BYTES = "application/octet-stream"
+HIDDEN = "/api/v1/hidden"
+"""A route that nobody has thought of."""
+
+
+@dataclass
+class Team:
+    """A server of a team, on a socket, with somebody of each role."""
+
+    address: str
+    app: FastAPI
+    cookies: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def store(self) -> Store:
+        store: Store = self.app.state.services.store
+        return store
+
+    def ask(
+        self,
+        method: str,
+        target: str,
+        body: Any = None,
+        *,
+        role: str | None = None,
+        only_head: bool = False,
+        kind: str = "application/json",
+        **headers: str,
+    ) -> Answer:
+        """Ask as somebody of a role, or as a stranger; a page of this server asks."""
+        sent = {
+            "Origin": self.address,
+            **{name.replace("_", "-"): headers[name] for name in headers},
+        }
+        if role in self.cookies:
+            sent["Cookie"] = self.cookies[role]
+        data = (
+            body if isinstance(body, bytes) else None if body is None else json.dumps(body).encode()
+        )
+        if data is not None:
+            sent["Content-Type"] = kind
+        asker = Asker(self.address)
+        try:
+            return asker(
+                method, target, {k: v for k, v in sent.items() if v}, data, only_head=only_head
+            )
+        finally:
+            asker.close()
+
+    def log_in(self, name: str, password: str = SECRET, **headers: str) -> Answer:
+        return self.ask("POST", f"{API}/session", {"name": name, "password": password}, **headers)
+
+    def add(self, name: str, role: Role) -> str:
+        """Somebody more, who has logged in; their cookie."""
+        _, link = invite(self.store, name, role, actor="local")
+        links.use(self.store, link.token, SECRET)
+        self.cookies[name] = cookie_in(self.log_in(name))
+        return self.cookies[name]
+
+
+def cookie_in(answer: Answer) -> str:
+    assert answer.status == 200, answer.body
+    return answer.headers["set-cookie"].partition(";")[0]
+
+
+@pytest.fixture(scope="module")
+def team(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Team]:
+    settings = Settings(home=tmp_path_factory.mktemp("team"), team=True)
+    Store.open(settings).close()
+    cheap = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(passwords, "HASHER", cheap)
+        patch.setattr(access, "LOOK_SECONDS", 0.05)
+        passwords._nobodys.cache_clear()
+        app = create_app(settings)
+        app.add_api_route(HIDDEN, lambda: {"secret": 1}, include_in_schema=False)
+        # Before the routes that take whatever is left.
+        app.router.routes.insert(0, app.router.routes.pop())
+        with listen("127.0.0.1", 0) as (socket, address):
+            server = make_server(app)
+            thread = threading.Thread(target=lambda: server.run(sockets=[socket]))
+            thread.start()
+            made = Team(address, app)
+            for role in Role:
+                made.add(role.value, role)
+            yield made
+            server.should_exit = True
+            thread.join(SECONDS)
+        passwords._nobodys.cache_clear()
+
+
+def asked(team: Team, row: Row, role: str | None) -> Answer:
+    """The answer to a route as the table has it; the body is of a shape that nothing is done with."""
+    target = row.target({"ending": "csv", "tab": "keys"})
+    kind, body = "application/json", None if row.kind in ("read", "page", "stream") else []
+    if row.kind == "upload":
+        return team.ask("POST", f"{target}?name=a.zip", b"PK", role=role, kind=BYTES)
+    stream = row.kind == "stream"
+    return team.ask(
+        "HEAD" if stream else row.method,
+        target,
+        body if row.kind == "body" else None,
+        role=role,
+        kind=kind,
+        only_head=stream,
+    )
+
+
+RANKS = [role.value for role in Role]
+GUARDED = [row for row in rows() if row.role != "everybody"]
+
+
+class TestTable:
+    def test_the_reviewed_table_and_the_one_that_decides_are_the_same(self) -> None:
+        reviewed = {str(row): row.role for row in rows()}
+        decided = {
+            re.sub(r":path(?=})", "", route): "everybody" if action is OPEN else LEAST[action].value
+            for route, action in RULES.items()
+        }
+        # It is one of the files of a version.
+        assert reviewed.pop("GET /assets/{version}/all.css") == "everybody"
+        assert decided == reviewed
+
+    def test_nothing_is_open_but_the_application_and_the_way_in(self) -> None:
+        opened = {route for route, action in RULES.items() if action is OPEN}
+        data = {route for route in opened if API in route}
+        assert data == {
+            f"GET {API}/session",
+            f"POST {API}/session",
+            f"DELETE {API}/session",
+            f"POST {API}/links/look",
+            f"POST {API}/links/use",
+        }
+        assert {f"GET {page}" for page in PAGES} < opened
+        assert "GET /metrics" not in opened
+
+    def test_every_role_is_explained(self) -> None:
+        assert list(TABLE["roles"])[1:] == RANKS
+        assert {row.role for row in rows()} <= set(TABLE["roles"])
+
+
+class TestEveryRoute:
+    @pytest.mark.parametrize("row", GUARDED, ids=str)
+    def test_lets_in_who_may_and_nobody_else(self, team: Team, row: Row) -> None:
+        stranger = asked(team, row, None)
+        assert stranger.status == 401, (row, stranger.body)
+        if row.kind != "stream":
+            assert_guarded(stranger, row)
+        assert stranger.headers["www-authenticate"].startswith("Session")
+        least = RANKS.index(row.role)
+        if least:
+            below = asked(team, row, RANKS[least - 1])
+            assert below.status == 403, (row, below.body)
+            assert row.kind == "stream" or f"needs the role {row.role}".encode() in below.body
+        if str(row) == f"DELETE {API}/sessions":
+            return
+        enough = asked(team, row, row.role)
+        assert enough.status not in (401, 403), (row, enough.body)
+        assert enough.status < 500, (row, enough.body)
+
+    @pytest.mark.parametrize("row", [r for r in rows() if r.role == "everybody"], ids=str)
+    def test_what_is_open_answers_strangers(self, team: Team, row: Row) -> None:
+        assert asked(team, row, None).status not in (401, 403), row
+
+    def test_what_is_in_no_table_is_refused(self, team: Team) -> None:
+        assert team.ask("GET", HIDDEN).status == 401
+        for role in RANKS:
+            answer = team.ask("GET", HIDDEN, role=role)
+            assert (answer.status, b"secret" in answer.body) == (404, False)
+
+    def test_a_route_taken_for_another_is_refused(
+        self, team: Team, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Should the table's addresses ever be read otherwise than the router reads them."""
+        monkeypatch.setattr(access._Rules, "find", lambda *_: (f"GET {API}/session", OPEN))
+        assert team.ask("GET", f"{API}/datasets").status == 403
+        assert team.ask("GET", "/metrics").status == 403
+        assert team.ask("GET", f"{API}/session").status == 200
+
+    @pytest.mark.parametrize(
+        "path",
+        [
+            f"{API}/datasets/",
+            f"{API}//datasets",
+            "/API/V1/datasets",
+            f"{API}/%64atasets",
+            "/metrics/",
+            f"{API}/datasets%2f",
+        ],
+    )
+    def test_another_spelling_opens_nothing(self, team: Team, path: str) -> None:
+        answer = team.ask("GET", path)
+        assert answer.status in (401, 404), answer.body
+        assert b"items" not in answer.body
+
+    @pytest.mark.parametrize("method", ["OPTIONS", "TRACE", "PROPFIND", "POST"])
+    def test_another_method_opens_nothing(self, team: Team, method: str) -> None:
+        assert team.ask(method, f"{API}/datasets").status in (401, 405)
+
+
+class TestSessions:
+    def test_the_cookie_is_for_this_server_alone(self, team: Team) -> None:
+        said = team.log_in("viewer").headers["set-cookie"].lower()
+        assert "httponly" in said and "samesite=strict" in said and "path=/" in said
+        assert "domain" not in said
+        assert "secure" not in said, "there is no TLS on loopback"
+
+    def test_behind_tls_it_is_secure_and_bound_to_its_name(self, tmp_path: Path) -> None:
+        from app.api.team import Team as Way
+
+        settings = Settings(home=tmp_path, team=True, url="https://touchline.example.org")
+        way = Way.of(settings, None)  # type: ignore[arg-type]
+        assert way is not None
+        assert way.cookie.startswith("__Host-")
+        assert way.cookie_values("x")["secure"] is True
+
+    def test_a_login_gives_a_new_session_and_ends_the_old(self, team: Team) -> None:
+        old = team.add("fixed", Role.VIEWER)
+        planted = "touchline_session=" + "A" * 43
+        for before in (old, planted):
+            fresh = cookie_in(team.log_in("fixed", Cookie=before))
+            assert fresh != before
+            assert team.ask("GET", f"{API}/datasets", Cookie=before).status == 401
+            assert team.ask("GET", f"{API}/datasets", Cookie=fresh).status == 200
+
+    def test_logging_out_ends_it_on_the_server(self, team: Team) -> None:
+        cookie = team.add("leaves", Role.VIEWER)
+        answer = team.ask("DELETE", f"{API}/session", role="leaves")
+        assert "max-age=0" in answer.headers["set-cookie"].lower()
+        assert team.ask("GET", f"{API}/datasets", Cookie=cookie).status == 401
+
+    def test_two_cookies_of_the_name_are_none(self, team: Team) -> None:
+        mine = team.cookies["viewer"]
+        both = f"{mine}; touchline_session=x"
+        assert team.ask("GET", f"{API}/datasets", Cookie=both).status == 401
+        assert team.ask("GET", f"{API}/datasets", Cookie=f"a=b; {mine}").status == 200
+
+    def test_own_sessions_are_listed_and_ended(self, team: Team) -> None:
+        team.add("many", Role.VIEWER)
+        other = cookie_in(team.log_in("many", User_Agent="Another/1.0"))
+        items = json.loads(team.ask("GET", f"{API}/sessions", role="many").body)["items"]
+        assert sorted(item["this"] for item in items) == [False, True]
+        gone = next(item for item in items if item["browser"] == "Another/1.0")
+        foreign = team.ask("DELETE", f"{API}/sessions/{gone['id']}", role="viewer")
+        assert foreign.status == 404
+        assert team.ask("DELETE", f"{API}/sessions/{gone['id']}", role="many").status == 204
+        assert team.ask("GET", f"{API}/datasets", Cookie=other).status == 401
+        assert team.ask("GET", f"{API}/datasets", role="many").status == 200
+
+    def test_a_role_that_is_taken_away_is_gone_with_the_next_request(self, team: Team) -> None:
+        team.add("falls", Role.LEAD)
+        target = f"{API}/uploads"
+        assert team.ask("GET", target, role="falls").status == 200
+        user = find_person(team.store, "falls").id
+        edit = {"role": "viewer"}
+        assert team.ask("PATCH", f"{API}/users/{user}", edit, role="admin").status == 200
+        assert team.ask("GET", target, role="falls").status == 403
+
+    def test_nobody_changes_their_own_rights(self, team: Team) -> None:
+        me = find_person(team.store, "admin").id
+        for edit in ({"role": "viewer"}, {"disabled": True}):
+            assert team.ask("PATCH", f"{API}/users/{me}", edit, role="admin").status == 403
+
+    def test_too_many_tries_of_a_name_wait(self, team: Team) -> None:
+        told = [team.log_in("tried", "wrong wrong wrong").status for _ in range(11)]
+        assert told == [401] * 10 + [429]
+        answer = team.log_in("tried")
+        assert 0 < int(answer.headers["retry-after"]) <= 60
+        assert team.log_in("viewer").status == 200, "others are let in"
+
+    def test_a_link_sets_a_password_once_and_logs_in(self, team: Team) -> None:
+        made = team.ask("POST", f"{API}/users", {"name": "new", "role": "viewer"}, role="admin")
+        assert made.status == 201, made.body
+        base, _, token = json.loads(made.body)["link"].partition("#")
+        assert base == f"{team.address}/join"
+        meant = team.ask("POST", f"{API}/links/look", {"token": token})
+        assert json.loads(meant.body) == {"name": "new", "joined": False}
+        use = {"token": token, "password": SECRET}
+        cookie = cookie_in(team.ask("POST", f"{API}/links/use", use))
+        assert team.ask("GET", f"{API}/datasets", Cookie=cookie).status == 200
+        assert team.ask("POST", f"{API}/links/use", use).status == 404
+
+    def test_no_secret_is_kept_for_a_request_that_is_repeated(self, team: Team) -> None:
+        person = find_person(team.store, "viewer")
+        target = f"{API}/users/{person.id}/link"
+        answers = [team.ask("POST", target, role="admin", Idempotency_Key="k-1") for _ in "12"]
+        one, two = (json.loads(answer.body)["link"] for answer in answers)
+        assert one != two
+        with pytest.raises(Exception, match="not good any more"):
+            links.look(team.store, one.partition("#")[2])
+
+
+class TestWhoActs:
+    def test_a_change_must_say_that_it_comes_from_here(self, team: Team) -> None:
+        target = f"{API}/session/password"
+        body = {"old": SECRET, "new": SECRET}
+        for origin in ("", "http://evil.example", "null"):
+            answer = team.ask("PUT", target, body, role="viewer", Origin=origin)
+            assert answer.status == 403, origin
+        assert team.ask("GET", f"{API}/datasets", role="viewer", Origin="").status == 200
+
+    def test_nobody_hides_behind_the_name_of_a_script(self, team: Team) -> None:
+        target = f"{API}/datasets/{MISSING}/saved-views"
+        body = {"name": "a", "q": ""}
+        answer = team.ask("POST", target, body, role="annotator", X_Actor="bot")
+        assert answer.status == 400
+        assert b"names nobody" in answer.body
+
+    def test_the_log_names_the_person(self, team: Team) -> None:
+        team.ask("POST", f"{API}/users", {"name": "logged", "role": "viewer"}, role="admin")
+        with team.store.read() as session:
+            last = list(read_log(session))[-1]
+        assert (last.actor, last.body["person"], last.body["did"]) == ("admin", "logged", "invited")
+
+    def test_what_is_made_is_its_makers(self, team: Team) -> None:
+        ensure_dataset(team.store, "made", "local")
+        body = {"name": "mine", "q": ""}
+        answer = team.ask("POST", f"{API}/datasets/made/saved-views", body, role="annotator")
+        assert (answer.status, json.loads(answer.body)["by"]) == (201, "annotator")
+
+    def test_a_key_belongs_to_its_person(self, team: Team) -> None:
+        """Two people may choose the same; neither is given the other's answer."""
+        target, key = f"{API}/uploads?name=a.zip", "the-same-key"
+        team.add("lead2", Role.LEAD)
+        told = [
+            team.ask("POST", target, sent, role=role, kind=BYTES, Idempotency_Key=key)
+            for role, sent in (("lead", b"one"), ("lead2", b"two"), ("lead", b"one"))
+        ]
+        assert [answer.status for answer in told] == [201, 201, 201]
+        assert told[0].body == told[2].body != told[1].body
+        assert "idempotency-replayed" not in told[1].headers
+
+
+class TestStreams:
+    @pytest.mark.parametrize("ends", ["disabled", "logged out"])
+    def test_an_open_stream_ends_with_its_session(self, team: Team, ends: str) -> None:
+        name = f"hears-{ends.replace(' ', '-')}"
+        cookie = team.add(name, Role.VIEWER)
+        connection = http.client.HTTPConnection(team.address.partition("//")[2], timeout=SECONDS)
+        connection.request("GET", f"{API}/events", headers={"Cookie": cookie})
+        answer = connection.getresponse()
+        assert answer.status == 200
+        assert answer.readline().startswith(b":")
+        if ends == "disabled":
+            person = find_person(team.store, name)
+            change_person(team.store, person.id, actor="local", disabled=True)
+        else:
+            team.ask("DELETE", f"{API}/session", role=name)
+        # It says every now and then that it is still there.
+        until = time.monotonic() + SECONDS
+        while answer.read1(1000):
+            assert time.monotonic() < until, "it goes on"
+        connection.close()
+        assert team.ask("GET", f"{API}/events", Cookie=cookie).status == 401
+
+    def test_it_goes_on_while_the_session_does(self, team: Team) -> None:
+        connection = http.client.HTTPConnection(team.address.partition("//")[2], timeout=1)
+        headers = {"Cookie": team.cookies["viewer"]}
+        connection.request("GET", f"{API}/events", headers=headers)
+        answer = connection.getresponse()
+        with pytest.raises(TimeoutError):
+            answer.read()
+        connection.close()
+
+
+def test_a_reset_link_ends_sessions_when_it_is_used(team: Team) -> None:
+    cookie = team.add("resets", Role.VIEWER)
+    _, link = renew_link(team.store, find_person(team.store, "resets").id, actor="admin")
+    assert team.ask("GET", f"{API}/datasets", Cookie=cookie).status == 200
+    team.ask("POST", f"{API}/links/use", {"token": link.token, "password": SECRET})
+    assert team.ask("GET", f"{API}/datasets", Cookie=cookie).status == 401
