@@ -96,7 +96,7 @@ def _read(task: PaintTask, digest: str, image: Image) -> PaintReading | None:
         return None
     if why_unreadable(image, size) is not None:
         return replace(task.without_frame, frame=digest)
-    seen = paint_of(image, size, clicked, task.group.pitch, policy)
+    seen = paint_of(image, size, clicked, task.group.pitch, policy, task.view.extras.places)
     reason = NO_PAINT if seen.outcome == "nothing" else seen.reason
     evidence = seen.evidence if reason is None else NOTHING
     return PaintReading(digest, task.sought_for, evidence, reason, seen.supported, seen.explained)

@@ -261,7 +261,7 @@ def _give(
 def _tasks(store: Store, ids: Sequence[int], dataset: Dataset) -> dict[int, list[PaintTask]]:
     """What is to be read for each group; groups without a view that takes paint have none."""
     with store.read() as session:
-        stored = read_groups(session, ids, extras=False)
+        stored = read_groups(session, ids)
         clicks = replace(dataset.policy, calibration=_without_paint(dataset.policy.calibration))
         known = known_calibrations(session, [item.group for item in stored.values()], clicks)
     return {

@@ -145,6 +145,12 @@ def kinds(store, number=1):
     return [item.kind for item in said if item.kind in ("no_paint", "paint_disagrees")]
 
 
+def inside(box, place):
+    """Whether a place of paint lies well inside a box."""
+    across, down = place.x - box.x, place.y - box.y
+    return 2 < across < box.width - 2 and 2 < down < box.height - 2
+
+
 class TestReadPaint:
     def test_is_refused_where_the_policy_would_not_use_it(self, store, pictures):
         ingest(store, "demo", groups(pictures), source="files", actor="ann")
@@ -165,6 +171,15 @@ class TestReadPaint:
                 assert found.paint.supported > 0.5 and found.paint.error_px < 0.2
                 assert np.linalg.norm(found.camera.position - truth.position) < 0.25
         assert kinds(painted) == []
+
+    def test_nothing_is_believed_where_the_dataset_has_people(self, painted):
+        for number in (1, 2):
+            group = load(painted, number).group
+            for view in group.views:
+                people = [box for box in view.extras.places if box.width * box.height < 2e4]
+                assert people
+                for places in group.paint[view.key].evidence.points.values():
+                    assert not [place for place in places for box in people if inside(box, place)]
 
     def test_the_least_agreement_of_a_groups_views_is_in_the_queue(self, painted):
         for row in list_groups(painted, 1).items:
