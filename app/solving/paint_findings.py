@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from app.soccer.group import Group, View
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES
 from app.soccer.policy import CalibrationPolicy
-from app.soccer.solution import Finding, ViewSolution
+from app.soccer.solution import Finding, Fix, ViewSolution
 from app.solving.calibrate import wanted_paint
 
+READ_PAINT = "read_paint"
+"""The fix that asks for a picture to be read."""
 STAYS = "so its camera is that of the clicks"
 READ_AGAIN = (
     "The lines of this view, its pitch or the thresholds have changed since its paint was read, "
@@ -46,7 +48,9 @@ def paint_findings(
     if wanted_paint(group, view, policy) is None:
         return
     if fit is None:
-        yield Finding(NO_PAINT, READ_AGAIN, view.key)
+        yield Finding(NO_PAINT, READ_AGAIN, view.key, fix=Fix(READ_PAINT, view.key))
     elif fit.reason is not None:
         kind = PAINT_DISAGREES if fit.reason == PAINT_DISAGREES else NO_PAINT
-        yield Finding(kind, SENTENCES[fit.reason], view.key, number=fit.supported)
+        # To read again what shows no paint would show as little; a picture may have come back.
+        fix = Fix(READ_PAINT, view.key) if fit.reason == NO_FRAME else None
+        yield Finding(kind, SENTENCES[fit.reason], view.key, number=fit.supported, fix=fix)

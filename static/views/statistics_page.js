@@ -14,6 +14,7 @@ import { DatasetFrame } from './dataset_page.js';
 import { HeatMap } from './heat_map.js';
 import { NoiseCard } from './noise_card.js';
 import { Loading, Trouble } from './page_frame.js';
+import { PaintCard } from './paint_card.js';
 import { Pitches } from './pitches.js';
 import { Positions } from './positions.js';
 import { QueryBox } from './query_box.js';
@@ -92,7 +93,8 @@ function StatisticsOf({ one }) {
 			<h2 class="statistics__whole">Of the whole dataset</h2>
 			<${NoiseCard} dataset=${one.id} />
 			<${Pitches} dataset=${one.id} />
-			<${Positions} dataset=${one.id} />` : found.error ? null : html`<${Loading} what="statistics" />`}
+			<${Positions} dataset=${one.id} />
+			<${PaintCard} dataset=${one} />` : found.error ? null : html`<${Loading} what="statistics" />`}
 	`;
 }
 

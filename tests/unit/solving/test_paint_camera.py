@@ -16,6 +16,7 @@ from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.soccer.picture import OPEN
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
+from app.soccer.solution import Fix
 from app.solving.calibrate import calibrate_view, view_key
 from app.solving.solve import solve
 from tests.balls import box_around
@@ -175,19 +176,23 @@ class TestFindings:
 
     def test_lines_that_changed_since_ask_for_another_reading(self):
         group = read(clicked(), sought_for="another")
-        assert "changed since its paint was read" in kinds(group)["a"].sentence
+        found = kinds(group)["a"]
+        assert "changed since its paint was read" in found.sentence
+        assert found.fix == Fix("read_paint", "a")
 
     @pytest.mark.parametrize(
-        ("reason", "kind", "words"),
+        ("reason", "kind", "words", "fix"),
         [
-            ("no_paint", "no_paint", "Too little paint"),
-            ("no_frame", "no_paint", "missing"),
-            ("paint_disagrees", "paint_disagrees", "does not lie where"),
+            ("no_paint", "no_paint", "Too little paint", None),
+            ("no_frame", "no_paint", "missing", Fix("read_paint", "a")),
+            ("paint_disagrees", "paint_disagrees", "does not lie where", None),
         ],
     )
-    def test_each_reason_is_told(self, reason, kind, words):
+    def test_each_reason_is_told_and_where_reading_helps_it_is_proposed(
+        self, reason, kind, words, fix
+    ):
         found = kinds(read(clicked(), reason=reason))["a"]
-        assert (found.kind, words in found.sentence) == (kind, True)
+        assert (found.kind, words in found.sentence, found.fix) == (kind, True, fix)
 
 
 class TestSolve:
