@@ -1,22 +1,19 @@
 // @ts-check
 /** Carrying out what mends a group: the edit itself, or leading the person to the place where to draw. */
 
-import { readDatasetPaint } from '../api/paint.js';
 import { squareBox } from '../geometry/ball.js';
 import { framePoints } from '../geometry/frame_points.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { raysInto } from '../overlays/scene.js';
-import { sentenceOf } from '../lib/resource.js';
 import { placeBall } from '../state/ball_edits.js';
 import { startBall, startMarking } from '../state/drawing.js';
 import { group, pending, solution, submit } from '../state/group.js';
 import { mend } from '../state/mends.js';
-import { follow } from '../state/jobs.js';
-import { announce, complain } from '../state/notice.js';
+import { announce } from '../state/notice.js';
 import { zoomTo } from '../state/viewports.js';
 import { focusView, selected } from '../state/workspace.js';
 
-/** @import {GroupDocument, ViewJson} from '../api/types.js' */
+/** @import {ViewJson} from '../api/types.js' */
 /** @import {ImagePoint} from '../geometry/viewport.js' */
 /** @import {Edit} from '../state/edits.js' */
 /** @import {Mend} from '../state/mends.js' */
@@ -75,17 +72,6 @@ function fitBox(view) {
 	submit({ kind: 'ball', view: view.key, ball: { ...ball, box: squareBox(center, diameter) } });
 }
 
-/** Have the pictures of the match read: those that still fit are only compared. @param {GroupDocument} shown */
-async function readAgain({ dataset, match }) {
-	try {
-		announce('The pictures of this match are read.');
-		const job = await follow(await readDatasetPaint(dataset.id, match), () => {});
-		if (job.state === 'failed') complain(job.problem?.detail ?? 'The pictures could not be read.');
-	} catch (error) {
-		complain(sentenceOf(error));
-	}
-}
-
 /** An edit of the server builds on what it has: not on a change of the same lines or ball that is still on its way. @param {Edit} edit */
 function submitOffered(edit) {
 	const waits = edit.kind !== 'include' && pending.value.some(({ kind, view }) => kind === edit.kind && view === edit.view);
@@ -108,7 +94,7 @@ export function carryOut({ fix, edit }) {
 	}
 	else if (fix.action === 'draw_marking' && fix.marking) drawMissing(view, fix.marking);
 	else if (fix.action === 'resize_ball') fitBox(view);
-	else if (fix.action === 'read_paint') readAgain(shown);
+	else if (fix.action === 'read_paint') import('../state/paint_again.js').then(({ readAgain }) => readAgain(shown));
 	else if (fix.action === 'look_ball' && fix.point) {
 		showPlace(view, [{ x: fix.point[0], y: fix.point[1] }]);
 		selected.value = { kind: 'ball', view: view.key };
