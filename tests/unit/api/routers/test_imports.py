@@ -81,6 +81,9 @@ class TestStartImport:
         job = finished(app, api.post(API, json=body()))
         assert job.result["paint_job"] is None
         assert get_dataset(app.state.services.store, "fresh").policy == PAPER
+        named = finished(app, api.post(API, json=body(dataset="named", policy="touchline")))
+        assert (named.result["solve_job"], named.result["paint_job"]) == (ANY, None)
+        assert get_dataset(app.state.services.store, "named").policy == TOUCHLINE
 
     def test_with_pictures_their_paint_is_read_next_and_solved_with(
         self, app, api, tree, group
