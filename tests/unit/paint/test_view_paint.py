@@ -63,9 +63,7 @@ def test_nothing_is_believed_where_people_are_and_a_box_of_the_field_hides_none(
         ]
         assert found.outcome == "snapped"
         assert not [one for one in told if abs(one[0] - x) < 28 and abs(one[1] - y) < 38]
-        apart = [(abs(one[0] - x), abs(one[1] - y)) for one in told]
-        beside = [one for one in apart if one[0] > 32 or one[1] > 42]
-        assert [one for one in beside if one[0] < 39 and one[1] < 52]
+        assert [one for one in told if 32 < one[0] - x < 46 and abs(one[1] - y) < 38]
     assert [one for one in whole.line_like if abs(one[0] - x) < 28 and abs(one[1] - y) < 38]
 
 
