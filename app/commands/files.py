@@ -18,6 +18,7 @@ from app.commands.options import (
     parse_size,
     read_settings,
 )
+from app.commands.policy import read_policy_option
 from app.commands.terminal import complain, print_export, print_import, show_progress
 from app.datasets.format_names import ExportFormat, ImportFormat
 from app.soccer.frames import ImageSize
@@ -76,6 +77,13 @@ def import_(
             "--size", parser=parse_size, metavar="WxH", help="Default 960x540; ISSIA 1920x1080."
         ),
     ] = None,
+    policy: Annotated[
+        str,
+        typer.Option(
+            metavar="paper|strict|touchline|FILE.yaml",
+            help="Judges the dataset where this import makes it.",
+        ),
+    ] = "paper",
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would happen, and keep nothing.")
     ] = False,
@@ -97,11 +105,13 @@ def import_(
         frame_offset=parse_frame_offset(frame_offset),
         flipped=parse_cameras(flip),
     )
+    chosen = read_policy_option(policy)
     settings = read_settings()
     with opened_store(settings) as store, show_progress("Importing") as progress:
         imported = import_source(
-            store, dataset, source, settings, progress, actor=acting(), dry_run=dry_run
-        )
+            store, dataset, source, settings, progress,
+            actor=acting(), dry_run=dry_run, policy=chosen,
+        )  # fmt: skip
     print_import(imported.values(), json_)
     if not imported.something:
         complain(*imported.nothing_read())

@@ -151,12 +151,18 @@ def read_picture(image: Image, field: BoolArray, hidden: Sequence[Box] = ()) -> 
     red, green, blue = cv2.split(image)
     least = cv2.min(red, cv2.min(green, blue)).astype(np.float32)
     level = np.asarray(cv2.GaussianBlur(least, (5, 5), SMOOTH_PX), np.float32)
-    covered = np.logical_not(field).astype(np.uint8)
+    covered = np.logical_not(seen_field(field, hidden)).astype(np.uint8)
+    return Reading(image, level, covered, _noise(level, field))
+
+
+def seen_field(field: BoolArray, hidden: Sequence[Box]) -> BoolArray:
+    """The field of play, shape (H, W), without boxes in which nothing is believed, pixels."""
+    seen = field.copy()
     for box in hidden:
         left, top = max(int(np.floor(box.x)), 0), max(int(np.floor(box.y)), 0)
         right, bottom = int(np.ceil(box.x + box.width)), int(np.ceil(box.y + box.height))
-        covered[top : max(bottom, 0), left : max(right, 0)] = 1
-    return Reading(image, level, covered, _noise(level, field))
+        seen[top : max(bottom, 0), left : max(right, 0)] = False
+    return seen
 
 
 def trace(reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SPACING_PX) -> Traced:

@@ -14,7 +14,7 @@ from app.geometry.arrays import BoolArray
 from app.paint.evidence import Image, to_paint_evidence
 from app.paint.propose import LEAST_SIDE
 from app.paint.snap import Snapped
-from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint
 
 SHAPES_APART = 0.005
@@ -38,6 +38,11 @@ class PictureScale:
     def told(self, x: float, y: float) -> ImagePoint:
         """A place of the picture in pixels of the annotations; centres of pixels are whole."""
         return ImagePoint((x + 0.5) / self.x - 0.5, (y + 0.5) / self.y - 0.5)
+
+    def box(self, box: Box) -> Box:
+        """A box of the annotations in pixels of the picture."""
+        x, y = ((box.x + 0.5) * self.x - 0.5, (box.y + 0.5) * self.y - 0.5)
+        return Box(x, y, box.width * self.x, box.height * self.y)
 
     def evidence(self, snapped: Snapped) -> PaintEvidence:
         """The paint that was found, in pixels of the annotations."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -12,12 +13,12 @@ from app.errors import GeometryError
 from app.geometry.lens import BROWN_CONRADY
 from app.geometry.resection import PARAMETERS
 from app.paint.agreement import agreement
-from app.paint.evidence import Image
+from app.paint.evidence import Image, seen_field
 from app.paint.grass import field_of_play, why_no_field
 from app.paint.picture_scale import SHAPES_APART, PictureScale, why_unreadable
 from app.paint.ridges import line_like
 from app.paint.snap import snap
-from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Media
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES, PaintEvidence
 from app.soccer.pitch import Pitch
@@ -29,6 +30,9 @@ SENTENCES = {
     NO_PAINT: "Too little paint is seen near the lines.",
     PAINT_DISAGREES: "The paint lies elsewhere than the lines: check their labels.",
 }
+
+LARGEST_PERSON = 0.1
+"""Of the picture; a box that covers more hides no line from a camera that shows any."""
 
 
 @dataclass(frozen=True)
@@ -67,13 +71,19 @@ def read_paint(
     start: Calibration,
     pitch: Pitch,
     policy: CalibrationPolicy,
+    people: Sequence[Box] = (),
 ) -> ViewPaint:
     """``paint_of`` for a frame where it lies; raises what ``decode_frame`` does."""
-    return paint_of(decode_frame(media, flipped, settings), size, start, pitch, policy)
+    return paint_of(decode_frame(media, flipped, settings), size, start, pitch, policy, people)
 
 
 def paint_of(
-    image: Image, size: ImageSize, start: Calibration, pitch: Pitch, policy: CalibrationPolicy
+    image: Image,
+    size: ImageSize,
+    start: Calibration,
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+    people: Sequence[Box] = (),
 ) -> ViewPaint:
     """What a picture shows of the markings that a camera projects into it.
 
@@ -83,6 +93,8 @@ def paint_of(
         start: Calibration of the view, pixels of ``size``.
         pitch: The pitch.
         policy: Prior of the distortion.
+        people: Boxes in which nothing is believed, pixels of ``size``; what is larger than people
+            are is looked into all the same.
     """
     why = why_unreadable(image, size)
     if why is not None:
@@ -92,7 +104,9 @@ def paint_of(
     if why is not None:
         return ViewPaint("nothing", sentence=f"There is nothing to read: {why}.")
     scale = PictureScale.of(image, size)
-    paint = line_like(image, grass)
+    hidden = [scale.box(box) for box in people if _is_person(box, size)]
+    seen_grass = seen_field(grass, hidden)
+    paint = line_like(image, grass) & seen_grass
     told = ViewPaint("nothing", line_like=scale.line_like(paint))
     why = _unusable(start)
     if why is not None:
@@ -103,10 +117,12 @@ def paint_of(
     if start.covariance is not None and start.source == "lines":
         spread = np.reshape(start.covariance, (PARAMETERS, PARAMETERS))
     try:
-        snapped = snap(image, grass, camera, pitch, policy=policy, start_covariance=spread)
+        snapped = snap(
+            image, grass, camera, pitch, hidden=hidden, policy=policy, start_covariance=spread
+        )
     except (GeometryError, np.linalg.LinAlgError):
         return replace(told, sentence="The camera of the lines cannot be drawn onto the paint.")
-    seen = agreement(snapped.camera, grass, paint, pitch)
+    seen = agreement(snapped.camera, seen_grass, paint, pitch)
     return replace(
         told,
         outcome="kept" if snapped.reason else "snapped",
@@ -118,6 +134,11 @@ def paint_of(
         error_px=None if snapped.error_px is None else snapped.error_px / scale.x,
         moved_px=snapped.moved_px / scale.x,
     )
+
+
+def _is_person(box: Box, size: ImageSize) -> bool:
+    """Whether a box can be that of somebody on the field, and not of the field or a goal."""
+    return box.width * box.height <= LARGEST_PERSON * size.width * size.height
 
 
 def _unusable(start: Calibration) -> str | None:

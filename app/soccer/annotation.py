@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,6 +11,8 @@ from app.soccer.frames import Box, ImagePoint
 
 Lines = Mapping[str, tuple[ImagePoint, ...]]
 """Annotated points per marking; keys are names from ``pitch.MARKINGS``, sorted."""
+
+CORNERS = ("x1", "y1", "x2", "y2")
 
 
 def make_lines(lines: Mapping[str, Any]) -> Lines:
@@ -55,3 +58,18 @@ class Extras:
     boxes: tuple[Mapping[str, Any], ...] = ()
     lines: tuple[Mapping[str, Any], ...] = ()
     metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def places(self) -> tuple[Box, ...]:
+        """Where its boxes lie, pixels; what has no corners that are numbers is left out."""
+        return tuple(box for item in self.boxes if (box := _corner_box(item)) is not None)
+
+
+def _corner_box(item: Mapping[str, Any]) -> Box | None:
+    """A box in the shape that all readers give them: ``{"points": {"x1", "y1", "x2", "y2"}}``."""
+    try:
+        left, top, right, bottom = (float(item["points"][name]) for name in CORNERS)
+    except (KeyError, TypeError, ValueError):
+        return None
+    box = Box(min(left, right), min(top, bottom), abs(right - left), abs(bottom - top))
+    return box if math.isfinite(box.x + box.y + box.width + box.height) else None

@@ -102,6 +102,17 @@ class View:
         return self.station.size
 
     @property
+    def takes_paint(self) -> bool:
+        """Whether the paint of its picture could place its camera.
+
+        A static camera is that of many pictures, a given one is what it is, and a picture that was
+        stretched or cropped has no lens of one radial term about its middle.
+        """
+        station = self.station
+        is_given = station.given is not None and station.calibration == "given"
+        return bool(station.lines) and not (station.shared or is_given or station.picture)
+
+    @property
     def ball(self) -> BallAnnotation | None:
         """The ball of this view; None when there is none, or several to pick from."""
         seen = [ball for ball in self.balls if not ball.out_of_view]

@@ -17,7 +17,7 @@ from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImagePoint
 from app.soccer.pitch import canonical_marking
 
-EXTRACTOR_VERSION = "1"
+EXTRACTOR_VERSION = "2"
 """Raised by one whenever the same picture gives other evidence."""
 NO_PAINT, PAINT_DISAGREES, NO_FRAME = "no_paint", "paint_disagrees", "no_frame"
 """Why a camera stays that of its clicks: too little paint, paint that contradicts them, and a

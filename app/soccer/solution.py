@@ -385,6 +385,7 @@ class Fix:
     ``action`` is ``relabel``, ``move_point``, ``drop_point``, ``drop_marking``, ``swap_sides``,
     ``include_view``, ``exclude_view``, ``free_picture`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
     say where a person should look and draw: what was computed there is no evidence for itself.
+    ``read_paint`` asks for its picture to be read, which is no edit either.
     """
 
     action: str

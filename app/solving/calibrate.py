@@ -294,20 +294,9 @@ def clicks_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
     return calibration_key(view.station, group.pitch, policy, _shared(group, view, policy))
 
 
-def takes_paint(view: View) -> bool:
-    """Whether the paint of a view's picture could place its camera.
-
-    A static camera is that of many pictures, a given one is what it is, and a picture that was
-    stretched or cropped has no lens of one radial term about its middle.
-    """
-    station = view.station
-    is_given = station.given is not None and station.calibration == "given"
-    return bool(station.lines) and not (station.shared or is_given or station.picture)
-
-
 def wanted_paint(group: Group, view: View, policy: CalibrationPolicy) -> PaintReading | None:
     """What was read for a view, as far as the policy wants it; perhaps for other clicks."""
-    if policy.source != "paint" or not takes_paint(view):
+    if policy.source != "paint" or not view.takes_paint:
         return None
     return group.paint.get(view.key)
 

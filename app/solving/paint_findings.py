@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from app.soccer.group import Group, View
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES
 from app.soccer.policy import CalibrationPolicy
-from app.soccer.solution import Finding, ViewSolution
-from app.solving.calibrate import takes_paint, wanted_paint
+from app.soccer.solution import Finding, Fix, ViewSolution
+from app.solving.calibrate import wanted_paint
 
+READ_PAINT = "read_paint"
+"""The fix that asks for a picture to be read."""
 STAYS = "so its camera is that of the clicks"
-NEVER_READ = f"Nobody has read the paint of this view's picture, {STAYS}. Read the paint."
 READ_AGAIN = (
     "The lines of this view, its pitch or the thresholds have changed since its paint was read, "
     f"{STAYS}. Read the paint again."
@@ -36,14 +37,20 @@ SENTENCES = {
 def paint_findings(
     group: Group, view: View, solved: ViewSolution, policy: CalibrationPolicy
 ) -> Iterator[Finding]:
-    """Why the camera of a view is not that of its paint; nothing where it is, or cannot be."""
-    if policy.source != "paint" or not takes_paint(view) or solved.calibration.camera is None:
+    """Why the camera of a view is not that of its paint; nothing where it is, or cannot be.
+
+    A picture that is not there, or that nobody has read yet, is no fault of the group: how many
+    there are is told of the dataset.
+    """
+    if policy.source != "paint" or not view.takes_paint or solved.calibration.camera is None:
         return
-    fit, reading = solved.calibration.paint, wanted_paint(group, view, policy)
-    if reading is None:
-        yield Finding(NO_PAINT, NEVER_READ, view.key)
-    elif fit is None:
-        yield Finding(NO_PAINT, READ_AGAIN, view.key)
+    fit = solved.calibration.paint
+    if wanted_paint(group, view, policy) is None:
+        return
+    if fit is None:
+        yield Finding(NO_PAINT, READ_AGAIN, view.key, fix=Fix(READ_PAINT, view.key))
     elif fit.reason is not None:
         kind = PAINT_DISAGREES if fit.reason == PAINT_DISAGREES else NO_PAINT
-        yield Finding(kind, SENTENCES[fit.reason], view.key, number=fit.supported)
+        # To read again what shows no paint would show as little; a picture may have come back.
+        fix = Fix(READ_PAINT, view.key) if fit.reason == NO_FRAME else None
+        yield Finding(kind, SENTENCES[fit.reason], view.key, number=fit.supported, fix=fix)

@@ -28,6 +28,7 @@ _READINGS = (
     .where(_EVIDENCE.c.digest.in_(_DIGESTS))
     .group_by(_EVIDENCE.c.digest)
 )
+_WITHOUT_PICTURE = func.count(StationModel.id).filter(ViewModel.media_path.is_(None))
 _BATCH = 500
 
 
@@ -86,13 +87,17 @@ class MatchPaint:
 
     Attributes:
         groups: Ids of its groups.
-        views: Views of moving cameras with lines.
+        views: Views of moving cameras with lines, of which paint could place the camera.
+        without_picture: How many of them have no picture.
+        painted: Ids of the groups of which something was read.
         reasons: How many readings there are by the reason why they are not solved with, or None.
     """
 
     match: str
     groups: tuple[int, ...]
     views: int
+    without_picture: int
+    painted: tuple[int, ...]
     reasons: Mapping[str | None, int]
 
 
@@ -100,13 +105,21 @@ def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
     """What was read of the pictures of each match of a dataset, by name."""
     group = GroupModel
     statement = (
-        select(group.id, group.match, func.count(StationModel.id).label("views"))
+        select(
+            group.id,
+            group.match,
+            group.paint.is_not(None).label("painted"),
+            func.count(StationModel.id).label("views"),
+            _WITHOUT_PICTURE.label("without_picture"),
+        )
         .outerjoin(ViewModel, ViewModel.group_id == group.id)
         .outerjoin(
             StationModel,
             (StationModel.id == ViewModel.station_id)
             & StationModel.shared.is_(False)
-            & (StationModel.lines != "{}"),
+            & (StationModel.lines != "{}")
+            & StationModel.picture.is_(None)
+            & (StationModel.given.is_(None) | (StationModel.calibration != "given")),
         )
         .where(group.dataset_id == dataset_id)
         .group_by(group.id)
@@ -121,6 +134,8 @@ def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
             match,
             tuple(row.id for row in some),
             sum(row.views for row in some),
+            sum(row.without_picture for row in some),
+            tuple(row.id for row in some if row.painted),
             reasons.get(match, {}),
         )
         for match, some in rows.items()

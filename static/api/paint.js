@@ -1,8 +1,9 @@
 // @ts-check
 /** Requests about the painted lines that a frame shows. */
 
-import { request } from './client.js';
+import { idempotencyKey, request } from './client.js';
 
+/** @import {JobJson} from './jobs.js' */
 /** @import {LinesJson} from './types.js' */
 
 /** @typedef {[x: number, y: number, sigma: number]} PaintPlace pixels of the annotated size */
@@ -41,4 +42,36 @@ export function readPaint(view, lines, signal) {
 /** Lines for a view that has none. @param {number} view @param {AbortSignal} [signal] @returns {Promise<ProposalJson>} */
 export function proposeLines(view, signal) {
 	return request(`/views/${view}/propose`, { method: 'POST', signal });
+}
+
+/**
+ * @typedef {object} MatchPaintJson
+ * @property {string} match
+ * @property {number} groups
+ * @property {number} views those of which paint could place the camera
+ * @property {number} without_picture
+ * @property {number} read
+ * @property {number | null} old read for other lines, or by an older version; null: too many to compare
+ * @property {number} painted
+ * @property {number} no_paint
+ * @property {number} paint_disagrees
+ * @property {number} no_frame
+ * @property {string} sentence
+ */
+
+/** @typedef {{used: boolean, items: MatchPaintJson[]}} DatasetPaintJson */
+
+/** What was read of a dataset's pictures. @param {number} dataset @param {AbortSignal} [signal] @returns {Promise<DatasetPaintJson>} */
+export function getDatasetPaint(dataset, signal) {
+	return request(`/datasets/${dataset}/paint`, { signal });
+}
+
+/** Read the pictures of a match, or of all. @param {number} dataset @param {string | null} match @returns {Promise<JobJson>} */
+export function readDatasetPaint(dataset, match) {
+	return request(`/datasets/${dataset}/paint`, { method: 'POST', body: match === null ? {} : { match }, key: idempotencyKey() });
+}
+
+/** Take the last reading back. @param {number} dataset @returns {Promise<JobJson>} */
+export function takeDatasetPaintBack(dataset) {
+	return request(`/datasets/${dataset}/paint`, { method: 'DELETE', key: idempotencyKey() });
 }

@@ -29,7 +29,7 @@ const chosen = signal(0);
 
 /** Buttons of what leads a person to the place. */
 const GUIDES = /** @type {Record<string, string>} */ ({
-	draw_marking: 'Draw it', look_ball: 'Show the place', place_ball: 'Place it there', draw_ball: 'Draw it', resize_ball: 'Fit the box',
+	draw_marking: 'Draw it', look_ball: 'Show the place', place_ball: 'Place it there', draw_ball: 'Draw it', resize_ball: 'Fit the box', read_paint: 'Read its paint',
 });
 
 /** @typedef {Pick<Mend, 'fix' | 'edit' | 'label'>} Way */
@@ -48,6 +48,7 @@ function offered(fix, offers) {
 function waysOf({ kind, view, marking, fix, offers }) {
 	if (kind === 'visible_not_annotated') return [guide('draw_marking', view, { marking })];
 	if (kind === 'ball_size') return [guide('resize_ball', view)];
+	if (fix?.action === 'read_paint') return [guide('read_paint', view)];
 	return fix ? offered(fix, offers) : [];
 }
 

@@ -35,7 +35,7 @@ const REFUSALS = /** @type {{[reason: string]: string}} */ ({
 /** @param {{preview: BulkPreview, q: string}} props */
 function Outcome({ preview, q }) {
 	return html`
-		<div class="bulk__outcome" role="status">
+		<div role="status">
 			<p><strong>${count(preview.would_change)}</strong> of ${count(preview.matches)} ${preview.matches === 1 ? 'group changes' : 'groups change'}.</p>
 			${preview.refused.length ? html`
 				<ul class="bulk__refused">${preview.refused.map(({ reason, groups }) => html`
@@ -134,8 +134,10 @@ export function BulkDialog({ dataset, q, total, ticked, onClose }) {
 		>
 			<${Which} q=${q} total=${total} ticked=${ticked} chosen=${chosen} choose=${choose} />
 			<${Fields} ask=${ask} change=${(/** @type {Partial<BulkRequest>} */ values) => setAsk({ ...ask, ...values })} />
-			${preview.value ? html`<${Outcome} preview=${preview.value} q=${q} />` : preview.error ? null : html`<p class="empty-note" role="status">Counting…</p>`}
-			${state.error || preview.error ? html`<p class="form__error" role="alert">${state.error || sentenceOf(preview.error)}</p>` : null}
+			<div class="bulk__outcome">
+				${preview.value ? html`<${Outcome} preview=${preview.value} q=${q} />` : preview.error ? null : html`<p role="status">Counting…</p>`}
+				${state.error || preview.error ? html`<p class="form__error" role="alert">${state.error || sentenceOf(preview.error)}</p>` : null}
+			</div>
 		<//>
 	`;
 }

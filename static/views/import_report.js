@@ -5,6 +5,7 @@ import { html } from 'htm/preact';
 
 import { count, plural, words } from '../lib/format.js';
 import { queueAddress } from '../state/navigation.js';
+import { pageAddress } from './dataset_menu.js';
 
 /** @import {ImportReport as Report} from '../api/imports.js' */
 
@@ -61,6 +62,8 @@ export function ImportReport({ report, dry, dataset }) {
 			<dl class="number-list">${numbers.map(([name, n]) => html`<div key=${name}><dt>${name}</dt><dd>${count(Number(n ?? 0))}</dd></div>`)}</dl>
 			${counts.length ? html`<p class="note">${counts.map(([name, n]) => `${count(n)} ${words(name)}`).join(' · ')}</p>` : null}
 			<${WithoutPicture} report=${report} dry=${dry} dataset=${dataset} />
+			${report.paint_job ? html`
+				<p>Cameras are found from the lines first. Then <a href=${pageAddress(dataset, 'statistics')}>the paint of the pictures</a> is read, which places them more exactly.</p>` : null}
 			${(report.remarks ?? []).map((remark) => html`<p key=${String(remark)} class="note">${String(remark)}</p>`)}
 			<${Skipped} report=${report} />
 		</section>

@@ -14,6 +14,7 @@ import { DatasetFrame } from './dataset_page.js';
 import { HeatMap } from './heat_map.js';
 import { NoiseCard } from './noise_card.js';
 import { Loading, Trouble } from './page_frame.js';
+import { PaintCard } from './paint_card.js';
 import { Pitches } from './pitches.js';
 import { Positions } from './positions.js';
 import { Proposals } from './proposals.js';
@@ -94,7 +95,8 @@ function StatisticsOf({ one }) {
 			<${NoiseCard} dataset=${one.id} />
 			<${Pitches} dataset=${one.id} />
 			<${Positions} dataset=${one.id} />
-			<${Proposals} dataset=${one.id} name=${one.name} />` : found.error ? null : html`<${Loading} what="statistics" />`}
+			<${Proposals} dataset=${one.id} name=${one.name} />
+			<${PaintCard} dataset=${one} />` : found.error ? null : html`<${Loading} what="statistics" />`}
 	`;
 }
 

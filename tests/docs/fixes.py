@@ -34,9 +34,14 @@ ACTIONS: dict[str, tuple[str, str | None]] = {
     "exclude_view": ("a view is left out", "include_view"),
     "look_ball": ("no edit: look whether the ball is at `point`, then send its box", None),
     "draw_marking": ("no edit: the marking can be seen and nobody drew it; draw it", None),
+    "read_paint": ("no edit: the picture is read again, with those of its match", None),
 }
 """By the action of a fix: what it does, and its edit."""
-BY_HAND = {"look_ball": "set_balls", "draw_marking": "set_lines"}
+BY_HAND = {
+    "look_ball": "as `set_balls`",
+    "draw_marking": "as `set_lines`",
+    "read_paint": '`POST /datasets/{id}/paint` with `{"match"}`, a job',
+}
 """What to send where no edit is offered, once somebody has looked."""
 
 FINDINGS: dict[str, tuple[tuple[str, ...], str]] = {
@@ -47,9 +52,12 @@ FINDINGS: dict[str, tuple[tuple[str, ...], str]] = {
     "under_constrained": ((), "draw more markings: `PATCH /views/{id}/lines`"),
     "paint_disagrees": (
         (),
-        "correct the lines, then read the paint again: `POST /datasets/{id}/paint`",
+        "correct the lines; their paint is read again with the edit",
     ),
-    "no_paint": ((), "read the paint: `POST /datasets/{id}/paint`"),
+    "no_paint": (
+        ("read_paint",),
+        "where paint was read and shows too little, correct the lines",
+    ),
     "picture_geometry": (("free_picture",), ""),
     "view_disagrees": (("exclude_view",), "or correct its ball: `PATCH /views/{id}/ball`"),
     "views_contradict": (("exclude_view",), ""),
@@ -86,7 +94,7 @@ def fixes_page() -> str:
     """What docs/fixes.md has to say."""
     edits = [f"| `{name}` | `{request}` | `{body}` |" for name, (request, body) in EDITS.items()]
     actions = [
-        f"| `{name}` | {what} | {f'`{edit}`' if edit else f'as `{BY_HAND[name]}`'} |"
+        f"| `{name}` | {what} | {f'`{edit}`' if edit else BY_HAND[name]} |"
         for name, (what, edit) in ACTIONS.items()
     ]
     findings = [

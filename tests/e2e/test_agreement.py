@@ -1,4 +1,4 @@
-"""How far cameras agree with their paint, where people meet it: views, queue, yield."""
+"""Paint of a dataset, where people meet it: agreement in views, queue and yield; reading it."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import httpx
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.screen import Screen
 from tests.e2e.service import run_touchline, serving
+from tests.e2e.test_access import serious
 from tests.homes import copy_home
 
 MATCH = "meridia_premier-division/2025-2026/2025-08-16 - 20-45 Marlowick 2 - 0 Port Selwin"
@@ -41,7 +43,7 @@ def test_agreement_is_told_of_views_and_finds_groups_and_may_be_asked_for(
     expect(page.get_by_role("columnheader", name="paint")).to_have_attribute(
         "aria-sort", "ascending"
     )
-    expect(page.locator('.histogram[aria-label="agreement with paint"] svg')).to_be_visible()
+    expect(page.locator('.histogram[aria-label="paint agrees"] svg')).to_be_visible()
 
     page.keyboard.press("Enter")
     screen = Screen(page)
@@ -65,3 +67,44 @@ def test_agreement_is_told_of_views_and_finds_groups_and_may_be_asked_for(
     asked.fill("1")
     asked.press("Enter")
     expect(step).to_contain_text(re.compile("−[1-9]"))
+
+
+def test_the_pictures_of_a_match_are_read_and_taken_back_by_keyboard(
+    painted: str, open_page: Callable[..., Page]
+) -> None:
+    page = open_page("/datasets/sample/statistics", address=painted)
+    card = page.get_by_role("region", name="Paint of the pictures")
+    unread = card.locator("tbody tr").filter(has_text="the paint of none").first
+    name = unread.get_by_role("rowheader").inner_text().split("\n")[0]
+    row = card.locator("tbody tr").filter(has_text=name)
+    row.get_by_role("button", name=f"Read {name}").press("Enter")
+    expect(row).to_contain_text("by their paint")
+    expect(row.get_by_role("button")).to_have_count(0)
+    expect(card.get_by_role("heading")).to_be_focused()
+    assert serious(page) == []
+    back = card.get_by_role("button", name="Take the last reading back")
+    expect(back).to_have_attribute("aria-disabled", "false")
+    back.press("Enter")
+    expect(row).to_contain_text("The paint of none")
+
+
+def test_what_was_read_for_other_thresholds_is_counted_and_read_again_from_its_finding(
+    painted: str, open_page: Callable[..., Page]
+) -> None:
+    path = f"{painted}/api/v1/datasets/sample/policy"
+    etag = httpx.get(path).headers["etag"]
+    body = {"values": {"calibration.robust_scale_px": 2.5}}
+    assert httpx.put(path, json=body, headers={"If-Match": etag}).is_success
+    page = open_page("/datasets/sample/statistics", address=painted)
+    row = page.get_by_role("region", name="Paint of the pictures").locator("tbody tr")
+    expect(row.filter(has_text="to be read again")).to_have_count(1)
+
+    page.goto("/groups?q=finding:no_paint")
+    expect(page.locator("[data-number=agreement]").first).to_be_visible()
+    page.keyboard.press("Enter")
+    Screen(page).ready()
+    again = page.get_by_role("button", name="Read its paint")
+    again.first.press("Enter")
+    expect(again).to_have_count(0)
+    solved = Screen(page).document()["solution"]["views"]
+    assert "paint" in {view["calibration"]["source"] for view in solved}

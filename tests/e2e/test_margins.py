@@ -69,7 +69,7 @@ class TestMargins:
 
 
 class TestLogarithmicHistograms:
-    @pytest.mark.parametrize("name", ["ball error, % diagonal", "σ, m"])
+    @pytest.mark.parametrize("name", ["ball error, %", "σ, m"])
     def test_a_brushed_bar_finds_exactly_the_groups_that_it_counts(
         self, open_page: OpenPage, name: str
     ) -> None:

@@ -78,6 +78,11 @@ class ImportBody(BaseModel):
     format: ImportFormat
     source: ImportPlace
     options: ImportOptions = ImportOptions()
+    policy: Literal["paper", "strict", "touchline"] | None = Field(
+        default=None,
+        description="Of a dataset that is made; null: `touchline` where most of its views have a "
+        "picture whose paint can place their camera, else `paper`.",
+    )
     dry_run: StrictBool = Field(
         default=False, description="The same as the parameter: report, and save nothing."
     )
@@ -95,6 +100,7 @@ class ImportBody(BaseModel):
             None if lines is None else lines.values(),
             options,
             dry_run or self.dry_run,
+            self.policy,
         )
 
 

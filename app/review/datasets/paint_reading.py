@@ -57,20 +57,26 @@ class PaintTask:
         return old if old.evidence.version == EXTRACTOR_VERSION else None
 
     @property
+    def is_old(self) -> bool:
+        """Whether something was read that is to be read again."""
+        return self.old is not None and self.old.reason != NO_FRAME and self.fitting is None
+
+    @property
     def without_frame(self) -> PaintReading:
         """What is kept where no picture can be read."""
         return PaintReading("", self.sought_for, NOTHING, NO_FRAME)
 
 
 def read_view_paint(task: PaintTask, settings: Settings) -> PaintReading | None:
-    """What is to be kept of a view's picture; None where its clicks give no camera.
+    """What is to be kept of a view's picture; None where its clicks give no camera, or where no
+    import ever brought one.
 
     A picture that was read for the same clicks before is not decoded again. Where it is missing,
     what was read of it stays.
     """
     fitting, media = task.fitting, task.view.media
     if media is None:
-        return fitting or task.without_frame
+        return fitting
     try:
         known = "" if fitting is None else fitting.frame
         digest, image = read_pixels(media, task.view.station.flipped, settings, known)
@@ -90,7 +96,7 @@ def _read(task: PaintTask, digest: str, image: Image) -> PaintReading | None:
         return None
     if why_unreadable(image, size) is not None:
         return replace(task.without_frame, frame=digest)
-    seen = paint_of(image, size, clicked, task.group.pitch, policy)
+    seen = paint_of(image, size, clicked, task.group.pitch, policy, task.view.extras.places)
     reason = NO_PAINT if seen.outcome == "nothing" else seen.reason
     evidence = seen.evidence if reason is None else NOTHING
     return PaintReading(digest, task.sought_for, evidence, reason, seen.supported, seen.explained)

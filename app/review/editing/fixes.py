@@ -173,6 +173,7 @@ _ACTIONS = {
         1, "the ball of {letter} was really {px:.1f} px away, on the ray of the other view"
     ),
     "draw_marking": _Action(2),
+    "read_paint": _Action(1),
     "include_view": _Action(2, "{letter} was used again", "Use it again", _include),
     "drop_point": _Action(
         3, "point {number} of {marking} in {letter} was dropped", "Drop the point", _drop_point

@@ -1,6 +1,6 @@
 """Follow paint: with an edit of lines the paint of their view is read again.
 
-Only views whose paint was read before: whoever asked for that wants it to follow. Where a frame
+Only in groups whose paint was read before: whoever asked for that wants it to follow. Where a frame
 cannot be read in time the edit is saved all the same, and the camera is that of the clicks.
 """
 
@@ -67,15 +67,17 @@ class PaintFollower:
 def _stale(
     group: Group, policy: CalibrationPolicy, known: Mapping[str, Calibration]
 ) -> Iterator[PaintTask]:
-    """Views whose paint was read for other clicks than they have."""
+    """Views whose paint was read for other clicks than they have, or, with that of others, not yet."""
+    if policy.source != "paint" or not group.paint:
+        return
     for view in group.views:
         reading = wanted_paint(group, view, policy)
-        if reading is None:
+        if reading is None and (view.media is None or not view.takes_paint):
             continue
         key = clicks_key(group, view, policy)
         clicked = known.get(key)
         # Clicks that were seen to make no camera say nowhere where to look.
         is_lost = clicked is not None and clicked.camera is None
-        if reading.sought_for != key and not is_lost:
+        if (reading is None or reading.sought_for != key) and not is_lost:
             alone = replace(group, views=(view,), paint={})
             yield PaintTask(alone, policy, key, clicked, reading)

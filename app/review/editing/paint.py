@@ -23,7 +23,7 @@ from app.review.editing.edit import SetPaint
 from app.review.editing.known import known_calibrations
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, PaintReading
 from app.soccer.policy import CalibrationPolicy
-from app.solving.calibrate import clicks_key, takes_paint
+from app.solving.calibrate import clicks_key
 from app.store.clock import now
 from app.store.groups import StoredGroup, next_revision, read_groups, save_revision
 from app.store.log import Entry, append
@@ -43,6 +43,9 @@ ALLOWANCE = Allowance(memory=2 * 2**30, processor=60.0, silence=180.0)
 _A_CHILD = 6
 """Groups that each child gets before they are written."""
 _BATCH = 100
+MOST_COMPARED = 1000
+"""Groups with paint whose lines are compared with those that it was read for, when somebody asks
+how a dataset stands; a reading compares all."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,10 @@ class PaintState:
     Attributes:
         groups: How many it has.
         views: Views of moving cameras with lines.
-        read: How many of them were read.
+        without_picture: How many of them have no picture.
+        read: How many were read.
+        old: How many were read for other lines than they have, or by an older extractor; None: too
+            many were read to compare them. Whether a picture is still the same only reading says.
         painted: How many of those have a camera from their paint, as far as the lines are still
             those that it was read for.
         no_paint: How many show too little of it.
@@ -63,7 +69,9 @@ class PaintState:
     match: str
     groups: int
     views: int
+    without_picture: int
     read: int
+    old: int | None
     painted: int
     no_paint: int
     paint_disagrees: int
@@ -72,18 +80,25 @@ class PaintState:
     @property
     def sentence(self) -> str:
         """What people read of it."""
-        if not self.read:
-            return f"the paint of none of {self.views} pictures was read"
-        parts = [f"{self.read} of {self.views} pictures were read: {self.painted} by their paint"]
+        left = max(self.views - self.without_picture, self.read)
+        if not left:
+            return f"none of {self.views} views has a picture" if self.views else "nothing to read"
+        if self.read:
+            parts = [f"{self.read} of {left} pictures were read: {self.painted} by their paint"]
+        else:
+            parts = [f"the paint of none of {left} pictures was read"]
         parts += [
             f"{count} {words}"
             for count, words in (
                 (self.no_paint, "with too little paint"),
                 (self.paint_disagrees, "with paint that disagrees with the lines"),
                 (self.no_frame, "missing or unreadable"),
+                (self.old, "to be read again"),
             )
             if count
         ]
+        if self.without_picture:
+            parts.append(f"{self.without_picture} without a picture")
         return ", ".join(parts)
 
 
@@ -105,7 +120,9 @@ def get_paint(store: Store, dataset: str | int) -> DatasetPaint:
     """
     with store.read() as session:
         found = read_dataset(session, dataset)
-        items = tuple(map(_state, match_paint(session, found.id)))
+        matches = match_paint(session, found.id)
+        old = _old(session, found, matches)
+    items = tuple(_state(item, None if old is None else old[item.match]) for item in matches)
     return DatasetPaint(found.id, found.name, found.policy.calibration.source == "paint", items)
 
 
@@ -244,7 +261,7 @@ def _give(
 def _tasks(store: Store, ids: Sequence[int], dataset: Dataset) -> dict[int, list[PaintTask]]:
     """What is to be read for each group; groups without a view that takes paint have none."""
     with store.read() as session:
-        stored = read_groups(session, ids, extras=False)
+        stored = read_groups(session, ids)
         clicks = replace(dataset.policy, calibration=_without_paint(dataset.policy.calibration))
         known = known_calibrations(session, [item.group for item in stored.values()], clicks)
     return {
@@ -262,7 +279,7 @@ def _group_tasks(
 ) -> Iterator[PaintTask]:
     group = stored.group
     for view in group.views:
-        if takes_paint(view):
+        if view.takes_paint:
             key = clicks_key(group, view, policy)
             alone = replace(group, views=(view,), paint={})
             yield PaintTask(alone, policy, key, known.get(key), group.paint.get(view.key))
@@ -302,12 +319,41 @@ def _refusal(error: ChildEnded) -> ImageError:
     return ImageError(f"the picture {error}")
 
 
-def _state(item: MatchPaint) -> PaintState:
+def has_pictures(store: Store, dataset: str | int) -> bool:
+    """Whether there is a picture whose paint could be read.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        found = read_dataset(session, dataset)
+        return any(item.views > item.without_picture for item in match_paint(session, found.id))
+
+
+def _old(
+    session: Session, dataset: Dataset, matches: Sequence[MatchPaint]
+) -> dict[str, int] | None:
+    """How many readings of each match do not fit any more; None where they are too many."""
+    ids = [number for item in matches for number in item.painted]
+    if len(ids) > MOST_COMPARED:
+        return None
+    old = {item.match: 0 for item in matches}
+    for start in range(0, len(ids), _BATCH):
+        some = read_groups(session, ids[start : start + _BATCH], extras=False)
+        for stored in some.values():
+            tasks = _group_tasks(stored, dataset.policy.calibration, {})
+            old[stored.group.match] += sum(task.is_old for task in tasks)
+    return old
+
+
+def _state(item: MatchPaint, old: int | None) -> PaintState:
     return PaintState(
         match=item.match,
         groups=len(item.groups),
         views=item.views,
+        without_picture=item.without_picture,
         read=sum(item.reasons.values()),
+        old=old,
         painted=item.reasons.get(None, 0),
         no_paint=item.reasons.get(NO_PAINT, 0),
         paint_disagrees=item.reasons.get(PAINT_DISAGREES, 0),

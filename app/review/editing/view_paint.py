@@ -52,7 +52,7 @@ class PaintQuestion:
         station = self.view.station
         return frames.ask_of(
             self.media, station.flipped, read_paint,
-            station.size, self.start, self.group.pitch, self.policy,
+            station.size, self.start, self.group.pitch, self.policy, self.view.extras.places,
         )  # fmt: skip
 
     def ask_proposal(self, frames: Frames) -> PoolTask:

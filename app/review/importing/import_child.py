@@ -17,6 +17,7 @@ from app.config import Settings
 from app.errors import DamagedError, TooLargeError
 from app.progress import Progress
 from app.review.importing.sources import Source, import_source
+from app.soccer.policy import Policy
 from app.store.session import Store
 
 SILENCE = 900.0
@@ -55,6 +56,7 @@ def import_apart(
     dry_run: bool,
     progress: Progress,
     stop: Callable[[], None],
+    policy: Policy | None = None,
 ) -> Outcome:
     """``import_source`` in a process with limits.
 
@@ -66,6 +68,7 @@ def import_apart(
         dry_run: Say what would happen, and keep nothing.
         progress: Called with the number of groups done; what it raises ends the import.
         stop: Called every now and then; what it raises ends the import.
+        policy: Of a dataset that is made; None: as its first pictures suggest.
 
     Raises:
         DamagedError: The child met damage; no change is taken from then on, here either.
@@ -85,7 +88,15 @@ def import_apart(
 
         try:
             outcome: Outcome = child.run(
-                import_here, settings, dataset, source, actor, dry_run, heard=hear, stop=stop
+                import_here,
+                settings,
+                dataset,
+                source,
+                actor,
+                dry_run,
+                policy,
+                heard=hear,
+                stop=stop,
             )
         except DamagedError as error:
             store.note_damage(error)
@@ -96,7 +107,13 @@ def import_apart(
 
 
 def import_here(
-    settings: Settings, dataset: str, source: Source, actor: str, dry_run: bool, tell: Tell
+    settings: Settings,
+    dataset: str,
+    source: Source,
+    actor: str,
+    dry_run: bool,
+    policy: Policy | None,
+    tell: Tell,
 ) -> Outcome:
     """The import itself, in this process."""
 
@@ -105,7 +122,7 @@ def import_here(
 
     with closing(Store.open(settings, _Turn(tell))) as store:
         imported = import_source(
-            store, dataset, source, settings, told, actor=actor, dry_run=dry_run
+            store, dataset, source, settings, told, actor=actor, dry_run=dry_run, policy=policy
         )
     result = imported.result
     nothing = None if imported.something else imported.nothing_read()

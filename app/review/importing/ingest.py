@@ -16,8 +16,9 @@ from app.review.editing.shared_stations import SharedStations
 from app.review.editing.upstream import KIND, Kept, follow_group
 from app.review.importing.body import import_body, places_of
 from app.review.importing.missing import GONE, note_gone, of_read_matches
+from app.review.policies.first_policy import first_policy
 from app.soccer.group import Group, View
-from app.soccer.policy import PAPER
+from app.soccer.policy import PAPER, Policy
 from app.store.clock import now
 from app.store.datasets import find_dataset
 from app.store.digest import source_hash
@@ -73,6 +74,7 @@ def ingest(
     actor: str,
     progress: Progress | None = None,
     dry_run: bool = False,
+    policy: Policy | None = PAPER,
 ) -> IngestReport:
     """Bring groups into a dataset, which the first of them makes when there is none of that name.
 
@@ -87,12 +89,14 @@ def ingest(
         actor: Who imports.
         progress: Called after each batch.
         dry_run: Say what would happen, and keep nothing.
+        policy: Of a dataset that is made; None: as its first pictures suggest.
     """
     report, seen, done = IngestReport(), set[str](), 0
     sound, stations = _sound(groups, seen, report), set[str]()
     while batch := list(islice(sound, BATCH)):
         with attempt(store, keep=not dry_run) as session:
-            origin = Origin(_ensure_dataset(session, dataset, actor), source, actor)
+            identity = _ensure_dataset(session, dataset, actor, policy or first_policy(batch))
+            origin = Origin(identity, source, actor)
             ingest_batch(session, origin, batch, report, stations)
         done += len(batch)
         if progress is not None:
@@ -127,14 +131,14 @@ def attempt(store: Store, *, keep: bool) -> Iterator[Session]:
 
 
 def ensure_dataset(store: Store, dataset: str, actor: str) -> int:
-    """Id of the dataset of that name, made with the default policy when there is none."""
+    """Id of the dataset of that name, made with the policy ``paper`` when there is none."""
     with store.write() as session:
-        return _ensure_dataset(session, dataset, actor)
+        return _ensure_dataset(session, dataset, actor, PAPER)
 
 
-def _ensure_dataset(session: Session, dataset: str, actor: str) -> int:
+def _ensure_dataset(session: Session, dataset: str, actor: str, policy: Policy) -> int:
     row = find_dataset(session, dataset)
-    return insert_dataset(session, dataset, PAPER, actor) if row is None else int(row.id)
+    return insert_dataset(session, dataset, policy, actor) if row is None else int(row.id)
 
 
 def _note_missing(

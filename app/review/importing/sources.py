@@ -30,6 +30,7 @@ from app.review.importing.spare import SpareFrame, ingest_spare
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group
+from app.soccer.policy import PAPER, Policy
 from app.store.session import Store
 
 FORMATS: tuple[str, ...] = get_args(ImportFormat)
@@ -151,6 +152,7 @@ def import_source(
     *,
     actor: str = "local",
     dry_run: bool = False,
+    policy: Policy | None = PAPER,
 ) -> Imported:
     """Bring the files into a dataset, which is made when there is none of that name.
 
@@ -164,6 +166,8 @@ def import_source(
         progress: Called with the number of groups done.
         actor: Who imports.
         dry_run: Say what would happen, and keep nothing.
+        policy: Of a dataset that is made; None: as its first pictures suggest. A dataset that a
+            ``touchline`` file makes has the policy of the file.
     """
     report, limits = Report(), Limits.of(settings)
     if source.format == "cameras":
@@ -198,6 +202,7 @@ def import_source(
         actor=actor,
         progress=progress,
         dry_run=dry_run,
+        policy=policy,
     )
     if folder is not None and not dry_run:
         ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)

@@ -10,14 +10,17 @@ from typing import Any
 from app.config import Settings
 from app.errors import InputError
 from app.progress import Progress
-from app.review.datasets.dataset import dataset_id, require_name
+from app.review.datasets.dataset import get_dataset, require_name
+from app.review.editing.paint import has_pictures
 from app.review.importing.folders import resolve_folder
 from app.review.importing.import_child import Outcome, import_apart
 from app.review.importing.sources import FORMATS, Source
 from app.review.jobs.job_run import FailedWithReportError, JobProgress, Work
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.paint import request_paint
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
+from app.soccer.policy import POLICIES
 from app.store.codecs import Json
 from app.store.datasets import find_dataset
 from app.store.jobs import Job
@@ -37,6 +40,7 @@ class ImportRequest:
         source: ``{"upload": id}`` or ``{"folder": path}``.
         lines: The same for ISSIA's line files, or None.
         options: ``calibration``, ``frame_offset``, ``flipped``, ``size`` ([width, height]).
+        policy: Name of a shipped one for a dataset that is made; None: as its pictures suggest.
     """
 
     dataset: str
@@ -45,6 +49,7 @@ class ImportRequest:
     lines: Mapping[str, str] | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     dry_run: bool = False
+    policy: str | None = None
 
     def values(self) -> dict[str, Json]:
         """As a job keeps it."""
@@ -55,6 +60,7 @@ class ImportRequest:
             "lines": None if self.lines is None else dict(self.lines),
             "options": dict(self.options),
             "dry_run": self.dry_run,
+            "policy": self.policy,
         }
 
 
@@ -124,6 +130,7 @@ def import_work(
             dry_run=request.dry_run,
             progress=_step(progress, sentence),
             stop=progress.check,
+            policy=None if request.policy is None else POLICIES[request.policy],
         )
         with store.read() as session:
             found = find_dataset(session, request.dataset)
@@ -131,12 +138,24 @@ def import_work(
             jobs.belongs(progress.job_id, int(found.id))
         if outcome.nothing is not None:
             raise FailedWithReportError(*outcome.nothing, _result(outcome, request))
-        following = None
-        if not request.dry_run and outcome.fresh:
-            following = request_solve(jobs, store, dataset_id(store, request.dataset), actor=actor)
-        return _result(outcome, request, None if following is None else following.id)
+        if request.dry_run or not outcome.fresh:
+            return _result(outcome, request)
+        return _result(outcome, request, **_following(jobs, store, request.dataset, actor))
 
     return work
+
+
+def _following(jobs: Jobs, store: Store, dataset: str, actor: str) -> dict[str, int | None]:
+    """Ids of the jobs that compute what is new.
+
+    The clicks are solved first, for that takes seconds; reading the pictures is asked for next, and
+    solves once more what it changes.
+    """
+    found = get_dataset(store, dataset)
+    solve, paint = request_solve(jobs, store, found.id, actor=actor), None
+    if found.policy.calibration.source == "paint" and has_pictures(store, found.id):
+        paint = request_paint(jobs, store, found.id, None, actor=actor).id
+    return {"solve_job": solve.id, "paint_job": paint}
 
 
 def _step(progress: JobProgress, sentence: str) -> Progress:
@@ -146,8 +165,14 @@ def _step(progress: JobProgress, sentence: str) -> Progress:
     return step
 
 
-def _result(outcome: Outcome, request: ImportRequest, solve_job: int | None = None) -> Json:
-    """The report; ``solve_job`` is the job that computes what is new, where there is one."""
+def _result(
+    outcome: Outcome,
+    request: ImportRequest,
+    *,
+    solve_job: int | None = None,
+    paint_job: int | None = None,
+) -> Json:
+    """The report; with the jobs that solve what is new and read its paint, where there are any."""
     values = outcome.values
     hidden = max(len(values["skipped"]) - SHOWN, 0)
     return {
@@ -155,6 +180,7 @@ def _result(outcome: Outcome, request: ImportRequest, solve_job: int | None = No
         "dataset": request.dataset,
         "dry_run": request.dry_run,
         "solve_job": solve_job,
+        "paint_job": paint_job,
         "skipped": values["skipped"][:SHOWN],
         "more_skipped": values["more_skipped"] + hidden,
     }

@@ -14,6 +14,11 @@ from app.store.jobs import Job
 from app.store.session import Session, Store
 
 KIND = "paint"
+TOLD = (
+    *("views", "without_picture", "read"),
+    *("painted", "no_paint", "paint_disagrees", "no_frame"),
+)
+"""What a result counts of all matches."""
 
 
 def request_paint(
@@ -84,7 +89,6 @@ def _work(jobs: Jobs, store: Store, dataset: int, request: Json, actor: str) -> 
         finally:
             # What some groups were given before it ended is solved, however it ended.
             request_solve(jobs, store, dataset, actor=actor)
-        names = ("views", "read", "painted", "no_paint", "paint_disagrees", "no_frame")
-        return {name: sum(getattr(item, name) for item in found.items) for name in names}
+        return {name: sum(getattr(item, name) for item in found.items) for name in TOLD}
 
     return work

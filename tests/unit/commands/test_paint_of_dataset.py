@@ -15,17 +15,21 @@ from app.review.policies.policy import change_policy
 from app.soccer.policy import TOUCHLINE
 from app.store.session import Store
 from tests.unit.review.editing.test_positions import MATCH, match
+from tests.unit.review.jobs.test_paint import without_files
 
 Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
 def run(touchline: Run, tmp_path: Path) -> Run:
-    """Run the command in a home with a match without pictures, as ``demo`` and as ``paper``."""
+    """Run the command in a home with a match without files of its pictures, as ``demo`` and as
+    ``paper``, and with one that never had any, as ``bare``."""
     store = Store.open(Settings(home=tmp_path / "home"))
     for dataset in ("demo", "paper"):
-        ingest(store, dataset, match(), source="files", actor="ann")
-    change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
+        ingest(store, dataset, without_files(match()), source="files", actor="ann")
+    ingest(store, "bare", match(), source="files", actor="ann")
+    for dataset in ("demo", "bare"):
+        change_policy(store, dataset, TOUCHLINE, if_match=None, actor="ann")
     store.close()
     return partial(touchline, "paint")
 
@@ -41,6 +45,11 @@ class TestPaint:
         assert "12 missing or unreadable" in run("demo", "--show")[1]
         (back,) = json.loads(run("demo", "--undo", "--json")[1])
         assert back["read"] == 0
+
+    def test_views_that_never_had_a_picture_are_counted_and_not_read(self, run: Run) -> None:
+        (read,) = json.loads(run("bare", "--workers", "1", "--json")[1])
+        assert (read["views"], read["without_picture"], read["read"]) == (12, 12, 0)
+        assert run("bare", "--show")[1] == f"{MATCH}: none of 12 views has a picture\n"
 
     @pytest.mark.parametrize(
         ("words", "code", "sentence"),

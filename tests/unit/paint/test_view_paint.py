@@ -10,7 +10,7 @@ import pytest
 
 from app.paint.snap import PAINT_DISAGREES
 from app.paint.view_paint import paint_of
-from app.soccer.frames import ImageSize
+from app.soccer.frames import Box, ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
@@ -47,6 +47,24 @@ def test_a_smaller_picture_is_told_in_the_pixels_of_its_annotations(rendered) ->
     apart = [np.hypot(*(large - place).T).min() for place in less]
     assert np.median(apart) < 3.0
     assert max(y for _, y in found.line_like) > 540
+
+
+def test_nothing_is_believed_where_people_are_and_a_box_of_the_field_hides_none(rendered) -> None:
+    whole = seen(rendered.image, rendered.clicked)
+    places = max(whole.evidence.points.values(), key=len)
+    x, y, _ = places[len(places) // 2]
+    people = (Box(x - 30, y - 40, 60, 80), Box(0, 0, 1280, 720))
+    small = np.asarray(cv2.resize(rendered.image, (960, 540), interpolation=cv2.INTER_AREA))
+    for image in (rendered.image, small):
+        found = paint_of(image, SIZE, rendered.clicked, Pitch(), POLICY, people)
+        told = [
+            *found.line_like,
+            *(place for some in found.evidence.points.values() for place in some),
+        ]
+        assert found.outcome == "snapped"
+        assert not [one for one in told if abs(one[0] - x) < 28 and abs(one[1] - y) < 38]
+        assert [one for one in told if 32 < one[0] - x < 46 and abs(one[1] - y) < 38]
+    assert [one for one in whole.line_like if abs(one[0] - x) < 28 and abs(one[1] - y) < 38]
 
 
 def test_a_camera_of_other_lines_is_contradicted(rendered) -> None:

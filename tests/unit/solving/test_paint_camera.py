@@ -16,6 +16,7 @@ from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.soccer.picture import OPEN
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
+from app.soccer.solution import Fix
 from app.solving.calibrate import calibrate_view, view_key
 from app.solving.solve import solve
 from tests.balls import box_around
@@ -168,26 +169,30 @@ class TestFindings:
     def test_the_policy_of_lines_asks_for_no_paint(self):
         assert kinds(clicked(), PAPER) == {}
 
-    def test_a_view_without_a_reading_is_told_and_one_on_its_paint_is_not(self):
-        found = kinds(read(clicked()))
-        assert set(found) == {"b"}
-        assert (found["b"].kind, "Nobody has read" in found["b"].sentence) == ("no_paint", True)
+    def test_a_picture_that_is_not_there_or_was_never_read_is_no_fault_of_the_group(self):
+        assert kinds(read(clicked())) == {}
+        assert kinds(clicked()) == {}
+        assert solve(clicked(), TOUCHLINE).findings == solve(clicked(), PAPER).findings
 
     def test_lines_that_changed_since_ask_for_another_reading(self):
         group = read(clicked(), sought_for="another")
-        assert "changed since its paint was read" in kinds(group)["a"].sentence
+        found = kinds(group)["a"]
+        assert "changed since its paint was read" in found.sentence
+        assert found.fix == Fix("read_paint", "a")
 
     @pytest.mark.parametrize(
-        ("reason", "kind", "words"),
+        ("reason", "kind", "words", "fix"),
         [
-            ("no_paint", "no_paint", "Too little paint"),
-            ("no_frame", "no_paint", "missing"),
-            ("paint_disagrees", "paint_disagrees", "does not lie where"),
+            ("no_paint", "no_paint", "Too little paint", None),
+            ("no_frame", "no_paint", "missing", Fix("read_paint", "a")),
+            ("paint_disagrees", "paint_disagrees", "does not lie where", None),
         ],
     )
-    def test_each_reason_is_told(self, reason, kind, words):
+    def test_each_reason_is_told_and_where_reading_helps_it_is_proposed(
+        self, reason, kind, words, fix
+    ):
         found = kinds(read(clicked(), reason=reason))["a"]
-        assert (found.kind, words in found.sentence) == (kind, True)
+        assert (found.kind, words in found.sentence, found.fix) == (kind, True, fix)
 
 
 class TestSolve:

@@ -91,3 +91,4 @@ class TestReadings:
         with filled.read() as session:
             (item,) = match_paint(session, 1)
         assert (item.match, item.groups, item.reasons) == ("m", (1,), {None: 2, "no_paint": 1})
+        assert (item.views >= item.without_picture, item.painted) == (True, (1,))

@@ -16,6 +16,7 @@ from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.review.datasets.dataset import get_dataset
 from app.review.jobs.imports import resume_imports
 from app.soccer.group import Group
+from app.soccer.policy import PAPER, STRICT, TOUCHLINE
 from app.store.jobs import NewJob, insert_job, update_job
 from app.store.log import read_log
 from app.store.uploads import get_upload
@@ -36,6 +37,14 @@ def tree(app: Any, tmp_path: Path, group: Group) -> Path:
 
 def body(**changes: Any) -> dict[str, Any]:
     return {"dataset": "fresh", "format": "soccernet-v3", "source": {"folder": "data"}} | changes
+
+
+def add_pictures(tree: Path, group: Group) -> None:
+    """Grey pictures of the group's views, beside its labels."""
+    (labels,) = tree.rglob("Labels-v3.json")
+    for view in group.views:
+        picture = np.full((view.size.height, view.size.width, 3), 127, np.uint8)
+        cv2.imwrite(str(labels.parent / view.key), picture)
 
 
 def finished(app: Any, answer: Any) -> Any:
@@ -68,6 +77,39 @@ class TestStartImport:
         assert again.result["solve_job"] is None
         assert get_dataset(app.state.services.store, "fresh").solved == 1
 
+    def test_without_pictures_the_dataset_is_judged_as_in_the_paper(self, app, api, tree) -> None:
+        job = finished(app, api.post(API, json=body()))
+        assert job.result["paint_job"] is None
+        assert get_dataset(app.state.services.store, "fresh").policy == PAPER
+        named = finished(app, api.post(API, json=body(dataset="named", policy="touchline")))
+        assert (named.result["solve_job"], named.result["paint_job"]) == (ANY, None)
+        assert get_dataset(app.state.services.store, "named").policy == TOUCHLINE
+
+    def test_with_pictures_their_paint_is_read_next_and_solved_with(
+        self, app, api, tree, group
+    ) -> None:
+        add_pictures(tree, group)
+        result = finished(app, api.post(API, json=body())).result
+        services = app.state.services
+        assert get_dataset(services.store, "fresh").policy == TOUCHLINE
+        assert services.jobs.wait(result["solve_job"], SECONDS).result["policy"] == "touchline"
+        read = services.jobs.wait(result["paint_job"], SECONDS)
+        assert (read.kind, read.result["views"]) == ("paint", len(group.views))
+        assert read.result["without_picture"] == 0 < read.result["read"]
+        assert finished(app, api.post(API, json=body())).result["paint_job"] is None
+
+    def test_the_policy_that_is_named_judges_what_is_made_and_nothing_else(
+        self, app, api, tree, group
+    ) -> None:
+        finished(app, api.post(API, json=body(policy="strict")))
+        store = app.state.services.store
+        assert get_dataset(store, "fresh").policy == STRICT
+        add_pictures(tree, group)
+        again = finished(app, api.post(API, json=body(policy="touchline")))
+        assert (again.result["changed"], again.result["paint_job"]) == (1, None)
+        assert get_dataset(store, "fresh").policy == STRICT
+        assert api.post(API, json=body(policy="lenient")).status_code == 422
+
     def test_its_job_carries_the_dataset_from_the_beginning(self, app, api, tree) -> None:
         answer = api.post(API, json=body())
         assert answer.json()["dataset"] == "fresh"
@@ -86,6 +128,7 @@ class TestStartImport:
         ]  # fmt: skip
         done = finished(app, api.post(API, json=body())).result
         assert {**dry, "dry_run": False, "solve_job": done["solve_job"]} == done
+        assert get_dataset(app.state.services.store, "fresh").policy == PAPER
         assert (dry["solve_job"], done["solve_job"]) == (None, ANY)
 
     def test_an_upload_is_read_in_place_and_stays(self, app, api, tree) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from app.review.importing.ingest import ingest
+from app.soccer.group import Media
 from tests.waiting import SECONDS
 
 PAINT = "/api/v1/datasets/broadcast/paint"
@@ -36,7 +39,10 @@ def test_an_unknown_match_is_404(api, using) -> None:
     assert api.post(PAINT, json={"match": "nowhere"}).status_code == 404
 
 
-def test_it_is_read_by_a_job_told_in_the_history_and_taken_back(app, api, using) -> None:
+def test_it_is_read_by_a_job_told_in_the_history_and_taken_back(app, api, using, group) -> None:
+    lost = (replace(view, media=Media(f"/gone/{view.key}")) for view in group.views)
+    with_pictures = replace(group, views=tuple(lost))
+    ingest(app.state.services.store, "broadcast", [with_pictures], source="test", actor="ann")
     job = api.post(PAINT, json={}).json()
     assert job["kind"] == "paint"
     done = app.state.services.jobs.wait(job["id"], SECONDS)

@@ -50,6 +50,7 @@ class TestEditOfFix:
             Fix("drop_marking", "nowhere", "Circle left"),
             Fix("pick_ball", "a", index=4),
             Fix("draw_marking", "a", "Circle left"),
+            Fix("read_paint", "a"),
             Fix("look_ball", "a", to="b"),
         ],
     )

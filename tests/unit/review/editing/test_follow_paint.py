@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import Future
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -131,6 +132,19 @@ class TestFollow:
         assert after.solution.views[0].calibration.camera is None
         monkeypatch.setattr(Frames, "ask_to", lambda *_: pytest.fail("a picture was asked for"))
         change(painted, paint, SetBall(view.key, None))
+
+    def test_a_view_that_gets_its_first_lines_is_read_with_the_others(
+        self, painted, paint, monkeypatch
+    ):
+        view = load(painted, 1).group.views[0]
+        state = load(painted, 1)
+        paint_of = {key: item for key, item in state.group.paint.items() if key != view.key}
+        bare = replace(state.group, paint=paint_of)
+        policy = state.stored.policy.calibration
+        assert set(paint.follow(bare, policy, {}).paint) == set(state.group.paint)
+        monkeypatch.setattr(Frames, "ask_to", lambda *_: pytest.fail("a picture was asked for"))
+        without = bare.with_view(replace(view, media=None))
+        assert paint.follow(without, policy, {}) is without
 
     def test_what_nobody_asked_for_is_not_read(self, painted, paint, looked):
         take_back_paint(painted, "demo", actor="ann")

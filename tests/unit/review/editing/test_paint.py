@@ -145,6 +145,12 @@ def kinds(store, number=1):
     return [item.kind for item in said if item.kind in ("no_paint", "paint_disagrees")]
 
 
+def inside(box, place):
+    """Whether a place of paint lies well inside a box."""
+    across, down = place.x - box.x, place.y - box.y
+    return 2 < across < box.width - 2 and 2 < down < box.height - 2
+
+
 class TestReadPaint:
     def test_is_refused_where_the_policy_would_not_use_it(self, store, pictures):
         ingest(store, "demo", groups(pictures), source="files", actor="ann")
@@ -165,6 +171,15 @@ class TestReadPaint:
                 assert found.paint.supported > 0.5 and found.paint.error_px < 0.2
                 assert np.linalg.norm(found.camera.position - truth.position) < 0.25
         assert kinds(painted) == []
+
+    def test_nothing_is_believed_where_the_dataset_has_people(self, painted):
+        for number in (1, 2):
+            group = load(painted, number).group
+            for view in group.views:
+                people = [box for box in view.extras.places if box.width * box.height < 2e4]
+                assert people
+                for places in group.paint[view.key].evidence.points.values():
+                    assert not [place for place in places for box in people if inside(box, place)]
 
     def test_the_least_agreement_of_a_groups_views_is_in_the_queue(self, painted):
         for row in list_groups(painted, 1).items:
@@ -215,10 +230,24 @@ class TestReadPaint:
         first, second = (view.calibration for view in after.solution.views)
         assert (first.source, first.paint, second.source) == ("lines", None, "paint")
         assert kinds(painted) == ["no_paint"]
+        assert (state(painted).old, "1 to be read again" in state(painted).sentence) == (1, True)
         read_paint(painted, "demo", actor="ann")
         solve_dataset(painted, "demo")
+        assert state(painted).old == 0
         assert looked == [after.group.views[0].key]
         assert [item.source for item in calibrations(painted)] == ["paint", "paint"]
+
+    def test_what_an_older_extractor_read_is_counted_and_read_again(
+        self, painted, looked, monkeypatch
+    ):
+        monkeypatch.setattr(paint_reading, "EXTRACTOR_VERSION", "next")
+        assert state(painted).old == 4
+        read_paint(painted, "demo", actor="ann")
+        assert len(looked) == 4
+
+    def test_where_too_many_were_read_nobody_says_how_many_are_old(self, painted, monkeypatch):
+        monkeypatch.setattr(editing, "MOST_COMPARED", 1)
+        assert (state(painted).old, state(painted).read) == (None, 4)
 
     def test_undo_of_the_lines_brings_their_paint_back(self, painted):
         before = calibrations(painted)
@@ -253,6 +282,21 @@ class TestReadPaint:
         assert load(painted, 1).group.paint[view.key].reason == NO_FRAME
         assert "missing" in load(painted, 1).solution.findings[-1].sentence
         assert "1 missing or unreadable" in state(painted).sentence
+
+    def test_a_view_that_never_had_a_picture_has_the_camera_of_its_clicks_and_no_finding(
+        self, store, pictures, here
+    ):
+        first, second = groups(pictures)
+        bare = first.with_view(replace(first.views[0], media=None))
+        ingest(store, "demo", [bare, second], source="files", actor="ann")
+        change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
+        read_paint(store, "demo", actor="ann")
+        solve_dataset(store, "demo")
+        assert [item.source for item in calibrations(store)] == ["lines", "paint"]
+        assert kinds(store) == []
+        item = state(store)
+        assert (item.views, item.without_picture, item.read) == (4, 1, 3)
+        assert item.sentence == "3 of 3 pictures were read: 3 by their paint, 1 without a picture"
 
     def test_mirrored_and_smaller_pictures_are_read_as_they_were_annotated(
         self, painted, pictures, tmp_path

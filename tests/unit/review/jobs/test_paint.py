@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import pytest
 
@@ -13,6 +14,7 @@ from app.review.jobs import paint as paint_job
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.paint import request_paint, resume_reading, take_paint_back
 from app.review.policies.policy import change_policy
+from app.soccer.group import Group, Media
 from app.soccer.policy import TOUCHLINE
 from app.store.log import read_log
 from app.store.session import Store
@@ -20,10 +22,21 @@ from tests.unit.review.editing.test_positions import match
 from tests.waiting import SECONDS
 
 
+def without_files(groups: list[Group]) -> list[Group]:
+    """Groups with pictures that an import once found and that are not there."""
+    return [
+        replace(
+            group,
+            views=tuple(replace(view, media=Media(f"/gone/{view.key}")) for view in group.views),
+        )
+        for group in groups
+    ]
+
+
 @pytest.fixture
 def asked(store: Store) -> Store:
-    """A match without pictures, and a policy that uses their paint."""
-    ingest(store, "demo", match(), source="files", actor="ann")
+    """A match whose pictures are gone, and a policy that uses their paint."""
+    ingest(store, "demo", without_files(match()), source="files", actor="ann")
     change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
     return store
 
@@ -32,6 +45,7 @@ def test_it_counts_solves_and_is_taken_back(asked: Store) -> None:
     jobs = Jobs(asked)
     done = jobs.wait(request_paint(jobs, asked, "demo", None, actor="ann").id, SECONDS)
     assert (done.state, done.result["views"], done.result["no_frame"]) == ("done", 12, 12)
+    assert (done.result["read"], done.result["without_picture"]) == (12, 0)
     assert done.sentence == "6 of 6 groups looked at"
     (solve,) = jobs.find(kinds=["solve"])
     assert jobs.wait(solve.id, SECONDS).state == "done"
