@@ -10,7 +10,7 @@ export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 unexport PYTHONDONTWRITEBYTECODE
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
-.PHONY: setup run test test-python test-browser test-late check audit release bench mutate torture fuzz paper chromium clean
+.PHONY: setup run test test-python test-browser test-late check audit release generators bench mutate torture fuzz paper chromium clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready static/node_modules/.ready
@@ -39,7 +39,7 @@ PROCESSES = $(shell n=$$(getconf _NPROCESSORS_ONLN); echo $$(( n < 2 ? 2 : n < 8
 PYTEST = $(BIN)/python -m pytest --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder
 
 # What numba compiles is compiled before: every process would do it anew, until one has saved it.
-test: setup chromium
+test: setup chromium generators
 	@$(BIN)/python -m tests.compiled
 	@$(MAKE) --no-print-directory -j2 test-python test-browser
 	@echo "Every test has passed."
@@ -77,6 +77,21 @@ audit: setup
 release: setup .venv-release/ready
 	@$(BIN)/python -m tests.release build dist .venv-release/bin
 
+# Programs that make clients of the OpenAPI document, for a test; apart, for one needs an older typer
+# than the product, the other an older TypeScript.
+generators: .venv-generators/ready tests/generators/node_modules/.ready
+
+.venv-generators/ready: requirements-generators.lock .venv/ready
+	@echo "Installing openapi-python-client into .venv-generators"
+	@test -x .venv-generators/bin/python || $(PYTHON) -m venv .venv-generators
+	@.venv-generators/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-generators.lock
+	@touch $@
+
+tests/generators/node_modules/.ready: tests/generators/package-lock.json .venv/ready
+	@echo "Installing openapi-typescript into tests/generators/node_modules"
+	@cd tests/generators && PATH="$(CURDIR)/$(BIN):$$PATH" npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
+
 bench: setup
 	$(BIN)/python -m tests.bench
 
@@ -97,4 +112,4 @@ chromium: setup
 	@$(BIN)/python tests/e2e/install_chromium.py
 
 clean:
-	rm -rf .venv .venv-release dist static/node_modules
+	rm -rf .venv .venv-release .venv-generators dist static/node_modules tests/generators/node_modules

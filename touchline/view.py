@@ -113,7 +113,8 @@ class View:
         if resize and picture.size != (self.width, self.height):
             # Pillow resizes areas of pixels, which is the rule of ``Camera.scaled``.
             picture = picture.resize((self.width, self.height), image.Resampling.BILINEAR)
-        return np.asarray(picture)
+        # A copy: PyTorch takes no array that cannot be written to.
+        return np.array(picture)
 
 
 @dataclass(frozen=True)

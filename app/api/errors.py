@@ -132,10 +132,21 @@ async def _validation_error(request: Request, error: Exception) -> Response:
         FieldProblem(pointer=_pointer(detail["loc"]), detail=_sentence(request, detail))
         for detail in details[:20]
     ]
-    first = errors[0]
+    first = _first(errors)
     place = f"{first.pointer}: " if first.pointer else ""
     problem = make_problem(422, f"{place}{first.detail}", pointer=first.pointer, errors=errors)
     return problem_response(problem)
+
+
+def _first(errors: Sequence[FieldProblem]) -> FieldProblem:
+    """The problem to speak of: a misspelt name rather than that the right one is missing."""
+    missing = str(errors[0].pointer)
+    place, _, name = missing.rpartition("/")
+    for other in errors[1:]:
+        near = other.detail.endswith(f"; did you mean {name}?")
+        if near and str(other.pointer).rpartition("/")[0] == place:
+            return other
+    return errors[0]
 
 
 def _sentence(request: Request, detail: dict[str, Any]) -> str:

@@ -9,14 +9,17 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, check_name, open_tree
-from app.datasets.coco import OUTSIDE, PREFIX, STATE
+from app.datasets.camera_json import camera_from_json
+from app.datasets.coco import CAMERA, OUTSIDE, PREFIX, STATE
 from app.datasets.frame_names import IMAGE_SUFFIXES, UNASSIGNED
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.datasets.soccernet_v3 import SPLITS
+from app.datasets.synloc import camera_from_synloc, is_synloc
 from app.datasets.view_groups import PlacedView, ViewGroups
 from app.datasets.view_state import GroupHead, StateReader
 from app.errors import DatasetFormatError, UnsafePathError
+from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
 from app.soccer.group import Group, Media, Station, View
@@ -39,7 +42,8 @@ def read_coco(
     Images with the field ``touchline`` come back as the groups that they were; a box that
     somebody has changed since is the new annotation. Of any other file images with one
     ``group_id`` are a group, whose views are called as ``view`` says; an image without is a group
-    of one view, keyed by its file name. Boxes of other categories are kept beside the ball.
+    of one view, keyed by its file name. Boxes of other categories are kept beside the ball. A
+    ``camera`` as SoccerNet spells it, and one of SynLoc, is the view's given camera.
 
     Args:
         root: Folder, zip or one JSON file.
@@ -183,6 +187,8 @@ class _File:
                 boxes.append(_shown(category, item, box))
         station_key = key if group is None else f"{group}/{view_key}"
         station = Station(station_key, image.size(), calibration=self._calibration)
+        if (camera := self._camera(image)) is not None:
+            station = station.with_given(camera)
         media, extras = self._media(name), Extras(tuple(boxes))
         view = View(view_key, station, tuple(balls), media, extras=extras)
         if group is None:
@@ -191,6 +197,19 @@ class _File:
         label = f"Group {PurePosixPath(group).name}"
         # How many views it has is known once everything is read.
         return PlacedView(GroupHead(group, "", self._split, label, Pitch()), index, view)
+
+    def _camera(self, image: StateReader) -> Camera | None:
+        """The camera that a file of somebody else gives; one that is none is reported."""
+        given = image.value.get(CAMERA)
+        try:
+            if is_synloc(image.value):
+                return camera_from_synloc(image.value, self.path, image.record)
+            return None if given is None else camera_from_json(given, self.path, image.record)
+        except DatasetFormatError as error:
+            of_camera = [] if is_synloc(image.value) else [CAMERA]
+            field = ".".join([*of_camera, *filter(None, [error.field])])
+            self._note(image.record, field, f"{error.problem}; left out")
+            return None
 
     def _placed(self, image: StateReader, key: str) -> tuple[str | None, str]:
         """Group and name of a view; no group where the file says none."""

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import IO, Any
 
 from app.datasets.camera_json import camera_to_json
-from app.datasets.coco import OUTSIDE, PREFIX, STATE
+from app.datasets.coco import CAMERA, OUTSIDE, PREFIX, STATE
 from app.datasets.export_record import ExportRecord, chosen_box, frame_name
 from app.datasets.frame_names import UNASSIGNED
 from app.datasets.view_state import head_to_json, view_to_json
@@ -131,7 +131,7 @@ def _image(record: ExportRecord, view: View, identity: int, everything: bool) ->
     solved = record.view_solution(view)
     jac = solved.calibration.jac if solved else None
     computed = {
-        "camera": None if camera is None else camera_to_json(camera),
+        CAMERA: None if camera is None else camera_to_json(camera),
         "jac": None if jac is None else _by_gamma(jac),
         "ball_3d": list(record.point) if fit is not None and record.point else None,
         "verdict": record.verdict_text,

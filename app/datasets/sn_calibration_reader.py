@@ -28,7 +28,12 @@ _OTHER_PREFIXES = ("camera_", "Labels-", "match_info")
 
 
 def read_line_files(
-    path: Path, size: ImageSize, report: Report, limits: Limits = DEFAULT_LIMITS
+    path: Path,
+    size: ImageSize,
+    report: Report,
+    limits: Limits = DEFAULT_LIMITS,
+    *,
+    by_folder: bool = False,
 ) -> Iterator[LineFile]:
     """The line files of a folder or zip (or one file), by name.
 
@@ -41,6 +46,8 @@ def read_line_files(
         size: Size of the annotated images, pixels.
         report: Takes what had to be left out.
         limits: Caps on what is read.
+        by_folder: Whether a folder that is called as in our exports (``test-1280x720``) says the
+            size of its images.
     """
     tree = open_tree(path, report, limits)
     if tree is None:
@@ -48,7 +55,8 @@ def read_line_files(
     with closing(tree):
         names = tree.names()
         places = _places(read_match_info(tree, names, Report()))
-        yield from line_files_of(tree, names, size, report, Ours(places))
+        sizes = _sizes(map(_whole, names), path.stem) if by_folder else {}
+        yield from line_files_of(tree, names, size, report, Ours(places, sizes))
 
 
 @dataclass(frozen=True)
@@ -91,8 +99,8 @@ def _places(infos: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     return {whole: place for whole, info in infos.items() if (place := place_of(info))}
 
 
-def _sizes(places: Iterable[str]) -> dict[str, ImageSize]:
-    said = {whole: split_and_size(PurePosixPath(whole).parent.name) for whole in places}
+def _sizes(places: Iterable[str], top: str = "") -> dict[str, ImageSize]:
+    said = {whole: split_and_size(PurePosixPath(whole).parent.name or top) for whole in places}
     return {whole: found[1] for whole, found in said.items() if found}
 
 

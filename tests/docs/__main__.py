@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tests.docs.fixes import PAGE, fixes_page
+from tests.docs.group import GROUP_FILE, group_page
 from tests.docs.pages import (
     GLOSSARY_PAGE,
     GUIDE,
@@ -19,3 +20,4 @@ if __name__ == "__main__":
     QUERIES_PAGE.write_text(queries_page(), encoding="utf-8")
     GUIDE.write_text(guide_text(), encoding="utf-8")
     SETTINGS_PAGE.write_text(settings_page(), encoding="utf-8")
+    GROUP_FILE.write_text(group_page(), encoding="utf-8")

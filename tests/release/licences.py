@@ -45,10 +45,11 @@ READ = {
 def complaints() -> list[str]:
     """A sentence for each library that must not be among the pinned ones."""
     found = [_complaint(name, python_licence(name)) for name in sorted(pinned())]
-    lock = json.loads((ROOT / "static" / "package-lock.json").read_text("utf-8"))
-    for path, entry in sorted(lock["packages"].items()):
-        if path:
-            found.append(_complaint(Path(path).name, entry.get("license")))
+    for folder in ("static", "tests/generators"):
+        lock = json.loads((ROOT / folder / "package-lock.json").read_text("utf-8"))
+        for path, entry in sorted(lock["packages"].items()):
+            if path:
+                found.append(_complaint(Path(path).name, entry.get("license")))
     return [sentence for sentence in found if sentence is not None]
 
 

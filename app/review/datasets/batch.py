@@ -186,7 +186,7 @@ def score_files(
     Args:
         lines: Folder or zip of line files.
         cameras: Folder or zip of ``camera_<stem>.json``.
-        size: Size of the annotated images.
+        size: Size of the annotated images where no folder of an export says it.
         without: ``findings.json``; markings that it calls mislabelled are left out.
         progress: Called with frames done.
 
@@ -200,10 +200,10 @@ def score_files(
     dropped = _wrong_labels(without) if without is not None else set()
     pitch = Pitch()
     scores = []
-    for file in read_line_files(lines, size, report):
+    for file in read_line_files(lines, size, report, by_folder=True):
         kept = _without(file.lines, {marking for stem, marking in dropped if stem == file.stem})
         camera = found.get(file.stem)
-        scores.append(None if camera is None else score_frame(camera, kept, pitch, size))
+        scores.append(None if camera is None else score_frame(camera, kept, pitch, file.size))
         if progress is not None:
             progress(len(scores))
     if not scores:

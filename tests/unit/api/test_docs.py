@@ -1,4 +1,4 @@
-"""docs/api.md shows what the service says."""
+"""docs/api.md and the group that it refers to show what the service says."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from app.api.schemas.group import GroupDocument
 from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.problem import Problem
 from app.soccer.policy import PAPER
+from tests.docs.group import GROUP_FILE
 
 PAGE = (Path(__file__).parents[3] / "docs" / "api.md").read_text(encoding="utf-8")
-PROBLEM, GROUP = re.findall(r"```json\n(.*?)```", PAGE, re.S)
+(PROBLEM,) = re.findall(r"```json\n(.*?)```", PAGE, re.S)
+GROUP = GROUP_FILE.read_text(encoding="utf-8")
 
 
 def names(value: Any) -> Any:

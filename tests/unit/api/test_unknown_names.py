@@ -48,8 +48,10 @@ class TestFields:
     ) -> None:
         answer = api.post(f"{API}/datasets/broadcast/versions", json=body)
         assert answer.status_code == 422
-        told = {one["pointer"]: one["detail"] for one in answer.json()["errors"]}
-        assert told[pointer] == f"there is no such field; did you mean {nearest}?"
+        # Not that the right name is missing.
+        assert answer.json()["pointer"] == pointer
+        sentence = f"{pointer}: there is no such field; did you mean {nearest}?"
+        assert answer.json()["detail"] == sentence
 
 
 class TestDryRun:

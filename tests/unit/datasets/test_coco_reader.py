@@ -145,6 +145,51 @@ class TestReadCoco:
         assert len(set(stations)) == 4
         assert report.problems == []
 
+    def test_the_cameras_of_others_are_given_cameras(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        write_coco(tmp_path, [record := solved(soccer_group())])
+        path = tmp_path / "annotations/instances_train.json"
+        value = json.loads(path.read_text())
+        for image in value["images"]:
+            del image["touchline"]
+        path.write_text(json.dumps(value))
+        (group,) = read_coco(tmp_path, report)
+        for found, written in zip(group.views, record.group.views, strict=True):
+            assert found.station.given is not None
+            assert found.station.given == record.camera(written)
+        assert report.problems == []
+
+    def test_the_cameras_of_synloc_are_given_cameras(
+        self, read: Callable[[Any], list[Group]], report: Report
+    ) -> None:
+        across = [[0, 1, 0, 0], [0, 0, -1, 0], [-1, 0, 0, 60]]
+        image = foreign()["images"][0] | {"camera_matrix": across, "dist_poly": [1.0, 0.0]}
+        (group,) = read(foreign(images=[image]))
+        camera = group.views[0].station.given
+        assert camera is not None
+        assert (camera.lens, camera.position[1]) == ("arctan_polynomial", 60.0)
+        assert report.problems == []
+
+    @pytest.mark.parametrize(
+        ("changes", "field"),
+        [
+            ({"camera": "main"}, "camera"),
+            ({"camera": {"pan_degrees": 1}}, "camera.tilt_degrees"),
+            ({"camera_matrix": [[1]], "dist_poly": [1, 0]}, "camera_matrix"),
+        ],
+    )
+    def test_a_camera_that_is_none_is_named_and_its_image_stays(
+        self,
+        read: Callable[[Any], list[Group]],
+        report: Report,
+        changes: dict[str, Any],
+        field: str,
+    ) -> None:
+        (group,) = read(foreign(images=[foreign()["images"][0] | changes]))
+        assert group.views[0].station.given is None
+        assert [item.field for item in report.problems] == [field]
+
     def test_the_split_is_in_the_name_of_the_file(self, tmp_path: Path, report: Report) -> None:
         (tmp_path / "outside_valid.json").write_text(json.dumps(foreign()))
         (group,) = read_coco(tmp_path, report)

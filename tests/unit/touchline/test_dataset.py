@@ -92,6 +92,10 @@ class TestSamples:
         assert len(test) == len(version.groups[0].views)
         sample = train[0]
         assert sample["image"].shape == (*sample["size"][::-1], 3)
+        # PyTorch makes tensors of them in place.
+        arrays = [value for value in sample.values() if isinstance(value, np.ndarray)]
+        assert len(arrays) == 6
+        assert all(array.flags.writeable for array in arrays)
         assert "image" not in test[0]
         stacked = {name: np.stack([s[name] for s in train]) for name in ("box", "ball", "P")}
         assert {name: array.shape[1:] for name, array in stacked.items()} == {

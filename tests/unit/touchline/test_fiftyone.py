@@ -1,4 +1,4 @@
-"""Samples of FiftyOne, where the package is installed; its database is asked for nothing."""
+"""FiftyOne, where the package is installed; its database is one in memory, where mongomock is."""
 
 from __future__ import annotations
 
@@ -12,6 +12,20 @@ from touchline.errors import DataError, MissingPackageError
 from touchline.fiftyone import _written, to_fiftyone, to_samples
 
 
+@pytest.fixture
+def database(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A database of FiftyOne without a server; it holds datasets and joins no collections."""
+    mongomock, mongoengine = pytest.importorskip("mongomock"), pytest.importorskip("mongoengine")
+    pytest.importorskip("fiftyone")
+    from fiftyone.core.odm import database
+
+    mongoengine.disconnect_all()
+    client = mongomock.MongoClient
+    mongoengine.connect("fiftyone", mongo_client_class=client, uuidRepresentation="standard")
+    monkeypatch.setattr(database, "_client", mongoengine.get_connection())
+    monkeypatch.setattr(database, "_connect", lambda: None)
+
+
 class TestToFiftyone:
     def test_the_package_is_asked_for_where_it_is_not(
         self, export: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -19,6 +33,19 @@ class TestToFiftyone:
         monkeypatch.setitem(__import__("sys").modules, "fiftyone", None)
         with pytest.raises(MissingPackageError, match="pip install 'fiftyone'"):
             to_fiftyone(touchline.open(export), tmp_path)
+
+    def test_a_version_is_a_dataset_whose_slices_are_the_views(
+        self, export: Path, tmp_path: Path, database: None
+    ) -> None:
+        version = touchline.open(export)
+        found = to_fiftyone(version, tmp_path, "league-v1")
+        assert (found.name, found.media_type, len(found)) == ("league-v1", "group", len(version))
+        assert found.info == {"dataset": "league", "version": "v1", "hash": version.hash}
+        seen = []
+        for name in found.group_slices:
+            found.group_slice = name
+            seen += [(sample["key"], sample["view"]) for sample in found.iter_samples()]
+        assert sorted(seen) == sorted((view.group, view.key) for view in version.views)
 
 
 class TestToSamples:

@@ -22,7 +22,6 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.solving.score import FrameScore, score, score_frame
 from app.store.session import Store
-from tests.cameras import SIZE
 
 FOLDERS = ["test-1280x720", "train-1280x720"]
 PERSON = {"class": "Player team left", "ID": "7"}
@@ -79,8 +78,16 @@ class TestSnCalibration:
     @pytest.mark.parametrize("parts", [("lines", "cameras"), (".", ".")])
     def test_our_own_score_reads_it_as_well(self, written, parts: tuple[str, str]) -> None:
         root = written("sn-calibration")
-        found = score_files(*(root / part for part in parts), size=SIZE)
+        # The usual size, which is not that of the export: its folders say theirs.
+        found = score_files(*(root / part for part in parts), size=ImageSize(960, 540))
         assert (found["frames"], found["completeness"]) == (4, 1.0)
+        assert found["fs5"] > 0.99
+
+    def test_our_own_score_knows_the_size_of_one_folder_of_it(self, written) -> None:
+        root = written("sn-calibration")
+        folders = [root / part / FOLDERS[0] for part in ("lines", "cameras")]
+        found = score_files(*folders, size=ImageSize(960, 540))
+        assert found["frames"] == 2
         assert found["fs5"] > 0.99
 
 
