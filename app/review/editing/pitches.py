@@ -26,7 +26,8 @@ from app.solving.pitch_size import PitchEstimate, PitchFrame, estimate_pitch
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.digest import digest
-from app.store.groups import next_revision, read_groups, save_revision
+from app.store.group_revisions import next_revision, save_revision
+from app.store.groups import read_groups
 from app.store.log import Entry, LogEntry, append
 from app.store.pitches import (
     PITCH,

@@ -12,10 +12,11 @@ from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Finding, Solution
 from app.store.digest import digest
-from app.store.groups import StoredGroup, StoredStation, read_groups
+from app.store.groups import StoredGroup, read_groups
 from app.store.queue import import_findings, is_fixed
 from app.store.session import Session
 from app.store.solutions import SolutionKey, read_solutions
+from app.store.stations import StoredStation
 from app.store.verdicts import StoredVerdict, read_last_verdicts
 
 

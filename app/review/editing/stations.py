@@ -26,14 +26,8 @@ from app.store.clock import now
 from app.store.codecs import Json
 from app.store.datasets import dataset_name
 from app.store.digest import group_inputs_hash
-from app.store.groups import (
-    StoredGroup,
-    StoredStation,
-    groups_of_station,
-    read_stations,
-    refresh_inputs_hashes,
-    save_station,
-)
+from app.store.group_revisions import refresh_inputs_hashes
+from app.store.groups import StoredGroup
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
@@ -42,6 +36,7 @@ from app.store.solutions import (
     SolutionKey,
     insert_solutions,
 )
+from app.store.stations import StoredStation, groups_of_station, read_stations, save_station
 
 
 @dataclass(frozen=True)

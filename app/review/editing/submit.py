@@ -26,13 +26,8 @@ from app.solving.solve import solve
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
-from app.store.groups import (
-    StoredGroup,
-    group_of_view,
-    next_revision,
-    read_groups,
-    save_revision,
-)
+from app.store.group_revisions import next_revision, save_revision
+from app.store.groups import StoredGroup, group_of_view, read_groups
 from app.store.log import Entry, LogEntry, append, group_entries
 from app.store.paint import FOLLOWS, PAINT, insert_readings
 from app.store.queue import refresh_queue, update_row
