@@ -30,7 +30,7 @@ from app.review.editing.pitches import read_pitches
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.stations import load_station
 from app.review.editing.submit import load
-from app.review.evaluating.evaluation import EvaluationRequest, run_evaluation
+from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
 from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.evaluating.predictions import add_predictions
 from app.review.importing.ingest import ingest
