@@ -16,6 +16,7 @@ from sqlalchemy import event
 
 from app.cli import main
 from app.store.session import Store
+from tests.kept_child import USERS, KeptChild
 
 # As the server logs. The default draws a traceback with all its variables, half a second each.
 structlog.configure(
@@ -36,6 +37,15 @@ class Cost:
     writes: int = 0
     commits: int = 0
     statements: int = 0
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _children_are_kept() -> Iterator[None]:
+    """Who asks a child for something gets one that an earlier test has left, if there is one."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in USERS:
+            patch.setattr(f"{module}.Child", KeptChild)
+        yield
 
 
 @pytest.fixture(autouse=True)
