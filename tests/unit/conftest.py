@@ -57,19 +57,25 @@ def _usual_umask() -> Iterator[None]:
 
 
 @pytest.fixture
+def home(tmp_path: Path) -> Path:
+    """Where the home of a test is; nothing is there yet."""
+    return tmp_path / "home"
+
+
+@pytest.fixture
 def touchline(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], home: Path
 ) -> Callable[..., tuple[int, str, str]]:
-    """Runs a command in a home of its own, ``tmp_path / "home"``: exit code, stdout, stderr."""
+    """Runs a command in the ``home`` of the test: exit code, stdout, stderr."""
     for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
         monkeypatch.delenv(name)
-    monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("TOUCHLINE_HOME", str(home))
 
     def command(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["touchline", *map(str, arguments)])
         with pytest.raises(SystemExit) as ended:
             main()
-        out, err = capsys.readouterr()
+        out, err = capfd.readouterr()
         return int(ended.value.code or 0), out, err
 
     return command

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import closing
 from functools import partial
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 
@@ -18,14 +20,24 @@ from tests.unit.review.editing.test_positions import MATCH, SHARING, match
 Run = Callable[..., tuple[int, str, str]]
 
 
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with a match as the datasets ``demo`` and, by the paper, ``paper``."""
+    home = tmp_path_factory.mktemp("filled")
+    with closing(Store.open(Settings(home=home))) as store:
+        for dataset in ("demo", "paper"):
+            ingest(store, dataset, match(), source="files", actor="ann")
+        change_policy(store, "demo", SHARING, if_match=None, actor="ann")
+    return home
+
+
 @pytest.fixture
-def run(touchline: Run, tmp_path: Path) -> Run:
-    """Run the command in a home with a match as the datasets ``demo`` and, by the paper, ``paper``."""
-    store = Store.open(Settings(home=tmp_path / "home"))
-    for dataset in ("demo", "paper"):
-        ingest(store, dataset, match(), source="files", actor="ann")
-    change_policy(store, "demo", SHARING, if_match=None, actor="ann")
-    store.close()
+def home(filled: Path, home: Path) -> Path:
+    return Path(copytree(filled, home))
+
+
+@pytest.fixture
+def run(touchline: Run) -> Run:
     return partial(touchline, "positions")
 
 

@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 import json
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from app.cli import main
 from tests.unit.paint.lawns import TRUE, drawn, lawn
 
-
-def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
-    """Run the command; its exit code."""
-    monkeypatch.setattr(sys, "argv", ["touchline", "propose", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
+Run = Callable[..., tuple[int, str, str]]
 
 
 class TestPropose:
-    def test_cameras_of_proposed_pictures_alone_are_written(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-    ):
+    def test_cameras_of_proposed_pictures_alone_are_written(self, tmp_path: Path, touchline: Run):
         pictures, out = tmp_path / "pictures", tmp_path / "out"
         pictures.mkdir()
         out.mkdir()
@@ -34,8 +25,9 @@ class TestPropose:
         whole = (pictures / "good.png").read_bytes()
         (pictures / "cut.png").write_bytes(whole[: len(whole) // 2])
         (out / "camera_grass.json").write_text("of an earlier run")
-        assert run(monkeypatch, pictures, out, "--json") == 0
-        rows = json.loads(capsys.readouterr().out)
+        code, told, _ = touchline("propose", pictures, out, "--json")
+        rows = json.loads(told)
+        assert code == 0
         assert rows == json.loads((out / "propose.json").read_text())
         assert {row["frame"]: row["outcome"] for row in rows} == {
             "good": "proposed",
@@ -49,17 +41,15 @@ class TestPropose:
         }  # fmt: skip
 
     def test_no_camera_is_written_of_which_it_is_unsure(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, touchline: Run
     ):
         monkeypatch.setattr("app.paint.propose.LEAST_SUM", 9.0)
         cv2.imwrite(str(tmp_path / "good.png"), lawn(drawn(TRUE, 3))[:, :, ::-1])
-        assert run(monkeypatch, tmp_path / "good.png", tmp_path / "out") == 0
-        assert "unsure" in capsys.readouterr().out
+        code, told, _ = touchline("propose", tmp_path / "good.png", tmp_path / "out")
+        assert (code, "unsure" in told) == (0, True)
         assert [file.name for file in (tmp_path / "out").iterdir()] == ["propose.json"]
 
-    def test_a_folder_without_pictures_is_said(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-    ):
+    def test_a_folder_without_pictures_is_said(self, tmp_path: Path, touchline: Run):
         (tmp_path / "in").mkdir()
-        assert run(monkeypatch, tmp_path / "in", tmp_path / "out") == 1
-        assert "no pictures" in capsys.readouterr().err
+        code, _, err = touchline("propose", tmp_path / "in", tmp_path / "out")
+        assert (code, "no pictures" in err) == (1, True)
