@@ -1,15 +1,17 @@
-"""A home with one match, of which lines alone are known."""
+"""A home with one match."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import closing
 from pathlib import Path
 
 from app.config import Settings
 from app.datasets.sn_calibration import LineFile
 from app.review.importing.ingest import ingest
+from app.review.policies.policy import change_policy
 from app.soccer.group import Group, Station, View
+from app.soccer.policy import Policy
 from app.store.session import Store
 
 
@@ -22,3 +24,12 @@ def ingest_match(home: Path, match: str, files: Iterable[LineFile]) -> None:
         groups.append(Group(f"{match}/{file.stem}.png", (view,), match=match))
     with closing(Store.open(Settings(home=home))) as store:
         ingest(store, "demo", groups, source="files", actor="ann")
+
+
+def ingest_by_policies(home: Path, match: Iterable[Group], policies: Mapping[str, Policy]) -> None:
+    """Put a match into a home as several datasets, each under its policy."""
+    groups = list(match)
+    with closing(Store.open(Settings(home=home))) as store:
+        for dataset, policy in policies.items():
+            ingest(store, dataset, groups, source="files", actor="ann")
+            change_policy(store, dataset, policy, if_match=None, actor="ann")

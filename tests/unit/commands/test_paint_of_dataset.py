@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from contextlib import closing
 from functools import partial
 from pathlib import Path
-from shutil import copytree
 
 import pytest
 
-from app.config import Settings
-from app.review.importing.ingest import ingest
-from app.review.policies.policy import change_policy
-from app.soccer.policy import TOUCHLINE
-from app.store.session import Store
+from app.soccer.policy import PAPER, TOUCHLINE
+from tests.unit.commands.match_home import ingest_by_policies
 from tests.unit.review.editing.test_positions import MATCH, match
 
 Run = Callable[..., tuple[int, str, str]]
@@ -25,16 +20,8 @@ Run = Callable[..., tuple[int, str, str]]
 def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A home with a match without pictures, as ``demo`` and as ``paper``."""
     home = tmp_path_factory.mktemp("filled")
-    with closing(Store.open(Settings(home=home))) as store:
-        for dataset in ("demo", "paper"):
-            ingest(store, dataset, match(), source="files", actor="ann")
-        change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
+    ingest_by_policies(home, match(), {"demo": TOUCHLINE, "paper": PAPER})
     return home
-
-
-@pytest.fixture
-def home(filled: Path, home: Path) -> Path:
-    return Path(copytree(filled, home))
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from shutil import copytree
 
 import pytest
 
@@ -36,11 +35,6 @@ def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     home = tmp_path_factory.mktemp("filled")
     ingest_match(home, MATCH, frames())
     return home
-
-
-@pytest.fixture
-def home(filled: Path, home: Path) -> Path:
-    return Path(copytree(filled, home))
 
 
 @pytest.fixture

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from contextlib import closing
 from functools import partial
 from pathlib import Path
-from shutil import copytree
 
 import pytest
 
-from app.config import Settings
-from app.review.importing.ingest import ingest
-from app.review.policies.policy import change_policy
-from app.store.session import Store
+from app.soccer.policy import PAPER
+from tests.unit.commands.match_home import ingest_by_policies
 from tests.unit.review.editing.test_positions import MATCH, SHARING, match
 
 Run = Callable[..., tuple[int, str, str]]
@@ -24,16 +20,8 @@ Run = Callable[..., tuple[int, str, str]]
 def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A home with a match as the datasets ``demo`` and, by the paper, ``paper``."""
     home = tmp_path_factory.mktemp("filled")
-    with closing(Store.open(Settings(home=home))) as store:
-        for dataset in ("demo", "paper"):
-            ingest(store, dataset, match(), source="files", actor="ann")
-        change_policy(store, "demo", SHARING, if_match=None, actor="ann")
+    ingest_by_policies(home, match(), {"demo": SHARING, "paper": PAPER})
     return home
-
-
-@pytest.fixture
-def home(filled: Path, home: Path) -> Path:
-    return Path(copytree(filled, home))
 
 
 @pytest.fixture

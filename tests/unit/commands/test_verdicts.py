@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from shutil import copytree
 
 import pytest
 
@@ -32,11 +31,6 @@ def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ingest(store, "demo", read_soccernet_v3(home / "tree", Report()), source="t", actor="ann")
         solve_dataset(store, "demo")
     return home
-
-
-@pytest.fixture
-def home(filled: Path, home: Path) -> Path:
-    return Path(copytree(filled, home))
 
 
 @pytest.fixture
