@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from app.soccer.finding import FINDING_KINDS
 from app.soccer.reasons import REASONS
-from app.soccer.solution import FINDING_KINDS, GATES
+from app.soccer.solution import GATES
 
 Kind = Literal["number", "flag", "choice", "text", "ids", "order"]
 COMPARED = (":", "=", "<", "<=", ">", ">=")
