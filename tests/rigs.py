@@ -8,8 +8,9 @@ import numpy as np
 
 from app.geometry.camera import Camera
 from app.geometry.resection import camera_from_parameters, parameters_from_camera
-from app.soccer.annotation import Lines, make_lines
+from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import ImagePoint
+from app.soccer.group import Group, Station, View
 from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.rig import RigCamera, RigFrame
 from tests.cameras import SIZE, looking
@@ -86,3 +87,19 @@ def frames(
             if 0 <= x < SIZE.width and 0 <= y < SIZE.height:
                 balls[place][key] = ImagePoint(x, y)
     return [RigFrame(int(time), seen) for time, seen in zip(times, balls, strict=True)]
+
+
+def groups(count: int) -> list[Group]:
+    """The instants of so many frames that show a ball, from cameras that are given."""
+    stations = {c.key: Station(c.key, SIZE, shared=True, given=c.camera) for c in cameras()}
+    return [
+        Group(
+            str(frame.time),
+            tuple(
+                View(key, stations[key], (BallAnnotation(point=center),))
+                for key, center in frame.balls.items()
+            ),
+        )
+        for frame in frames(count)
+        if frame.balls
+    ]

@@ -173,7 +173,7 @@ def evaluate(
     """
     if predictions is None and careful is None and cameras is None:
         raise typer.BadParameter("name predictions, --cameras or --careful")
-    from app.review.evaluating.evaluation import EvaluationRequest
+    from app.review.evaluating.evaluation_run import EvaluationRequest
     from app.review.evaluating.folder import evaluation_values, write_evaluation
     from app.review.evaluating.prediction_source import PredictionSource, evaluate_sources
 

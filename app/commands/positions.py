@@ -9,7 +9,7 @@ import typer
 
 from app.commands.opened import executor_of, opened_store
 from app.commands.options import Dataset, Json, Workers, acting, read_settings
-from app.commands.terminal import print_json, say, show_progress
+from app.commands.terminal import print_rows, show_progress
 
 commands = typer.Typer()
 
@@ -56,8 +56,9 @@ def positions(
         else:
             found = get_positions(store, dataset)
     items = [item for item in found.items if match in (None, item.match)]
-    if json_:
-        print_json([{**asdict(item), "sentence": item.sentence} for item in items])
-        return
-    for item in items:
-        say(f"{item.match}: {item.sentence}")
+    print_rows(
+        items,
+        json_,
+        lambda item: {**asdict(item), "sentence": item.sentence},
+        lambda item: f"{item.match}: {item.sentence}",
+    )

@@ -9,7 +9,7 @@ import typer
 
 from app.commands.opened import opened_store
 from app.commands.options import Dataset, Json, Workers, acting, read_settings
-from app.commands.terminal import complain, print_json, print_values, say, show_progress
+from app.commands.terminal import complain, print_json, print_rows, print_values, say, show_progress
 
 if TYPE_CHECKING:
     from app.store.predictions import PredictionSet
@@ -28,12 +28,15 @@ def list_(dataset: Dataset, json_: Json = False) -> None:
 
     with opened_store() as store:
         found = list_predictions(store, dataset)
-    if json_:
-        print_json([vars(item) for item in found])
-        return
-    for item in found:
-        counts = f"{item.boxes:8} boxes in {item.frames} frames, {item.cameras} cameras"
-        say(f"{item.name:24} {item.format:8} {item.created[:19]} {counts}")
+    print_rows(
+        found,
+        json_,
+        vars,
+        lambda item: (
+            f"{item.name:24} {item.format:8} {item.created[:19]} "
+            f"{item.boxes:8} boxes in {item.frames} frames, {item.cameras} cameras"
+        ),
+    )
 
 
 @commands.command()

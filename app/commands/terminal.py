@@ -9,13 +9,15 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from threading import Event
-from typing import Any, TextIO, cast
+from typing import Any, TextIO, TypeVar, cast
 
 from app.finite import finite, json_text
 from app.progress import Progress
+
+Row = TypeVar("Row")
 
 MAX_MISSING = 20
 """Missing images that are named in a table."""
@@ -121,6 +123,17 @@ def print_values(values: Mapping[str, Any], as_json: bool) -> None:
     width = max((len(name) for name in values), default=0)
     for name, value in values.items():
         say(f"{name.replace('_', ' '):{width}}  {_text(value)}")
+
+
+def print_rows(
+    rows: Iterable[Row], as_json: bool, values: Callable[[Row], Any], line: Callable[[Row], str]
+) -> None:
+    """Each of some things on a line of its own, or the values of all as one JSON list."""
+    if as_json:
+        print_json([values(row) for row in rows])
+        return
+    for row in rows:
+        say(line(row))
 
 
 def print_import(values: Mapping[str, Any], as_json: bool) -> None:

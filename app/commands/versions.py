@@ -18,7 +18,14 @@ from app.commands.options import (
     read_settings,
     read_text,
 )
-from app.commands.terminal import complain, print_json, print_values, say, show_progress
+from app.commands.terminal import (
+    complain,
+    print_json,
+    print_rows,
+    print_values,
+    say,
+    show_progress,
+)
 
 if TYPE_CHECKING:
     from app.review.versions.version import Version
@@ -100,12 +107,15 @@ def versions(dataset: Dataset, json_: Json = False) -> None:
 
     with opened_store() as store:
         found = list_versions(store, dataset)
-    if json_:
-        print_json([version_values(item) for item in found])
-        return
-    for item in found:
-        groups = f"{item.counts['groups']:6} groups"
-        say(f"{item.name:16} {item.hash[:16]}  {item.created[:19]}  {groups}  {item.note}")
+    print_rows(
+        found,
+        json_,
+        version_values,
+        lambda item: (
+            f"{item.name:16} {item.hash[:16]}  {item.created[:19]}  "
+            f"{item.counts['groups']:6} groups  {item.note}"
+        ),
+    )
 
 
 @commands.command()

@@ -112,12 +112,11 @@ def require_determined(information: FloatArray) -> None:
         raise DegenerateGeometryError("a combination of parameters is not determined")
 
 
-def covariance(information: FloatArray, variance: float = 1.0) -> FloatArray:
-    """Covariance of the parameters, ``variance`` times the inverse of J^T W J.
+def covariance(information: FloatArray) -> FloatArray:
+    """Covariance of the parameters: the inverse of J^T W J, its weights one over the variances.
 
     Args:
         information: J^T W J at the minimum, shape (n, n).
-        variance: Of one residual of weight one.
 
     Raises:
         DegenerateGeometryError: Some combination of parameters is not determined.
@@ -126,7 +125,7 @@ def covariance(information: FloatArray, variance: float = 1.0) -> FloatArray:
     scale = np.sqrt(np.diag(information))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     inverse = vectors / values @ vectors.T
-    return np.asarray(variance * inverse / np.outer(scale, scale), dtype=np.float64)
+    return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64)
 
 
 def _damped_step(gradient: FloatArray, information: FloatArray, damping: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from app.geometry.camera import Camera
+from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 
 SOLVER_VERSION = "3"
@@ -30,27 +31,6 @@ GATES = (
     "chi_square",
 )
 """Names of the gates in the order in which they are judged."""
-
-FINDING_KINDS = (
-    "wrong_label",
-    "sides_swapped",
-    "visible_not_annotated",
-    "bad_point",
-    "under_constrained",
-    "paint_disagrees",
-    "no_paint",
-    "picture_geometry",
-    "view_disagrees",
-    "views_contradict",
-    "not_synchronous",
-    "ball_size",
-    "low_parallax",
-    "high_uncertainty",
-    "implausible_ball",
-    "implausible_camera",
-    "several_balls",
-    "upstream_changed",
-)
 
 
 @dataclass(frozen=True)
@@ -376,38 +356,6 @@ class Gate:
     view: str | None = None
     active: bool = True
     """False when the policy does not ask for it."""
-
-
-@dataclass(frozen=True)
-class Fix:
-    """What a finding or a remedy proposes to do.
-
-    ``action`` is ``relabel``, ``move_point``, ``drop_point``, ``drop_marking``, ``swap_sides``,
-    ``include_view``, ``exclude_view``, ``free_picture`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
-    say where a person should look and draw: what was computed there is no evidence for itself.
-    ``read_paint`` asks for its picture to be read, which is no edit either.
-    """
-
-    action: str
-    view: str | None = None
-    marking: str | None = None
-    to: str | None = None
-    index: int | None = None
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something that a person should look at, with its number, its limit and one sentence."""
-
-    kind: str
-    sentence: str
-    view: str | None = None
-    marking: str | None = None
-    suggested: str | None = None
-    number: float | None = None
-    threshold: float | None = None
-    confidence: float | None = None
-    fix: Fix | None = None
 
 
 @dataclass(frozen=True)

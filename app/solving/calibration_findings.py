@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from app.soccer.finding import Finding, Fix
 from app.soccer.frames import ImageSize, height_above_grass
-from app.soccer.solution import Calibration, Finding, Fix
+from app.soccer.solution import Calibration
 from app.solving.calibrate import MAX_POSITION_SIGMA_M
 from app.solving.picture import BELIEVED, MIN_SHIFT, MIN_STRETCH
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from app.soccer.finding import Finding, Fix
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.soccer.solution import Ball3D, Finding, Fix, Pair, ViewSolution
+from app.soccer.solution import Ball3D, Pair, ViewSolution
 from app.solving.calibration_findings import calibration_findings
 from app.solving.contradiction import LOW_P_VALUE, SPEEDS, TYPICAL_SPEED, Contradiction
 from app.solving.gates import chance

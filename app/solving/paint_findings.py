@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from app.soccer.finding import Finding, Fix
 from app.soccer.group import Group, View
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES
 from app.soccer.policy import CalibrationPolicy
-from app.soccer.solution import Finding, Fix, ViewSolution
+from app.soccer.solution import ViewSolution
 from app.solving.calibrate import wanted_paint
 
 READ_PAINT = "read_paint"

@@ -129,9 +129,7 @@ class NewRows:
         )
         return int(identity["id"])
 
-    def add_group(
-        self, group: Group, source: str, at: str, shared: Mapping[str, int], revision: int = 1
-    ) -> int:
+    def add_group(self, group: Group, source: str, at: str, shared: Mapping[str, int]) -> int:
         """Gather a group with its views and own stations; returns its id.
 
         ``shared`` has the ids of shared stations by key.
@@ -143,7 +141,7 @@ class NewRows:
                 "id": identity,
                 "dataset_id": self.dataset_id,
                 "number": self._number + len(self.groups) + 1,
-                "revision": revision,
+                "revision": 1,
                 "changed": at,
                 "source_hash": source,
             }

@@ -1,63 +1,34 @@
-"""Groups in the database: rows to values and back, in batches."""
+"""Groups in the database: rows to values, in batches."""
 
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
-from sqlalchemy import BindParameter, bindparam, delete, null, select, update
+from sqlalchemy import BindParameter, bindparam, null, select
 from sqlalchemy.orm import Session
 from sqlalchemy.sql import FromClause
 
 from app.errors import NotFoundError
-from app.geometry.camera import Camera
-from app.soccer.annotation import BallAnnotation, Extras, Lines
-from app.soccer.frames import ImageSize
+from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.group import Group, Media, SharedPosition, Station, View
 from app.soccer.paint_evidence import PaintReading
-from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.reasons import LeftOut
 from app.store import codecs
 from app.store.datasets import policy_of
-from app.store.digest import inputs_hash, station_digest, view_digest
-from app.store.group_rows import (
-    NewRows,
-    head_values,
-    paint_text,
-    positions_text,
-    station_values,
-    view_values,
-)
 from app.store.models import (
     DatasetModel,
     GroupModel,
-    ImportFindingModel,
     StationModel,
     ViewModel,
 )
 from app.store.paint import paint_digests, read_readings
-
-
-@dataclass(frozen=True)
-class StoredStation:
-    """A station with its row's keeping; ``edited`` says that a person changed it."""
-
-    id: int
-    dataset_id: int
-    revision: int
-    station: Station
-    digest: str
-    source_digest: str
-
-    @property
-    def edited(self) -> bool:
-        """Whether it differs from what its dataset brought."""
-        return self.digest != self.source_digest
+from app.store.stations import StoredStation, stored_station
 
 
 @dataclass(frozen=True)
@@ -173,12 +144,6 @@ def group_of_view(session: Session, view_id: int) -> int:
     return int(found)
 
 
-def read_stations(session: Session, ids: Iterable[int]) -> dict[int, StoredStation]:
-    """Stations by id."""
-    statement = select(*StationModel.__table__.columns).where(StationModel.id.in_(list(ids)))
-    return {row.id: stored_station(row) for row in session.execute(statement)}
-
-
 def _stored_group(
     head: Any,
     rows: Sequence[Any],
@@ -192,7 +157,7 @@ def _stored_group(
         pitch=Pitch(head.pitch_length, head.pitch_width),
         split=head.split,
         label=head.label,
-        positions={} if head.positions is None else _positions(head.positions),
+        positions=positions_of(head.positions),
         paint={} if head.paint is None else _paint(head.paint, readings),
     )
     return StoredGroup(
@@ -228,31 +193,15 @@ def _view_from_row(row: Any, station: Station) -> View:
     )
 
 
-def stored_station(row: Any) -> StoredStation:
-    """A station from all columns of its row."""
-    station = Station(
-        key=row.key,
-        size=ImageSize(row.width, row.height),
-        shared=row.shared,
-        lines=_lines(row.lines),
-        given=None if row.given is None else _camera(row.given),
-        calibration=row.calibration,
-        flipped=row.flipped,
-        given_covariance=None if row.given is None else _covariance(row.given),
-        picture=None if row.picture is None else _picture(row.picture),
-        proposed=() if row.proposed is None else _proposed(row.proposed),
-    )
-    return StoredStation(
-        row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
-    )
-
-
 def _paint(text: str, readings: Mapping[str, PaintReading]) -> dict[str, PaintReading]:
     with codecs.as_written():
         return {view: readings[digest] for view, digest in paint_digests(text).items()}
 
 
-def _positions(text: str) -> dict[str, SharedPosition]:
+def positions_of(text: str | None) -> dict[str, SharedPosition]:
+    """Shared positions of a group from its column, by the views' keys."""
+    if text is None:
+        return {}
     with codecs.as_written():
         return codecs.positions_from_json(codecs.parse(text))
 
@@ -273,242 +222,3 @@ def _balls(text: str) -> tuple[BallAnnotation, ...]:
 def _extras(data: bytes) -> Extras:
     with codecs.as_written():
         return codecs.extras_from_json(codecs.unpack(data))
-
-
-@lru_cache(maxsize=1024)
-def _lines(text: str) -> Lines:
-    with codecs.as_written():
-        return codecs.lines_from_json(codecs.parse(text))
-
-
-@lru_cache(maxsize=1024)
-def _camera(text: str) -> Camera:
-    with codecs.as_written():
-        return codecs.camera_from_json(codecs.parse(text))
-
-
-@lru_cache(maxsize=1024)
-def _covariance(text: str) -> tuple[float, ...] | None:
-    with codecs.as_written():
-        return codecs.covariance_from_json(codecs.parse(text).get("covariance"))
-
-
-@lru_cache(maxsize=256)
-def _proposed(text: str) -> tuple[str, ...]:
-    with codecs.as_written():
-        return tuple(map(str, codecs.parse(text)))
-
-
-@lru_cache(maxsize=256)
-def _picture(text: str) -> PictureGeometry | None:
-    with codecs.as_written():
-        return codecs.picture_from_json(codecs.parse(text))
-
-
-def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
-    """A stored group as it is once an edit has made it into ``group``, the same views otherwise.
-
-    Shared stations are the stored ones; only what differs is digested again.
-    """
-    stations, digests = dict(stored.stations), dict(stored.view_digests)
-    for view, old in zip(group.views, stored.group.views, strict=True):
-        own = stations[view.key]
-        if view.station != old.station and not own.station.shared:
-            stations[view.key] = replace(
-                own,
-                revision=own.revision + 1,
-                station=view.station,
-                digest=station_digest(view.station),
-            )
-        if _differs(view, old):
-            digests[view.key] = (view_digest(view), digests[view.key][1])
-    pairs = [(digests[view.key][0], stations[view.key].digest) for view in group.views]
-    return replace(
-        stored,
-        revision=stored.revision + 1,
-        changed=at,
-        inputs_hash=inputs_hash(
-            group.pitch, pairs, group.positions, codecs.paint_to_json(group.paint)
-        ),
-        group=group,
-        stations=stations,
-        view_digests=digests,
-    )
-
-
-def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> None:
-    """Write what ``next_revision`` changed; solutions and queue are the caller's to refresh."""
-    for position, (view, old) in enumerate(zip(after.group.views, stored.group.views, strict=True)):
-        if _differs(view, old):
-            _update(session, _VIEW, after.view_ids[view.key], view_values(view, position))
-        own = after.stations[view.key]
-        if own != stored.stations[view.key]:
-            values = {**station_values(own.station), "revision": own.revision}
-            _update(session, _STATION, own.id, values)
-    names = ("revision", "changed", "inputs_hash")
-    values = {name: getattr(after, name) for name in names}
-    pitch = after.group.pitch
-    values |= {"pitch_length": pitch.length, "pitch_width": pitch.width}
-    values["positions"] = positions_text(after.group)
-    values["paint"] = paint_text(codecs.paint_to_json(after.group.paint))
-    _update(session, GroupModel.__table__, after.id, values)
-
-
-def _differs(view: View, old: View) -> bool:
-    """Whether the view's own row is another; its station has one of its own."""
-    return replace(view, station=old.station) != old
-
-
-def _update(session: Session, table: Any, identity: int, values: Mapping[str, Any]) -> None:
-    session.execute(_update_of(table), {"row": identity, **values})
-
-
-@cache
-def _update_of(table: Any) -> Any:
-    return update(table).where(table.c.id == bindparam("row"))
-
-
-def save_group(
-    session: Session,
-    stored: StoredGroup,
-    group: Group,
-    *,
-    at: str,
-    source: Group,
-    digest: str | None = None,
-    shared: Mapping[str, int] | None = None,
-) -> None:
-    """Write the next revision of a group whose dataset has changed: head, views, own stations.
-
-    Shared stations are left alone; ``save_station`` writes those. Views that are gone are
-    deleted, new ones inserted.
-
-    Args:
-        session: A write session.
-        stored: The group as it is.
-        group: The group as it shall be.
-        at: Time of the change.
-        source: The group as it would be had nobody edited it.
-    """
-    kept = {view.key for view in group.views if keeps_station(stored, view)}
-    _delete_views(session, stored, set(stored.view_ids) - kept)
-    for position, view in enumerate(group.views):
-        if view.key in kept:
-            _save_view(session, stored, view, position, source.view(view.key))
-    if len(kept) < len(group.views):
-        rows = NewRows(session, stored.dataset_id)
-        for position, view in enumerate(group.views):
-            if view.key not in kept:
-                rows.add_view(stored.id, view, position, shared or {})
-        rows.insert()
-    values = {**head_values(group), "revision": stored.revision + 1, "changed": at}
-    if digest is not None:
-        values["source_hash"] = digest
-    session.execute(update(GroupModel).where(GroupModel.id == stored.id).values(values))
-
-
-def keeps_station(stored: StoredGroup, view: View) -> bool:
-    """Whether a view is stored and still has its own station, or still shares the same one."""
-    if view.key not in stored.stations:
-        return False
-    old, new = stored.stations[view.key].station, view.station
-    return old.shared == new.shared and (not new.shared or old.key == new.key)
-
-
-def _save_view(
-    session: Session, stored: StoredGroup, view: View, position: int, source: View | None
-) -> None:
-    old = stored.group.view(view.key)
-    if source is None and view == old and stored.group.views.index(old) == position:
-        return
-    values = view_values(view, position)
-    if source is not None:
-        values["source_digest"] = view_digest(source)
-    identity = stored.view_ids[view.key]
-    session.execute(update(ViewModel).where(ViewModel.id == identity).values(values))
-    own = stored.stations[view.key]
-    base = None if source is None else source.station
-    if not own.station.shared and (view.station != own.station or base is not None):
-        save_station(session, own, view.station, source=base)
-
-
-def _delete_views(session: Session, stored: StoredGroup, keys: set[str]) -> None:
-    for key in keys:
-        session.execute(delete(ViewModel).where(ViewModel.id == stored.view_ids[key]))
-        own = stored.stations[key]
-        if not own.station.shared:
-            session.execute(
-                delete(ImportFindingModel).where(ImportFindingModel.station_id == own.id)
-            )
-            session.execute(delete(StationModel).where(StationModel.id == own.id))
-
-
-def save_station(
-    session: Session, stored: StoredStation, station: Station, *, source: Station | None = None
-) -> None:
-    """Write the next revision of a station; its groups' hashes are the caller's to refresh.
-
-    ``source`` is the station as it would be had nobody edited it, where the dataset changed.
-    """
-    values = {**station_values(station), "revision": stored.revision + 1}
-    if source is not None:
-        values["source_digest"] = station_digest(source)
-    session.execute(update(StationModel).where(StationModel.id == stored.id).values(values))
-
-
-def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
-    """Bring the inputs hashes of groups in step after a station of theirs changed."""
-    statement = (
-        select(
-            GroupModel.id,
-            GroupModel.pitch_length,
-            GroupModel.pitch_width,
-            GroupModel.positions,
-            GroupModel.paint,
-            ViewModel.digest,
-            StationModel.digest.label("station_digest"),
-        )
-        .join(ViewModel, ViewModel.group_id == GroupModel.id)
-        .join(StationModel, StationModel.id == ViewModel.station_id)
-        .where(GroupModel.id.in_(group_ids))
-        .order_by(GroupModel.id, ViewModel.position)
-    )
-    heads: dict[int, Any] = {}
-    pairs: dict[int, list[tuple[str, str]]] = {}
-    for row in session.execute(statement):
-        heads.setdefault(row.id, row)
-        pairs.setdefault(row.id, []).append((row.digest, row.station_digest))
-    rows = []
-    for key, row in heads.items():
-        positions = {} if row.positions is None else _positions(row.positions)
-        pitch = Pitch(row.pitch_length, row.pitch_width)
-        digest = inputs_hash(pitch, pairs[key], positions, paint_digests(row.paint))
-        rows.append({"id": key, "inputs_hash": digest})
-    session.execute(update(GroupModel), rows)
-
-
-def groups_of_station(session: Session, station_id: int) -> list[int]:
-    """Ids of the groups that a station's views belong to."""
-    statement = select(ViewModel.group_id).where(ViewModel.station_id == station_id).distinct()
-    return list(session.scalars(statement.order_by(ViewModel.group_id)))
-
-
-def station_pitches(session: Session, dataset_id: int) -> list[tuple[int, Pitch]]:
-    """Ids of a dataset's static cameras with each size of pitch that their groups have."""
-    statement = (
-        select(StationModel.id, GroupModel.pitch_length, GroupModel.pitch_width)
-        .join(ViewModel, ViewModel.station_id == StationModel.id)
-        .join(GroupModel, GroupModel.id == ViewModel.group_id)
-        .where(StationModel.dataset_id == dataset_id, StationModel.shared)
-        .distinct()
-    )
-    return [(station, Pitch(*size)) for station, *size in session.execute(statement)]
-
-
-def bump_groups(session: Session, group_ids: Sequence[int], at: str) -> None:
-    """Count a revision of groups that a change of something of theirs made."""
-    session.execute(
-        update(GroupModel)
-        .where(GroupModel.id.in_(group_ids))
-        .values(revision=GroupModel.revision + 1, changed=at)
-    )

@@ -9,9 +9,9 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app.store.groups import StoredStation, stored_station
 from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, LogModel, StationModel, VerdictModel
+from app.store.stations import StoredStation, stored_station
 
 VERDICT = (
     "actor",

@@ -8,7 +8,7 @@ from typing import Any
 from sqlalchemy import delete, insert, select, text
 from sqlalchemy.orm import Session
 
-from app.store.groups import StoredGroup, StoredStation, read_groups, stored_station
+from app.store.groups import StoredGroup, read_groups
 from app.store.models import (
     GroupModel,
     ImportFindingModel,
@@ -19,6 +19,7 @@ from app.store.models import (
     ViewModel,
 )
 from app.store.pitches import FINDING
+from app.store.stations import StoredStation, stored_station
 
 _BATCH = 500
 Rows = Sequence[Mapping[str, Any]]

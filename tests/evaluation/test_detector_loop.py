@@ -19,7 +19,8 @@ from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
 from app.review.evaluating.accept import AcceptRequest, accept
 from app.review.evaluating.detect import DetectRequest, detect
-from app.review.evaluating.evaluation import EvaluationRequest, run_evaluation, tables_of
+from app.review.evaluating.evaluation import tables_of
+from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
 from app.review.evaluating.onnx_model import OnnxModel
 from app.review.evaluating.predictions import view_predictions
 from app.review.importing.sources import Source, import_source

@@ -23,7 +23,7 @@ import pytest
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.sample.scene import Scene
 from app.soccer.group import Group
-from tests.e2e.service import run_touchline
+from tests.e2e.service import run_touchline, serving
 from tests.homes import copy_home, once_for_all
 from tests.scenes import make_scenes
 
@@ -146,6 +146,13 @@ def address(touchline) -> Iterator[str]:
         server.terminate()
         server.communicate(timeout=60)
     assert "Traceback" not in (errors := log.read_text()), errors
+
+
+@pytest.fixture(scope="module")
+def own_server(filled: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A server over a home of its own: what others judge and edit changes what is in a version."""
+    with serving(copy_home(filled, tmp_path_factory)) as address:
+        yield address
 
 
 @pytest.fixture(scope="session")

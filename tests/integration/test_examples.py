@@ -6,13 +6,10 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.e2e.service import serving
-from tests.homes import copy_home
 from touchline import Client
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -22,10 +19,8 @@ BLOCK = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
 
 
 @pytest.fixture(scope="module")
-def address(filled: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A server over a home of its own: what others judge and edit changes what is in a version."""
-    with serving(copy_home(filled, tmp_path_factory)) as address:
-        yield address
+def address(own_server: str) -> str:
+    return own_server
 
 
 @pytest.fixture(scope="module")

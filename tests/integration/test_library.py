@@ -12,18 +12,14 @@ import numpy as np
 import pytest
 
 import touchline as library
-from tests.e2e.service import serving
-from tests.homes import copy_home
 from touchline.errors import DataError, HashError, RequestError, StaleError, UnreachableError
 
 ALIKE_PX = 1e-9
 
 
 @pytest.fixture(scope="module")
-def address(filled: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A server over a home of its own: what others judge and edit changes what is in a version."""
-    with serving(copy_home(filled, tmp_path_factory)) as address:
-        yield address
+def address(own_server: str) -> str:
+    return own_server
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,7 @@ from app.review.editing.pitches import read_pitches
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.stations import load_station
 from app.review.editing.submit import load
-from app.review.evaluating.evaluation import EvaluationRequest, run_evaluation
+from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
 from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.evaluating.predictions import add_predictions
 from app.review.importing.ingest import ingest
@@ -41,7 +41,7 @@ from app.store.session import Store
 from app.store.uploads import UploadWriter
 from tests.waiting import SECONDS
 
-EXAMPLES = 5
+EXAMPLES = {GenerationMode.POSITIVE: 5, GenerationMode.NEGATIVE: 3}
 EVALUATION, DELETED_EVALUATION = "1", "2"
 """Ids of sets of predictions and of evaluations, both."""
 EXPORT, DELETED_EXPORT = "1", "2"
@@ -120,7 +120,7 @@ class Attack:
 
         @given(case=operation.as_strategy(generation_mode=mode))
         @settings(
-            max_examples=EXAMPLES,
+            max_examples=EXAMPLES[mode],
             deadline=None,
             derandomize=True,
             database=None,

@@ -128,10 +128,10 @@ class TestCommands:
 
 class TestCrowd:
     def test_people_on_the_same_groups_lose_no_change_and_meet_no_error(self, home: Path) -> None:
-        found = crowd.crowd(home, people=4, seconds=5, think=0, seed=1)
+        found = crowd.crowd(home, people=4, seconds=3, think=0, seed=1)
         assert found.faults == []
         assert found.changes > 0
-        assert found.lines()[0].startswith("4 people, 5 s: ")
+        assert found.lines()[0].startswith("4 people, 3 s: ")
 
 
 class TestFlood:

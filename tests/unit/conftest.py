@@ -16,6 +16,7 @@ from sqlalchemy import event
 
 from app.cli import main
 from app.store.session import Store
+from tests.kept_child import USERS, KeptChild
 
 # As the server logs. The default draws a traceback with all its variables, half a second each.
 structlog.configure(
@@ -38,6 +39,15 @@ class Cost:
     statements: int = 0
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _children_are_kept() -> Iterator[None]:
+    """Who asks a child for something gets one that an earlier test has left, if there is one."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in USERS:
+            patch.setattr(f"{module}.Child", KeptChild)
+        yield
+
+
 @pytest.fixture(autouse=True)
 def _usual_umask() -> Iterator[None]:
     """What a server or a restore takes from new files ends with its test."""
@@ -47,19 +57,25 @@ def _usual_umask() -> Iterator[None]:
 
 
 @pytest.fixture
+def home(tmp_path: Path) -> Path:
+    """Where the home of a test is; nothing is there yet."""
+    return tmp_path / "home"
+
+
+@pytest.fixture
 def touchline(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], home: Path
 ) -> Callable[..., tuple[int, str, str]]:
-    """Runs a command in a home of its own, ``tmp_path / "home"``: exit code, stdout, stderr."""
+    """Runs a command in the ``home`` of the test: exit code, stdout, stderr."""
     for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
         monkeypatch.delenv(name)
-    monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("TOUCHLINE_HOME", str(home))
 
     def command(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["touchline", *map(str, arguments)])
         with pytest.raises(SystemExit) as ended:
             main()
-        out, err = capsys.readouterr()
+        out, err = capfd.readouterr()
         return int(ended.value.code or 0), out, err
 
     return command

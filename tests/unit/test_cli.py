@@ -319,7 +319,7 @@ class TestCalibrateAndScore:
 class TestSample:
     def test_writes_a_tree_that_can_be_imported(self, run: Run, tmp_path: Path) -> None:
         out = tmp_path / "tree"
-        code, told, _ = run("sample", out, "--groups", 3, "--labels-only", "--json")
+        code, told, _ = run("sample", out, "--groups", 3, "--labels-only", "--workers", 1, "--json")
         assert (code, json.loads(told)["groups"]) == (0, 3)
         assert (out / "truth.json").is_file()
         code, told, _ = run("import", "soccernet-v3", out, "--dataset", "s", "--json")

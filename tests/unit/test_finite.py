@@ -33,7 +33,8 @@ from app.finite import finite, json_text
 from app.geometry.camera import Camera
 from app.review.exporting.formats import FORMATS, WriteOptions, write_format
 from app.review.queue.findings import GroupFindings
-from app.soccer.solution import BestBall, Finding, Fix, Gate, MarkingFit, Solution, Suspect
+from app.soccer.finding import Finding, Fix
+from app.soccer.solution import BestBall, Gate, MarkingFit, Solution, Suspect
 from app.store.jobs import _text as job_text
 from app.store.value_codec import dumps, from_json, to_json
 from tests.unit.datasets.conftest import camera, issia_group, soccer_group, solved  # noqa: F401

@@ -12,7 +12,7 @@ from app.api.problem import responses
 from app.api.schemas.queue import FindingList, FindingRow
 from app.review.datasets.dataset import dataset_id
 from app.review.queue.findings import count_groups, read_findings
-from app.soccer.solution import FINDING_KINDS
+from app.soccer.finding import FINDING_KINDS
 
 router = APIRouter(prefix="/findings", tags=["findings"])
 

@@ -19,6 +19,7 @@ from app.api.deps import (
     Id,
     IfMatch,
     QueryText,
+    Services,
     etag_matches,
 )
 from app.api.edits import preview_edits
@@ -198,11 +199,7 @@ def undo(
     group: Id, services: AppServices, actor: Actor, if_match: IfMatch, asked: AskedUnder
 ) -> Response:
     """Take the last edit back; 409 when there is none."""
-    store = services.store
-    change = partial(
-        submit.undo, store, group, if_match=if_match, actor=actor, paint=services.paint
-    )
-    return change_group(asked, lambda: load_document(store, group), change)
+    return _step(submit.undo, services, group, actor, if_match, asked)
 
 
 @router.post(
@@ -215,10 +212,19 @@ def redo(
     group: Id, services: AppServices, actor: Actor, if_match: IfMatch, asked: AskedUnder
 ) -> Response:
     """Do again what was undone last; 409 when there is nothing."""
+    return _step(submit.redo, services, group, actor, if_match, asked)
+
+
+def _step(
+    step: Callable[..., GroupState],
+    services: Services,
+    group: int,
+    actor: str,
+    if_match: str,
+    asked: Asked | None,
+) -> Response:
     store = services.store
-    change = partial(
-        submit.redo, store, group, if_match=if_match, actor=actor, paint=services.paint
-    )
+    change = partial(step, store, group, if_match=if_match, actor=actor, paint=services.paint)
     return change_group(asked, lambda: load_document(store, group), change)
 
 

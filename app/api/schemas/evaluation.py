@@ -10,11 +10,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 from app.api.schemas.document import Document
 from app.api.schemas.version import VersionId
 from app.evaluation.table import Cell
-from app.review.evaluating.evaluation import (
-    Comparison,
-    EvaluationRequest,
-    read_tables,
-)
+from app.review.evaluating.evaluation import Comparison, read_tables
+from app.review.evaluating.evaluation_run import EvaluationRequest
 
 SetId = Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
 

@@ -12,7 +12,7 @@ from app.api.schemas.group import State, image_address
 from app.api.schemas.solution import FailingGate, FindingDocument, FixDocument, OfferDocument
 from app.review.queue.findings import GroupFindings
 from app.review.queue.listing import GroupRow as QueueRow
-from app.soccer.solution import Finding
+from app.soccer.finding import Finding
 from app.store.log import LogEntry
 
 THUMBNAIL_WIDTH = 208

@@ -16,9 +16,10 @@ from app.geometry.lens import BROWN_CONRADY
 from app.review.editing.codec import edit_to_json
 from app.review.editing.fixes import offers
 from app.soccer.camera_sigma import camera_sigma
+from app.soccer.finding import Finding
 from app.soccer.frames import Box
 from app.soccer.group import Group
-from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Finding, Solution
+from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Solution
 
 DRAWN_DECIMALS = 3
 """What is only drawn travels to a thousandth of a pixel; what is edited or judged, exactly."""

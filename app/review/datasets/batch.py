@@ -28,11 +28,12 @@ from app.progress import Progress
 from app.review.datasets.matches import Share, read_matches, shares_of
 from app.review.datasets.pictures import as_taken, picture_for
 from app.soccer.annotation import Lines, make_lines
+from app.soccer.finding import Finding
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.soccer.solution import Calibration, Finding
+from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
 from app.solving.calibration_findings import calibration_findings
 from app.solving.leave_one_out import leave_one_out

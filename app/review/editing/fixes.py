@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 from app.review.editing.edit import Edit, IncludeView, SetBall, SetLines, SetPicture
 from app.soccer.annotation import BallAnnotation
+from app.soccer.finding import Fix
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View
 from app.soccer.picture import OPEN
 from app.soccer.pitch import twin_marking
-from app.soccer.solution import Fix
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,11 @@ from app.store.codecs import (
     view_from_json,
 )
 from app.store.digest import digest, station_digest, view_digest
-from app.store.groups import StoredGroup, StoredStation
+from app.store.groups import StoredGroup
 from app.store.imports import shared_stations
 from app.store.log import LogEntry, group_entries, groups_with_past, station_entries
 from app.store.session import Session
+from app.store.stations import StoredStation
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,8 @@ from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, Paint
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import clicks_key
 from app.store.clock import now
-from app.store.groups import StoredGroup, next_revision, read_groups, save_revision
+from app.store.group_revisions import next_revision, save_revision
+from app.store.groups import StoredGroup, read_groups
 from app.store.log import Entry, append
 from app.store.paint import (
     PAINT,

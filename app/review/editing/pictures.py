@@ -23,7 +23,8 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.policy import CalibrationPolicy
 from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
 from app.store.clock import now
-from app.store.groups import next_revision, read_groups, save_revision
+from app.store.group_revisions import next_revision, save_revision
+from app.store.groups import read_groups
 from app.store.log import Entry, append
 from app.store.pitches import groups_of_match, match_pitches
 from app.store.queue import refresh_queue

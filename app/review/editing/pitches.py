@@ -23,10 +23,10 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, digested_calibration
 from app.soccer.solution import SOLVER_VERSION
 from app.solving.pitch_size import PitchEstimate, PitchFrame, estimate_pitch
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.digest import digest
-from app.store.groups import next_revision, read_groups, save_revision
+from app.store.group_revisions import next_revision, save_revision
+from app.store.groups import read_groups
 from app.store.log import Entry, LogEntry, append
 from app.store.pitches import (
     PITCH,
@@ -168,7 +168,6 @@ def change_pitches(
     *,
     if_match: str | None,
     actor: str,
-    keep: Keep[DatasetPitches] = keep_nothing,
 ) -> DatasetPitches:
     """Give matches another pitch: all their groups at once; they are stale until solved again.
 
@@ -180,14 +179,13 @@ def change_pitches(
         wanted: Sizes by match; the one in use changes nothing.
         if_match: ETag of the pitches that the change builds on; None: whatever they are.
         actor: Who says so.
-        keep: Keeps the answer with the change.
 
     Raises:
         NotFoundError: There is no such dataset or match.
         StaleRevisionError: Somebody else was faster.
     """
     with store.write() as session:
-        return apply_pitches(session, dataset, wanted, if_match=if_match, actor=actor, keep=keep)
+        return apply_pitches(session, dataset, wanted, if_match=if_match, actor=actor)
 
 
 def apply_pitches(
@@ -197,7 +195,6 @@ def apply_pitches(
     *,
     if_match: str | None,
     actor: str,
-    keep: Keep[DatasetPitches] = keep_nothing,
 ) -> DatasetPitches:
     """``change_pitches`` within a write session."""
     state = _read(session, dataset)
@@ -213,7 +210,6 @@ def apply_pitches(
     shown = {item.match: (item.estimate, item.problem) for item in state.items}
     changed = _read(session, state.dataset_id, shown)
     _note(session, changed)
-    keep(changed)(session)
     return changed
 
 

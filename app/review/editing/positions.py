@@ -28,7 +28,8 @@ from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.match_position import Place, Places, pan_of, place_of
 from app.store.clock import now
 from app.store.digest import digest
-from app.store.groups import next_revision, read_groups, save_revision
+from app.store.group_revisions import next_revision, save_revision
+from app.store.groups import read_groups
 from app.store.log import Entry, append
 from app.store.positions import (
     POSITION,

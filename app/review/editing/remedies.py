@@ -10,10 +10,11 @@ import numpy as np
 
 from app.review.editing.edit import Edit, SetLines
 from app.review.editing.fixes import Offer, ball_at, edit_of_fix, offers, rank, sentence
+from app.soccer.finding import Fix
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View
 from app.soccer.policy import Policy
-from app.soccer.solution import Calibration, Fix, Gate, MarkingFit, Solution, ViewSolution
+from app.soccer.solution import Calibration, Gate, MarkingFit, Solution, ViewSolution
 from app.solving.solve import solve
 
 MOST_TRIALS = 24

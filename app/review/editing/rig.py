@@ -32,10 +32,11 @@ from app.solving.rig_proposal import RigProposal, propose_rig
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import lines_to_json
 from app.store.digest import digest
-from app.store.groups import read_groups, station_pitches
+from app.store.groups import read_groups
 from app.store.imports import known_groups, shared_stations
 from app.store.log import read_entry
 from app.store.session import Session, Store
+from app.store.stations import station_pitches
 
 CAMERAS, SIGMA = "cameras", "sigma"
 """What can be accepted: the adjusted cameras; or how far those in use may be off, alone."""

@@ -8,14 +8,16 @@ from dataclasses import dataclass, replace
 from app.errors import NotFoundError, StaleRevisionError
 from app.review.editing.etags import group_etag, said_of, said_part
 from app.review.editing.undo import Stacks, read_stacks
+from app.soccer.finding import Finding
 from app.soccer.group import Group
 from app.soccer.policy import Policy
-from app.soccer.solution import Finding, Solution
+from app.soccer.solution import Solution
 from app.store.digest import digest
-from app.store.groups import StoredGroup, StoredStation, read_groups
+from app.store.groups import StoredGroup, read_groups
 from app.store.queue import import_findings, is_fixed
 from app.store.session import Session
 from app.store.solutions import SolutionKey, read_solutions
+from app.store.stations import StoredStation
 from app.store.verdicts import StoredVerdict, read_last_verdicts
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NotRequired, TypedDict, Unpack
 
 from app.errors import ConflictError, NotFoundError
 from app.review.editing.codec import edit_to_json, station_edit_from_json
@@ -26,14 +27,8 @@ from app.store.clock import now
 from app.store.codecs import Json
 from app.store.datasets import dataset_name
 from app.store.digest import group_inputs_hash
-from app.store.groups import (
-    StoredGroup,
-    StoredStation,
-    groups_of_station,
-    read_stations,
-    refresh_inputs_hashes,
-    save_station,
-)
+from app.store.group_revisions import refresh_inputs_hashes
+from app.store.groups import StoredGroup
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
@@ -42,6 +37,7 @@ from app.store.solutions import (
     SolutionKey,
     insert_solutions,
 )
+from app.store.stations import StoredStation, groups_of_station, read_stations, save_station
 
 
 @dataclass(frozen=True)
@@ -67,6 +63,22 @@ class _Change:
     station: Station
 
 
+class _How(TypedDict):
+    """How a step is taken.
+
+    Attributes:
+        if_match: ETag of the station that it builds on.
+        actor: Who says so.
+        shown: One of its groups, which is solved and saved with it.
+        keep: Keeps the answer, that group, with it.
+    """
+
+    if_match: str
+    actor: str
+    shown: NotRequired[int | None]
+    keep: NotRequired[Keep[GroupState]]
+
+
 _Plan = Callable[[Session, StationState], _Change]
 _Trial = tuple[StoredGroup, Group, Mapping[str, Calibration]]
 
@@ -85,11 +97,7 @@ def submit_station(
     store: Store,
     station_id: int,
     edit: StationEdit,
-    *,
-    if_match: str,
-    actor: str,
-    shown: int | None = None,
-    keep: Keep[GroupState] = keep_nothing,
+    **how: Unpack[_How],
 ) -> StationState:
     """Save an edit of a static camera; its groups are then stale until they are solved again.
 
@@ -99,10 +107,8 @@ def submit_station(
         store: The database.
         station_id: The station.
         edit: What to change.
-        if_match: ETag of the station that the edit builds on.
-        actor: Who says so.
-        shown: One of its groups, which is solved and saved with the edit.
-        keep: Keeps the answer, that group, with the edit.
+        how: ETag of the station that the edit builds on (``if_match``), who says so (``actor``), the
+            group that is solved and saved with it (``shown``), and what keeps that (``keep``).
 
     Raises:
         StaleRevisionError: ``if_match`` is not the station's present ETag.
@@ -110,14 +116,7 @@ def submit_station(
         InputError: The edit says something impossible.
     """
 
-    def plan(_session: Session, state: StationState) -> _Change:
-        station = state.station
-        if isinstance(edit, SetStationLines):
-            require_few_points(f"camera {station.key}", station.lines, edit.lines)
-        body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(station))}
-        return _Change("station_edit", body, edit.apply(station))
-
-    return _change(store, station_id, plan, if_match, actor, shown, keep)
+    return _change(store, station_id, _plan_edit(edit), **how)
 
 
 def submit_stations(
@@ -139,17 +138,7 @@ def submit_stations(
         StaleRevisionError: One of the cameras has changed since.
     """
 
-    def plan(edit: StationEdit) -> _Plan:
-        def change(_session: Session, state: StationState) -> _Change:
-            body = {
-                "edit": edit_to_json(edit),
-                "inverse": edit_to_json(edit.inverse(state.station)),
-            }
-            return _Change("station_edit", body, edit.apply(state.station))
-
-        return change
-
-    steps = [(state.id, plan(edit), state.etag) for state, edit in edits]
+    steps = [(state.id, _plan_edit(edit), state.etag) for state, edit in edits]
     with store.write() as session:
         if check is not None:
             check(session)
@@ -183,40 +172,25 @@ def _save_all(session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: 
     refresh_queue(session, sorted(groups))
 
 
-def undo_station(
-    store: Store,
-    station_id: int,
-    *,
-    if_match: str,
-    actor: str,
-    shown: int | None = None,
-    keep: Keep[GroupState] = keep_nothing,
-) -> StationState:
+def undo_station(store: Store, station_id: int, **how: Unpack[_How]) -> StationState:
     """Take the last edit of a static camera back; raises ConflictError without one."""
-    return _change(store, station_id, _plan_step("undo"), if_match, actor, shown, keep)
+    return _change(store, station_id, _plan_step("undo"), **how)
 
 
-def redo_station(
-    store: Store,
-    station_id: int,
-    *,
-    if_match: str,
-    actor: str,
-    shown: int | None = None,
-    keep: Keep[GroupState] = keep_nothing,
-) -> StationState:
+def redo_station(store: Store, station_id: int, **how: Unpack[_How]) -> StationState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    return _change(store, station_id, _plan_step("redo"), if_match, actor, shown, keep)
+    return _change(store, station_id, _plan_step("redo"), **how)
 
 
 def _change(
     store: Store,
     station_id: int,
     plan: _Plan,
+    *,
     if_match: str,
     actor: str,
-    shown: int | None,
-    keep: Keep[GroupState],
+    shown: int | None = None,
+    keep: Keep[GroupState] = keep_nothing,
 ) -> StationState:
     with store.read() as session:
         state, change = _planned(session, station_id, plan, if_match)
@@ -287,6 +261,17 @@ def _read(session: Session, station_id: int) -> StationState:
         can_redo=stacks.can_redo,
         stored=stored,
     )
+
+
+def _plan_edit(edit: StationEdit) -> _Plan:
+    def plan(_session: Session, state: StationState) -> _Change:
+        station = state.station
+        if isinstance(edit, SetStationLines):
+            require_few_points(f"camera {station.key}", station.lines, edit.lines)
+        body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(station))}
+        return _Change("station_edit", body, edit.apply(station))
+
+    return plan
 
 
 def _plan_step(kind: str) -> _Plan:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NotRequired, TypedDict, Unpack
 
 from app.errors import ConflictError, NotFoundError, SharedStationError
 from app.review.editing.codec import edit_from_json, edit_to_json
@@ -26,13 +27,8 @@ from app.solving.solve import solve
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
-from app.store.groups import (
-    StoredGroup,
-    group_of_view,
-    next_revision,
-    read_groups,
-    save_revision,
-)
+from app.store.group_revisions import next_revision, save_revision
+from app.store.groups import StoredGroup, group_of_view, read_groups
 from app.store.log import Entry, LogEntry, append, group_entries
 from app.store.paint import FOLLOWS, PAINT, insert_readings
 from app.store.queue import refresh_queue, update_row
@@ -59,6 +55,22 @@ class _Outcome:
     after: Record
     solution: Solution
     encoded: EncodedSolution
+
+
+class _How(TypedDict):
+    """How a step is taken.
+
+    Attributes:
+        if_match: ETag of the state that it builds on.
+        actor: Who says so.
+        keep: Keeps the answer with the step.
+        paint: Reads the paint of edited lines again, as part of it; None: it stays as it is.
+    """
+
+    if_match: str
+    actor: str
+    keep: NotRequired[Keep[GroupState]]
+    paint: NotRequired[PaintFollower | None]
 
 
 _Find = Callable[[Session], int]
@@ -92,11 +104,7 @@ def submit(
     store: Store,
     group_id: int,
     edit: Edit,
-    *,
-    if_match: str,
-    actor: str,
-    keep: Keep[GroupState] = keep_nothing,
-    paint: PaintFollower | None = None,
+    **how: Unpack[_How],
 ) -> GroupState:
     """Save an edit and answer with the group as it is then, solved.
 
@@ -104,10 +112,8 @@ def submit(
         store: The database.
         group_id: The group.
         edit: What to change.
-        if_match: ETag of the state that the edit builds on.
-        actor: Who says so.
-        keep: Keeps the answer with the edit.
-        paint: Reads the paint of edited lines again, as part of the edit; None: it stays as it is.
+        how: ETag of the state that the edit builds on (``if_match``), who says so (``actor``), what
+            keeps the answer with it (``keep``), and what reads the paint of its lines (``paint``).
 
     Raises:
         StaleRevisionError: Somebody else was faster.
@@ -115,19 +121,14 @@ def submit(
         InputError, NotFoundError: The edit does not fit the group.
         StorageError: Nothing was saved.
     """
-    plan = _plan_edit(lambda _stored: edit)
-    return _change(store, lambda _session: group_id, plan, if_match, actor, keep, paint)
+    return _change(store, lambda _session: group_id, _plan_edit(lambda _stored: edit), **how)
 
 
 def submit_view(
     store: Store,
     view_id: int,
     edit_of: Callable[[str], Edit],
-    *,
-    if_match: str,
-    actor: str,
-    keep: Keep[GroupState] = keep_nothing,
-    paint: PaintFollower | None = None,
+    **how: Unpack[_How],
 ) -> GroupState:
     """``submit`` for a view's id: ``edit_of`` makes the edit from the view's key."""
 
@@ -137,37 +138,17 @@ def submit_view(
     def find(session: Session) -> int:
         return group_of_view(session, view_id)
 
-    return _change(store, find, _plan_edit(edit), if_match, actor, keep, paint)
+    return _change(store, find, _plan_edit(edit), **how)
 
 
-def undo(
-    store: Store,
-    group_id: int,
-    *,
-    if_match: str,
-    actor: str,
-    keep: Keep[GroupState] = keep_nothing,
-    paint: PaintFollower | None = None,
-) -> GroupState:
+def undo(store: Store, group_id: int, **how: Unpack[_How]) -> GroupState:
     """Take the last edit of a group back, whoever made it; raises ConflictError without one."""
-    return _change(
-        store, lambda _session: group_id, _plan_step("undo"), if_match, actor, keep, paint
-    )
+    return _change(store, lambda _session: group_id, _plan_step("undo"), **how)
 
 
-def redo(
-    store: Store,
-    group_id: int,
-    *,
-    if_match: str,
-    actor: str,
-    keep: Keep[GroupState] = keep_nothing,
-    paint: PaintFollower | None = None,
-) -> GroupState:
+def redo(store: Store, group_id: int, **how: Unpack[_How]) -> GroupState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    return _change(
-        store, lambda _session: group_id, _plan_step("redo"), if_match, actor, keep, paint
-    )
+    return _change(store, lambda _session: group_id, _plan_step("redo"), **how)
 
 
 def preview(
@@ -258,10 +239,11 @@ def _change(
     store: Store,
     find: _Find,
     plan: _Plan,
+    *,
     if_match: str,
     actor: str,
-    keep: Keep[GroupState],
-    paint: PaintFollower | None,
+    keep: Keep[GroupState] = keep_nothing,
+    paint: PaintFollower | None = None,
 ) -> GroupState:
     while True:
         with store.read() as session:

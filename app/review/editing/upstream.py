@@ -9,7 +9,9 @@ from dataclasses import dataclass, replace
 
 from app.soccer.group import Group, Station, View
 from app.store.digest import station_digest, view_digest
-from app.store.groups import StoredGroup, StoredStation, keeps_station
+from app.store.group_revisions import keeps_station
+from app.store.groups import StoredGroup
+from app.store.stations import StoredStation
 
 KIND = "upstream_changed"
 

@@ -11,7 +11,7 @@ from app.datasets.archive import open_tree
 from app.datasets.report import Report
 from app.errors import NotFoundError
 from app.progress import Progress
-from app.review.evaluating.evaluation import EvaluationRequest, run_evaluation
+from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
 from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.evaluating.predictions import add_predictions, find_predictions
 from app.review.versions.version import find_version

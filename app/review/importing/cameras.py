@@ -11,16 +11,11 @@ from app.review.datasets.dataset import get_dataset
 from app.review.importing.ingest import IngestReport, attempt
 from app.store.clock import now
 from app.store.codecs import camera_to_json
-from app.store.groups import (
-    bump_groups,
-    groups_of_station,
-    read_stations,
-    refresh_inputs_hashes,
-    save_station,
-)
+from app.store.group_revisions import bump_groups, refresh_inputs_hashes
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
+from app.store.stations import groups_of_station, read_stations, save_station
 from app.store.views import dataset_views
 
 BATCH = 500

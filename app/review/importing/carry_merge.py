@@ -15,7 +15,8 @@ from app.soccer.group import Group, View
 from app.store.clock import now
 from app.store.digest import station_digest, view_digest
 from app.store.findings import group_findings
-from app.store.groups import StoredGroup, read_groups, save_group
+from app.store.group_revisions import save_group
+from app.store.groups import StoredGroup, read_groups
 from app.store.log import Entry, append
 from app.store.session import Session
 

@@ -15,16 +15,12 @@ from app.store.clock import now
 from app.store.codecs import station_to_json
 from app.store.digest import station_digest
 from app.store.findings import replace_station_finding, station_finding
-from app.store.groups import (
-    StoredStation,
-    groups_of_station,
-    refresh_inputs_hashes,
-    save_station,
-)
+from app.store.group_revisions import refresh_inputs_hashes
 from app.store.imports import shared_stations
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
 from app.store.session import Session
+from app.store.stations import StoredStation, groups_of_station, save_station
 
 
 def merge_stations(

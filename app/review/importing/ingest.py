@@ -23,8 +23,9 @@ from app.store.clock import now
 from app.store.datasets import find_dataset
 from app.store.digest import source_hash
 from app.store.findings import group_findings, groups_told, replace_group_findings
+from app.store.group_revisions import save_group
 from app.store.group_rows import NewRows
-from app.store.groups import StoredGroup, read_groups, save_group
+from app.store.groups import StoredGroup, read_groups
 from app.store.imports import known_groups, newest_imports
 from app.store.log import Entry, append
 from app.store.pitches import edited_pitches

@@ -15,7 +15,8 @@ from app.soccer.group import Group
 from app.store.clock import now
 from app.store.codecs import Json
 from app.store.findings import add_group_findings, group_findings, groups_told
-from app.store.groups import StoredGroup, read_groups, save_group
+from app.store.group_revisions import save_group
+from app.store.groups import StoredGroup, read_groups
 from app.store.imports import known_groups
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue

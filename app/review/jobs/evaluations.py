@@ -7,12 +7,8 @@ from typing import Any
 
 from app.review.datasets.dataset import get_dataset
 from app.review.evaluating.accept import AcceptReport, AcceptRequest, accept, plan_accept
-from app.review.evaluating.evaluation import (
-    EvaluationRequest,
-    check_evaluation,
-    list_evaluations,
-    run_evaluation,
-)
+from app.review.evaluating.evaluation import list_evaluations
+from app.review.evaluating.evaluation_run import EvaluationRequest, check_evaluation, run_evaluation
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.store.codecs import Json

@@ -8,7 +8,7 @@ knows how (``Jobs.resumes``) and marks the others failed.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import replace
@@ -18,10 +18,10 @@ import structlog
 
 from app.errors import (
     ConflictError,
-    NotFoundError,
     OverloadedError,
     StorageError,
 )
+from app.review.jobs.job_records import JobRecords, need_job
 from app.review.jobs.job_run import JobProgress, JobRun, RunQueue, Work
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
@@ -35,21 +35,17 @@ from app.store.jobs import (
     WAITING,
     Job,
     NewJob,
-    delete_job,
     insert_job,
-    read_job,
     read_jobs,
     trim_jobs,
     update_job,
 )
-from app.store.session import Session, Store
+from app.store.session import Store
 
 log = structlog.get_logger("touchline.jobs")
 
 CAPACITY = 32
 """Jobs that may wait; one more is told to come back."""
-TICK = 0.25
-"""Seconds between two looks at the progress of the running job."""
 CLOSE_SECONDS = 10.0
 """How long a server that stops waits for the running job's next step."""
 PROMPT = frozenset({"solve"})
@@ -60,19 +56,19 @@ KEPT = {"solve": 200, "bulk": 200, "verify": 200}
 MOST_TRIES = 2
 """So many times a server may die at a job before it is left alone."""
 
-Listener = Callable[[Job], None]
 Pool = Callable[[], AbstractContextManager[Executor]]
 """Makes an executor for the length of one large job, so that requests keep their processor."""
 
 
-class Jobs:
+class Jobs(JobRecords):
     """The jobs of one server: a worker beside the requests, and who wants to hear of them.
 
     ``pool`` is for work that is worth processes of its own; without one it stays in this process.
     """
 
     def __init__(self, store: Store, *, capacity: int = CAPACITY, pool: Pool | None = None):
-        self._store, self._capacity, self.pool = store, capacity, pool
+        super().__init__(store)
+        self._capacity, self.pool = capacity, pool
         # Replaced as a whole and only under ``_changed``, so that it is read without.
         self._queue = RunQueue()
         self._entering = 0
@@ -81,7 +77,6 @@ class Jobs:
         self._closing = threading.Event()
         self._worker: threading.Thread | None = None
         self._resumers: dict[str, Callable[[Job], Work]] = {}
-        self._listeners: list[Listener] = []
 
     def resumes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
         """Start jobs of a kind again after a restart; to be told before ``start``.
@@ -91,10 +86,6 @@ class Jobs:
             work_of: From a job's record (its ``request`` above all) to its work.
         """
         self._resumers[kind] = work_of
-
-    def listen(self, listener: Listener) -> None:
-        """Call a function, on the worker's thread, whenever a job changes; it must be quick."""
-        self._listeners.append(listener)
 
     def start(self) -> None:
         """Take up what an earlier server left behind, or say that it is lost."""
@@ -143,7 +134,7 @@ class Jobs:
             known = self._waiting_for(kind, dataset_id) if once else None
             if not once:
                 self._require_room()
-            job = _need(session, insert_job(session, new) if known is None else known.id)
+            job = need_job(session, insert_job(session, new) if known is None else known.id)
             keep(job)(session)
             if known is None:
                 progress = JobProgress(job.id, self._closing)
@@ -152,35 +143,6 @@ class Jobs:
             return job
         self._announce(job)
         return job
-
-    def get(self, job_id: int) -> Job:
-        """A job as it stands.
-
-        Raises:
-            NotFoundError: There is none of that id.
-        """
-        with self._store.read() as session:
-            return _need(session, job_id)
-
-    def find(
-        self,
-        *,
-        dataset_id: int | None = None,
-        kinds: Sequence[str] = (),
-        states: Sequence[str] = (),
-        before: int | None = None,
-        limit: int = 50,
-    ) -> list[Job]:
-        """Jobs, the newest first; ``before`` is the id of the last one of the page before."""
-        with self._store.read() as session:
-            return read_jobs(
-                session,
-                dataset_id=dataset_id,
-                kinds=kinds,
-                states=states,
-                before=before,
-                limit=limit,
-            )
 
     def cancel(self, job_id: int) -> Job:
         """End a job: one that waits at once, one that runs at its next step.
@@ -202,18 +164,6 @@ class Jobs:
         if run is not None:
             self._finish(run, state=CANCELLED, sentence="Cancelled before it began.")
         return self.get(job_id)
-
-    def forget(self, job_id: int) -> None:
-        """Delete the record of a job that is over.
-
-        Raises:
-            NotFoundError: There is none of that id.
-            ConflictError: It is not over.
-        """
-        with self._store.write() as session:
-            if _need(session, job_id).state in OPEN:
-                raise ConflictError(f"job {job_id} is not over yet", hint="Cancel it first.")
-            delete_job(session, job_id)
 
     def belongs(self, job_id: int, dataset_id: int) -> None:
         """Note whose a running job is, where its dataset came to be while it ran."""
@@ -377,16 +327,6 @@ class Jobs:
             with suppress(StorageError):
                 self._save(run.id, begun=-1)
 
-    def _tick(self, run: JobRun, ended: threading.Event) -> None:
-        """Keep the record in step with the progress, off the work's own thread: the work may hold
-        the write lock when it tells how far it is."""
-        shown = run.progress.place
-        while not ended.wait(TICK):
-            if run.progress.place != shown:
-                shown = run.progress.place
-                with suppress(StorageError):
-                    self._save(run.id, **run.columns)
-
     def _finish(self, run: JobRun, **values: Any) -> None:
         place = run.columns
         # Where the disk is full for a moment, the record waits for it.
@@ -399,21 +339,3 @@ class Jobs:
             else:
                 break
         run.over.set()
-
-    def _save(self, job_id: int, **values: Any) -> None:
-        with self._store.write() as session:
-            update_job(session, job_id, **values)
-            job = read_job(session, job_id)
-        if job is not None:
-            self._announce(job)
-
-    def _announce(self, job: Job) -> None:
-        for listener in self._listeners:
-            listener(job)
-
-
-def _need(session: Session, job_id: int) -> Job:
-    job = read_job(session, job_id)
-    if job is None:
-        raise NotFoundError(f"there is no job {job_id}")
-    return job

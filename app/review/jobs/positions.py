@@ -8,8 +8,8 @@ from app.review.datasets.dataset import dataset_id
 from app.review.editing.positions import apply_take_back, require_sharable, share_positions
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.solve import request_solve
-from app.store.answers import Keep, Kept, keep_nothing
+from app.review.jobs.solve import request_solve, solve_after
+from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.session import Session, Store
@@ -59,14 +59,11 @@ def take_positions_back(
     """
     number = dataset_id(store, dataset)
 
-    def change(job: Job) -> Kept:
-        def write(session: Session) -> None:
-            apply_take_back(session, number, match, actor=actor)
-            keep(job)(session)
+    def change(session: Session, job: Job) -> Job:
+        apply_take_back(session, number, match, actor=actor)
+        return job
 
-        return write
-
-    return request_solve(jobs, store, number, actor=actor, keep=change)
+    return solve_after(jobs, store, number, change, actor=actor, keep=keep)
 
 
 def _work(jobs: Jobs, store: Store, dataset: int, matches: list[str] | None, actor: str) -> Work:

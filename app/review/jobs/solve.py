@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
+from typing import TypeVar
 
 from app.review.datasets.dataset import get_dataset, list_datasets
 from app.review.editing.pitches import (
@@ -25,6 +27,7 @@ from app.store.jobs import Job
 from app.store.session import Session, Store
 
 KIND = "solve"
+Changed = TypeVar("Changed")
 WORTH_A_POOL = 400
 """Groups from which on starting processes costs less than it saves the requests."""
 MATCHES_WORTH_A_POOL = 4
@@ -66,6 +69,38 @@ def request_solve(
     )
 
 
+def solve_after(
+    jobs: Jobs,
+    store: Store,
+    dataset_id: int,
+    change: Callable[[Session, Job], Changed],
+    *,
+    actor: str,
+    keep: Keep[Changed] = keep_nothing,
+) -> Changed:
+    """Change something of a dataset and solve what that leaves stale, soon: both, or neither.
+
+    Args:
+        jobs: Where the job is queued.
+        store: The database.
+        dataset_id: The dataset.
+        change: Makes the change, in the transaction of the job's record; what it returns is kept.
+        actor: Who says so.
+        keep: Keeps the answer with the change.
+    """
+    changed: list[Changed] = []
+
+    def both(job: Job) -> Kept:
+        def write(session: Session) -> None:
+            changed.append(change(session, job))
+            keep(changed[0])(session)
+
+        return write
+
+    request_solve(jobs, store, dataset_id, actor=actor, keep=both)
+    return changed[0]
+
+
 def request_policy(
     jobs: Jobs,
     store: Store,
@@ -81,18 +116,12 @@ def request_policy(
     Raises:
         StaleRevisionError: Somebody else was faster.
     """
-    judged: list[Judged] = []
 
-    def change(job: Job) -> Kept:
-        def write(session: Session) -> None:
-            state = apply_policy(session, dataset_id, policy, if_match=if_match, actor=actor)
-            judged.append(Judged(state, job))
-            keep(judged[0])(session)
+    def change(session: Session, job: Job) -> Judged:
+        state = apply_policy(session, dataset_id, policy, if_match=if_match, actor=actor)
+        return Judged(state, job)
 
-        return write
-
-    request_solve(jobs, store, dataset_id, actor=actor, keep=change)
-    return judged[0]
+    return solve_after(jobs, store, dataset_id, change, actor=actor, keep=keep)
 
 
 def request_pitches(
@@ -111,18 +140,12 @@ def request_pitches(
         NotFoundError: There is no such match.
         StaleRevisionError: Somebody else was faster.
     """
-    sized: list[Sized] = []
 
-    def change(job: Job) -> Kept:
-        def write(session: Session) -> None:
-            state = apply_pitches(session, dataset_id, wanted, if_match=if_match, actor=actor)
-            sized.append(Sized(state, job))
-            keep(sized[0])(session)
+    def change(session: Session, job: Job) -> Sized:
+        state = apply_pitches(session, dataset_id, wanted, if_match=if_match, actor=actor)
+        return Sized(state, job)
 
-        return write
-
-    request_solve(jobs, store, dataset_id, actor=actor, keep=change)
-    return sized[0]
+    return solve_after(jobs, store, dataset_id, change, actor=actor, keep=keep)
 
 
 def resume_solving(jobs: Jobs, store: Store) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from app.soccer.finding import FINDING_KINDS
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 from app.soccer.reasons import REASONS
-from app.soccer.solution import FINDING_KINDS, GATES
+from app.soccer.solution import GATES
 
 Kind = Literal["number", "flag", "choice", "text", "ids", "order"]
 COMPARED = (":", "=", "<", "<=", ">", ">=")

@@ -8,8 +8,8 @@ from typing import Any
 
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.state import GroupState, read_states
+from app.soccer.finding import Finding
 from app.soccer.group import Group
-from app.soccer.solution import Finding
 from app.store.conditions import Condition, compares, contains, lists
 from app.store.listing import Listing
 from app.store.order import Order

@@ -22,7 +22,6 @@ from app.api.site import Site
 from app.config import Settings
 from app.geometry.camera import Camera
 from app.review.editing.recompute import solve_dataset
-from app.review.evaluating.prediction_reader import PredictionReader
 from app.review.importing.ingest import ingest
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import Group, Media, Station, View
@@ -156,38 +155,18 @@ def only_app(prepared_home: Path, tmp_path_factory: pytest.TempPathFactory) -> F
     return app
 
 
-class KeptReader(PredictionReader):
-    """Reads predictions for one test after the other: its process is started once."""
-
-    def close(self) -> None:
-        """Stay; see ``end``."""
-
-    def end(self) -> None:
-        """End the process."""
-        super().close()
-
-
-@pytest.fixture(scope="session")
-def reader(prepared_home: Path) -> Iterator[KeptReader]:
-    """Reads predictions for every application of this session."""
-    kept = KeptReader(Settings(home=prepared_home))
-    yield kept
-    kept.end()
-
-
 @pytest.fixture
 def app(
     only_app: FastAPI,
     prepared_home: Path,
     tmp_path: Path,
-    reader: KeptReader,
 ) -> Iterator[FastAPI]:
     """The whole application over a home of its own."""
     shutil.copytree(prepared_home, tmp_path / "home")
     opened = Services.open(Settings(home=tmp_path / "home"))
     # Most tests show no picture: the process that makes them starts with the first one.
     opened.frames.warm = lambda: None  # type: ignore[method-assign]
-    only_app.state.services = replace(opened, predictions=reader)
+    only_app.state.services = opened
     yield only_app
     only_app.state.services.close()
 

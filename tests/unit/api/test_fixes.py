@@ -13,9 +13,9 @@ from app.review.editing.codec import edit_to_json
 from app.review.editing.fixes import _ACTIONS, offers
 from app.review.editing.submit import load
 from app.review.importing.ingest import ingest
+from app.soccer.finding import FINDING_KINDS, Fix
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
-from app.soccer.solution import FINDING_KINDS, Fix
 from tests.docs.fixes import ACTIONS, EDITS, FINDINGS, PAGE, fixes_page, request_of
 
 ROOT = Path(__file__).resolve().parents[3]

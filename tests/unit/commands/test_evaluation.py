@@ -142,20 +142,11 @@ class TestEvaluate:
         done = run("evaluate", "--dataset", "small", "truth", "--version", "v1", "--json")
         assert json.loads(done.stdout)["pins"]["version_name"] == "v1"
 
-    def test_what_is_missing_is_one_sentence_and_exit_code_1(self, home, tmp_path) -> None:
-        import os
-        import subprocess
-        import sys
-
-        command = [sys.executable, "-c", "from app.cli import main; main()", "evaluate"]
-        environment = {**os.environ, "TOUCHLINE_HOME": str(home)}
-        done = subprocess.run(
-            [*command, "--dataset", "small", str(tmp_path / "none.json")],
-            env=environment, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert (done.returncode, done.stdout) == (1, "")
-        assert "no set of predictions" in done.stderr
-        assert "Traceback" not in done.stderr
+    def test_what_is_missing_is_one_sentence_and_exit_code_1(self, touchline, tmp_path) -> None:
+        code, out, err = touchline("evaluate", "--dataset", "small", tmp_path / "none.json")
+        assert (code, out) == (1, "")
+        assert "no set of predictions" in err
+        assert "Traceback" not in err
 
     def test_without_anything_to_measure_it_is_wrong_usage(self, run) -> None:
         assert run("evaluate", "--dataset", "small").exit_code == 2

@@ -9,28 +9,26 @@ from pathlib import Path
 
 import pytest
 
-from app.config import Settings
-from app.review.importing.ingest import ingest
-from app.review.policies.policy import change_policy
-from app.soccer.policy import TOUCHLINE
-from app.store.session import Store
+from app.soccer.policy import PAPER, TOUCHLINE
+from tests.unit.commands.match_home import ingest_by_policies
 from tests.unit.review.editing.test_positions import MATCH, match
 from tests.unit.review.jobs.test_paint import without_files
 
 Run = Callable[..., tuple[int, str, str]]
 
 
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with a match without files of its pictures, as ``demo`` and as ``paper``, and with one
+    that never had any, as ``bare``."""
+    home = tmp_path_factory.mktemp("filled")
+    ingest_by_policies(home, without_files(match()), {"demo": TOUCHLINE, "paper": PAPER})
+    ingest_by_policies(home, match(), {"bare": TOUCHLINE})
+    return home
+
+
 @pytest.fixture
-def run(touchline: Run, tmp_path: Path) -> Run:
-    """Run the command in a home with a match without files of its pictures, as ``demo`` and as
-    ``paper``, and with one that never had any, as ``bare``."""
-    store = Store.open(Settings(home=tmp_path / "home"))
-    for dataset in ("demo", "paper"):
-        ingest(store, dataset, without_files(match()), source="files", actor="ann")
-    ingest(store, "bare", match(), source="files", actor="ann")
-    for dataset in ("demo", "bare"):
-        change_policy(store, dataset, TOUCHLINE, if_match=None, actor="ann")
-    store.close()
+def run(touchline: Run) -> Run:
     return partial(touchline, "paint")
 
 

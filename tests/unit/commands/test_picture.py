@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import json
-import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from app.cli import main
 from app.config import Settings
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_writer import write_line_files
 from app.review.editing.submit import load
-from app.review.importing.ingest import ingest
-from app.soccer.group import Group, Station, View
 from app.soccer.picture import PictureGeometry
 from app.store.session import Store
 from tests.cameras import SIZE, looking
+from tests.unit.commands.match_home import ingest_match
 from tests.unit.solving.conftest import BEND, click
 
 Run = Callable[..., tuple[int, str, str]]
@@ -35,38 +31,18 @@ def frames() -> list[LineFile]:
     return files
 
 
-@pytest.fixture
-def home(tmp_path: Path) -> Settings:
-    return Settings(home=tmp_path / "home")
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with that match as the dataset ``demo``."""
+    home = tmp_path_factory.mktemp("filled")
+    ingest_match(home, MATCH, frames())
+    return home
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], home: Settings) -> Run:
-    """Run a command in a home with that match as the dataset ``demo``: exit code, stdout, stderr."""
-    for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("TOUCHLINE_HOME", str(home.home))
-    store = Store.open(home)
-    groups = [
-        Group(
-            f"{MATCH}/{file.stem}.png",
-            (View(f"{file.stem}.png", Station(f"{MATCH}/{file.stem}", SIZE, lines=file.lines)),),
-            match=MATCH,
-        )
-        for file in frames()
-    ]
-    ingest(store, "demo", groups, source="files", actor="ann")
-    store.close()
-
-    def command(*arguments: object) -> tuple[int, str, str]:
-        words = ["touchline", *map(str, arguments), "--workers", "1"]
-        monkeypatch.setattr(sys, "argv", words)
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return command
+def run(touchline: Run) -> Run:
+    """Runs a command, in one process."""
+    return lambda *words: touchline(*words, "--workers", "1")
 
 
 class TestPicture:
@@ -78,9 +54,7 @@ class TestPicture:
         assert (code, found["frames"], found["changed"]) == (0, 4, True)
         assert found["aspect"] == pytest.approx(1.06, abs=0.015)
 
-    def test_of_a_dataset_is_proposed_accepted_and_taken_back(
-        self, run: Run, home: Settings
-    ) -> None:
+    def test_of_a_dataset_is_proposed_accepted_and_taken_back(self, run: Run, home: Path) -> None:
         code, out, _ = run("picture", "--dataset", "demo")
         assert (code, "use it with --accept" in out) == (0, True)
         (accepted,) = json.loads(run("picture", "--dataset", "demo", "--accept", "--json")[1])
@@ -90,8 +64,8 @@ class TestPicture:
         run("picture", "--dataset", "demo", "--match", MATCH, "--as-taken")
         assert self.aspect(home) is None
 
-    def aspect(self, home: Settings) -> float | None:
-        store = Store.open(home)
+    def aspect(self, home: Path) -> float | None:
+        store = Store.open(Settings(home=home))
         picture = load(store, 1).group.views[0].station.picture
         store.close()
         return None if picture is None else picture.aspect

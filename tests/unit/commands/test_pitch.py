@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from app.cli import main
-from app.config import Settings
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_writer import write_line_files
-from app.review.importing.ingest import ingest
-from app.soccer.group import Group, Station, View
 from app.soccer.pitch import Pitch
-from app.store.session import Store
 from tests.cameras import SIZE, looking
+from tests.unit.commands.match_home import ingest_match
 from tests.unit.solving.conftest import BEND, click
 
 Run = Callable[..., tuple[int, str, str]]
@@ -35,33 +29,18 @@ def frames() -> list[LineFile]:
     return files
 
 
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with that match as the dataset ``demo``."""
+    home = tmp_path_factory.mktemp("filled")
+    ingest_match(home, MATCH, frames())
+    return home
+
+
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """Run a command in a home with that match as the dataset ``demo``: exit code, stdout, stderr."""
-    for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
-    store = Store.open(Settings(home=tmp_path / "home"))
-    groups = [
-        Group(
-            f"{MATCH}/{file.stem}.png",
-            (View(f"{file.stem}.png", Station(f"{MATCH}/{file.stem}", SIZE, lines=file.lines)),),
-            match=MATCH,
-        )
-        for file in frames()
-    ]
-    ingest(store, "demo", groups, source="files", actor="ann")
-    store.close()
-
-    def command(*arguments: object) -> tuple[int, str, str]:
-        words = ["touchline", "pitch", *map(str, arguments), "--workers", "1"]
-        monkeypatch.setattr(sys, "argv", words)
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return int(ended.value.code or 0), out, err
-
-    return command
+def run(touchline: Run) -> Run:
+    """Runs the command, in one process."""
+    return lambda *words: touchline("pitch", *words, "--workers", "1")
 
 
 class TestPitch:

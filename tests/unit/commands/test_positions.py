@@ -9,23 +9,23 @@ from pathlib import Path
 
 import pytest
 
-from app.config import Settings
-from app.review.importing.ingest import ingest
-from app.review.policies.policy import change_policy
-from app.store.session import Store
+from app.soccer.policy import PAPER
+from tests.unit.commands.match_home import ingest_by_policies
 from tests.unit.review.editing.test_positions import MATCH, SHARING, match
 
 Run = Callable[..., tuple[int, str, str]]
 
 
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with a match as the datasets ``demo`` and, by the paper, ``paper``."""
+    home = tmp_path_factory.mktemp("filled")
+    ingest_by_policies(home, match(), {"demo": SHARING, "paper": PAPER})
+    return home
+
+
 @pytest.fixture
-def run(touchline: Run, tmp_path: Path) -> Run:
-    """Run the command in a home with a match as the datasets ``demo`` and, by the paper, ``paper``."""
-    store = Store.open(Settings(home=tmp_path / "home"))
-    for dataset in ("demo", "paper"):
-        ingest(store, dataset, match(), source="files", actor="ann")
-    change_policy(store, "demo", SHARING, if_match=None, actor="ann")
-    store.close()
+def run(touchline: Run) -> Run:
     return partial(touchline, "positions")
 
 

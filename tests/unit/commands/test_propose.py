@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 import pytest
 
-from app.cli import main
 from app.config import Settings
 from app.review.importing.ingest import ingest
 from app.soccer.group import Group, Media, Station, View
@@ -19,19 +18,11 @@ from app.store.session import Store
 from tests.cameras import SIZE
 from tests.unit.paint.lawns import TRUE, drawn, lawn
 
-
-def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
-    """Run the command; its exit code."""
-    monkeypatch.setattr(sys, "argv", ["touchline", "propose", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
+Run = Callable[..., tuple[int, str, str]]
 
 
 class TestPropose:
-    def test_cameras_of_proposed_pictures_alone_are_written(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-    ):
+    def test_cameras_of_proposed_pictures_alone_are_written(self, tmp_path: Path, touchline: Run):
         pictures, out = tmp_path / "pictures", tmp_path / "out"
         pictures.mkdir()
         out.mkdir()
@@ -40,8 +31,9 @@ class TestPropose:
         whole = (pictures / "good.png").read_bytes()
         (pictures / "cut.png").write_bytes(whole[: len(whole) // 2])
         (out / "camera_grass.json").write_text("of an earlier run")
-        assert run(monkeypatch, pictures, out, "--json") == 0
-        rows = json.loads(capsys.readouterr().out)
+        code, told, _ = touchline("propose", pictures, out, "--json")
+        rows = json.loads(told)
+        assert code == 0
         assert rows == json.loads((out / "propose.json").read_text())
         assert {row["frame"]: row["outcome"] for row in rows} == {
             "good": "proposed",
@@ -55,41 +47,39 @@ class TestPropose:
         }  # fmt: skip
 
     def test_no_camera_is_written_of_which_it_is_unsure(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, touchline: Run
     ):
         monkeypatch.setattr("app.paint.propose.LEAST_SUM", 9.0)
         cv2.imwrite(str(tmp_path / "good.png"), lawn(drawn(TRUE, 3))[:, :, ::-1])
-        assert run(monkeypatch, tmp_path / "good.png", tmp_path / "out") == 0
-        assert "unsure" in capsys.readouterr().out
+        code, told, _ = touchline("propose", tmp_path / "good.png", tmp_path / "out")
+        assert (code, "unsure" in told) == (0, True)
         assert [file.name for file in (tmp_path / "out").iterdir()] == ["propose.json"]
 
-    def test_a_folder_without_pictures_is_said(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-    ):
+    def test_a_folder_without_pictures_is_said(self, tmp_path: Path, touchline: Run):
         (tmp_path / "in").mkdir()
-        assert run(monkeypatch, tmp_path / "in", tmp_path / "out") == 1
-        assert "no pictures" in capsys.readouterr().err
+        code, _, err = touchline("propose", tmp_path / "in", tmp_path / "out")
+        assert (code, "no pictures" in err) == (1, True)
 
 
 class TestOfDataset:
     @pytest.fixture
-    def home(self, touchline, tmp_path: Path):
-        store = Store.open(Settings(home=tmp_path / "home"))
+    def propose(self, touchline: Run, home: Path, tmp_path: Path):
+        store = Store.open(Settings(home=home))
         media = Media(str(tmp_path / "gone.png"))
         group = Group("1", (View("a", Station("a", SIZE), media=media),), match="m")
         ingest(store, "demo", [group], source="files", actor="ann")
         store.close()
         return partial(touchline, "propose", "--dataset", "demo")
 
-    def test_looks_shows_and_forgets(self, home):
-        assert home("--show")[1] == (
+    def test_looks_shows_and_forgets(self, propose):
+        assert propose("--show")[1] == (
             "m: 0 of 1 views looked at: 0 proposed, 0 unsure, 0 nothing, 0 accepted\n"
         )
-        found = json.loads(home("--workers", "1", "--json")[1])
+        found = json.loads(propose("--workers", "1", "--json")[1])
         assert (found["views"], found["nothing"], found["missing"]) == (1, 1, 1)
-        (row,) = json.loads(home("--show", "--match", "m", "--json")[1])
+        (row,) = json.loads(propose("--show", "--match", "m", "--json")[1])
         assert (row["looked"], row["nothing"]) == (1, 1)
-        assert "forgotten  1" in home("--undo")[1]
+        assert "forgotten  1" in propose("--undo")[1]
 
     @pytest.mark.parametrize(
         ("words", "code", "sentence"),
@@ -100,8 +90,8 @@ class TestOfDataset:
             (("--undo", "--match", "m"), 2, "all of a dataset"),
         ],
     )
-    def test_what_cannot_be_is_said(self, home, words, code: int, sentence: str):
-        found, _, err = home(*words)
+    def test_what_cannot_be_is_said(self, propose, words, code: int, sentence: str):
+        found, _, err = propose(*words)
         assert (found, sentence in err) == (code, True)
 
     def test_without_pictures_and_dataset_nothing_is_done(self, touchline):

@@ -13,12 +13,9 @@ from app.cli import app
 from app.config import Settings
 from app.errors import InputError
 from app.review.importing.ingest import ingest
-from app.soccer.annotation import BallAnnotation
-from app.soccer.group import Group, Station, View
 from app.store.imports import shared_stations
 from app.store.session import Store
-from tests.cameras import SIZE
-from tests.rigs import cameras, frames
+from tests.rigs import groups
 
 
 @pytest.fixture
@@ -26,19 +23,7 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Store]:
     """A home with the balls that four static cameras show."""
     monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path))
     store = Store.open(Settings())
-    stations = {c.key: Station(c.key, SIZE, shared=True, given=c.camera) for c in cameras()}
-    groups = [
-        Group(
-            str(frame.time),
-            tuple(
-                View(key, stations[key], (BallAnnotation(point=center),))
-                for key, center in frame.balls.items()
-            ),
-        )
-        for frame in frames(45)
-        if frame.balls
-    ]
-    ingest(store, "rig", groups, source="test", actor="ann")
+    ingest(store, "rig", groups(45), source="test", actor="ann")
     yield store
     store.close()
 

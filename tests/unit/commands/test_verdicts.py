@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from app.config import Settings
+from app.datasets.report import Report
+from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
+from app.review.editing.recompute import solve_dataset
+from app.review.importing.ingest import ingest
 from app.review.verdicts.bulk import list_batches
 from app.store.session import Store
 from tests.scenes import make_scenes
@@ -18,17 +23,18 @@ Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
-def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = tmp_path_factory.mktemp("tree")
-    write_soccernet_v3(root, [scene.group for scene in make_scenes(2, 4, faults=False)])
-    return root
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with the solved dataset ``demo``."""
+    home = tmp_path_factory.mktemp("filled")
+    write_soccernet_v3(home / "tree", [scene.group for scene in make_scenes(2, 4, faults=False)])
+    with closing(Store.open(Settings(home=home))) as store:
+        ingest(store, "demo", read_soccernet_v3(home / "tree", Report()), source="t", actor="ann")
+        solve_dataset(store, "demo")
+    return home
 
 
 @pytest.fixture
-def run(touchline: Run, tree: Path) -> Run:
-    """Run a command in a home with the solved dataset ``demo``: exit code, stdout, stderr."""
-    touchline("import", "soccernet-v3", tree, "--dataset", "demo")
-    touchline("solve", "--dataset", "demo", "--workers", "1")
+def run(touchline: Run) -> Run:
     return touchline
 
 

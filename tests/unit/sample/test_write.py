@@ -26,14 +26,14 @@ def _digests(root: Path) -> dict[str, str]:
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("sample")
-    write_sample(out, groups=4, seed=21, workers=1)
+    write_sample(out, groups=2, seed=21, workers=1)
     return out
 
 
 class TestWriteSample:
     def test_every_match_has_labels_and_frames(self, written: Path):
         names = sorted(path.name for path in written.rglob("*") if path.is_file())
-        assert names == ["Frames-v3.zip"] * 4 + ["Labels-v3.json"] * 4 + ["truth.json"]
+        assert names == ["Frames-v3.zip"] * 2 + ["Labels-v3.json"] * 2 + ["truth.json"]
 
     def test_frames_are_images_of_the_annotated_size(self, written: Path):
         with zipfile.ZipFile(next(written.rglob("Frames-v3.zip"))) as frames:
@@ -42,14 +42,14 @@ class TestWriteSample:
         assert cv2.imdecode(content, cv2.IMREAD_COLOR).shape == (720, 1280, 3)
 
     def test_two_processes_write_the_same_bytes_as_one(self, written: Path, tmp_path: Path):
-        write_sample(tmp_path, groups=4, seed=21, workers=2)
+        write_sample(tmp_path, groups=2, seed=21, workers=2)
         assert _digests(tmp_path) == _digests(written)
 
     def test_what_is_read_back_is_what_was_made(self, written: Path):
         report = Report()
         groups = {group.key: group for group in read_soccernet_v3(written, report)}
         assert not report.problems
-        scenes = make_scenes(4, 21)
+        scenes = make_scenes(2, 21)
         assert set(groups) == {scene.group.key for scene in scenes}
         for scene in scenes:
             read = groups[scene.group.key]
@@ -68,7 +68,7 @@ class TestWriteSample:
 
     def test_the_truth_comes_back_to_the_last_digit(self, written: Path):
         truth = read_truth(written)
-        assert truth == {scene.truth.key: scene.truth for scene in make_scenes(4, 21)}
+        assert truth == {scene.truth.key: scene.truth for scene in make_scenes(2, 21)}
 
     def test_labels_alone_of_fifty_groups(self, tmp_path: Path):
         seen: list[tuple[int, int]] = []

@@ -7,18 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.soccer.annotation import BallAnnotation
+from app.soccer.finding import Finding, Fix
 from app.soccer.frames import Box
 from app.soccer.policy import PAPER
-from app.soccer.solution import (
-    Ball3D,
-    BallFit,
-    Calibration,
-    ChiSquare,
-    Finding,
-    Fix,
-    Pair,
-    ViewSolution,
-)
+from app.soccer.solution import Ball3D, BallFit, Calibration, ChiSquare, Pair, ViewSolution
 from app.solving.contradiction import Contradiction
 from app.solving.findings import _BY_WEIGHT, _sides_swapped, find
 from app.solving.sides import Swap

@@ -10,7 +10,8 @@ from sqlalchemy import text
 
 from app.errors import DamagedError, StorageError
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
-from app.store.groups import next_revision, read_groups, refresh_inputs_hashes, save_revision
+from app.store.group_revisions import next_revision, refresh_inputs_hashes, save_revision
+from app.store.groups import read_groups
 from app.store.paint import insert_readings, match_paint, read_readings
 from app.store.removal import delete_rows
 from app.store.session import Store

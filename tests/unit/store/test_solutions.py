@@ -7,13 +7,12 @@ from dataclasses import replace
 import pytest
 from sqlalchemy import insert, text
 
+from app.soccer.finding import Finding, Fix
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.solution import (
     Ball3D,
     BallFit,
     Calibration,
-    Finding,
-    Fix,
     Gate,
     MarkingFit,
     PaintFit,

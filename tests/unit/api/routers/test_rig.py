@@ -6,10 +6,7 @@ import pytest
 
 from app.api.deps import Services
 from app.review.importing.ingest import ingest
-from app.soccer.annotation import BallAnnotation
-from app.soccer.group import Group, Station, View
-from tests.cameras import SIZE
-from tests.rigs import cameras, frames
+from tests.rigs import groups
 
 ADDRESS = "/api/v1/datasets/rig/rig"
 
@@ -18,19 +15,7 @@ ADDRESS = "/api/v1/datasets/rig/rig"
 def services(app) -> Services:
     """The application's, with a dataset of four static cameras."""
     services: Services = app.state.services
-    stations = {c.key: Station(c.key, SIZE, shared=True, given=c.camera) for c in cameras()}
-    groups = [
-        Group(
-            str(frame.time),
-            tuple(
-                View(key, stations[key], (BallAnnotation(point=center),))
-                for key, center in frame.balls.items()
-            ),
-        )
-        for frame in frames(45)
-        if frame.balls
-    ]
-    ingest(services.store, "rig", groups, source="test", actor="ann")
+    ingest(services.store, "rig", groups(45), source="test", actor="ann")
     return services
 
 

@@ -10,9 +10,10 @@ import pytest
 
 from app.api.schemas.solution import SolutionDocument
 from app.review.editing.codec import edit_from_json
+from app.soccer.finding import Finding, Fix
 from app.soccer.group import Group
 from app.soccer.policy import PAPER
-from app.soccer.solution import Calibration, Finding, Fix, Solution
+from app.soccer.solution import Calibration, Solution
 from app.solving.solve import solve
 from tests.cameras import WIDE_LENSES, wide
 

@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 import pytest
 
-from app.cli import main
 from app.config import Settings
 from app.datasets.cameras_reader import read_cameras
 from app.datasets.cameras_writer import write_cameras
@@ -132,24 +131,16 @@ class TestAgreeFiles:
 
 
 class TestCommands:
-    def test_agree_prints_one_json_document(self, folder, monkeypatch, capsys):
-        images = str(folder / "images" / "good.png")
-        arguments = ["touchline", "agree", str(folder / "cameras"), images, "--json"]
-        monkeypatch.setattr("sys.argv", arguments)
-        with pytest.raises(SystemExit) as ended:
-            main()
-        assert ended.value.code == 0
-        (row,) = json.loads(capsys.readouterr().out)
+    def test_agree_prints_one_json_document(self, folder, touchline):
+        code, out, _ = touchline(
+            "agree", folder / "cameras", folder / "images" / "good.png", "--json"
+        )
+        assert code == 0
+        (row,) = json.loads(out)
         assert row["frame"] == "good" and row["supported"] > 0.8
 
-    def test_snap_takes_several_files_and_a_folder_to_write(
-        self, folder, tmp_path, monkeypatch, capsys
-    ):
-        images = [str(folder / "images" / f"{name}.png") for name in ("good", "cut")]
-        arguments = ["touchline", "snap", str(folder / "lines"), *images, str(tmp_path / "out")]
-        monkeypatch.setattr("sys.argv", arguments)
-        with pytest.raises(SystemExit) as ended:
-            main()
-        assert ended.value.code == 0
-        assert "good  proposed" in capsys.readouterr().out
+    def test_snap_takes_several_files_and_a_folder_to_write(self, folder, tmp_path, touchline):
+        images = [folder / "images" / f"{name}.png" for name in ("good", "cut")]
+        code, out, _ = touchline("snap", folder / "lines", *images, tmp_path / "out")
+        assert (code, "good  proposed" in out) == (0, True)
         assert (tmp_path / "out" / "camera_good.json").is_file()

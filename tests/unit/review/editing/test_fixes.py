@@ -4,8 +4,8 @@ import pytest
 
 from app.review.editing.fixes import edit_of_fix, offers, rank, sentence
 from app.soccer.annotation import BallAnnotation
+from app.soccer.finding import Fix
 from app.soccer.frames import ImagePoint
-from app.soccer.solution import Fix
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, group, view
 
 BALL = (36.0, 3.0, -0.5)

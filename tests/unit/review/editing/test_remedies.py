@@ -6,10 +6,11 @@ from app.review.editing.fixes import edit_of_fix
 from app.review.editing.influence import influences
 from app.review.editing.remedies import find_remedies
 from app.soccer.annotation import BallAnnotation, make_lines
+from app.soccer.finding import Finding, Fix
 from app.soccer.frames import ImagePoint
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.soccer.solution import Finding, Fix, Suspect
+from app.soccer.solution import Suspect
 from app.solving.solve import solve
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, group, view
 

@@ -11,18 +11,16 @@ from app.review.editing.edit import SetBall
 from app.review.editing.submit import load, submit
 from app.review.evaluating.accept import AcceptRequest, accept
 from app.review.evaluating.evaluation import (
-    EvaluationRequest,
     FrameQuery,
-    check_evaluation,
     compare,
     get_evaluation,
     get_figure,
     list_evaluations,
     list_frames,
     remove_evaluation,
-    run_evaluation,
     tables_of,
 )
+from app.review.evaluating.evaluation_run import EvaluationRequest, check_evaluation, run_evaluation
 from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.evaluating.predictions import add_predictions
 from app.review.verdicts.verdict import set_verdict

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from app.child import Child
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import DamagedError, JobCancelled, TooLargeError
 from app.progress import Progress
@@ -142,8 +143,11 @@ class TestImportApart:
         assert [item.name for item in list_datasets(store)] == ["apart"]
 
     def test_one_that_is_told_to_end_ends_and_lets_others_write(
-        self, store: Store, tree: Path
+        self, store: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
+        # A process that waits already may be done before anybody says that it shall end.
+        monkeypatch.setattr(import_child, "Child", Child)
+
         def stop() -> None:
             raise JobCancelled
 

@@ -8,7 +8,8 @@ from app.errors import NotFoundError
 from app.review.editing.edit import SetBall
 from app.review.editing.submit import load, submit
 from app.review.evaluating.accept import AcceptRequest
-from app.review.evaluating.evaluation import EvaluationRequest, list_evaluations
+from app.review.evaluating.evaluation import list_evaluations
+from app.review.evaluating.evaluation_run import EvaluationRequest
 from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.evaluating.predictions import add_predictions
 from app.review.jobs.evaluations import request_accept, request_evaluation, resume_evaluations

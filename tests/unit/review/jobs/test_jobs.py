@@ -31,7 +31,7 @@ from tests.waiting import SECONDS
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "TICK", 0.01)
+    monkeypatch.setattr("app.review.jobs.job_records.TICK", 0.01)
 
 
 @pytest.fixture
@@ -220,7 +220,7 @@ class TestProgress:
     def test_is_written_a_few_times_a_second_however_often_it_is_told(
         self, jobs: Jobs, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(module, "TICK", 0.05)
+        monkeypatch.setattr("app.review.jobs.job_records.TICK", 0.05)
         heard: list[Job] = []
         jobs.listen(heard.append)
 

@@ -18,7 +18,9 @@ from app.soccer.solution import GATES
 from app.store.models import GroupModel, QueueModel
 from app.store.session import Store
 
-COUNT = 120
+COUNT = 60
+SEASON = 12_764
+"""Groups of the largest dataset that there is."""
 
 
 def queue_rows(count: int, seed: int = 5) -> list[dict[str, object]]:
@@ -78,6 +80,12 @@ def dataset(store: Store, once) -> int:
     return once("rows made up", lambda: fill_queue(store, COUNT))
 
 
+@pytest.fixture
+def season(store: Store, once) -> int:
+    """Id of a dataset as large as a season."""
+    return once("a season made up", lambda: fill_queue(store, SEASON))
+
+
 def fill_queue(store: Store, count: int) -> int:
     """A dataset of rows made up; returns its id."""
     dataset = ensure_dataset(store, "big", "ann")
@@ -123,6 +131,8 @@ def sorted_by(row: GroupRow, name: str) -> Any:
     return getattr(row, SORTS[name])
 
 
+NEAR = (COUNT - 7) // 2
+"""Where the last page of seven begins that is looked for from the start and not from the end."""
 SORTED = [f"sort:{name}{end}" for name in SORTS for end in ("", "-desc")]
 
 
@@ -205,13 +215,12 @@ class TestListGroups:
         with pytest.raises(InputError):
             list_groups(store, 1, "", limit)
 
-    def test_a_season_of_groups_is_listed_at_once(self, store) -> None:
-        dataset = fill_queue(store, 12_764)
-        list_groups(store, dataset, "status:unreviewed jac<0.95 sort:value", 50)
+    def test_a_season_of_groups_is_listed_at_once(self, store, season: int) -> None:
+        list_groups(store, season, "status:unreviewed jac<0.95 sort:value", 50)
         spent = []
         for sort in SORTS:
             start = time.process_time()
-            list_groups(store, dataset, f"status:unreviewed jac<0.95 sort:{sort}", 50)
+            list_groups(store, season, f"status:unreviewed jac<0.95 sort:{sort}", 50)
             spent.append(time.process_time() - start)
         # 50 ms are promised; of processor time, as other work shares the machine.
         assert min(spent) < 0.05
@@ -223,7 +232,7 @@ class TestPositions:
         self, store, dataset, query
     ) -> None:
         whole = list_groups(store, dataset, query, 500)
-        for start in (0, 1, 50, 58, 59, 60, 61, 100, COUNT - 7, COUNT - 1, COUNT, 10**15):
+        for start in (0, 1, NEAR, NEAR + 1, COUNT - 7, COUNT - 1, COUNT, 10**15):
             page = list_groups(store, dataset, query, 7, start=start)
             assert page.items == whole.items[start : start + 7]
             assert page.total == whole.total
@@ -233,9 +242,9 @@ class TestPositions:
 
     def test_a_page_of_a_position_has_a_cursor_that_goes_on(self, store, dataset) -> None:
         ids = walk(store, dataset, "sort:sigma", 500)
-        page = list_groups(store, dataset, "sort:sigma", 10, start=80)
+        page = list_groups(store, dataset, "sort:sigma", 10, start=40)
         after = list_groups(store, dataset, "sort:sigma", 10, page.next)
-        assert [row.id for row in after.items] == ids[90:100]
+        assert [row.id for row in after.items] == ids[50:60]
         assert list_groups(store, dataset, "sort:sigma", 10, start=COUNT - 10).next is None
 
     def test_a_cursor_or_a_position_but_not_both(self, store, dataset) -> None:
@@ -248,13 +257,11 @@ class TestPositions:
         found = list_ids(store, dataset, "sort:sigma-desc")
         assert list(found.ids) == walk(store, dataset, "sort:sigma-desc", 500)
 
-    def test_far_into_a_season_of_groups_is_as_near_as_its_start(self, store) -> None:
-        count = 12_764
-        dataset = fill_queue(store, count)
+    def test_far_into_a_season_of_groups_is_as_near_as_its_start(self, store, season: int) -> None:
         spent = []
-        for start in (6_300, 9_000, count - 100):
+        for start in (6_300, 9_000, SEASON - 100):
             began = time.process_time()
-            page = list_groups(store, dataset, "sort:value", 100, start=start)
+            page = list_groups(store, season, "sort:value", 100, start=start)
             spent.append(time.process_time() - began)
             assert len(page.items) == 100
         # 50 ms are promised; of processor time, as other work shares the machine.
