@@ -41,7 +41,7 @@ from app.store.session import Store
 from app.store.uploads import UploadWriter
 from tests.waiting import SECONDS
 
-EXAMPLES = {GenerationMode.POSITIVE: 5, GenerationMode.NEGATIVE: 3}
+EXAMPLES = 5
 EVALUATION, DELETED_EVALUATION = "1", "2"
 """Ids of sets of predictions and of evaluations, both."""
 EXPORT, DELETED_EXPORT = "1", "2"
@@ -120,7 +120,7 @@ class Attack:
 
         @given(case=operation.as_strategy(generation_mode=mode))
         @settings(
-            max_examples=EXAMPLES[mode],
+            max_examples=EXAMPLES,
             deadline=None,
             derandomize=True,
             database=None,
