@@ -10,7 +10,7 @@ export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 unexport PYTHONDONTWRITEBYTECODE
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
-.PHONY: setup run test test-python test-browser test-late check audit release generators bench mutate torture fuzz paper chromium clean
+.PHONY: setup run test test-python test-browser test-late check audit release generators readers bench mutate torture fuzz paper chromium clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready static/node_modules/.ready
@@ -39,7 +39,7 @@ PROCESSES = $(shell n=$$(getconf _NPROCESSORS_ONLN); echo $$(( n < 2 ? 2 : n < 8
 PYTEST = $(BIN)/python -m pytest --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder
 
 # What numba compiles is compiled before: every process would do it anew, until one has saved it.
-test: setup chromium generators
+test: setup chromium generators readers
 	@$(BIN)/python -m tests.compiled
 	@$(MAKE) --no-print-directory -j2 test-python test-browser
 	@echo "Every test has passed."
@@ -92,6 +92,15 @@ tests/generators/node_modules/.ready: tests/generators/package-lock.json .venv/r
 	@cd tests/generators && PATH="$(CURDIR)/$(BIN):$$PATH" npm ci --no-audit --no-fund --loglevel=error
 	@touch $@
 
+# The packages with which users read exports, for a test; apart, for the product needs none of them.
+readers: .readers/ready
+
+.readers/ready: requirements-readers.lock .venv/ready
+	@echo "Installing soccernet, sn-trackeval and pycocotools into .readers"
+	@rm -rf .readers
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps --target .readers -r requirements-readers.lock
+	@touch $@
+
 bench: setup
 	$(BIN)/python -m tests.bench
 
@@ -112,4 +121,4 @@ chromium: setup
 	@$(BIN)/python tests/e2e/install_chromium.py
 
 clean:
-	rm -rf .venv .venv-release .venv-generators dist static/node_modules tests/generators/node_modules
+	rm -rf .venv .venv-release .venv-generators .readers dist static/node_modules tests/generators/node_modules

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from app.datasets.camera_json import camera_from_json
-from app.datasets.report import Report
-from app.datasets.sn_calibration_reader import lines_from_json
 from app.review.datasets.batch import score_files
 from app.review.exporting.export import export
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import Pitch
-from app.solving.score import FrameScore, score, score_frame
 from app.store.session import Store
 
 FOLDERS = ["test-1280x720", "train-1280x720"]
@@ -44,36 +39,57 @@ def written(store: Store, fill, make_group, tmp_path: Path):
     return write
 
 
-def evaluated(root: Path, folder: str) -> Iterator[FrameScore | None]:
-    """The frames of a split as the evaluator of sn-calibration finds them.
+READERS = Path(__file__).parents[4] / ".readers"
+HEAD = """
+import json, sys
+from pathlib import Path
+from zipfile import ZipFile
+root, found = Path(sys.argv[1]), {}
+"""
 
-    Every name with ``.json`` in it is a frame; it is called like what stands before the first
-    dot; its camera is ``camera_<name>.json`` below the folder of predictions. One size for all.
-    """
+
+def read_by(program: str, export: Path, tmp_path: Path) -> dict[str, dict[str, float]]:
+    """What a program says that reads an export with a package of its users, in a process of its own."""
+    if not (READERS / "ready").is_file():
+        pytest.fail(
+            "The packages that read exports are missing: run 'make readers'.", pytrace=False
+        )
+    done = subprocess.run(
+        [sys.executable, "-c", f"{HEAD}{program}\nprint(json.dumps(found))", export],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(READERS)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    found: dict[str, dict[str, float]] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+CALIBRATION = """
+from SoccerNet.Evaluation.CameraCalibration import evaluate
+for folder in sorted(path.name for path in (root / "lines").iterdir()):
+    for part in ("lines", "cameras"):
+        with ZipFile(f"{part}.zip", "w") as archive:
+            for path in (root / part / folder).iterdir():
+                archive.write(path, f"{folder}/{path.name}")
     width, height = map(int, folder.rsplit("-", 1)[1].split("x"))
-    size = ImageSize(width, height)
-    for path in (root / "lines" / folder).iterdir():
-        if ".json" not in path.name:
-            continue
-        camera = root / "cameras" / folder / f"camera_{path.name.split('.')[0]}.json"
-        if not camera.is_file():
-            yield None
-            continue
-        report = Report()
-        lines, _ = lines_from_json(json.loads(path.read_text()), size, "f", report)
-        assert report.problems == []
-        found = camera_from_json(json.loads(camera.read_text()), "f")
-        yield score_frame(found, lines, Pitch(), size)
+    scores = evaluate(
+        "lines.zip", "cameras.zip", threshold=5, width=width, height=height, folder=folder
+    )
+    found[folder] = {name: float(scores[name]) for name in ("completeness", "meanAccuracies")}
+"""
 
 
 class TestSnCalibration:
-    def test_its_evaluator_takes_every_frame_once_and_at_its_size(self, written) -> None:
-        root = written("sn-calibration")
-        assert sorted(path.name for path in (root / "lines").iterdir()) == FOLDERS
-        for folder in FOLDERS:
-            total = score(evaluated(root, folder))
-            assert (total.frames, total.completeness) == (2, 1.0)
-            assert total.challenge > 0.99
+    def test_its_evaluator_takes_every_frame_once_and_at_its_size(
+        self, written, tmp_path: Path
+    ) -> None:
+        found = read_by(CALIBRATION, written("sn-calibration"), tmp_path)
+        assert sorted(found) == FOLDERS
+        for scores in found.values():
+            assert scores["completeness"] == 1.0
+            assert scores["meanAccuracies"] > 0.99
 
     @pytest.mark.parametrize("parts", [("lines", "cameras"), (".", ".")])
     def test_our_own_score_reads_it_as_well(self, written, parts: tuple[str, str]) -> None:
@@ -91,26 +107,58 @@ class TestSnCalibration:
         assert found["fs5"] > 0.99
 
 
+GAMESTATE = """
+import trackeval
+for split in sorted(path.name for path in root.iterdir() if path.is_dir()):
+    told = Path("trackers") / f"SoccerNetGS-{split}" / "self" / "data"
+    told.mkdir(parents=True)
+    for truth in (root / split).glob("*/Labels-GameState.json"):
+        boxes = json.loads(truth.read_text())["annotations"]
+        people = [box for box in boxes if box.get("bbox_pitch")]
+        (told / f"{truth.parent.name}.json").write_text(json.dumps({"predictions": people}))
+    config = trackeval.datasets.SoccerNetGS.get_default_dataset_config()
+    config |= {"GT_FOLDER": str(root), "TRACKERS_FOLDER": "trackers", "SPLIT_TO_EVAL": split}
+    data = trackeval.datasets.SoccerNetGS(config)
+    raw = [data._load_raw_file("self", name, True) for name in data.seq_list]
+    quiet = trackeval.Evaluator.get_default_eval_config()
+    quiet |= {name: False for name in quiet if name.startswith(("OUTPUT", "PLOT", "PRINT"))}
+    hota = trackeval.metrics.HOTA({"METRICS": ["HOTA"], "THRESHOLD": 0.5})
+    scores, _ = trackeval.Evaluator(quiet).evaluate([data], [hota])
+    person = scores["SoccerNetGS"]["self"]["COMBINED_SEQ"]["person"]
+    found[split] = {
+        "frames": sum(sequence["num_timesteps"] for sequence in raw),
+        "people": sum(len(ids) for sequence in raw for ids in sequence["gt_ids"]),
+        "hota": float(person["HOTA"]["HOTA"].mean()),
+    }
+"""
+
+
 class TestGamestate:
-    def test_its_evaluator_takes_every_frame(self, written) -> None:
-        root = written("gamestate")
-        for split in ("train", "test"):
-            (sequence,) = (path for path in (root / split).iterdir() if path.is_dir())
-            value = json.loads((sequence / "Labels-GameState.json").read_text())
-            labelled = [
-                image["image_id"]
-                for image in value["images"]
-                if all(image[f"has_labeled_{what}"] for what in ("pitch", "camera", "person"))
-            ]
-            assert len(labelled) == 2
-            people = [item for item in value["annotations"] if item["category_id"] == 1]
-            assert [item["image_id"] for item in people] == labelled
-            for person in people:
-                places = [
-                    f"{axis}_bottom_{name}" for name in ("left", "middle", "right") for axis in "xy"
-                ]
-                assert all(isinstance(person["bbox_pitch"][place], float) for place in places)
-                assert isinstance(person["track_id"], int)
+    def test_its_evaluator_takes_every_frame_and_everybody(self, written, tmp_path: Path) -> None:
+        found = read_by(GAMESTATE, written("gamestate"), tmp_path)
+        whole = {"frames": 2, "people": 2, "hota": 1.0}
+        assert found == {"test": whole, "train": whole}
+
+
+COCO = """
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
+for path in sorted((root / "annotations").glob("*.json")):
+    truth = COCO(str(path))
+    boxes = truth.loadAnns(truth.getAnnIds())
+    names = ("image_id", "category_id", "bbox")
+    same = [{**{name: box[name] for name in names}, "score": 1.0} for box in boxes]
+    judge = COCOeval(truth, truth.loadRes(same), "bbox")
+    judge.evaluate(), judge.accumulate(), judge.summarize()
+    found[path.stem] = {"images": len(truth.imgs), "boxes": len(boxes), "ap": float(judge.stats[0])}
+"""
+
+
+class TestCoco:
+    def test_its_tools_count_every_ball(self, written, tmp_path: Path) -> None:
+        found = read_by(COCO, written("coco"), tmp_path)
+        whole = {"images": 2, "boxes": 2, "ap": 1.0}
+        assert found == {"instances_test": whole, "instances_train": whole}
 
 
 PANDAS = """
