@@ -11,12 +11,12 @@ import pytest
 from app.geometry.camera import Camera
 from app.geometry.polyline import clip_polyline
 from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.soccer.finding import Fix
 from app.soccer.group import Group, Station, View
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.soccer.picture import OPEN
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
-from app.soccer.solution import Fix
 from app.solving.calibrate import calibrate_view, view_key
 from app.solving.solve import solve
 from tests.balls import box_around
