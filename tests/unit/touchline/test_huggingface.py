@@ -1,15 +1,29 @@
-"""Rows of Hugging Face datasets, where the package is installed."""
+"""Rows of Hugging Face datasets, read by the package itself."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import touchline
+from tests.readers import read_by
 from touchline.errors import MissingPackageError
 from touchline.huggingface import to_datasets
+
+ROWS = """
+import numpy as np
+import touchline
+from touchline.huggingface import to_datasets
+version = touchline.open(root)
+rows = to_datasets(version)
+sample, row = version.samples("train")[0], rows["train"][0]
+row["image"] = np.asarray(row["image"].convert("RGB"))
+names = ("group", "view", "image", "box", "center", "P")
+found["rows"] = {split: len(rows[split]) for split in rows}
+found["same"] = [name for name in names if np.array_equal(row[name], sample[name])]
+found["without"] = "image" in to_datasets(version, images=False)["train"].column_names
+"""
 
 
 class TestToDatasets:
@@ -20,17 +34,12 @@ class TestToDatasets:
         with pytest.raises(MissingPackageError, match="pip install 'datasets'"):
             to_datasets(touchline.open(export))
 
-    def test_a_split_has_a_row_for_each_view_with_its_frame(self, export: Path) -> None:
-        pytest.importorskip("datasets")
+    def test_a_split_has_a_row_for_each_view_with_its_frame(
+        self, export: Path, tmp_path: Path
+    ) -> None:
         version = touchline.open(export)
-        found = to_datasets(version)
-        assert {name: len(rows) for name, rows in found.items()} == {
-            split: len(version.samples(split)) for split in version.splits
+        assert read_by(ROWS, export, tmp_path) == {
+            "rows": {split: len(version.samples(split)) for split in version.splits},
+            "same": ["group", "view", "image", "box", "center", "P"],
+            "without": False,
         }
-        sample, row = version.samples("train")[0], found["train"][0]
-        assert (row["group"], row["view"]) == (sample["group"], sample["view"])
-        assert (np.asarray(row["image"].convert("RGB")) == sample["image"]).all()
-        for name in ("box", "center", "P"):
-            assert np.array_equal(row[name], sample[name])
-        without = to_datasets(version, images=False)
-        assert "image" not in without["train"].column_names

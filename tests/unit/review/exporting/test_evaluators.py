@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -17,6 +16,7 @@ from app.review.exporting.export import export
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.store.session import Store
+from tests.readers import read_by
 
 FOLDERS = ["test-1280x720", "train-1280x720"]
 PERSON = {"class": "Player team left", "ID": "7"}
@@ -37,33 +37,6 @@ def written(store: Store, fill, make_group, tmp_path: Path):
         return export(store, "demo", format_, tmp_path / format_, everything=True).out
 
     return write
-
-
-READERS = Path(__file__).parents[4] / ".readers"
-HEAD = """
-import json, sys
-from pathlib import Path
-from zipfile import ZipFile
-root, found = Path(sys.argv[1]), {}
-"""
-
-
-def read_by(program: str, export: Path, tmp_path: Path) -> dict[str, dict[str, float]]:
-    """What a program says that reads an export with a package of its users, in a process of its own."""
-    if not (READERS / "ready").is_file():
-        pytest.fail(
-            "The packages that read exports are missing: run 'make readers'.", pytrace=False
-        )
-    done = subprocess.run(
-        [sys.executable, "-c", f"{HEAD}{program}\nprint(json.dumps(found))", export],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(READERS)},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    found: dict[str, dict[str, float]] = json.loads(done.stdout.splitlines()[-1])
-    return found
 
 
 CALIBRATION = """
