@@ -20,9 +20,9 @@ _FOUND = select(
 ).join(PersonModel, PersonModel.id == LoginModel.person_id)
 
 
-def insert_login(session: Session, values: dict[str, Any]) -> int:
-    """Insert a session; returns its id."""
-    return int(session.execute(insert(LoginModel).returning(LoginModel.id), values).scalar_one())
+def insert_login(session: Session, values: dict[str, Any]) -> None:
+    """Insert a session."""
+    session.execute(insert(LoginModel), values)
 
 
 def find_login(session: Session, token_hash: str, *, at: str, idle_since: str) -> Any | None:

@@ -53,11 +53,9 @@ def count_able(session: Session, role: str, *, but: int | None = None) -> int:
     return session.scalar(statement) or 0
 
 
-def insert_person(
-    session: Session, name: str, role: str, *, by: str, password: str | None = None
-) -> int:
+def insert_person(session: Session, name: str, role: str, *, by: str) -> int:
     """Insert a person; returns their id. Accounts are never deleted: the log names them."""
-    values = {"name": name, "role": role, "password": password, "disabled": False}
+    values = {"name": name, "role": role, "password": None, "disabled": False}
     done = session.execute(
         insert(PersonModel).returning(PersonModel.id),
         {**values, "created": now(), "created_by": by},

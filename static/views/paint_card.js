@@ -70,9 +70,9 @@ export function PaintCard({ dataset }) {
 	const pictures = items.reduce((total, one) => total + one.views - one.without_picture, 0);
 	if (!value || !items.length || !(value.used || pictures)) return null;
 	const left = items.reduce((total, one) => total + leftToRead(one), 0);
-	// Under another policy what was read once is still there, and can be seen.
-	const isTold = value.used || items.some(({ read }) => read > 0);
 	const isRead = items.some(({ read }) => read > 0);
+	// Under another policy what was read once is still there, and can be seen.
+	const isTold = value.used || isRead;
 	/** @param {string} text @param {string} title @param {() => void} act @param {string} [kind] */
 	const button = (text, title, act, kind = '') => html`
 		<button class=${`button ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) act(); }}>${text}</button>`;

@@ -7,7 +7,7 @@ from typing import Annotated
 import structlog
 from fastapi import APIRouter, Depends, Request, Response
 
-from app.api.deps import Id
+from app.api.deps import AppStore, Id
 from app.api.problem import responses
 from app.api.schemas.people import (
     LinkLook,
@@ -26,7 +26,6 @@ from app.review.people import links
 from app.review.people.logins import Login
 from app.review.people.roles import Action, Role, may
 from app.soccer.actors import LOCAL_USER
-from app.store.session import Store
 
 router = APIRouter(tags=["sessions"])
 log = structlog.get_logger("touchline.access")
@@ -151,23 +150,18 @@ def end_session(session: Id, team: AppTeam, me: Me) -> None:
     team.logins.end(me, session)
 
 
-def _store(request: Request) -> Store:
-    store: Store = request.app.state.services.store
-    return store
-
-
 @router.post("/links/look", operation_id="lookAtLink", responses=responses(404, 409, 413, 415, 429))
-def look_at_link(asked: LinkLook, request: Request, team: AppTeam) -> LinkMeaning:
+def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTeam) -> LinkMeaning:
     """Whom a link is for; 404 when it is not good any more."""
     team.tries.count(team.address(request))
-    return LinkMeaning(**vars(links.look(_store(request), asked.token)))
+    return LinkMeaning(**vars(links.look(store, asked.token)))
 
 
 @router.post("/links/use", operation_id="useLink", responses=responses(404, 409, 413, 415, 429))
 def use_link(
-    chosen: LinkUse, request: Request, response: Response, team: AppTeam
+    chosen: LinkUse, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
     """Set the password that a link is for, and log in with it; the link is good no more."""
     team.tries.count(team.address(request))
-    name = links.use(_store(request), chosen.token, chosen.password, chosen.name)
+    name = links.use(store, chosen.token, chosen.password, chosen.name)
     return _begin(team, request, response, name, chosen.password)

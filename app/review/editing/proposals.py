@@ -17,12 +17,7 @@ from app.child_pool import ChildPool
 from app.errors import ImageError, NotFoundError
 from app.progress import Progress
 from app.review.datasets.dataset import Dataset, read_dataset
-from app.review.datasets.proposal_reading import (
-    MISSING,
-    UNREADABLE,
-    ProposalTask,
-    read_proposal,
-)
+from app.review.datasets.proposal_reading import UNREADABLE, ProposalTask, read_proposal
 from app.review.editing.etags import read_head
 from app.review.editing.view_paint import known_cameras
 from app.store.answers import Keep, keep_nothing
@@ -91,7 +86,7 @@ class ProposalRun:
             views=self.views + 1,
             **{found.outcome: getattr(self, found.outcome) + 1},
             changed=self.changed + (before not in ("", found.frame) and found.frame != ""),
-            missing=self.missing + (found.sentence in (MISSING, UNREADABLE)),
+            missing=self.missing + (found.frame == ""),
         )
 
 

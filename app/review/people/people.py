@@ -60,12 +60,6 @@ def has_people(store: Store) -> bool:
         return count_people(session) > 0
 
 
-def has_admin(store: Store) -> bool:
-    """Whether some admin can log in."""
-    with store.read() as session:
-        return count_able(session, Role.ADMIN) > 0
-
-
 def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, Link]:
     """Make an account, and the link with which its person chooses a password.
 
