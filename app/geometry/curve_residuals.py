@@ -30,9 +30,12 @@ def accumulate(
     """Cost, gradient and J^T W J of each row of parameters, written to the last three."""
     offsets = np.empty((len(pixels), 2))
     jacobians = np.empty((len(pixels), 2, 8))
+    arcs, ideal = arc_points(kinds, shapes), np.empty((2, len(pixels)))
+    samples, place = np.empty((5, ARC_SAMPLES + 1)), np.empty(6)
     for b in range(len(parameters)):
-        residual_rows(
-            parameters[b], kinds, shapes, pixels, curve, half_diagonal, offsets, jacobians
+        camera = unpack(parameters[b], half_diagonal)
+        rows_of(
+            camera, kinds, shapes, arcs, pixels, curve, ideal, samples, place, offsets, jacobians
         )
         total = 0.0
         g, H = gradient[b], information[b]
@@ -52,10 +55,11 @@ def accumulate(
             for row in range(rows):
                 e = w * offsets[n, row]
                 for i in range(8):
-                    j_i = jacobians[n, row, i]
-                    g[i] += e * j_i
-                    wj = w * j_i
-                    for k in range(i + 1):
+                    g[i] += e * jacobians[n, row, i]
+                # Whole rows, though the lower triangle alone counts: they are added eight at once.
+                for i in range(8):
+                    wj = w * jacobians[n, row, i]
+                    for k in range(8):
                         H[i, k] += wj * jacobians[n, row, k]
         for i in range(8):
             for k in range(i):
@@ -70,31 +74,56 @@ def residual_rows(parameters, kinds, shapes, pixels, curve, half_diagonal, offse
     The first residual of a point is normal to the curve, the second along it (zero but beyond
     an end). Shapes (N, 2) and (N, 2, 8).
     """
-    camera = unpack(parameters, half_diagonal)
-    ends = np.empty(4)
-    samples = np.empty((ARC_SAMPLES + 1, 2))
-    place = np.empty(6)
+    rows_of(
+        unpack(parameters, half_diagonal), kinds, shapes, arc_points(kinds, shapes), pixels, curve,
+        np.empty((2, len(pixels))), np.empty((5, ARC_SAMPLES + 1)), np.empty(6),
+        offsets, jacobians,
+    )  # fmt: skip
+
+
+@compiled
+def rows_of(camera, kinds, shapes, arcs, pixels, curve, ideal, samples, place, offsets, jacobians):
+    """``residual_rows`` of a camera; ``arcs`` are ``arc_points``, the rest is room."""
+    ideal_pixels(camera, pixels, ideal)
+    shares = np.empty((2, ARC_SAMPLES))
     last = -1
     visible = False
+    ends = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for n in range(len(pixels)):
         m = curve[n]
+        x, y = pixels[n, 0], pixels[n, 1]
         if m != last:
             last = m
             if kinds[m] == SEGMENT:
-                visible = project_segment(camera, shapes[m], ends)
+                visible, ends = project_segment(camera, shapes, m)
             else:
-                visible = sample_arc(camera, shapes[m], samples)
+                visible = sample_arc(camera, arcs, m, samples)
         inside = False
         if visible:
             if kinds[m] == SEGMENT:
-                inside = nearest_on_segment(camera, shapes[m], ends, pixels[n], place)
+                inside = nearest_on_segment(shapes, m, ends, ideal[0, n], ideal[1, n], place)
             else:
-                inside = nearest_on_arc(camera, shapes[m], samples, pixels[n], place)
+                inside = nearest_on_arc(camera, shapes, m, samples, shares, x, y, place)
         if visible and depth(camera, place) > 0.5 * NEAR:
-            residual(camera, place, inside, pixels[n], offsets[n], jacobians[n])
+            residual_at(camera, place, inside, x, y, offsets, jacobians, n)
         else:
             offsets[n, 0], offsets[n, 1] = BEHIND_PX, 0.0
-            jacobians[n] = 0.0
+            for k in range(8):
+                jacobians[n, 0, k] = 0.0
+                jacobians[n, 1, k] = 0.0
+
+
+@compiled
+def arc_points(kinds, shapes):
+    """Points along each arc, metres, shape (M, ARC_SAMPLES + 1, 2); no camera moves them."""
+    points = np.zeros((len(kinds), ARC_SAMPLES + 1, 2))
+    for m in range(len(kinds)):
+        if kinds[m] != SEGMENT:
+            for i in range(ARC_SAMPLES + 1):
+                angle = shapes[m, 3] + (shapes[m, 4] - shapes[m, 3]) * i / ARC_SAMPLES
+                points[m, i, 0] = shapes[m, 0] + shapes[m, 2] * np.cos(angle)
+                points[m, i, 1] = shapes[m, 1] + shapes[m, 2] * np.sin(angle)
+    return points
 
 
 @compiled
@@ -161,41 +190,59 @@ def ideal_pixel(camera, px, py):
 
 
 @compiled
-def project_segment(camera, shape, ends):
-    """Where along the segment the part in front of the camera begins and ends.
-
-    Writes the two places (0 to 1 along the segment) and their depths; False where nothing is
-    in front.
-    """
-    z0 = to_camera(camera, shape[0], shape[1], shape[2])[2]
-    z1 = to_camera(camera, shape[3], shape[4], shape[5])[2]
-    ends[0], ends[1], ends[2], ends[3] = 0.0, 1.0, z0, z1
-    if z0 < NEAR and z1 < NEAR:
-        return False
-    if z0 < NEAR:
-        ends[0], ends[2] = (NEAR - z0) / (z1 - z0), NEAR
-    elif z1 < NEAR:
-        ends[1], ends[3] = (NEAR - z0) / (z1 - z0), NEAR
-    return True
+def ideal_pixels(camera, pixels, ideal):
+    """Writes ``ideal_pixel`` of many pixels, shape (2, N): several at once, as nothing branches."""
+    kappa = camera[13]
+    for n in range(len(pixels)):
+        ideal[0, n], ideal[1, n] = pixels[n, 0], pixels[n, 1]
+    if kappa == 0.0:
+        return
+    for n in range(len(pixels)):
+        px, py = ideal[0, n], ideal[1, n]
+        target = np.sqrt(px * px + py * py)
+        rho = target
+        for _ in range(4):
+            u = kappa * rho * rho
+            rho -= (rho * (1 + u + 0.5 * u * u) - target) / (1 + 3 * u + 2.5 * u * u)
+        share = rho / target if target > 0 else 1.0
+        ideal[0, n], ideal[1, n] = px * share, py * share
 
 
 @compiled
-def nearest_on_segment(camera, shape, ends, pixel, place):
-    """Writes the place of the segment nearest to the pixel and the segment's direction.
+def project_segment(camera, shapes, m):
+    """Whether any of a segment is in front of the camera, and its part that is: where it begins
+    and ends (0 to 1 along the segment), both ends' ideal pixels, and their depths."""
+    x0, y0, z0 = shapes[m, 0], shapes[m, 1], shapes[m, 2]
+    first = to_camera(camera, x0, y0, z0)[2]
+    last = to_camera(camera, shapes[m, 3], shapes[m, 4], shapes[m, 5])[2]
+    begin, end = 0.0, 1.0
+    if first < NEAR and last < NEAR:
+        return False, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, first, last)
+    if first < NEAR:
+        begin = (NEAR - first) / (last - first)
+    elif last < NEAR:
+        end = (NEAR - first) / (last - first)
+    dx, dy, dz = shapes[m, 3] - x0, shapes[m, 4] - y0, shapes[m, 5] - z0
+    ax, ay, az = to_camera(camera, x0 + begin * dx, y0 + begin * dy, z0 + begin * dz)
+    bx, by, bz = to_camera(camera, x0 + end * dx, y0 + end * dy, z0 + end * dz)
+    focal = camera[12]
+    ax, ay, bx, by = focal * ax / az, focal * ay / az, focal * bx / bz, focal * by / bz
+    return True, (begin, end, ax, ay, bx, by, az, bz)
+
+
+@compiled
+def nearest_on_segment(shapes, m, ends, qx, qy, place):
+    """Writes the place of the segment nearest to an ideal pixel and the segment's direction.
 
     Straight lines stay straight before distortion, so the nearest place is sought there; the
     residual is then taken in the image as seen.
     """
-    qx, qy = ideal_pixel(camera, pixel[0], pixel[1])
-    dx, dy, dz = shape[3] - shape[0], shape[4] - shape[1], shape[5] - shape[2]
-    ax, ay, az = to_camera(
-        camera, shape[0] + ends[0] * dx, shape[1] + ends[0] * dy, shape[2] + ends[0] * dz
+    begin, end, ax, ay, bx, by, az, bz = ends
+    dx, dy, dz = (
+        shapes[m, 3] - shapes[m, 0],
+        shapes[m, 4] - shapes[m, 1],
+        shapes[m, 5] - shapes[m, 2],
     )
-    bx, by, bz = to_camera(
-        camera, shape[0] + ends[1] * dx, shape[1] + ends[1] * dy, shape[2] + ends[1] * dz
-    )
-    focal = camera[12]
-    ax, ay, bx, by = focal * ax / az, focal * ay / az, focal * bx / bz, focal * by / bz
     lx, ly = bx - ax, by - ay
     squared = lx * lx + ly * ly
     s = ((qx - ax) * lx + (qy - ay) * ly) / squared if squared > 1e-12 else 0.0
@@ -203,76 +250,98 @@ def nearest_on_segment(camera, shape, ends, pixel, place):
     s = min(max(s, 0.0), 1.0)
     # From the share of the image segment to the share of the segment in space.
     along = s * az / (bz * (1 - s) + s * az)
-    t = ends[0] + along * (ends[1] - ends[0])
-    place[0], place[1], place[2] = shape[0] + t * dx, shape[1] + t * dy, shape[2] + t * dz
+    t = begin + along * (end - begin)
+    place[0], place[1], place[2] = (
+        shapes[m, 0] + t * dx,
+        shapes[m, 1] + t * dy,
+        shapes[m, 2] + t * dz,
+    )
     place[3], place[4], place[5] = dx, dy, dz
     return inside
 
 
 @compiled
-def sample_arc(camera, shape, samples):
-    """Writes the image of points along the arc (NaN behind); False where none is in front."""
+def sample_arc(camera, arcs, m, samples):
+    """Writes the image of points along the arc (NaN behind), and of each chord between them its
+    direction and squared length, shape (5, ARC_SAMPLES + 1); False where none is in front."""
     focal, kappa = camera[12], camera[13]
     seen = False
     for i in range(ARC_SAMPLES + 1):
-        angle = shape[3] + (shape[4] - shape[3]) * i / ARC_SAMPLES
-        x, y, z = to_camera(
-            camera, shape[0] + shape[2] * np.cos(angle), shape[1] + shape[2] * np.sin(angle), 0.0
-        )
+        x, y, z = to_camera(camera, arcs[m, i, 0], arcs[m, i, 1], 0.0)
         if z < NEAR:
-            samples[i, 0] = np.nan
+            samples[0, i] = np.nan
             continue
         px, py = focal * x / z, focal * y / z
         growth = radial_growth(kappa * (px * px + py * py))
-        samples[i, 0], samples[i, 1] = px * growth, py * growth
+        samples[0, i], samples[1, i] = px * growth, py * growth
         seen = True
+    for i in range(ARC_SAMPLES):
+        lx, ly = samples[0, i + 1] - samples[0, i], samples[1, i + 1] - samples[1, i]
+        samples[2, i], samples[3, i], samples[4, i] = lx, ly, lx * lx + ly * ly
     return seen
 
 
 @compiled
-def nearest_on_arc(camera, shape, samples, pixel, place):
+def nearest_on_arc(camera, shapes, m, samples, shares, pixel_x, pixel_y, place):
     """Writes the place of the arc nearest to the pixel and its tangent, starting at a chord."""
-    step = (shape[4] - shape[3]) / ARC_SAMPLES
-    angle, closest = shape[3], np.inf
+    x0, y0, radius, start, stop = (
+        shapes[m, 0],
+        shapes[m, 1],
+        shapes[m, 2],
+        shapes[m, 3],
+        shapes[m, 4],
+    )
+    step = (stop - start) / ARC_SAMPLES
     for i in range(ARC_SAMPLES):
-        ax, ay = samples[i, 0], samples[i, 1]
-        lx, ly = samples[i + 1, 0] - ax, samples[i + 1, 1] - ay
-        squared = lx * lx + ly * ly
-        share = ((pixel[0] - ax) * lx + (pixel[1] - ay) * ly) / squared if squared > 0 else 0.0
+        ax, ay, lx, ly = samples[0, i], samples[1, i], samples[2, i], samples[3, i]
+        squared = samples[4, i]
+        share = ((pixel_x - ax) * lx + (pixel_y - ay) * ly) / squared if squared > 0 else 0.0
         share = min(max(share, 0.0), 1.0)
-        distance = (ax + share * lx - pixel[0]) ** 2 + (ay + share * ly - pixel[1]) ** 2
+        shares[0, i] = share
+        shares[1, i] = (ax + share * lx - pixel_x) ** 2 + (ay + share * ly - pixel_y) ** 2
+    angle, closest = start, np.inf
+    for i in range(ARC_SAMPLES):
         # A chord with an end behind the camera is NaN and never closer.
-        if distance < closest:
-            angle, closest = shape[3] + step * (i + share), distance
-    full = shape[4] - shape[3] > 2 * np.pi - 1e-9
+        if shares[1, i] < closest:
+            angle, closest = start + step * (i + shares[0, i]), shares[1, i]
+    full = stop - start > 2 * np.pi - 1e-9
     focal, kappa = camera[12], camera[13]
     for _ in range(ARC_STEPS):
         sine, cosine = np.sin(angle), np.cos(angle)
-        x, y, z = to_camera(camera, shape[0] + shape[2] * cosine, shape[1] + shape[2] * sine, 0.0)
+        x, y, z = to_camera(camera, x0 + radius * cosine, y0 + radius * sine, 0.0)
         if z < NEAR:
             break
-        vx, vy, vz = turn(camera, -shape[2] * sine, shape[2] * cosine, 0.0)
+        vx, vy, vz = turn(camera, -radius * sine, radius * cosine, 0.0)
         px, py = focal * x / z, focal * y / z
         rho2 = px * px + py * py
         growth, bend = radial_growth(kappa * rho2), 2 * kappa * (1 + kappa * rho2)
         gx, gy = focal * (vx - x / z * vz) / z, focal * (vy - y / z * vz) / z
         inward = bend * (px * gx + py * gy)
         gx, gy = gx * growth + px * inward, gy * growth + py * inward
-        ex, ey = pixel[0] - px * growth, pixel[1] - py * growth
+        ex, ey = pixel_x - px * growth, pixel_y - py * growth
         move = (gx * ex + gy * ey) / max(gx * gx + gy * gy, 1e-12)
         angle += min(max(move, -step), step)
-    inside = full or (shape[3] <= angle <= shape[4])
+    inside = full or (start <= angle <= stop)
     if not full:
-        angle = min(max(angle, shape[3]), shape[4])
+        angle = min(max(angle, start), stop)
     sine, cosine = np.sin(angle), np.cos(angle)
-    place[0], place[1], place[2] = shape[0] + shape[2] * cosine, shape[1] + shape[2] * sine, 0.0
-    place[3], place[4], place[5] = -shape[2] * sine, shape[2] * cosine, 0.0
+    place[0], place[1], place[2] = x0 + radius * cosine, y0 + radius * sine, 0.0
+    place[3], place[4], place[5] = -radius * sine, radius * cosine, 0.0
     return inside
 
 
 @compiled
 def residual(camera, place, inside, pixel, offset, jacobian):
     """Writes the offset of one image point from one place of space, and its derivatives."""
+    residual_at(
+        camera, place, inside, pixel[0], pixel[1],
+        offset.reshape((1, 2)), jacobian.reshape((1, 2, 8)), 0,
+    )  # fmt: skip
+
+
+@compiled
+def residual_at(camera, place, inside, pixel_x, pixel_y, offsets, jacobians, n):
+    """``residual`` into row ``n`` of many."""
     dx, dy, dz = place[0] - camera[9], place[1] - camera[10], place[2] - camera[11]
     ux, uy, uz = turn(camera, dx, dy, dz)
     focal, kappa = camera[12], camera[13]
@@ -283,7 +352,7 @@ def residual(camera, place, inside, pixel, offset, jacobian):
     # Derivative of the seen by the ideal pixel.
     bend = 2 * kappa * (1 + kappa * rho2)
     dxx, dxy, dyy = growth + bend * px * px, bend * px * py, growth + bend * py * py
-    ex, ey = pixel[0] - px * growth, pixel[1] - py * growth
+    ex, ey = pixel_x - px * growth, pixel_y - py * growth
     # Unit tangent of the projected curve: it splits the offset into normal and along.
     vx, vy, vz = turn(camera, place[3], place[4], place[5])
     ix, iy = focal * (vx - nx * vz) / uz, focal * (vy - ny * vz) / uz
@@ -293,13 +362,13 @@ def residual(camera, place, inside, pixel, offset, jacobian):
         gx, gy = gx / length, gy / length
     else:
         gx, gy = 1.0, 0.0
-    offset[0] = gx * ey - gy * ex
-    offset[1] = 0.0 if inside else gx * ex + gy * ey
-    projection_derivatives(camera, dx, dy, dz, jacobian)
+    offsets[n, 0] = gx * ey - gy * ex
+    offsets[n, 1] = 0.0 if inside else gx * ex + gy * ey
+    derivatives_at(camera, dx, dy, dz, jacobians, n)
     for k in range(8):
-        jx, jy = jacobian[0, k], jacobian[1, k]
-        jacobian[0, k] = gy * jx - gx * jy
-        jacobian[1, k] = 0.0 if inside else -(gx * jx + gy * jy)
+        jx, jy = jacobians[n, 0, k], jacobians[n, 1, k]
+        jacobians[n, 0, k] = gy * jx - gx * jy
+        jacobians[n, 1, k] = 0.0 if inside else -(gx * jx + gy * jy)
 
 
 @compiled
@@ -308,6 +377,12 @@ def projection_derivatives(camera, dx, dy, dz, derivatives):
 
     (dx, dy, dz) is the point less the camera's position, pitch frame.
     """
+    derivatives_at(camera, dx, dy, dz, derivatives.reshape((1, 2, 8)), 0)
+
+
+@compiled
+def derivatives_at(camera, dx, dy, dz, derivatives, n):
+    """``projection_derivatives`` into row ``n`` of many."""
     ux, uy, uz = turn(camera, dx, dy, dz)
     focal, kappa, unit = camera[12], camera[13], camera[14]
     nx, ny = ux / uz, uy / uz
@@ -320,28 +395,50 @@ def projection_derivatives(camera, dx, dy, dz, derivatives):
     along, across = cp * dx + sp * dy, -sp * dx + cp * dy
     lifted = -st * across + ct * dz
     lowered = ct * across + st * dz
-    for k in range(8):
-        a, b, c = 0.0, 0.0, 0.0
-        if k == 0:
-            # d Rz(-pan) X / d pan = (across, -along, 0), then tilted and rolled.
-            a = cr * across - sr * ct * along
-            b = -sr * across - cr * ct * along
-            c = st * along
-        elif k == 1:
-            a, b, c = sr * lifted, cr * lifted, -lowered
-        elif k == 2:
-            a, b, c = uy, -ux, 0.0
-        elif k < 6:
-            a, b, c = -camera[k - 3], -camera[k], -camera[k + 3]
-        if k < 6:
-            qx, qy = focal * (a - nx * c) / uz, focal * (b - ny * c) / uz
-            jx, jy = dxx * qx + dxy * qy, dxy * qx + dyy * qy
-        elif k == 6:
-            jx, jy = dxx * px + dxy * py, dxy * px + dyy * py
-        else:
-            share = rho2 * unit * (1 + kappa * rho2)
-            jx, jy = px * share, py * share
-        derivatives[0, k], derivatives[1, k] = jx, jy
+    # d Rz(-pan) X / d pan = (across, -along, 0), then tilted and rolled.
+    _moved(
+        derivatives,
+        n,
+        0,
+        cr * across - sr * ct * along,
+        -sr * across - cr * ct * along,
+        st * along,
+        focal,
+        nx,
+        ny,
+        uz,
+        dxx,
+        dxy,
+        dyy,
+    )
+    _moved(derivatives, n, 1, sr * lifted, cr * lifted, -lowered, focal, nx, ny, uz, dxx, dxy, dyy)
+    _moved(derivatives, n, 2, uy, -ux, 0.0, focal, nx, ny, uz, dxx, dxy, dyy)
+    for k in range(3, 6):
+        _moved(
+            derivatives,
+            n,
+            k,
+            -camera[k - 3],
+            -camera[k],
+            -camera[k + 3],
+            focal,
+            nx,
+            ny,
+            uz,
+            dxx,
+            dxy,
+            dyy,
+        )
+    derivatives[n, 0, 6], derivatives[n, 1, 6] = dxx * px + dxy * py, dxy * px + dyy * py
+    share = rho2 * unit * (1 + kappa * rho2)
+    derivatives[n, 0, 7], derivatives[n, 1, 7] = px * share, py * share
+
+
+@compiled
+def _moved(derivatives, n, k, a, b, c, focal, nx, ny, uz, dxx, dxy, dyy):
+    """Writes what the pixel does when the point moves by (a, b, c) in the camera frame."""
+    qx, qy = focal * (a - nx * c) / uz, focal * (b - ny * c) / uz
+    derivatives[n, 0, k], derivatives[n, 1, k] = dxx * qx + dxy * qy, dxy * qx + dyy * qy
 
 
 @compiled

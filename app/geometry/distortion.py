@@ -23,10 +23,14 @@ _FEW = 4
 def distort(points: FloatArray, coefficients: FloatArray) -> FloatArray:
     """Distorted normalised coordinates of ideal ones, both shape (N, 2).
 
+    Args:
+        points: The ideal ones.
+        coefficients: Of the lens, shape (12,), or of a lens for each point, shape (12, N).
+
     Source: OpenCV, projectPoints without its tilt terms.
     """
     points = require_shape(points, (None, 2), "points")
-    if len(points) == 1:
+    if len(points) == 1 and coefficients.ndim == 1:
         x, y = points[0].tolist()
         return np.array([distort_point(x, y, coefficients.tolist())])
     return np.column_stack(_distorted(points[:, 0], points[:, 1], coefficients))
@@ -54,9 +58,9 @@ def _distorted(x: Any, y: Any, coefficients: Iterable[float]) -> tuple[Any, Any]
 
 
 def distort_jacobian(points: FloatArray, coefficients: FloatArray) -> FloatArray:
-    """Derivative of ``distort`` by the ideal coordinates, shape (N, 2, 2)."""
+    """Derivative of ``distort`` by the ideal coordinates, shape (N, 2, 2); same arguments."""
     points = require_shape(points, (None, 2), "points")
-    if len(points) == 1:
+    if len(points) == 1 and coefficients.ndim == 1:
         x, y = points[0].tolist()
         try:
             return np.array(_slopes(x, y, coefficients.tolist())).reshape(1, 2, 2)

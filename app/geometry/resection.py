@@ -23,17 +23,21 @@ import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.geometry.curve_fit import descend
 from app.geometry.curve_residuals import (
     accumulate,
     point_rows,
     residual_rows,
 )
+from app.geometry.least_squares import CONVERGED, OUT_OF_STEPS, STUCK, Fit
 from app.geometry.rotation import pan_tilt_roll_from_rotation, rotation_from_pan_tilt_roll
 
 PARAMETERS = 8
 PAN, TILT, ROLL, X, Y, Z, LOG_FOCAL, KAPPA = range(PARAMETERS)
 
 SEGMENT, ARC = 0, 1
+NAMES = (CONVERGED, OUT_OF_STEPS, STUCK)
+"""Why a start stopped, by the number that ``curve_fit`` has for it."""
 
 IntArray = npt.NDArray[np.int64]
 
@@ -151,6 +155,54 @@ def normal_equations(
         information,
     )
     return cost, gradient, information
+
+
+def fit_curves(
+    start: FloatArray,
+    curves: Curves,
+    sightings: Sightings,
+    prior: Prior,
+    scale_px: float,
+    half_diagonal: float,
+    steps: int,
+    *,
+    tolerance: float,
+    damping: float,
+) -> Fit:
+    """``levenberg_marquardt`` on ``normal_equations`` with its rounds compiled, bit for bit.
+
+    Args:
+        start: Shape (B, 8).
+    """
+    parameters = np.array(start, dtype=np.float64)
+    count = len(parameters)
+    cost, gradient = np.empty(count), np.empty((count, PARAMETERS))
+    information = np.empty((count, PARAMETERS, PARAMETERS))
+    accepted, rejected = np.zeros(count), np.zeros(count)
+    reasons = np.full(count, NAMES.index(OUT_OF_STEPS))
+    descend(
+        parameters,
+        curves.kinds,
+        curves.shapes,
+        sightings.pixels,
+        sightings.curve,
+        sightings.weight,
+        prior.mean,
+        prior.sigma,
+        scale_px,
+        half_diagonal,
+        steps,
+        tolerance,
+        damping,
+        cost,
+        gradient,
+        information,
+        accepted,
+        rejected,
+        reasons,
+    )
+    names = tuple(NAMES[reason] for reason in reasons.tolist())
+    return Fit(parameters, cost, information, accepted, rejected, names)
 
 
 def distances(

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from app.errors import DegenerateGeometryError
-from app.geometry.arrays import FloatArray, cross, require_shape
+from app.geometry.arrays import BoolArray, FloatArray, cross, require_shape
 from app.geometry.smallest_singular import smallest_singular_vectors
 
 _PARALLEL = 1e-12
@@ -121,26 +118,31 @@ def parallax_angle(
     return np.where(nowhere, np.nan, np.arctan2(sine, cosine))
 
 
-def point_covariance(
-    jacobians: Sequence[FloatArray], pixel_covariances: Sequence[FloatArray] | FloatArray
-) -> FloatArray:
-    """Covariance of a point seen by several cameras, square metres, shape (3, 3).
+def point_covariances(
+    jacobians: FloatArray, pixel_covariances: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Covariances of points seen by several cameras each, square metres.
 
     Args:
-        jacobians: Of the pixel by the point in each camera, shape (2, 3).
-        pixel_covariances: Of the measured pixel in each camera, shape (2, 2).
+        jacobians: Of the pixel by the point in each camera, shape (N, V, 2, 3).
+        pixel_covariances: Of the measured pixel in each camera, shape (N, V, 2, 2).
 
-    Raises:
-        DegenerateGeometryError: The cameras do not determine the point.
+    Returns:
+        Shape (N, 3, 3), and whether the cameras determine the point at all, shape (N,).
 
     Source: Hartley & Zisserman, result 5.10.
     """
-    information = np.zeros((3, 3))
-    # One call for all cameras: each costs more than what it computes.
-    weighed = np.linalg.solve(np.asarray(pixel_covariances), np.asarray(jacobians))
-    for jacobian, weighted in zip(jacobians, weighed, strict=True):
-        information += jacobian.T @ weighted
+    weighed = np.linalg.solve(pixel_covariances, jacobians)
+    information = summed(jacobians.swapaxes(-1, -2) @ weighed)
     values = np.linalg.eigvalsh(information)
-    if values[0] <= 1e-15 * values[-1]:
-        raise DegenerateGeometryError("all rays to the point are parallel")
-    return np.asarray(np.linalg.inv(information), dtype=np.float64)
+    parallel = values[:, 0] <= 1e-15 * values[:, -1]
+    information[parallel] = np.eye(3)
+    return np.asarray(np.linalg.inv(information), dtype=np.float64), ~parallel
+
+
+def summed(parts: FloatArray) -> FloatArray:
+    """Sums over the second axis, one after the other: the same bits however many rows there are."""
+    total = np.zeros((len(parts), *parts.shape[2:]))
+    for place in range(parts.shape[1]):
+        total += parts[:, place]
+    return total

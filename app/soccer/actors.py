@@ -10,7 +10,39 @@ LOCAL_USER = "local"
 """Who acts in single-user mode."""
 SCRIPT = "script:"
 """How the name of a script begins, so that none passes for a person."""
+TOKEN = " (token "
+"""What stands between the name of a person and that of their token."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._@+-]{0,59}")
+
+
+def with_token(name: str, token: str) -> str:
+    """The name under which a script acts that asks with a person's token.
+
+    Example:
+        >>> with_token("anna", "deploy")
+        'anna (token deploy)'
+    """
+    return f"{name}{TOKEN}{token})"
+
+
+def person_of(actor: str) -> str:
+    """The name of the person behind an actor; no name of a person has a bracket.
+
+    Example:
+        >>> person_of("anna (token deploy)"), person_of("anna")
+        ('anna', 'anna')
+    """
+    return actor.partition(TOKEN)[0]
+
+
+def is_of(actor: str, name: str) -> bool:
+    """Whether an actor is a person of that name, one of their tokens, or that very token.
+
+    Example:
+        >>> is_of("anna (token deploy)", "anna"), is_of("anna", "anna (token deploy)")
+        (True, False)
+    """
+    return name in (actor, person_of(actor))
 
 
 def script_name(said: str, *, pointer: str | None = None) -> str:

@@ -95,6 +95,8 @@ class View:
     extras: Extras = field(default_factory=Extras)
     left_out: LeftOut | None = None
     """Why it was left out, where the person said so; None while it is included."""
+    noise: float = 1.0
+    """How noisy the place of its ball is: sigma beside that of the dataset's balls."""
 
     @property
     def size(self) -> ImageSize:
@@ -154,6 +156,11 @@ class Group:
     label: str = ""
     positions: Mapping[str, SharedPosition] = field(default_factory=dict)
     paint: Mapping[str, PaintReading] = field(default_factory=dict)
+
+    @property
+    def noise(self) -> dict[str, float]:
+        """How noisy balls are, where that is unlike the dataset's, by the view's key."""
+        return {view.key: view.noise for view in self.views if view.noise != 1}
 
     def view(self, key: str) -> View | None:
         """The view of that key, or None."""

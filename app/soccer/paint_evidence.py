@@ -51,18 +51,19 @@ class PaintEvidence:
         """Places in all."""
         return sum(map(len, self.points.values()))
 
-    def some_points(self, most: int = POINTS_PER_MARKING) -> Lines:
-        """At most so many places of each marking, spread along it."""
+    def some_points(self) -> Lines:
+        """At most ``POINTS_PER_MARKING`` places of each marking, spread along it."""
         lines = {}
         for marking, points in self.points.items():
-            chosen = np.linspace(0, len(points) - 1, min(len(points), most)).round().astype(int)
+            chosen = np.linspace(0, len(points) - 1, min(len(points), POINTS_PER_MARKING))
+            chosen = chosen.round().astype(int)
             places = (points[index] for index in np.unique(chosen).tolist())
             lines[marking] = [ImagePoint(place.x, place.y) for place in places]
         return make_lines(lines)
 
 
 PROPOSAL_OUTCOMES = ("proposed", "unsure", "nothing")
-"""What can become of a picture without lines whose paint is looked at."""
+"""What can become of a view for which lines are sought in the paint of its picture."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,7 @@ class PaintReading:
         supported: Agreement of the camera that was found with the picture (``paint.agreement``);
             None where nothing was measured.
         explained: The same of the paint that lies near a marking.
+        people: Digest of the boxes in which nothing was believed; empty where there were none.
     """
 
     frame: str
@@ -87,6 +89,7 @@ class PaintReading:
     reason: str | None = None
     supported: float | None = None
     explained: float | None = None
+    people: str = ""
 
     @cached_property
     def text(self) -> str:
@@ -106,8 +109,8 @@ class PaintReading:
 
 
 def reading_to_json(reading: PaintReading) -> dict[str, Any]:
-    """As JSON; what was not measured is null."""
-    return {
+    """As JSON; what was not measured is null, and ``people`` is there where somebody was."""
+    value = {
         "frame": reading.frame,
         "sought_for": reading.sought_for,
         "evidence": evidence_to_json(reading.evidence),
@@ -115,6 +118,7 @@ def reading_to_json(reading: PaintReading) -> dict[str, Any]:
         "supported": reading.supported,
         "explained": reading.explained,
     }
+    return {**value, "people": reading.people} if reading.people else value
 
 
 def reading_from_json(value: Any) -> PaintReading:
@@ -124,13 +128,18 @@ def reading_from_json(value: Any) -> PaintReading:
         InputError: It is none.
     """
     try:
-        shares = [value[name] for name in ("supported", "explained")]
+        supported, explained = (
+            None if (share := value[name]) is None else float(share)
+            for name in ("supported", "explained")
+        )
         return PaintReading(
             str(value["frame"]),
             str(value["sought_for"]),
             evidence_from_json(value["evidence"]),
             None if value["reason"] is None else str(value["reason"]),
-            *(None if share is None else float(share) for share in shares),
+            supported,
+            explained,
+            str(value.get("people", "")),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"this is no reading of paint: {error}") from error

@@ -87,5 +87,18 @@ class PictureGeometry:
         return replace(camera, focal_length=(x * self.aspect, y), principal_point=self.middle(size))
 
 
+def camera_aspect(camera: Camera) -> float:
+    """Width of a pixel of a camera's picture by its height."""
+    x, y = camera.focal_length
+    return x / y
+
+
+def taken_camera(camera: Camera) -> Camera:
+    """The camera of a picture as it was taken, from that of the picture as it is; its principal
+    point stays where it is."""
+    y = camera.focal_length[1]
+    return replace(camera, focal_length=(y, y))
+
+
 OPEN = PictureGeometry(sigma=(0.3, 0.4, 0.4))
 """Of a picture of which nothing is known but that something was done to it: its lines say what."""

@@ -76,6 +76,29 @@ class CalibrationPolicy:
     )
     """``lines``: what was clicked; ``paint``: started by the clicks, drawn onto what was read of the
     paint in the picture. Not in the ``repr`` either: calibrations are keyed by what was read."""
+    line_sigma_px: float | None = _threshold(
+        None,
+        CALIBRATION,
+        "Sigma of a point on a line",
+        "px at 960x540",
+        0.1,
+        10.0,
+        later=True,
+        told=False,
+    )
+    """Of a clicked point across its marking, about which images differ; None: what real annotations
+    show, and each image by itself. Not in the ``repr``: ``calibration_key`` knows it where it is set."""
+    line_share: float | None = _threshold(
+        None,
+        CALIBRATION,
+        "Of its variance, what a marking shares",
+        "share",
+        0.0,
+        0.95,
+        later=True,
+        told=False,
+    )
+    """What the points of a marking have in common of that variance; None: weighed image by image."""
 
 
 @dataclass(frozen=True)

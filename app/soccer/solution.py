@@ -13,7 +13,7 @@ from app.geometry.camera import Camera
 from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 
-SOLVER_VERSION = "3"
+SOLVER_VERSION = "5"
 """Part of every solution's key; raised by one whenever a number changes."""
 
 GAMMAS_PERCENT = (0.5, 1.0, 2.0)
@@ -140,6 +140,9 @@ class Calibration:
         picture: How the picture was stretched or cropped, where the lines say so; the camera is
             found as if it were not.
         paint: How it and the paint agree, where that was read for the same clicks.
+        picture_covariance: Of a stretched or cropped picture: of the eight numbers of the camera as
+            the picture was taken, the logarithm of the aspect and both shifts, 11 x 11, row by row.
+            ``covariance`` is the nearest that eight numbers can say.
     """
 
     source: str
@@ -153,6 +156,7 @@ class Calibration:
     unobservable: tuple[str, ...] = ()
     picture: Picture | None = None
     paint: PaintFit | None = field(default=None, metadata={"later": True})
+    picture_covariance: tuple[float, ...] | None = field(default=None, metadata={"later": True})
 
     @property
     def is_known(self) -> bool:

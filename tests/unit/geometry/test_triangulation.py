@@ -4,13 +4,13 @@ import cv2
 import numpy as np
 import pytest
 
-from app.errors import DegenerateGeometryError, ShapeError
+from app.errors import ShapeError
 from app.geometry.camera import Camera
 from app.geometry.smallest_singular import smallest_singular_vectors
 from app.geometry.triangulation import (
     moved_points,
     parallax_angle,
-    point_covariance,
+    point_covariances,
     triangulate_pairs,
 )
 from tests.cameras import FULL_HD, looking
@@ -112,14 +112,22 @@ class TestParallaxAngle:
             parallax_angle(np.zeros((1, 3)), np.ones((1, 3)), np.zeros(3))
 
 
-class TestPointCovariance:
+class TestPointCovariances:
     def test_two_perpendicular_views_of_known_resolution(self):
         # One pixel is a centimetre for a camera that looks along x, and for one along y.
         along_x = np.array([[0.0, 100.0, 0.0], [0.0, 0.0, 100.0]])
         along_y = np.array([[100.0, 0.0, 0.0], [0.0, 0.0, 100.0]])
-        spread = point_covariance([along_x, along_y], [np.eye(2), np.eye(2)])
-        assert np.allclose(np.sqrt(np.diag(spread)), [0.01, 0.01, 0.01 / np.sqrt(2)])
+        spreads, known = point_covariances(
+            np.array([[along_x, along_y]]), np.tile(np.eye(2), (1, 2, 1, 1))
+        )
+        assert known.all()
+        assert np.allclose(np.sqrt(np.diag(spreads[0])), [0.01, 0.01, 0.01 / np.sqrt(2)])
 
-    def test_one_view_alone_determines_nothing(self):
-        with pytest.raises(DegenerateGeometryError):
-            point_covariance([np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])], [np.eye(2)])
+    def test_parallel_views_determine_nothing_and_disturb_nobody(self):
+        along_x = np.array([[0.0, 100.0, 0.0], [0.0, 0.0, 100.0]])
+        along_y = np.array([[100.0, 0.0, 0.0], [0.0, 0.0, 100.0]])
+        both = np.array([[along_x, along_x], [along_x, along_y]])
+        spreads, known = point_covariances(both, np.tile(np.eye(2), (2, 2, 1, 1)))
+        alone, _ = point_covariances(both[1:], np.tile(np.eye(2), (1, 2, 1, 1)))
+        assert known.tolist() == [False, True]
+        assert np.array_equal(spreads[1], alone[0])

@@ -65,6 +65,7 @@ class TestReading:
             {"reason": "no_paint"},
             {"supported": None},
             {"explained": 0.25},
+            {"people": "somebody"},
         ],
         ids=lambda item: next(iter(item)),
     )
