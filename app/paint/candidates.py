@@ -8,11 +8,14 @@ soon as one piece is a marking.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.geometry.resection import KAPPA, parameters_from_camera
 from app.paint.candidate_kernels import anchor_all
 from app.soccer.pitch import MARKINGS, Pitch, Segment
 
@@ -20,6 +23,11 @@ FOCAL_STEP = 1.11
 """Between neighbouring focal lengths of the library."""
 TILT_DEGREES = (35.0, 91.0)
 """Broadcast cameras look down, or level."""
+KNOWN, KNOWN_FOCAL, ZOOM = "known", (0.5, 6.0), 3.0
+"""Name of what a match knows; its focal lengths in widths of the image, and how much wider or
+narrower than the cameras at hand another frame may be."""
+SAME_STAND_M = 1.0
+MOST_KAPPA = 0.3
 SLACK_M = 4.0
 """How far beyond the end of its marking a piece of paint may seem to reach."""
 
@@ -33,12 +41,14 @@ class Library:
         stands: Positions in the pitch frame, metres, shape (S, 3).
         focal_range: Shortest and longest focal length, in widths of the image.
         position_sigma: How far from its stand a camera may be, metres, shape (3,).
+        kappa: Distortion of the lens where it is known (``geometry.resection``).
     """
 
     name: str
     stands: FloatArray
     focal_range: tuple[float, float]
     position_sigma: FloatArray
+    kappa: float | None = None
 
     def focals(self, width: float) -> FloatArray:
         """The focal lengths, pixels."""
@@ -54,7 +64,7 @@ def _grid(*axes: tuple[float, ...]) -> FloatArray:
 
 MAIN = Library(
     "main stand",
-    _grid((-7.0, 7.0), (47.0, 57.0, 69.0, 84.0), (-9.0, -13.0, -18.0, -25.0)),
+    _grid((-7.0, 0.0, 7.0), (47.0, 57.0, 69.0, 84.0), (-9.0, -13.0, -18.0, -25.0)),
     (0.6, 5.0),
     np.array([6.0, 12.0, 6.0]),
 )
@@ -79,6 +89,30 @@ WIDE = Library(
     np.array([8.0, 10.0, 5.0]),
 )
 """Replays: any side; the half turn of the pitch makes y >= 0 of every stand."""
+
+
+def known_library(known: Sequence[Camera]) -> Library:
+    """Where cameras of the same match stand, and with which lenses.
+
+    Args:
+        known: At least one; the lens centre of each is the centre of its picture.
+    """
+    stands: list[FloatArray] = []
+    focals, kappas = [], []
+    for camera in known:
+        if not any(np.linalg.norm(camera.position - stand) < SAME_STAND_M for stand in stands):
+            stands.append(camera.position)
+        width, height = (2 * center + 1 for center in camera.principal_point)
+        focals.append(camera.focal_length[0] / width)
+        kappas.append(parameters_from_camera(camera, float(np.hypot(width, height)) / 2)[KAPPA])
+    low, high = min(focals) / ZOOM, max(focals) * ZOOM
+    return Library(
+        KNOWN,
+        np.array(stands),
+        (min(max(low, KNOWN_FOCAL[0]), high), max(min(high, KNOWN_FOCAL[1]), low)),
+        np.array([0.5, 0.5, 0.5]),
+        float(np.clip(np.median(kappas), -MOST_KAPPA, MOST_KAPPA)),
+    )
 
 
 def candidates(pieces: FloatArray, library: Library, pitch: Pitch, width: float) -> FloatArray:

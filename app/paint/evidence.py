@@ -7,7 +7,7 @@ a fraction of a pixel, a standard deviation and a strength (docs/paint.md).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import cv2
@@ -17,7 +17,8 @@ import numpy.typing as npt
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import Camera
 from app.geometry.resection import parameters_from_camera
-from app.paint.profile_kernels import drop_strays, find_stripes
+from app.paint.grass_colour import grass_colour
+from app.paint.profile_kernels import BEYOND_PX, SIDE_PX, drop_strays, find_stripes
 from app.paint.trace_kernels import trace_markings
 from app.soccer.frames import Box
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint
@@ -138,6 +139,17 @@ class Evidence:
         """Where the paint is, pixels, shape (N, 2)."""
         return self.traced.pixels + self.offsets[:, None] * self.traced.normals
 
+    def scaled(self, factor: float) -> Evidence:
+        """The same evidence for the picture resized by a factor."""
+        traced = replace(
+            self.traced,
+            pixels=(self.traced.pixels + 0.5) * factor - 0.5,
+            widths=self.traced.widths * factor,
+            jacobian=self.traced.jacobian * factor,
+        )
+        offsets, sigmas = self.offsets * factor, self.sigmas * factor
+        return replace(self, traced=traced, offsets=offsets, sigmas=sigmas)
+
 
 def read_picture(image: Image, field: BoolArray, hidden: Sequence[Box] = ()) -> Reading:
     """A picture prepared for reading paint.
@@ -224,6 +236,32 @@ def seek(reading: Reading, traced: Traced, window_px: float | FloatArray) -> Evi
     sigma = np.hypot(sigmas[kept], SIGMA_FLOOR_PX)
     sigma *= 1 + (sigma / UNSURE_PX) ** 2
     return Evidence(seen, offsets[kept], sigma, strengths[kept], count)
+
+
+def shows_grass_beside(reading: Reading, traced: Traced, window_px: float) -> BoolArray:
+    """Where paint would be seen if it was there: in the picture, with grass to both sides.
+
+    Args:
+        window_px: How far to either side paint is sought.
+
+    Returns:
+        Shape (N,).
+    """
+    side = np.maximum(SIDE_PX, 0.5 * traced.widths + BEYOND_PX)
+    reach = (window_px + side + 1.0)[:, None] * traced.normals
+    last = np.array([reading.width, reading.height]) - 3.0
+    seen: BoolArray = np.ones(len(side), np.bool_)
+    for sign in (-1.0, 1.0):
+        end = traced.pixels + sign * reach
+        seen &= ((end >= 2.0) & (end <= last)).all(axis=1)
+    rows = np.flatnonzero(seen)
+    for sign in (-1.0, 1.0):
+        beside = traced.pixels[rows] + sign * side[rows, None] * traced.normals[rows]
+        x, y = (beside + 0.5).astype(np.int64).T
+        grass = np.empty((1, len(rows)), np.uint8)
+        grass_colour(np.ascontiguousarray(reading.image[y, x][None]), grass)
+        seen[rows] &= (grass[0] > 0) & (reading.hidden[y, x] == 0)
+    return seen
 
 
 def _bright_as_paint(strengths: FloatArray, widths: FloatArray) -> BoolArray:

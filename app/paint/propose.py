@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Literal
 
@@ -21,13 +21,14 @@ import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
+from app.geometry.resection import X, Z
 from app.paint.agreement import Agreement, agreement
-from app.paint.candidates import MAIN, WIDE, Library
-from app.paint.evidence import Reading, read_picture, trace
+from app.paint.candidates import KNOWN, MAIN, WIDE, Library, known_library
+from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace
 from app.paint.grass import field_of_play, why_no_field
 from app.paint.ridges import line_like
 from app.paint.scoring import Picture
-from app.paint.search import SCOUTED, Shown, search, shown_by, shows_the_same
+from app.paint.search import KAPPA_MEAN, SCOUTED, SEARCHED, Shown, search, shown_by, shows_the_same
 from app.paint.snap import Snapped, snap_reading
 from app.paint.straight import straight_pieces
 from app.soccer.frames import ImageSize
@@ -38,6 +39,8 @@ from app.solving.observations import principal_point
 Image = npt.NDArray[np.uint8]
 Outcome = Literal["proposed", "unsure", "nothing"]
 
+SEARCH_VERSION = 2
+"""Of the search and what decides: where nothing was proposed, a later one looks again."""
 WORK_WIDTH = 960
 LEAST_SIDE = 160
 """Pixels: in a smaller picture lines are narrower than a pixel."""
@@ -45,21 +48,22 @@ BORDER_PX = 4
 """At the border of a picture ridges are no paint."""
 MOST_PIECES = 8
 SNAPPED = 12
-KNOWN, KNOWN_SNAPPED, KNOWN_SCOUTED = "known", 5, 250
+KNOWN_SNAPPED, KNOWN_SCOUTED, KNOWN_SEARCHED = 4, 150, 24
 """Where the match says where the camera stands, fewer are looked at."""
 WINDOWS = (16.0, 10.0, 6.0, 4.0, 3.0, 3.0)
-KNOWN_FOCAL, KNOWN_SIGMA = (0.5, 6.0), np.array([0.5, 0.5, 0.5])
-"""Widths of the picture, and metres: a tripod stays where it is."""
-SAME_STAND_M = 1.0
 VISIBLE_PX = 0.8
 """Across: narrower paint may fade into the grass."""
+KNOWN_KAPPA_SIGMA = 0.015
+"""How far the distortion of a lens moves with its zoom."""
 MARKING_PLACES = 12
 """Places (``evidence.SPACING_PX`` apart) from which on the paint of a marking would be seen."""
 LEAST_WEAKEST = 0.25
 WELL_SUPPORTED, WELL_PAINTED = 0.75, 0.75
 """Where less of the markings has paint, each that would be seen has to have it nearly whole."""
-LEAST_SUPPORTED, LEAST_SCORE, LEAST_LEAD, LEAST_SUM = 0.55, 0.30, 0.06, 0.52
+LEAST_SUPPORTED, LEAST_SCORE, LEAST_LEAD, LEAST_SUM = 0.50, 0.30, 0.06, 0.52
 """The less of the paint a camera explains, the farther all others have to lie behind it."""
+MOST_UNCERTAIN_M = 1.0
+"""Standard deviation of the position: three lines lie on their paint for many cameras."""
 AIM_SIGMA, LENS_SIGMA = np.radians([3.0, 3.0, 1.0]), np.array([0.2, 0.01])
 """Pan, tilt and roll; logarithm of the focal length and kappa: how far a start may be off."""
 SOLE_LEAD = 0.15
@@ -104,11 +108,25 @@ class Frame:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A camera on the paint, and how well it agrees with all of it."""
+    """A camera on the paint, and how well it agrees with all of it.
+
+    Attributes:
+        weakest: As of ``weakest_marking``.
+        policy: Prior of the distortion with which it was snapped.
+    """
 
     snapped: Snapped
     agreement: Agreement
     weakest: float
+    policy: CalibrationPolicy = field(default_factory=CalibrationPolicy)
+
+    @property
+    def uncertain_m(self) -> float:
+        """Largest standard deviation of the position, metres."""
+        covariance = self.snapped.covariance
+        if covariance is None:
+            return np.inf
+        return float(np.sqrt(np.linalg.eigvalsh(covariance[X : Z + 1, X : Z + 1])[-1]))
 
     @property
     def is_contradicted(self) -> bool:
@@ -132,7 +150,8 @@ def propose(
     Args:
         image: Red green blue, shape (H, W, 3).
         pitch: The pitch.
-        known: Cameras of other frames of the match: it is looked for at their positions first.
+        known: Cameras of other frames of the match: it is looked for at their positions, and with
+            their lenses, first.
         policy: Prior of the distortion.
     """
     pitch, policy = pitch or Pitch(), policy or CalibrationPolicy()
@@ -140,11 +159,11 @@ def propose(
     if isinstance(frame, str):
         return Proposal("nothing", frame)
     ranked: list[Ranked] = []
-    for library in _libraries(known):
+    for library in [*([known_library(known)] if known else []), MAIN, WIDE]:
         ranked = merged(frame, ranked, rank(frame, library, pitch, policy))
         if why_unsure(ranked) is None:
             break
-    return _answer(image, frame, ranked, pitch, policy)
+    return _answer(image, frame, ranked, pitch)
 
 
 def read_frame(image: Image) -> Frame | str:
@@ -170,21 +189,18 @@ def read_frame(image: Image) -> Frame | str:
     return Frame(image, field, paint, pieces, picture, read_picture(image, field))
 
 
-def _libraries(known: Sequence[Camera]) -> list[Library]:
-    libraries = [MAIN, WIDE]
-    if known:
-        stands: list[FloatArray] = []
-        for camera in known:
-            if not any(np.linalg.norm(camera.position - stand) < SAME_STAND_M for stand in stands):
-                stands.append(camera.position)
-        libraries.insert(0, Library(KNOWN, np.array(stands), KNOWN_FOCAL, KNOWN_SIGMA))
-    return libraries
-
-
 def rank(frame: Frame, library: Library, pitch: Pitch, policy: CalibrationPolicy) -> list[Ranked]:
     """The cameras of a library that lie on the paint of a frame, best first."""
-    most, scouted = (SNAPPED, SCOUTED) if library.name != KNOWN else (KNOWN_SNAPPED, KNOWN_SCOUTED)
-    found = search(frame.picture, frame.pieces, library, pitch, threads(), most, scouted)
+    amount = (SNAPPED, SCOUTED, SEARCHED)
+    if library.name == KNOWN:
+        amount = (KNOWN_SNAPPED, KNOWN_SCOUTED, KNOWN_SEARCHED)
+    if library.kappa is None:
+        kappa = KAPPA_MEAN
+    else:
+        kappa = library.kappa
+        sigma = min(KNOWN_KAPPA_SIGMA, policy.distortion_sigma)
+        policy = replace(policy, distortion_mean=kappa, distortion_sigma=sigma)
+    found = search(frame.picture, frame.pieces, library, pitch, threads(), *amount, kappa)
     if not found:
         return []
     snapped = threads().map(lambda item: _drawn(frame, item.camera, library, pitch, policy), found)
@@ -193,6 +209,7 @@ def rank(frame: Frame, library: Library, pitch: Pitch, policy: CalibrationPolicy
             item,
             agreement(item.camera, frame.field, frame.paint, pitch),
             weakest_marking(frame.reading, item, pitch),
+            policy,
         )
         for item in snapped
         if item.reason is None
@@ -205,21 +222,27 @@ def _drawn(
 ) -> Snapped:
     """A camera drawn onto the paint; where the paint leaves a number open or would move it far,
     once more with what is known of cameras."""
-    alone = snap_reading(frame.reading, start, pitch, WINDOWS, policy)
+    alone = snap_reading(frame.reading, start, pitch, WINDOWS, policy, circles_count_twice=True)
     if alone.reason is None:
         return alone
     sigma = np.concatenate([AIM_SIGMA, library.position_sigma, LENS_SIGMA])
-    return snap_reading(frame.reading, start, pitch, WINDOWS, policy, np.diag(sigma**2))
+    return snap_reading(
+        frame.reading, start, pitch, WINDOWS, policy, np.diag(sigma**2), circles_count_twice=True
+    )
 
 
 def weakest_marking(reading: Reading, snapped: Snapped, pitch: Pitch) -> float:
     """The lowest share of a marking's places that have paint; short markings do not count.
 
     A camera that lays some markings on paint that is there by chance shows others where none is.
+    Nothing is asked of places behind people and along the border of the picture.
     """
     traced, paint = trace(reading, snapped.camera, pitch), snapped.evidence.traced
-    shown = np.bincount(traced.marking[traced.widths > VISIBLE_PX], minlength=len(MARKINGS))
+    told = shows_grass_beside(reading, traced, WINDOWS[-1] * reading.width / WORK_WIDTH)
+    told &= traced.widths > VISIBLE_PX
+    shown = np.bincount(traced.marking[told], minlength=len(MARKINGS))
     seen = np.bincount(paint.marking[paint.widths > VISIBLE_PX], minlength=len(MARKINGS))
+    seen = np.minimum(seen, shown)
     long = shown >= MARKING_PLACES
     return float((seen[long] / shown[long]).min()) if long.any() else 1.0
 
@@ -250,10 +273,12 @@ def why_unsure(ranked: Sequence[Ranked]) -> str | None:
     best, lead = ranked[0], runner_up(ranked)
     if best.is_contradicted:
         return "a marking that the best camera shows has no paint"
-    if best.agreement.supported < WELL_SUPPORTED and best.weakest < WELL_PAINTED:
+    supported = best.agreement.supported
+    is_patchy = supported < WELL_SUPPORTED and best.weakest < WELL_PAINTED
+    if is_patchy or supported < LEAST_SUPPORTED:
         return "much of the markings that the best camera shows has no paint"
-    if best.agreement.supported < LEAST_SUPPORTED:
-        return "much of the markings that the best camera shows has no paint"
+    if best.uncertain_m > MOST_UNCERTAIN_M:
+        return "too few markings are seen to say where the camera stands"
     lead = SOLE_LEAD if lead is None else lead
     if lead < LEAST_LEAD:
         return "another camera fits the paint nearly as well"
@@ -262,31 +287,14 @@ def why_unsure(ranked: Sequence[Ranked]) -> str | None:
     return None
 
 
-def _answer(
-    image: Image, frame: Frame, ranked: list[Ranked], pitch: Pitch, policy: CalibrationPolicy
-) -> Proposal:
+def _answer(image: Image, frame: Frame, ranked: list[Ranked], pitch: Pitch) -> Proposal:
     reason = why_unsure(ranked)
     if not ranked:
         return Proposal("unsure", reason)
     best, lead = ranked[0], runner_up(ranked)
     snapped = best.snapped
-    height, width = frame.field.shape
-    if image.shape[:2] != (height, width):
-        camera = snapped.camera.scaled(image.shape[1] / width, image.shape[0] / height)
-        field = cv2.resize(
-            frame.field.astype(np.uint8), image.shape[1::-1], interpolation=cv2.INTER_NEAREST
-        )
-        reading = read_picture(image, field.astype(np.bool_))
-        last = snap_reading(reading, camera, pitch, LAST_WINDOWS, policy)
-        scaled = replace(
-            snapped,
-            camera=camera,
-            error_px=None
-            if snapped.error_px is None
-            else snapped.error_px * image.shape[1] / width,
-            size=(image.shape[0], image.shape[1]),
-        )
-        snapped = last if last.reason is None else scaled
+    if image.shape[:2] != frame.field.shape:
+        snapped = _at_full_size(image, frame, best, pitch)
     return Proposal(
         "unsure" if reason else "proposed",
         reason,
@@ -295,6 +303,33 @@ def _answer(
         snapped,
         lead,
         best.weakest,
+    )
+
+
+def _at_full_size(image: Image, frame: Frame, best: Ranked, pitch: Pitch) -> Snapped:
+    """A camera drawn once more onto the paint of the picture as it is; where that says otherwise,
+    as it was found in the small one."""
+    height, width = image.shape[:2]
+    size = (width, height)
+    grass = cv2.resize(frame.field.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+    reading = read_picture(image, grass.astype(np.bool_))
+    found = scaled(best.snapped, height, width)
+    last = snap_reading(
+        reading, found.camera, pitch, LAST_WINDOWS, best.policy, circles_count_twice=True
+    )
+    return last if last.reason is None else found
+
+
+def scaled(snapped: Snapped, height: int, width: int) -> Snapped:
+    """A camera on the paint, and that paint, in the pixels of the picture at another size."""
+    factor = width / snapped.size[1]
+    return replace(
+        snapped,
+        camera=snapped.camera.scaled(factor, height / snapped.size[0]),
+        evidence=snapped.evidence.scaled(factor),
+        error_px=None if snapped.error_px is None else snapped.error_px * factor,
+        moved_px=snapped.moved_px * factor,
+        size=(height, width),
     )
 
 

@@ -53,6 +53,7 @@ def search(
     executor: Executor,
     most: int,
     scouted: int = SCOUTED,
+    searched: int = SEARCHED,
     kappa: float = KAPPA_MEAN,
 ) -> list[Found]:
     """The best cameras of a library, none like another.
@@ -65,6 +66,7 @@ def search(
         executor: Runs parts of it side by side; threads, as the kernels let go of the GIL.
         most: How many are wanted.
         scouted: How many candidates are drawn onto the markings.
+        searched: How many of these once more, and looked at closely.
         kappa: The lens's distortion to start with.
     """
     width = float(picture.field.shape[1])
@@ -79,7 +81,7 @@ def search(
     start[:, ROLL] = 0.0
     rows = refine(rows, start, sigma, picture, picture.some, pitch, SCOUT_SCALES, executor)
     score = _score(second_look(rows, picture, pitch, SECOND_REACH_PX, executor), picture)
-    chosen = _smallest(-score, SEARCHED)
+    chosen = _smallest(-score, searched)
     rows, start = rows[chosen], start[chosen]
     rows = refine(rows, start, sigma, picture, picture.points, pitch, SEARCH_SCALES, executor)
     score = _score(second_look(rows, picture, pitch, SECOND_REACH_PX, executor), picture)

@@ -18,7 +18,7 @@ from app.geometry.resection import camera_from_parameters, parameters_from_camer
 from app.paint.evidence import SPACING_PX, Evidence, Image, Reading, read_picture, seek, trace
 from app.soccer.frames import Box, ImageSize
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES
-from app.soccer.pitch import Pitch
+from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.paint_camera import MOST_SURPRISING, WORST_PX, PaintProblem
 from app.solving.paint_noise import PaintOffsets
@@ -33,6 +33,9 @@ COARSE_PX = 8.0
 LEAST_POINTS, LEAST_MARKINGS = 24, 3
 """Fewer points of paint, or markings with some, determine no camera."""
 LEAST_ON_MARKING = 4
+LEAST_ON_CIRCLE = 60
+"""Places of a circle, ``SPACING_PX`` apart, from which on it tells as much as two lines."""
+CURVED = [MARKINGS.index(name) for name in sorted(CIRCLES)]
 LEAST_SEEN = 0.2
 """Of the visible markings: where less shows paint, chance decides what the rest is."""
 KEPT_SHARE = 0.9
@@ -107,21 +110,29 @@ def snap_reading(
     windows: Sequence[float],
     policy: CalibrationPolicy,
     start_covariance: FloatArray | None = None,
+    circles_count_twice: bool = False,
 ) -> Snapped:
-    """As ``snap``, for a picture that is prepared already."""
+    """As ``snap``, for a picture that is prepared already.
+
+    Args:
+        circles_count_twice: A circle of which much is seen stands for two markings, as it tells
+            as much as two lines: with the middle line it determines a camera.
+    """
     problem = ResectionProblem.of(ImageSize(reading.width, reading.height), policy)
+    twice = CURVED if circles_count_twice else []
     rounds = _Rounds(reading, start, pitch, problem, start_covariance)
     parameters = rounds.first
     for index, window in enumerate(windows):
         strict = index >= len(windows) - STRICT_ROUNDS
-        evidence = rounds.seek(parameters, window, SPACING_PX if strict else COARSE_PX)
-        if not _suffices(evidence):
+        spacing = SPACING_PX if strict else COARSE_PX
+        evidence = rounds.seek(parameters, window, spacing)
+        if not _suffices(evidence, twice, spacing):
             return _kept(rounds, evidence, NO_PAINT)
         parameters = parameters + rounds.problem.step(parameters, rounds.seen(evidence), strict)
         if not np.isfinite(parameters).all():
             return _kept(rounds, evidence, PAINT_DISAGREES)
     evidence = rounds.seek(parameters, windows[-1])
-    if not _suffices(evidence) or evidence.share < LEAST_SEEN:
+    if not _suffices(evidence, twice) or evidence.share < LEAST_SEEN:
         return _kept(rounds, evidence, NO_PAINT)
     noise = rounds.problem.noise(parameters, rounds.seen(evidence))
     if noise is None:
@@ -184,9 +195,10 @@ class _Rounds:
         )
 
 
-def _suffices(evidence: Evidence) -> bool:
-    counts = np.bincount(evidence.traced.marking)
+def _suffices(evidence: Evidence, twice: list[int], spacing: float = SPACING_PX) -> bool:
+    counts = np.bincount(evidence.traced.marking, minlength=len(MARKINGS))
     markings = int((counts >= LEAST_ON_MARKING).sum())
+    markings += int((counts[twice] * spacing >= LEAST_ON_CIRCLE * SPACING_PX).sum())
     return len(evidence.offsets) >= LEAST_POINTS and markings >= LEAST_MARKINGS
 
 

@@ -104,7 +104,7 @@ def paint_of(
     if why is not None:
         return ViewPaint("nothing", sentence=f"There is nothing to read: {why}.")
     scale = PictureScale.of(image, size)
-    hidden = [scale.box(box) for box in people if _is_person(box, size)]
+    hidden = [scale.box(box) for box in hiding_boxes(people, size)]
     seen_grass = seen_field(grass, hidden)
     paint = line_like(image, grass) & seen_grass
     told = ViewPaint("nothing", line_like=scale.line_like(paint))
@@ -136,9 +136,10 @@ def paint_of(
     )
 
 
-def _is_person(box: Box, size: ImageSize) -> bool:
-    """Whether a box can be that of somebody on the field, and not of the field or a goal."""
-    return box.width * box.height <= LARGEST_PERSON * size.width * size.height
+def hiding_boxes(people: Sequence[Box], size: ImageSize) -> list[Box]:
+    """Those that can be of somebody on the field, and not of the field or a goal."""
+    largest = LARGEST_PERSON * size.width * size.height
+    return [box for box in people if box.width * box.height <= largest]
 
 
 def _unusable(start: Calibration) -> str | None:

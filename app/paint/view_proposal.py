@@ -24,11 +24,11 @@ from app.store.media import decode_frame
 
 @dataclass(frozen=True)
 class ViewProposal:
-    """Lines for a view that has none, drawn onto its paint.
+    """Lines for a view, from the paint of its picture; beside those that are drawn, the others.
 
     Attributes:
         outcome: ``proposed``, ``unsure`` or ``nothing``.
-        sentence: Why nothing is proposed; empty where something is.
+        sentence: Why nothing is proposed, or which drawn lines lie elsewhere; else empty.
         lines: Points on the paint of each marking that is seen; none unless proposed.
         supported, explained: As of ``ViewPaint``.
         runner_up: How much less the next best camera agrees; None where there is no other.

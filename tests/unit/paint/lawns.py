@@ -9,7 +9,7 @@ import numpy.typing as npt
 from app.geometry.camera import Camera
 from app.paint.scoring import Picture
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import Pitch
+from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.jaccard import project_markings
 from tests.cameras import looking
 
@@ -21,9 +21,15 @@ TRUE = looking((2.0, 62.0, -16.0), (36.0, -4.0, 0.0), 1500.0, size=SMALL)
 
 def drawn(camera: Camera, broad: int = 1) -> npt.NDArray[np.bool_]:
     """The grass markings as thin lines, shape (540, 960)."""
+    names = [name for name in MARKINGS if not name.startswith("Goal")]
+    return marked(camera, *names, broad=broad)
+
+
+def marked(camera: Camera, *names: str, broad: int = 3) -> npt.NDArray[np.bool_]:
+    """These markings alone, shape (540, 960)."""
     mask = np.zeros((SMALL.height, SMALL.width), np.uint8)
     for name, polyline in project_markings(camera, PITCH, SMALL).items():
-        if not name.startswith("Goal") and len(polyline) > 1:
+        if name in names and len(polyline) > 1:
             cv2.polylines(mask, [np.round(polyline).astype(np.int32)], False, 1, broad)
     return mask.astype(np.bool_)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.geometry.resection import PAN, TILT, parameters_from_camera
-from app.paint.candidates import MAIN, WIDE, Library, candidates
+from app.geometry.resection import KAPPA, PAN, TILT, camera_from_parameters, parameters_from_camera
+from app.paint.candidates import KNOWN, MAIN, WIDE, Library, candidates, known_library
 from app.soccer.pitch import Segment
 from tests.unit.paint.lawns import PITCH, SMALL, TRUE
 
@@ -51,3 +51,18 @@ class TestCandidates:
             assert (y >= 0).all()
             assert (z < 0).all()
             assert ((np.abs(x) > PITCH.length / 2) | (y > PITCH.width / 2)).all()
+
+
+class TestKnownLibrary:
+    def test_it_has_each_stand_once_and_the_lens_of_its_cameras(self):
+        half = SMALL.diagonal / 2
+        bent = parameters_from_camera(TRUE, half)
+        bent[KAPPA] = 0.08
+        near = camera_from_parameters(bent, TRUE.principal_point, half)
+        found = known_library([near, near.scaled(2.0, 2.0)])
+        assert found.name == KNOWN
+        assert found.stands.tolist() == [pytest.approx(TRUE.position.tolist())]
+        low, high = found.focal_range
+        assert low < FOCAL / SMALL.width < high < 6.0
+        assert high / low < 10
+        assert found.kappa == pytest.approx(0.08, abs=1e-3)

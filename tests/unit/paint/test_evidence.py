@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.paint.evidence import painted_markings, read_picture, seek, to_paint_evidence, trace
+from app.paint.evidence import (
+    Traced,
+    painted_markings,
+    read_picture,
+    seek,
+    shows_grass_beside,
+    to_paint_evidence,
+    trace,
+)
 from app.paint.profile_kernels import find_stripes
 from app.soccer.frames import Box
 from app.soccer.pitch import MARKINGS, Pitch
@@ -90,6 +98,21 @@ class TestTrace:
             assert traced.jacobian[:, index] == pytest.approx(
                 expected, rel=1e-3, abs=1e-3 * np.abs(expected).max()
             )
+
+
+class TestShowsGrassBeside:
+    def test_nothing_is_asked_beside_a_person_or_along_the_border(self):
+        image = np.full((100, 200, 3), GRASS, np.uint8)
+        image[:, 120:140] = (180, 30, 30)
+        reading = read_picture(image, np.ones(image.shape[:2], np.bool_))
+        x = np.array([3.0, 60.0, 116.0, 130.0, 160.0, 195.0])
+        none = np.zeros((len(x), 3))
+        traced = Traced(
+            none, np.column_stack([x, np.full(len(x), 50.0)]), np.tile([1.0, 0.0], (len(x), 1)),
+            np.ones(len(x)), np.zeros(len(x), np.int64), none, len(x),
+        )  # fmt: skip
+        told = shows_grass_beside(reading, traced, 3.0)
+        assert told.tolist() == [False, True, True, False, True, False]
 
 
 class TestSeek:

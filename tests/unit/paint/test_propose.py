@@ -1,19 +1,36 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
 
+from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.paint.agreement import Agreement
 from app.paint.candidates import Library
-from app.paint.propose import propose
+from app.paint.evidence import read_picture, seek, to_paint_evidence, trace
+from app.paint.propose import (
+    Frame,
+    Ranked,
+    propose,
+    read_frame,
+    scaled,
+    weakest_marking,
+    why_unsure,
+)
+from app.paint.snap import Snapped, snap_reading
 from app.sample.render import render
 from app.sample.scene import Scene
 from app.sample.scenes import make_match
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize
+from app.soccer.paint_evidence import NO_PAINT
+from app.soccer.policy import CalibrationPolicy
 from app.solving.jaccard import camera_jaccard, project_markings
-from tests.unit.paint.lawns import PITCH, SMALL, TRUE, drawn, lawn
+from tests.cameras import looking
+from tests.unit.paint.lawns import PITCH, SMALL, TRUE, drawn, lawn, marked
 
 Image = npt.NDArray[np.uint8]
 
@@ -58,6 +75,70 @@ class TestPropose:
         assert found.outcome == "proposed"
         assert found.camera is not None
         assert found.camera.position[1] > 0
+
+    def test_the_centre_circle_tells_as_much_as_two_lines(self):
+        true = looking((0.5, 66.0, -17.0), (3.0, -2.0, 0.0), 1750.0, size=SMALL)
+        picture = lawn(marked(true, "Circle central", "Middle line"))
+        reading = read_picture(picture, np.ones(picture.shape[:2], np.bool_))
+        asked = (reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy())
+        assert snap_reading(*asked).reason == NO_PAINT
+        assert snap_reading(*asked, circles_count_twice=True).reason is None
+
+    def test_at_full_size_it_is_drawn_as_it_was_found(self, monkeypatch: pytest.MonkeyPatch):
+        asked = []
+
+        def snap(*given, **named):
+            asked.append((given[0].width, given[4], named))
+            return snap_reading(*given, **named)
+
+        monkeypatch.setattr("app.paint.propose.snap_reading", snap)
+        small = lawn(drawn(TRUE, 3))
+        picture = np.asarray(cv2.resize(small, (1280, 720), interpolation=cv2.INTER_CUBIC))
+        assert propose(picture, known=[TRUE]).outcome == "proposed"
+        (found, *_, last) = asked
+        assert (found[0], last[0]) == (960, 1280)
+        # The lens of the match is known, and a circle counts as two lines.
+        assert found[1] == last[1] != CalibrationPolicy()
+        assert last[2] == {"circles_count_twice": True}
+
+    def test_what_was_found_in_the_small_picture_is_told_in_pixels_of_the_large_one(self):
+        reading = read_picture(lawn(drawn(TRUE, 3)), np.ones((540, 960), np.bool_))
+        pan, tilt, roll = np.radians(TRUE.pan_tilt_roll_degrees)
+        aside = replace(TRUE, rotation=rotation_from_pan_tilt_roll(pan + 0.004, tilt, roll))
+        seen = seek(reading, trace(reading, aside, PITCH), 12.0)
+        assert np.median(np.abs(seen.offsets)) > 1.0
+        snapped = Snapped(aside, seen, 1.0, None, 0.5, None, (540, 960))
+        large = scaled(snapped, 1080, 1920)
+        before, after = (to_paint_evidence(item.evidence, item.camera) for item in (snapped, large))
+        for name, places in before.points.items():
+            told = np.array(after.points[name])
+            wanted = np.array(places) * 2 + (0.5, 0.5, 0.0)
+            assert told == pytest.approx(wanted, abs=0.001)
+        assert (large.error_px, large.moved_px, large.size) == (2.0, 1.0, (1080, 1920))
+
+    def test_three_lines_say_too_little_of_the_camera(self):
+        true = looking((-3.0, 56.0, -16.0), (50.0, 0.0, 0.0), 2900.0, size=SMALL)
+        names = ("Side line right", "Small rect. right main", "Small rect. right top")
+        frame = read_frame(lawn(marked(true, *names)))
+        assert isinstance(frame, Frame)
+        snapped = snap_reading(frame.reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy())
+        assert snapped.reason is None
+        seen = Agreement(0.9, 0.9, 400)
+        reason = why_unsure([Ranked(snapped, seen, 1.0)])
+        assert reason is not None and "too few markings" in reason
+
+    def test_a_marking_behind_people_is_not_missed(self):
+        picture = lawn(drawn(TRUE, 3))
+        hidden = marked(TRUE, "Small rect. right main")
+        picture[cv2.dilate(hidden.astype(np.uint8), np.ones((13, 13), np.uint8)) > 0] = (
+            190,
+            30,
+            30,
+        )
+        reading = read_picture(picture, np.ones(picture.shape[:2], np.bool_))
+        snapped = snap_reading(reading, TRUE, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy())
+        assert snapped.reason is None
+        assert weakest_marking(reading, snapped, PITCH) > 0.7
 
     @pytest.mark.parametrize(
         ("picture", "reason"),

@@ -10,11 +10,11 @@ import pytest
 from app.geometry.camera import Camera
 from app.geometry.resection import parameters_from_camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
-from app.paint.evidence import to_paint_evidence
-from app.paint.snap import snap
+from app.paint.evidence import Evidence, Traced, to_paint_evidence
+from app.paint.snap import CURVED, _suffices, snap
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES, PaintReading
-from app.soccer.pitch import Pitch
+from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate_paint
 from tests.unit.paint.test_grass import GRASS, picture
@@ -75,6 +75,21 @@ class TestSnap:
         start = panned(rendered.truth, 3.0)
         first, second = (snap(rendered.image, rendered.field, start) for _ in range(2))
         assert first.camera == second.camera
+
+
+class TestCircle:
+    @pytest.mark.parametrize(("places", "spacing"), [(60, 4.0), (30, 8.0)])
+    def test_tells_as_much_as_two_lines_from_the_same_length_on(self, places, spacing):
+        def suffices(on_circle: int) -> bool:
+            marking = np.repeat(
+                np.array([CURVED[0], MARKINGS.index("Middle line")]), (on_circle, 10)
+            )
+            none = np.zeros((len(marking), 2))
+            traced = Traced(none, none, none, none[:, 0], marking, none, len(marking))
+            seen = Evidence(traced, none[:, 0], none[:, 0], none[:, 0], len(marking))
+            return _suffices(seen, CURVED, spacing)
+
+        assert suffices(places) and not suffices(places - 1)
 
 
 class TestStored:
