@@ -25,11 +25,12 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.datasets import fields
-from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
 from app.datasets.cameras_reader import read_cameras
 from app.datasets.csv_text import is_missing, numbers_in, read_rows
+from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
+from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError, InputError
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.evaluation.prediction_run import (

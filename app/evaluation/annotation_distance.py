@@ -1,0 +1,275 @@
+"""Annotation distance: how far two people's annotations of one group lie apart.
+
+Lines and balls are compared in pixels, view by view, 3D balls and cameras in metres. Nothing here
+says who is right: every number is the same when both change places, but those that say a side.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc
+
+from app.geometry.arrays import FloatArray
+from app.geometry.polyline import distance_to_polyline
+from app.soccer.annotation import BallAnnotation, Lines
+from app.soccer.group import Group, View
+from app.soccer.solution import GAMMAS_PERCENT, Ball3D, Calibration, Solution
+from app.solving.jaccard import camera_jaccard
+
+EXPLAINED_P = 0.05
+"""A difference with a smaller p-value is larger than both uncertainties explain."""
+
+SEEN, HIDDEN, OUT, NONE, SEVERAL = "seen", "occluded", "out_of_view", "none", "several"
+
+
+@dataclass(frozen=True)
+class LineDistance:
+    """One marking of one view as two people drew it.
+
+    Attributes:
+        only: ``a`` or ``b`` where only that one drew it, else None.
+        mean_px: Mean distance of the points of each from the line of the other, both ways;
+            None where only one drew it.
+        largest_px: The largest of them.
+    """
+
+    marking: str
+    only: str | None = None
+    mean_px: float | None = None
+    largest_px: float | None = None
+
+
+@dataclass(frozen=True)
+class BallDistance:
+    """The ball of one view as two people saw it.
+
+    Attributes:
+        a: ``seen``, ``occluded``, ``out_of_view``, ``none`` or ``several``; ``b`` likewise.
+        center_px: Distance of both centres; None unless both have one ball with a place.
+        diameter_px: Difference of both diameters, b less a; None unless both drew boxes.
+    """
+
+    a: str
+    b: str
+    center_px: float | None = None
+    diameter_px: float | None = None
+
+    @property
+    def is_same_state(self) -> bool:
+        """Whether both say the same of whether the ball is to be seen."""
+        return self.a == self.b
+
+
+@dataclass(frozen=True)
+class ViewDistance:
+    """One view.
+
+    Attributes:
+        view: Its key.
+        included: Whether each of a and b left it in the group.
+        lines: Markings that either drew, by name.
+        jac: JaC of a's camera with b's lines, and of b's camera with a's, at the least of
+            ``GAMMAS_PERCENT``; None where there is no camera or no line.
+        position_m: Between both cameras; None where either is missing.
+    """
+
+    view: str
+    included: tuple[bool, bool]
+    lines: tuple[LineDistance, ...]
+    ball: BallDistance
+    jac: tuple[float | None, float | None]
+    position_m: float | None
+
+    @property
+    def largest_px(self) -> float:
+        """The largest distance of a line or the ball; 0 where nothing was drawn twice."""
+        found = [line.largest_px for line in self.lines] + [self.ball.center_px]
+        return max((value for value in found if value is not None), default=0.0)
+
+    @property
+    def jac_least(self) -> float | None:
+        """The lower of both JaC; None where there is none."""
+        return min((value for value in self.jac if value is not None), default=None)
+
+
+@dataclass(frozen=True)
+class Ball3DDistance:
+    """Both 3D balls.
+
+    Attributes:
+        a: Whether a has one; ``b`` likewise.
+        distance_m: Between them; None unless both have one.
+        sigmas_m: Of each, along its longest axis.
+        p_value: How often chance alone would put them as far apart, were both uncertainties
+            true and independent; None where they are not known.
+    """
+
+    a: bool
+    b: bool
+    distance_m: float | None = None
+    sigmas_m: tuple[float | None, float | None] = (None, None)
+    p_value: float | None = None
+
+    @property
+    def is_explained(self) -> bool | None:
+        """Whether both uncertainties explain the difference; None where that is not known."""
+        return None if self.p_value is None else self.p_value >= EXPLAINED_P
+
+
+@dataclass(frozen=True)
+class GroupDistance:
+    """Two annotations of one group."""
+
+    views: tuple[ViewDistance, ...]
+    ball: Ball3DDistance
+
+
+def compare_annotations(
+    a: Group, b: Group, solution_a: Solution | None, solution_b: Solution | None
+) -> GroupDistance:
+    """Two annotations of the same frames, view by view in the order of ``a``.
+
+    Args:
+        a: One person's group.
+        b: The other's; views are known by their keys, one that either lacks is left out.
+        solution_a: Of a; None while it is not computed.
+        solution_b: Of b.
+    """
+    views = []
+    for first in a.views:
+        second = b.view(first.key)
+        if second is not None:
+            cameras = (_calibration(solution_a, first.key), _calibration(solution_b, first.key))
+            views.append(_compare_views(first, second, (a, b), cameras))
+    ball_a = None if solution_a is None else solution_a.ball
+    ball_b = None if solution_b is None else solution_b.ball
+    return GroupDistance(tuple(views), compare_balls_3d(ball_a, ball_b))
+
+
+def compare_lines(a: Lines, b: Lines) -> tuple[LineDistance, ...]:
+    """Every marking that either drew, by name.
+
+    The distance goes from the points of each to the polyline of the other. Points beyond the
+    other's ends do not count: how long a line is drawn does not say where it lies.
+    """
+    found = []
+    for marking in sorted({*a, *b}):
+        first, second = _points(a, marking), _points(b, marking)
+        if not len(first) or not len(second):
+            only = "a" if len(first) else "b"
+            if len(first) or len(second):
+                found.append(LineDistance(marking, only))
+            continue
+        there, back = _directed(first, second), _directed(second, first)
+        if not len(there) + len(back):
+            # Drawn one behind the other: what is left is how far apart they are.
+            there = distance_to_polyline(first, second)[0]
+            back = distance_to_polyline(second, first)[0]
+        means = [float(part.mean()) for part in (there, back) if len(part)]
+        largest = float(np.concatenate([there, back]).max())
+        found.append(LineDistance(marking, None, sum(means) / len(means), largest))
+    return tuple(found)
+
+
+def compare_balls(a: tuple[BallAnnotation, ...], b: tuple[BallAnnotation, ...]) -> BallDistance:
+    """The balls of one view; several on either side are not told apart."""
+    states = ball_state(a), ball_state(b)
+    places = [_place(a), _place(b)]
+    first, second = places
+    if first is None or second is None:
+        return BallDistance(*states)
+    (center_a, diameter_a), (center_b, diameter_b) = first, second
+    apart = math.dist(center_a, center_b)
+    wider = None if diameter_a is None or diameter_b is None else diameter_b - diameter_a
+    return BallDistance(*states, apart, wider)
+
+
+def compare_balls_3d(a: Ball3D | None, b: Ball3D | None) -> Ball3DDistance:
+    """Two triangulated balls, pitch frame, and whether their covariances explain the difference.
+
+    With d the difference and S the sum of both covariances, d' S^-1 d has a chi-square
+    distribution of three degrees of freedom if both are right and independent (Hartley &
+    Zisserman, A2.1). They share their frames and what the policy assumes of them, so a
+    difference that is not explained is one between the people.
+    """
+    sigmas = (None if a is None else a.sigma_m, None if b is None else b.sigma_m)
+    if a is None or b is None:
+        return Ball3DDistance(a is not None, b is not None, sigmas_m=sigmas)
+    step = np.subtract(b.point, a.point)
+    spread = np.add(a.covariance, b.covariance).reshape(3, 3)
+    p_value: float | None = None
+    if np.isfinite(spread).all() and np.linalg.eigvalsh(spread)[0] > 0:
+        p_value = float(chdtrc(3, step @ np.linalg.solve(spread, step)))
+    return Ball3DDistance(True, True, float(np.linalg.norm(step)), sigmas, p_value)
+
+
+def ball_state(balls: tuple[BallAnnotation, ...]) -> str:
+    """What a person says of the ball in a view: ``seen``, ``occluded``, ``out_of_view``, ..."""
+    seen = [ball for ball in balls if not ball.out_of_view]
+    if len(seen) > 1:
+        return SEVERAL
+    if seen:
+        return HIDDEN if seen[0].occluded else SEEN
+    return OUT if balls else NONE
+
+
+def _compare_views(
+    a: View, b: View, groups: tuple[Group, Group], found: tuple[Calibration | None, ...]
+) -> ViewDistance:
+    cameras = [None if item is None else item.camera for item in found]
+    position = None
+    if cameras[0] is not None and cameras[1] is not None:
+        position = float(np.linalg.norm(cameras[0].position - cameras[1].position))
+    jac: list[float | None] = []
+    for camera, lines, view, group in (
+        (cameras[0], b.station.lines, a, groups[0]),
+        (cameras[1], a.station.lines, b, groups[1]),
+    ):
+        if camera is None or not lines:
+            jac.append(None)
+            continue
+        gamma = GAMMAS_PERCENT[0] / 100 * view.size.diagonal
+        jac.append(camera_jaccard(camera, lines, group.pitch, view.size, (gamma,))[0])
+    return ViewDistance(
+        view=a.key,
+        included=(a.included, b.included),
+        lines=compare_lines(a.station.lines, b.station.lines),
+        ball=compare_balls(a.balls, b.balls),
+        jac=(jac[0], jac[1]),
+        position_m=position,
+    )
+
+
+def _calibration(solution: Solution | None, view: str) -> Calibration | None:
+    found = None if solution is None else solution.view(view)
+    return None if found is None else found.calibration
+
+
+def _points(lines: Lines, marking: str) -> FloatArray:
+    return np.array(lines.get(marking) or (), dtype=float).reshape(-1, 2)
+
+
+def _directed(points: FloatArray, line: FloatArray) -> FloatArray:
+    """Distances of the points that lie beside a polyline, not beyond its ends, shape (<= N,)."""
+    if len(line) < 2:
+        return distance_to_polyline(points, line)[0]
+    apart, nearest = distance_to_polyline(points, line)
+    beyond = np.zeros(len(points), bool)
+    for end, inward in ((line[0], line[1] - line[0]), (line[-1], line[-2] - line[-1])):
+        beyond |= (nearest == end).all(axis=1) & ((points - end) @ inward < 0)
+    return apart[~beyond]
+
+
+def _place(
+    balls: tuple[BallAnnotation, ...],
+) -> tuple[tuple[float, float], float | None] | None:
+    """Centre and diameter of the only ball to be seen, pixels."""
+    seen = [ball for ball in balls if not ball.out_of_view]
+    center = seen[0].center if len(seen) == 1 else None
+    if center is None:
+        return None
+    box = seen[0].box
+    return center, None if box is None else box.diameter
