@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtri
@@ -67,6 +67,7 @@ class Miss:
         diameter: The same for the squared share of the ball's diameter.
         given: The same for the squared sigma of given cameras without a covariance.
         known: Variance by the covariance of cameras from lines, square pixels.
+        by_view: Of each view its key, and what it adds to ``click``, ``diameter`` and ``given``.
     """
 
     miss: float
@@ -74,6 +75,7 @@ class Miss:
     diameter: float
     given: float
     known: float
+    by_view: tuple[tuple[str, float, float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -154,7 +156,13 @@ def misses_of(ball: Ball3D, sights: Sequence[Sight]) -> tuple[Miss, ...]:
         squared @ (units * bare),
         np.einsum("im,ij,jm->m", normals, known, normals),
     )
-    return tuple(Miss(*row) for row in np.transpose(columns).tolist())
+    own = squared[:, :, None] * np.column_stack([units, diameters, units * bare])
+    names = [sight.view for sight in seen]
+    found = []
+    for row, parts in zip(np.transpose(columns).tolist(), own.tolist(), strict=True):
+        by_view = tuple((name, *part) for name, part in zip(names, parts, strict=True))
+        found.append(Miss(row[0], row[1], row[2], row[3], row[4], by_view))
+    return tuple(found)
 
 
 def estimate_ball_noise(misses: Sequence[Miss], policy: Policy) -> BallNoise:
@@ -165,7 +173,9 @@ def estimate_ball_noise(misses: Sequence[Miss], policy: Policy) -> BallNoise:
             alike, so the interval comes from leaving out one tenth after the other.
         policy: What is thought of the noise so far.
     """
-    rows = np.array([astuple(miss) for miss in misses], float).reshape(-1, 5)
+    rows = np.array(
+        [(one.miss, one.click, one.diameter, one.given, one.known) for one in misses], float
+    ).reshape(-1, 5)
     free = rows[:, 3] == 0
     clicked, rest = rows[free], rows[~free]
     click = share = given = interval = None

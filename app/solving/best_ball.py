@@ -8,12 +8,12 @@ from itertools import combinations
 
 import numpy as np
 
-from app.errors import DegenerateGeometryError
-from app.geometry.arrays import FloatArray
-from app.geometry.triangulation import point_covariance
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.geometry.camera_stack import CameraStack
+from app.geometry.triangulation import point_covariances, summed
 from app.soccer.policy import Policy
 from app.soccer.solution import BestBall, Pair
-from app.solving.spread import pixel_spread
+from app.solving.spread import sight_spreads
 from app.solving.triangulate import Sight
 
 MAX_MAHALANOBIS = 13.8
@@ -26,7 +26,7 @@ _ARRIVED_M = 1e-6
 class _Estimate:
     """A point from some views, its covariance, and each view's squared Mahalanobis distance."""
 
-    sights: tuple[Sight, ...]
+    numbers: tuple[int, ...]
     point: FloatArray
     covariance: FloatArray
     distances: FloatArray
@@ -56,15 +56,18 @@ def best_ball(pairs: Sequence[Pair], usable: Sequence[Sight], policy: Policy) ->
         for pair in pairs
         if pair.failed in (None, "reprojection") and not _is_behind(pair, usable)
     }
-    estimate = _most_consistent(tuple(usable), starts, policy)
+    if not starts:
+        return None
+    views = _Views(usable, policy)
+    estimate = _most_consistent(views, starts)
     if estimate is None:
         return None
-    freedom = 2 * len(estimate.sights) - 3
+    freedom = 2 * len(estimate.numbers) - 3
     excess = max(1.0, float(estimate.distances.sum()) / freedom)
     if estimate.is_consistent:
         excess = 1.0
     spread = excess * estimate.covariance
-    used = tuple(sight.view for sight in estimate.sights)
+    used = tuple(views.sights[number].view for number in estimate.numbers)
     x, y, z = estimate.point.tolist()
     return BestBall(
         point=(x, y, z),
@@ -72,21 +75,22 @@ def best_ball(pairs: Sequence[Pair], usable: Sequence[Sight], policy: Policy) ->
         sigma_m=float(np.sqrt(np.linalg.eigvalsh(spread)[-1])),
         views=used,
         contradicting=tuple(sight.view for sight in usable if sight.view not in used),
-        influence_m=_influence(estimate, policy),
+        influence_m=_influence(views, estimate),
     )
 
 
-def _most_consistent(
-    sights: tuple[Sight, ...], starts: dict[frozenset[str], FloatArray], policy: Policy
-) -> _Estimate | None:
+def _most_consistent(views: _Views, starts: dict[frozenset[str], FloatArray]) -> _Estimate | None:
     """The estimate from the largest set of views that agree, else from the best pair."""
     fallback: list[_Estimate] = []
-    for count in range(len(sights), 1, -1):
-        found = [
-            estimate
-            for chosen in combinations(sights, count)
-            if (estimate := _estimate(chosen, starts, policy)) is not None
-        ]
+    for count in range(len(views.sights), 1, -1):
+        chosen, origins = [], []
+        for numbers in combinations(range(len(views.sights)), count):
+            names = {views.sights[number].view for number in numbers}
+            inside = [point for pair, point in starts.items() if pair <= names]
+            if inside:
+                chosen.append(numbers)
+                origins.append(np.mean(inside, axis=0))
+        found = [item for item in views.estimates(chosen, origins) if item is not None]
         agreeing = [estimate for estimate in found if estimate.is_consistent]
         if agreeing:
             return min(agreeing, key=lambda item: float(item.distances.sum()))
@@ -94,73 +98,109 @@ def _most_consistent(
     return min(fallback, key=lambda item: float(item.distances.sum()), default=None)
 
 
-def _estimate(
-    sights: tuple[Sight, ...], starts: dict[frozenset[str], FloatArray], policy: Policy
-) -> _Estimate | None:
-    """Gauss-Newton from the pairs' points; None where it does not settle in front of all."""
-    views = {sight.view for sight in sights}
-    origins = [point for pair, point in starts.items() if pair <= views]
-    if not origins:
-        return None
-    point = np.mean(origins, axis=0)
-    # The uncertainties hardly change on the way.
-    spreads = np.array([pixel_spread(sight, point, policy) for sight in sights])
-    try:
-        for _ in range(_STEPS):
-            offsets, jacobians = _linearized(sights, point)
-            covariance = point_covariance(jacobians, spreads)
-            pull = sum(
-                jacobian.T @ weighted
-                for jacobian, weighted in zip(jacobians, _weighed(spreads, offsets), strict=True)
-            )
-            step = covariance @ pull
-            point = point + step
-            if not np.isfinite(point).all():
-                return None
-            if np.linalg.norm(step) < _ARRIVED_M:
-                break
-        offsets, jacobians = _linearized(sights, point)
-        covariance = point_covariance(jacobians, spreads)
-    except (DegenerateGeometryError, np.linalg.LinAlgError):
-        return None
-    distances = [
-        float(offset @ weighted)
-        for offset, weighted in zip(offsets, _weighed(spreads, offsets), strict=True)
-    ]
-    return _Estimate(sights, point, covariance, np.array(distances))
-
-
-def _weighed(spreads: FloatArray, offsets: Sequence[FloatArray]) -> FloatArray:
-    """Offsets over their covariances (V, 2, 2), in one call for all views, shape (V, 2)."""
-    weighed = np.linalg.solve(spreads, np.array(offsets)[..., None])[..., 0]
-    return np.asarray(weighed, dtype=np.float64)
-
-
-def _linearized(
-    sights: tuple[Sight, ...], point: FloatArray
-) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Offsets of the clicks and Jacobians at a point, view by view."""
-    pixels = [sight.camera.project(point[None])[0] for sight in sights]
-    if np.isnan(pixels).any():
-        raise DegenerateGeometryError("the point is not in front of every camera")
-    offsets = [np.array(sight.center) - pixel for sight, pixel in zip(sights, pixels, strict=True)]
-    return offsets, [sight.camera.jacobian(point) for sight in sights]
-
-
-def _influence(estimate: _Estimate, policy: Policy) -> tuple[tuple[str, float], ...]:
+def _influence(views: _Views, estimate: _Estimate) -> tuple[tuple[str, float], ...]:
     """How far the point moves when one view is left out, metres; with three views or more."""
-    if len(estimate.sights) < 3:
+    if len(estimate.numbers) < 3:
         return ()
-    everyone = frozenset(sight.view for sight in estimate.sights)
-    moved = []
-    for sight in estimate.sights:
-        rest = tuple(other for other in estimate.sights if other is not sight)
-        start = {frozenset(everyone - {sight.view}): estimate.point}
-        without = _estimate(rest, start, policy)
-        if without is not None:
-            distance = float(np.linalg.norm(without.point - estimate.point))
-            moved.append((sight.view, distance))
-    return tuple(moved)
+    numbers = estimate.numbers
+    rest = [[other for other in numbers if other != left] for left in numbers]
+    without = views.estimates(rest, [estimate.point] * len(rest))
+    return tuple(
+        (views.sights[left].view, float(np.linalg.norm(found.point - estimate.point)))
+        for left, found in zip(numbers, without, strict=True)
+        if found is not None
+    )
+
+
+class _Views:
+    """The views of a group, and the most likely point of any of their subsets.
+
+    Subsets of one size are computed together, for each call costs more than what it computes;
+    each has the bits that it has by itself.
+    """
+
+    def __init__(self, sights: Sequence[Sight], policy: Policy):
+        self.sights = tuple(sights)
+        self._policy = policy
+        self._centers = np.array([sight.center for sight in sights])
+        self._cameras = CameraStack([sight.camera for sight in sights])
+
+    def estimates(
+        self, chosen: Sequence[Sequence[int]], starts: Sequence[FloatArray]
+    ) -> list[_Estimate | None]:
+        """Gauss-Newton from a start each; None where it does not settle in front of all.
+
+        Args:
+            chosen: Numbers of the views of each subset, all of one size.
+            starts: Pitch frame, metres, shape (3,) each.
+        """
+        if not chosen:
+            return []
+        try:
+            return self._fitted(np.array(chosen), np.array(starts))
+        except np.linalg.LinAlgError:
+            if len(chosen) == 1:
+                return [None]
+            # One of them has no solution; the others have.
+            alone = zip(chosen, starts, strict=True)
+            return [self.estimates([views], [start])[0] for views, start in alone]
+
+    def _fitted(self, chosen: IntArray, points: FloatArray) -> list[_Estimate | None]:
+        # The uncertainties hardly change on the way.
+        spreads = self._spreads(chosen, points)
+        settled, on_the_way = np.ones(len(chosen), bool), np.arange(len(chosen))
+        for _ in range(_STEPS):
+            now = self._linearized(chosen[on_the_way], points[on_the_way], spreads[on_the_way])
+            settled[on_the_way[~now.is_sound]] = False
+            step = (now.covariance @ now.pull[..., None])[..., 0]
+            points[on_the_way] += step
+            arrived = np.sqrt((step[:, None] @ step[:, :, None])[:, 0, 0]) < _ARRIVED_M
+            finite = np.isfinite(points[on_the_way]).all(axis=1)
+            settled[on_the_way[~finite]] = False
+            on_the_way = on_the_way[now.is_sound & finite & ~arrived]
+            if not len(on_the_way):
+                break
+        left = np.flatnonzero(settled)
+        last = self._linearized(chosen[left], points[left], spreads[left])
+        found: list[_Estimate | None] = [None] * len(chosen)
+        for row, number in enumerate(left.tolist()):
+            if last.is_sound[row]:
+                found[number] = _Estimate(
+                    tuple(chosen[number].tolist()),
+                    points[number],
+                    last.covariance[row],
+                    last.distances[row],
+                )
+        return found
+
+    def _spreads(self, chosen: IntArray, points: FloatArray) -> FloatArray:
+        """Covariance of each click at its start, square pixels, shape (E, V, 2, 2)."""
+        sights = [self.sights[view] for view in chosen.ravel().tolist()]
+        places = np.repeat(points, chosen.shape[1], axis=0)
+        return sight_spreads(sights, places, self._policy).reshape(*chosen.shape, 2, 2)
+
+    def _linearized(self, chosen: IntArray, points: FloatArray, spreads: FloatArray) -> _Linear:
+        pixels, jacobians = self._cameras.linearize(points, chosen)
+        offsets = self._centers[chosen] - pixels
+        # In front of every camera; what is not is left out of what follows.
+        is_sound = ~np.isnan(pixels).any(axis=(1, 2))
+        offsets[~is_sound], jacobians[~is_sound] = 0.0, 0.0
+        weighed = np.linalg.solve(spreads, offsets[..., None])
+        pulls = jacobians.swapaxes(-1, -2) @ weighed
+        covariance, known = point_covariances(jacobians, spreads)
+        distances = (offsets[..., None, :] @ weighed)[..., 0, 0]
+        return _Linear(summed(pulls)[..., 0], covariance, distances, is_sound & known)
+
+
+@dataclass(frozen=True)
+class _Linear:
+    """Subsets of views around a point each: which way it should move, shape (E, 3), its covariance,
+    (E, 3, 3), each view's squared distance, (E, V), and whether all of that is known, (E,)."""
+
+    pull: FloatArray
+    covariance: FloatArray
+    distances: FloatArray
+    is_sound: BoolArray
 
 
 def _is_behind(pair: Pair, sights: Sequence[Sight]) -> bool:

@@ -33,7 +33,7 @@ from app.solving.labels import find_suspects
 from app.solving.observations import Observations, observe
 from app.solving.paint_camera import PaintProblem, solve_paint
 from app.solving.picture import find_picture
-from app.solving.picture_camera import PictureProblem, estimate_picture, warp_of
+from app.solving.picture_camera import WIDTH, PictureProblem, estimate_picture, warp_of
 from app.solving.resect import (
     PositionPrior,
     Resection,
@@ -140,7 +140,7 @@ def calibrate_picture(
         return Calibration("lines", None, reason=error.message)
     if alone.camera is None:
         return alone
-    spread = _picture_spread(problem, observations, picture, found, alone.camera)
+    spread, whole = _picture_spread(problem, observations, picture, found, alone.camera)
     return measure(
         replace(
             alone,
@@ -148,6 +148,7 @@ def calibrate_picture(
             covariance=tuple(spread.ravel().tolist()) if np.isfinite(spread).all() else None,
             unobservable=_unobservable(spread),
             picture=None,
+            picture_covariance=tuple(whole.ravel().tolist()) if np.isfinite(whole).all() else None,
         ),
         lines,
         pitch,
@@ -161,14 +162,16 @@ def _picture_spread(
     prior: PictureGeometry,
     found: PictureGeometry,
     camera: Camera,
-) -> FloatArray:
-    """Covariance of a camera's parameters with what is not known of its picture, shape (8, 8)."""
+) -> tuple[FloatArray, FloatArray]:
+    """Covariance of a camera's parameters with what is not known of its picture, shape (8, 8), and
+    that of camera and picture together, shape (11, 11)."""
     search = PictureProblem.of(problem, observations, prior)
     unknowns = np.append(problem.parameters(camera), warp_of(found))
     try:
-        return search.carried(unknowns, search.covariance(unknowns))
+        whole = search.covariance(unknowns)
     except DegenerateGeometryError:
-        return np.full((PARAMETERS, PARAMETERS), np.inf)
+        return np.full((PARAMETERS, PARAMETERS), np.inf), np.full((WIDTH, WIDTH), np.inf)
+    return search.carried(unknowns, whole), whole
 
 
 def _found(problem: ResectionProblem, fit: Resection, observations: Observations) -> Calibration:
@@ -355,10 +358,17 @@ def calibration_key(
             parts.append(station.given.lens)
         if station.given_covariance is not None:
             parts.append(station.given_covariance)
-    elif station.picture is not None:
+        return _key(parts)
+    if station.picture is not None:
         parts.append(station.picture)
     elif shared is not None:
         parts.append(shared)
+    if (policy.line_sigma_px, policy.line_share) != (None, None):
+        parts.append(("line noise", policy.line_sigma_px, policy.line_share))
+    return _key(parts)
+
+
+def _key(parts: list[object]) -> str:
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 
 

@@ -48,15 +48,35 @@ def residuals_of(facts: Facts, used: BoolArray, start: FloatArray, policy: Polic
     Source: Hartley & Zisserman, sec. 12.5 and 5.3 (minimum of the residuals, and its expectation).
     """
     views = np.flatnonzero(used & np.isfinite(facts.view_axis[:, 0]))
-    owner = facts.view_group[views]
-    views = views[np.isfinite(start[owner, 0])]
-    owner = facts.view_group[views]
-    freedom = 2 * np.bincount(owner, minlength=facts.groups) - 3
+    return _tested(facts, views, facts.view_group[views], start, policy)
+
+
+def residuals_without(
+    facts: Facts, used: BoolArray, start: FloatArray, policy: Policy
+) -> Residuals:
+    """``residuals_of`` one group without one of its views, a row for each that counts, in order.
+
+    Args:
+        facts: Of the one group; the rest as for ``residuals_of``.
+    """
+    places = np.flatnonzero(used)
+    rest = ~np.eye(len(places), dtype=bool) & np.isfinite(facts.view_axis[places, 0])
+    without, views = np.nonzero(rest)
+    return _tested(facts, places[views], without, np.repeat(start, len(places), axis=0), policy)
+
+
+def _tested(
+    facts: Facts, views: IntArray, owner: IntArray, start: FloatArray, policy: Policy
+) -> Residuals:
+    """Residuals of sets of views, whose numbers are their owners, increasing, shape (N,)."""
+    sets, begun = len(start), np.isfinite(start[owner, 0])
+    views, owner = views[begun], owner[begun]
+    freedom = 2 * np.bincount(owner, minlength=sets) - 3
     with np.errstate(all="ignore"):
-        point, squares = _fitted(facts, views, start, policy)
-    total = np.bincount(owner, squares, facts.groups).astype(float)
+        point, squares = _fitted(facts, views, owner, start, policy)
+    total = np.bincount(owner, squares, sets).astype(float)
     total[(freedom < 1) | ~np.isfinite(point[:, 0])] = np.nan
-    p_value = np.full(facts.groups, np.nan)
+    p_value = np.full(sets, np.nan)
     there = np.isfinite(total)
     p_value[there] = chdtrc(freedom[there], total[there])
     point[~there] = np.nan
@@ -80,17 +100,17 @@ def untestable(facts: Facts, used: BoolArray, policy: Policy) -> BoolArray:
 
 
 def _fitted(
-    facts: Facts, views: IntArray, start: FloatArray, policy: Policy
+    facts: Facts, views: IntArray, owner: IntArray, start: FloatArray, policy: Policy
 ) -> tuple[FloatArray, FloatArray]:
     """The most likely points, (G, 3), and each view's squared residual in units of sigma, (N,)."""
-    owner = facts.view_group[views]
     slope, axis, position = (
         facts.view_slope[views],
         facts.view_axis[views],
         facts.view_position[views],
     )
     point = start.copy()
-    weight = _weights(facts, views, point, policy)
+    weight = _weights(facts, views, point[owner], policy)
+    nine, three = _cells(owner, 9), _cells(owner, 3)
     for step in range(_STEPS + 1):
         reach = point[owner] - position
         depth = _dot(axis, reach)
@@ -101,19 +121,21 @@ def _fitted(
         lean = offset[:, :, None] * axis[:, None] if step else 0.0
         jacobian = (slope + lean) / depth[:, None, None]
         pulled = jacobian.transpose(0, 2, 1) @ weight
-        matrix = _summed(facts, owner, pulled @ jacobian)
-        pull = _summed(facts, owner, _times(pulled, offset))
+        matrix = _summed(nine, pulled @ jacobian, (len(point), 3, 3))
+        pull = _summed(three, _times(pulled, offset), point.shape)
         point = point + _solved(matrix, pull)
     squares = _dot(offset, _times(weight, offset))
     squares[depth <= 0] = np.nan
     return point, squares
 
 
-def _weights(facts: Facts, views: IntArray, point: FloatArray, policy: Policy) -> FloatArray:
-    """Inverse covariance of each view's click and calibration, at the point, (N, 2, 2)."""
-    spread = pixel_spreads(facts, views, point[facts.view_group[views]], policy)
+def _weights(facts: Facts, views: IntArray, points: FloatArray, policy: Policy) -> FloatArray:
+    """Inverse covariance of each view's click and calibration, at a point each, (N, 2, 2)."""
+    spread = pixel_spreads(facts, views, points, policy)
     (a, b), (c, d) = spread.transpose(1, 2, 0)
-    adjugate = np.stack([np.stack([d, -b], -1), np.stack([-c, a], -1)], 1)
+    adjugate = np.empty_like(spread)
+    adjugate[:, 0, 0], adjugate[:, 0, 1] = d, -b
+    adjugate[:, 1, 0], adjugate[:, 1, 1] = -c, a
     weights: FloatArray = adjugate / (a * d - b * c)[:, None, None]
     return weights
 
@@ -121,17 +143,24 @@ def _weights(facts: Facts, views: IntArray, point: FloatArray, policy: Policy) -
 def _solved(matrix: FloatArray, pull: FloatArray) -> FloatArray:
     """Solutions of 3 x 3 systems by cofactors, NaN where one has none, shape (G, 3)."""
     a, b, c = matrix.transpose(1, 0, 2)
-    first = cross(b, c)
-    columns = np.stack([first, cross(c, a), cross(a, b)], axis=-1)
+    columns = np.empty(matrix.shape)
+    columns[..., 0] = first = cross(b, c)
+    columns[..., 1] = cross(c, a)
+    columns[..., 2] = cross(a, b)
     solution: FloatArray = _times(columns, pull) / _dot(a, first)[:, None]
     return solution
 
 
-def _summed(facts: Facts, owner: IntArray, parts: FloatArray) -> FloatArray:
-    flat = parts.reshape(len(parts), int(np.prod(parts.shape[1:])))
-    sums = [np.bincount(owner, column, facts.groups) for column in flat.T]
-    total: FloatArray = np.stack(sums, axis=-1).astype(float).reshape(-1, *parts.shape[1:])
-    return total
+def _cells(owner: IntArray, width: int) -> IntArray:
+    """Where each number of rows of a width is added for its owner."""
+    cells: IntArray = (width * owner[:, None] + np.arange(width)).ravel()
+    return cells
+
+
+def _summed(cells: IntArray, parts: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Sums of rows by their owners, one after the other: alone as among others the same bits."""
+    total: FloatArray = np.bincount(cells, parts.ravel(), int(np.prod(shape))).astype(float)
+    return total.reshape(shape)
 
 
 def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.frames import height_above_grass
 from app.soccer.policy import Policy
 from app.soccer.solution import ChiSquare
-from app.solving.chi_square import residuals_of, untestable
+from app.solving.chi_square import residuals_of, residuals_without, untestable
 from app.solving.facts import Facts
 from app.solving.triangulate import Sight
 from app.solving.verdict import Verdict, views_of
@@ -125,15 +125,12 @@ def _blamed(
 ) -> tuple[str | None, float, FloatArray]:
     """The view without which the others agree, how sure that is, and their ball, shape (3,)."""
     places = np.flatnonzero(used)
-    left = [
-        residuals_of(facts, used & (np.arange(len(used)) != at), start, policy) for at in places
-    ]
-    squares = np.array([item.chi_square[0] for item in left])
-    squares[np.isnan(squares)] = np.inf
+    left = residuals_without(facts, used, start, policy)
+    squares = np.where(np.isnan(left.chi_square), np.inf, left.chi_square)
     best = int(squares.argmin())
     confidence = 1.0 / float(np.exp((squares[best] - squares) / 2).sum())
-    agree = left[best].p_value[0] >= LOW_P_VALUE and confidence >= SURE
-    return keys[places[best]] if agree else None, confidence, left[best].point[0]
+    agree = left.p_value[best] >= LOW_P_VALUE and confidence >= SURE
+    return keys[places[best]] if agree else None, confidence, left.point[best]
 
 
 def _apart(a: Sight, b: Sight, point: FloatArray, policy: Policy) -> tuple[float, float | None]:

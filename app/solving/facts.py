@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
+from typing import Any, cast
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.resection import PARAMETERS, parameters_from_camera
 from app.geometry.triangulation import moved_points
 from app.soccer.group import View
+from app.soccer.picture import camera_aspect, taken_camera
 from app.soccer.solution import Calibration
 from app.solving.triangulate import Meeting, lines_of_sight, meet, sights_of
 
@@ -46,6 +48,12 @@ class Facts:
             pixels per metre, NaN where the view has no such ray, shape (V, 2, 3).
         view_axis: Direction of depth, NaN likewise, shape (V, 3).
         view_agreement: Of its camera with its paint, NaN where none was read.
+        view_picture: Of a picture that was stretched or cropped: covariances of its three numbers
+            with the eight parameters, which are then those of the picture as it was taken, and
+            among themselves; zero elsewhere, shape (V, 3, 11).
+        view_stretch: Width of its pixels by their height, and how far to the right of its axis
+            the ball is, pixels, shape (V, 2).
+        view_noise: Sigma of its click beside that of the dataset's balls.
         mark_view: Row of the view, shape (M,).
         mark_px: Largest distance of an annotated point of the marking, infinite without one.
         pair_group: Row of the group, shape (P,), like ``pair_...``.
@@ -84,6 +92,9 @@ class Facts:
     pair_parallax: FloatArray
     pair_point: FloatArray
     pair_moved: FloatArray
+    view_picture: FloatArray
+    view_stretch: FloatArray
+    view_noise: FloatArray
 
     @cached_property
     def view_known(self) -> BoolArray:
@@ -99,16 +110,48 @@ class Facts:
 
     def only(self, kept: BoolArray) -> Facts:
         """The facts of some of the groups, in the same order."""
-        views = kept[self.view_group]
-        rows = {"view": views, "mark": views[self.mark_view], "pair": kept[self.pair_group]}
-        arrays = {name: getattr(self, name)[rows[name.partition("_")[0]]] for name in COLUMNS}
-        place, view_place = np.cumsum(kept) - 1, np.cumsum(views) - 1
-        arrays["view_group"] = place[arrays["view_group"]]
-        arrays["mark_view"] = view_place[arrays["mark_view"]]
-        arrays["pair_group"] = place[arrays["pair_group"]]
-        arrays["pair_view"] = view_place[arrays["pair_view"]]
-        return Facts(int(kept.sum()), **arrays)
+        part = self.part(kept)
+        return Facts(part.groups, **{name: getattr(part, name) for name in COLUMNS})
 
+    def part(self, kept: BoolArray) -> Facts:
+        """``only`` whose columns are gathered when they are first read.
+
+        The gates read a tenth of what is known of a group.
+        """
+        return cast(Facts, _Part(self, kept))
+
+
+class _Part:
+    """Some of the groups of facts, a column of which is made when somebody reads it."""
+
+    def __init__(self, whole: Facts, kept: BoolArray):
+        self.groups = int(kept.sum())
+        views = kept[whole.view_group]
+        self._whole = whole
+        self._rows = {"view": views, "pair": kept[whole.pair_group]}
+        self._places = {"group": np.cumsum(kept) - 1, "view": np.cumsum(views) - 1}
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in COLUMNS:
+            # What is computed from columns is computed from these.
+            return getattr(Facts, name).func(self)
+        per = name.partition("_")[0]
+        if per not in self._rows:
+            self._rows[per] = self._rows["view"][self._whole.mark_view]
+        array = getattr(self._whole, name)[self._rows[per]]
+        if name in _POINTS_TO:
+            array = self._places[_POINTS_TO[name]][array]
+        self.__dict__[name] = array
+        return array
+
+
+_POINTS_TO = {
+    "view_group": "group",
+    "pair_group": "group",
+    "mark_view": "view",
+    "pair_view": "view",
+}
+"""Columns that hold rows of something else."""
 
 COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
     "view_group": (np.int64, ()),
@@ -135,6 +178,9 @@ COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
     "pair_point": (np.float64, (3,)),
     "pair_moved": (np.float64, (2, 2, 2, 3)),
     "view_agreement": (np.float64, ()),
+    "view_picture": (np.float64, (3, PARAMETERS + 3)),
+    "view_stretch": (np.float64, (2,)),
+    "view_noise": (np.float64, ()),
 }
 """Type of each array, and shape of one row of it; what came later stands last."""
 
@@ -184,6 +230,7 @@ def facts_of(
     boxes = [ball.box if ball is not None else None for ball in balls]
     diagonals = [view.size.diagonal for view in views]
     parameters, covariances = _uncertainties(calibrations, diagonals)
+    pictures, stretches = _pictures(views, calibrations, parameters, covariances)
     places = {view.key: place for place, view in enumerate(views)}
     slopes, axes = _rays(meetings, places)
     return Facts(
@@ -216,6 +263,9 @@ def facts_of(
         pair_parallax=np.array([item.parallax_degrees for item in meetings], float),
         pair_point=_rows([item.point for item in meetings], 3),
         pair_moved=_moved(meetings),
+        view_picture=pictures,
+        view_stretch=stretches,
+        view_noise=np.array([view.noise for view in views], float),
     )
 
 
@@ -230,6 +280,30 @@ def _uncertainties(
             parameters[place] = parameters_from_camera(item.camera, diagonal / 2)
             covariances[place] = np.reshape(item.covariance, (PARAMETERS, PARAMETERS))
     return parameters, covariances
+
+
+def _pictures(
+    views: Sequence[View],
+    calibrations: Sequence[Calibration],
+    parameters: FloatArray,
+    covariances: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """``view_picture`` and ``view_stretch``; parameters and covariances become those as taken."""
+    width = PARAMETERS + 3
+    pictures, stretches = np.zeros((len(views), 3, width)), np.zeros((len(views), 2))
+    stretches[:, 0] = 1.0
+    for place, (view, item) in enumerate(zip(views, calibrations, strict=True)):
+        if item.camera is None or item.picture_covariance is None:
+            continue
+        whole = np.reshape(item.picture_covariance, (width, width))
+        camera, half = taken_camera(item.camera), view.size.diagonal / 2
+        parameters[place] = parameters_from_camera(camera, half)
+        covariances[place] = whole[:PARAMETERS, :PARAMETERS]
+        pictures[place] = whole[PARAMETERS:]
+        center = None if view.ball is None else view.ball.center
+        foot = 0.0 if center is None else center[0] - item.camera.principal_point[0]
+        stretches[place] = camera_aspect(item.camera), foot
+    return pictures, stretches
 
 
 def _rays(meetings: Sequence[Meeting], places: Mapping[str, int]) -> tuple[FloatArray, FloatArray]:

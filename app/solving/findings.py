@@ -88,7 +88,9 @@ def _swaps(
     left = {solved.view for solved in views if solved.failed is None}
     first = next((sight for sight in sights if sight.view == group.views[0].key), None)
     usable = [sight for sight in sights if sight.view in left]
-    return find_swaps(first, usable, group.pitch, policy)
+    badly = {solved.view for solved in views if solved.failed == "jac"}
+    doubtful = [sight for sight in sights if sight.view in badly]
+    return find_swaps(first, usable, group.pitch, policy, doubtful)
 
 
 def _several_balls(view: View) -> Iterator[Finding]:

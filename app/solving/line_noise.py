@@ -4,7 +4,8 @@ Whoever clicks a line beside its middle does so along its whole length, and a pi
 painted as planned moves all points of a marking alike: many points of one marking say less than
 as many points of several. Each residual is taken as an offset that it shares with its marking
 and a part of its own; the share ``rho`` of the offset in the variance is estimated from the
-residuals of the image itself, with what real annotations show as prior.
+residuals of the image itself, with what real annotations show as prior. All images of a dataset
+together know both numbers far better than one of them: what each says of them adds up.
 
 Source: Patterson & Thompson, "Recovery of inter-block information when block sizes are unequal"
 (restricted likelihood); Liang & Zeger, "Longitudinal data analysis using generalized linear
@@ -13,9 +14,11 @@ models" (covariance of a fit with a working model of independent residuals).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import gammaln
 
 from app.geometry.arrays import FloatArray, IntArray
 
@@ -23,6 +26,15 @@ SHARES = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
 """Values of rho that are weighed, all alike before the residuals speak."""
 SIGMA_FREEDOM = 4.0
 """Degrees of freedom that the prior of the variance is worth."""
+MIN_VIEWS = 20
+"""Images of which fewer say too little about a dataset."""
+FREEDOMS = np.array([4.0, 8.0, 20.0, 1000.0])
+"""How much alike the variances of a dataset's images may be, as degrees of freedom."""
+SIGMAS = np.geomspace(0.1, 10.0, 93)
+"""Noises of a dataset that are tried, pixels at 960 x 540."""
+BLOCKS = 10
+STUDENT = 2.26
+"""95 % of Student's distribution with one degree of freedom less than blocks."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +52,119 @@ class LineNoise:
     parameters: FloatArray
 
 
+@dataclass(frozen=True)
+class LinePrior:
+    """What is known of the noise of an image's clicks before any is seen.
+
+    Attributes:
+        sigma_px: What a click's standard deviation is expected to be, pixels.
+        floor_px: What it is never below.
+        share: What the points of a marking have in common of the variance, where that is known.
+    """
+
+    sigma_px: float
+    floor_px: float
+    share: float | None = None
+
+
+@dataclass(frozen=True)
+class LineEvidence:
+    """What the residuals of one image say of its noise, for each of some shares (R).
+
+    Attributes:
+        rest: Sum of squares that the fit leaves, square pixels, shape (R,).
+        log_determinant: Of the errors' correlation and of the fit, shape (R,).
+        freedom: Of the sum of squares.
+    """
+
+    rest: FloatArray
+    log_determinant: FloatArray
+    freedom: int
+
+    def log_likelihood(
+        self, sigma: FloatArray | float, freedom: FloatArray | float = SIGMA_FREEDOM
+    ) -> FloatArray:
+        """Logarithm of the restricted likelihood of a prior of the variance, but for a constant.
+
+        Args:
+            sigma: Of the prior, pixels, a number or shape (S, 1).
+            freedom: Degrees of freedom that it is worth, a number or shape (F, 1, 1).
+        """
+        total, known = self.freedom + freedom, freedom * np.square(sigma)
+        # With the sum of squares as a share of what is known no large numbers cancel.
+        excess = np.log1p(np.maximum(self.rest, 0.0) / known)
+        inside: FloatArray = (
+            -self.freedom * np.log(known) - total * excess - self.log_determinant
+        ) / 2
+        return inside + (gammaln(total / 2) - gammaln(freedom / 2))
+
+    def in_units(self, pixels: float) -> LineEvidence:
+        """The same with so many pixels for one."""
+        return LineEvidence(self.rest / pixels**2, self.log_determinant, self.freedom)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """A least-squares fit with columns of one length; errors of a marking are correlated."""
+
+    residuals: FloatArray
+    jacobian: FloatArray
+    prior: FloatArray
+    lengths: FloatArray
+    sums: FloatArray
+    totals: FloatArray
+    size: IntArray
+
+    @staticmethod
+    def of(
+        residuals: FloatArray, jacobian: FloatArray, marking: IntArray, prior: FloatArray
+    ) -> _Fit:
+        # Angles and metres: columns of one length invert better.
+        lengths = np.sqrt((jacobian**2).sum(axis=0) + prior)
+        jacobian = jacobian / lengths
+        _, place, size = np.unique(marking, return_inverse=True, return_counts=True)
+        sums = np.zeros((len(size), jacobian.shape[1]))
+        np.add.at(sums, place, jacobian)
+        totals = np.asarray(np.bincount(place, residuals), float)
+        return _Fit(residuals, jacobian, prior / lengths**2, lengths, sums, totals, size)
+
+    def evidence(self, shares: FloatArray) -> LineEvidence:
+        """For each of the shares, shape (R,)."""
+        n, width = self.jacobian.shape
+        square = self.jacobian.T @ self.jacobian
+        # Inverse of (1 - rho) I + rho 11^T, marking by marking (Woodbury).
+        own = 1 - shares[:, None]
+        mixed = own + shares[:, None] * self.size
+        common = shares[:, None] / mixed
+        normal = square - np.einsum("rm,mi,mj->rij", common, self.sums, self.sums)
+        normal = normal / own[:, :, None] + np.diag(self.prior)
+        pull = (self.jacobian.T @ self.residuals - (common * self.totals) @ self.sums) / own
+        spent = np.einsum("ri,ri->r", pull, np.linalg.solve(normal, pull[:, :, None])[:, :, 0])
+        squares = self.residuals @ self.residuals - (common * self.totals**2).sum(1)
+        log_size = ((self.size - 1) * np.log(own) + np.log(mixed)).sum(1)
+        return LineEvidence(
+            squares / own[:, 0] - spent,
+            log_size + np.linalg.slogdet(normal)[1],
+            max(n - width + int((self.prior > 0).sum()), 1),
+        )
+
+
+def line_evidence(
+    residuals: FloatArray, jacobian: FloatArray, marking: IntArray, prior: FloatArray
+) -> LineEvidence:
+    """What a least-squares fit leaves says of the noise, for each of ``SHARES``.
+
+    The arguments are those of ``line_noise``.
+    """
+    return _Fit.of(residuals, jacobian, marking, prior).evidence(SHARES)
+
+
 def line_noise(
     residuals: FloatArray,
     jacobian: FloatArray,
     marking: IntArray,
     prior: FloatArray,
-    sigma_px: float,
-    floor_px: float,
+    known: LinePrior,
 ) -> LineNoise:
     """Noise of the clicks, and the covariance of a least-squares fit to them.
 
@@ -55,50 +173,113 @@ def line_noise(
         jacobian: Of the residuals, weighted alike, shape (N, n).
         marking: Of each residual, shape (N,).
         prior: Information of the parameters' own prior, shape (n,), a diagonal.
-        sigma_px: What a click's standard deviation is expected to be.
-        floor_px: What it is never below.
+        known: Of the noise, in the pixels of the residuals.
 
     Raises:
         LinAlgError: A combination of parameters is not determined.
     """
-    # Angles and metres: columns of one length invert better.
-    lengths = np.sqrt((jacobian**2).sum(axis=0) + prior)
-    jacobian, prior = jacobian / lengths, prior / lengths**2
-    n, width = jacobian.shape
-    shares = SHARES[:, None, None]
-    _, place, size = np.unique(marking, return_inverse=True, return_counts=True)
-    sums = np.zeros((len(size), width))
-    np.add.at(sums, place, jacobian)
-    totals = np.bincount(place, residuals)
-    square = jacobian.T @ jacobian
-    # Inverse of (1 - rho) I + rho 11^T, marking by marking (Woodbury).
-    own = 1 - SHARES[:, None]
-    mixed = own + SHARES[:, None] * size
-    common = SHARES[:, None] / mixed
-    normal = (square - np.einsum("rm,mi,mj->rij", common, sums, sums)) / own[:, :, None]
-    normal += np.diag(prior)
-    pull = (jacobian.T @ residuals - (common * totals) @ sums) / own
-    spent = np.einsum("ri,ri->r", pull, np.linalg.solve(normal, pull[:, :, None])[:, :, 0])
-    rest = (residuals @ residuals - (common * totals**2).sum(1)) / own[:, 0] - spent
-    freedom = max(n - width + int((prior > 0).sum()), 1)
-    scatter = np.maximum(rest, 0.0) + SIGMA_FREEDOM * sigma_px**2
-    log_size = ((size - 1) * np.log(own) + np.log(mixed)).sum(1)
-    likelihood = -0.5 * (
-        log_size + np.linalg.slogdet(normal)[1] + (freedom + SIGMA_FREEDOM) * np.log(scatter)
-    )
-    weight = np.exp(likelihood - likelihood.max())
+    fit = _Fit.of(residuals, jacobian, marking, prior)
+    values = SHARES if known.share is None else np.array([known.share])
+    found = fit.evidence(values)
+    n, freedom = len(residuals), found.freedom
+    weight = np.exp((at := found.log_likelihood(known.sigma_px)) - at.max())
     weight /= weight.sum()
     # Markings are few, so their common offsets are known badly: the covariance is that of
     # Student's distribution, with as many degrees of freedom as there are independent points.
-    independent = (size / (1 + SHARES[:, None] * (size - 1))).sum(1)
+    independent = (fit.size / (1 + values[:, None] * (fit.size - 1))).sum(1)
     student = SIGMA_FREEDOM + np.maximum(independent - n + freedom, 1.0)
+    scatter = np.maximum(found.rest, 0.0) + SIGMA_FREEDOM * known.sigma_px**2
     variance = scatter / (freedom + SIGMA_FREEDOM) * student / (student - 2)
-    variance = np.maximum(variance, floor_px**2)
-    inner = (1 - shares) * square + shares * (sums.T @ sums)
-    middle = np.tensordot(weight * variance, inner, 1) + np.diag(prior)
-    outer = np.linalg.inv(square + np.diag(prior))
+    variance = np.maximum(variance, known.floor_px**2)
+    shares, square = values[:, None, None], fit.jacobian.T @ fit.jacobian
+    inner = (1 - shares) * square + shares * (fit.sums.T @ fit.sums)
+    middle = np.tensordot(weight * variance, inner, 1) + np.diag(fit.prior)
+    outer = np.linalg.inv(square + np.diag(fit.prior))
     return LineNoise(
         variance=float(weight @ variance),
-        share=float(weight @ SHARES),
-        parameters=outer @ middle @ outer / np.outer(lengths, lengths),
+        share=float(weight @ values),
+        parameters=outer @ middle @ outer / np.outer(fit.lengths, fit.lengths),
     )
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A number with the ends of its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class LineEstimate:
+    """Noise of the clicks on lines of a dataset.
+
+    Attributes:
+        sigma: Of a point, pixels at 960 x 540: about this the images differ.
+        share: Of the variance, what the points of a marking have in common.
+        views: Images that it rests on.
+    """
+
+    sigma: Interval
+    share: Interval
+    views: int
+
+
+def estimate_line_noise(found: Sequence[LineEvidence]) -> LineEstimate | None:
+    """The noise under which the residuals of all images are likeliest; None where they are few.
+
+    Each image has its own variance, about that of the dataset: few images with wrong points
+    change little.
+
+    Args:
+        found: Of each image for ``SHARES``, pixels at 960 x 540, in the order in which they were
+            taken: neighbours err alike, so intervals are from leaving out one block after another.
+    """
+    if len(found) < MIN_VIEWS:
+        return None
+    blocks = np.zeros((BLOCKS, len(FREEDOMS), len(SIGMAS), len(SHARES)))
+    for at, item in enumerate(found):
+        told = item.log_likelihood(SIGMAS[:, None], FREEDOMS[:, None, None])
+        blocks[at * BLOCKS // len(found)] -= told
+    # How alike the images are decides little: the likeliest holds for all blocks.
+    blocks = blocks[:, blocks.sum(axis=0).min(axis=(1, 2)).argmin()]
+    whole = blocks.sum(axis=0)
+    log_sigma, share = _lowest(whole)
+    parts = np.array([_lowest(whole - part) for part in blocks])
+    squares = ((parts - parts.mean(axis=0)) ** 2).sum(axis=0)
+    half, wide = (STUDENT * np.sqrt((BLOCKS - 1) / BLOCKS * squares)).tolist()
+    half = max(half, STUDENT * np.sqrt(0.5 / sum(item.freedom for item in found)))
+    wide = max(wide, _SHARE_STEP / 4)
+    sigma = Interval(*np.exp([log_sigma, log_sigma - half, log_sigma + half]).tolist())
+    ends = max(share - wide, 0.0), min(share + wide, 1.0)
+    return LineEstimate(sigma, Interval(share, *ends), len(found))
+
+
+_SHARE_STEP = float(SHARES[1] - SHARES[0])
+_SIGMA_STEP = float(np.log(SIGMAS[1] / SIGMAS[0]))
+
+
+def _lowest(cost: FloatArray) -> tuple[float, float]:
+    """Logarithm of sigma and share of the lowest cost, shape (S, R), between the grid's points."""
+    places = cost.argmin(axis=0).tolist()
+    vertices = [_vertex(cost[:, share], at) for share, at in enumerate(places)]
+    off, least = np.transpose(vertices)
+    sigmas = np.log(SIGMAS[places]) + _SIGMA_STEP * off
+    at = int(least.argmin())
+    share = at + _vertex(least, at)[0]
+    # Sigma goes with the share: the more a marking has in common, the noisier its points.
+    sigma = np.interp(share, np.arange(len(SHARES)), sigmas)
+    return float(sigma), float(np.clip(SHARES[0] + _SHARE_STEP * share, 0.0, 1.0))
+
+
+def _vertex(cost: FloatArray, at: int) -> tuple[float, float]:
+    """How far the lowest point lies from the lowest one of the grid, in steps, and its cost."""
+    if not 0 < at < len(cost) - 1:
+        return 0.0, float(cost[at])
+    before, least, after = cost[at - 1 : at + 2].tolist()
+    bend = before - 2 * least + after
+    if bend <= 0:
+        return 0.0, least
+    off = (before - after) / (2 * bend)
+    return off, least - bend * off**2 / 2

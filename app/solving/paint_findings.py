@@ -15,8 +15,8 @@ READ_PAINT = "read_paint"
 """The fix that asks for a picture to be read."""
 STAYS = "so its camera is that of the clicks"
 READ_AGAIN = (
-    "The lines of this view, its pitch or the thresholds have changed since its paint was read, "
-    f"{STAYS}. Read the paint again."
+    "The lines of this view, the boxes of its people, its pitch or the thresholds have changed since "
+    f"its paint was read, {STAYS}. Read the paint again."
 )
 SENTENCES = {
     NO_PAINT: (

@@ -15,7 +15,7 @@ from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.least_squares import require_determined
 from app.geometry.resection import KAPPA
-from app.solving.line_noise import line_noise
+from app.solving.line_noise import LinePrior, line_noise
 
 SHARE = 0.05
 """Of a point's variance, what the points of a marking have in common when they are weighed."""
@@ -101,7 +101,7 @@ def paint_noise(
     known = np.diag(prior) + (0.0 if information is None else information)
     try:
         require_determined(rows.T @ rows + known)
-        noise = line_noise(rest, rows, seen.marking, prior, EXPECTED, LEAST)
+        noise = line_noise(rest, rows, seen.marking, prior, LinePrior(EXPECTED, LEAST))
     except (DegenerateGeometryError, np.linalg.LinAlgError):
         return None
     weighted = rows * marking_weights(seen.marking, seen.sigmas)[:, None]

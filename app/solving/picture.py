@@ -21,8 +21,9 @@ from app.solving.resect import MIN_CLICK_SIGMA_PX, ResectionProblem
 PRIOR = np.array([0.12, 0.2, 0.2])
 """Standard deviations of stretch (its logarithm) and of the middle (in half diagonals)."""
 BOUND = 0.45
-SHARE = 0.4
-"""Of the residuals' variance, what points of a marking have in common (see ``line_noise``)."""
+SHARE, MOST_SHARE = 0.4, 0.9
+"""Of the residuals' variance, what points of a marking have in common, where nobody has measured
+it (see ``line_noise``), and the most that is believed of a measured one."""
 SUSPICIOUS, BELIEVED = 3.0, 5.0
 """F ratios of what the three numbers explain: worth a fit, and worth a word."""
 MIN_RATIO = 3.0
@@ -47,9 +48,7 @@ class _Linear:
         """Step of the first ``width`` unknowns; ``prior`` is their information, shape (11,)."""
         normal = (self.normal + np.diag(prior))[:width, :width]
         pull = (self.pull + prior * offset)[:width]
-        scale = np.sqrt(np.diag(normal))
-        if not scale.all():
-            raise np.linalg.LinAlgError("the lines say nothing of one of the unknowns")
+        scale = _scale(normal)
         solved = np.linalg.solve(normal / np.outer(scale, scale), pull / scale)
         step: FloatArray = solved / scale
         return step
@@ -156,16 +155,25 @@ def _linear(
     sums = np.zeros((len(size), _WIDTH))
     np.add.at(sums, place, rows)
     totals = np.bincount(place, errors, len(size))
-    common = SHARE / (1 - SHARE + SHARE * size)
+    share = SHARE if problem.line_share is None else min(problem.line_share, MOST_SHARE)
+    common = share / (1 - share + share * size)
     return _Linear(
-        (rows.T @ rows - (sums.T * common) @ sums) / (1 - SHARE),
-        (rows.T @ errors - sums.T @ (common * totals)) / (1 - SHARE),
-        float(errors @ errors - common @ totals**2) / (1 - SHARE),
+        (rows.T @ rows - (sums.T * common) @ sums) / (1 - share),
+        (rows.T @ errors - sums.T @ (common * totals)) / (1 - share),
+        float(errors @ errors - common @ totals**2) / (1 - share),
         len(errors),
     )
 
 
+def _scale(normal: FloatArray) -> FloatArray:
+    """Root of the diagonal of a normal matrix; LinAlgError where an unknown is in no equation."""
+    scale: FloatArray = np.sqrt(np.diag(normal))
+    if not scale.all():
+        raise np.linalg.LinAlgError("the lines say nothing of one of the unknowns")
+    return scale
+
+
 def _inverse(normal: FloatArray) -> FloatArray:
-    scale = np.sqrt(np.diag(normal))
+    scale = _scale(normal)
     inverse: FloatArray = np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
     return inverse

@@ -7,7 +7,7 @@ those of the picture as it is: taken in the other one, a wider aspect would shri
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -166,13 +166,13 @@ class PictureProblem:
         prior[PARAMETERS:] = self.sigma**-2
         rows = jacobian * (weight / spread)[:, None]
         require_determined(rows.T @ rows + np.diag(prior))
+        known = self.problem.noise
         noise = line_noise(
             apart * weight / spread,
             rows,
             self.observations.marking,
             prior,
-            CLICK_SIGMA_PX * self.problem.unit / spread,
-            MIN_CLICK_SIGMA_PX * self.problem.unit / spread,
+            replace(known, sigma_px=known.sigma_px / spread, floor_px=known.floor_px / spread),
         )
         return noise.parameters
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import chdtrc
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
@@ -37,10 +38,17 @@ is believed to know them better."""
 UNKNOWN_SIGMA_M = 1.0
 """A size known to no better than this is unknown."""
 MIN_VOICES = 2.0
-"""One frame alone may be wrong in ways that its sigma does not know."""
+"""One frame alone may be wrong in ways that its sigma does not know. Fewer voices are enough where
+the other frames know the size without the loudest one, and agree with it."""
+AGREES = 2.5
+"""Standard deviations by which the loudest frame and the others may differ then."""
 CERTAIN_SIGMAS = 5.0
 LEAST_DIFFERENCE_M = 0.3
 """A size differs from another when it is this many sigmas and metres away."""
+SEVERAL_P_VALUE = 0.001
+"""Frames of one pitch disagree about a size as much as others do in less than so many cases."""
+SPEAKS = 1.0
+"""Information (of a sigma of 1 m) below which a frame has no say in that."""
 _MISFIT_SHARE = 4.0
 """A frame whose cost a point is so many times that of the median frame has a wrong label."""
 _ROUNDS, _SETTLED_M, _LONGEST_STEP_M = 12, 0.01, 2.5
@@ -100,7 +108,11 @@ class PitchEstimate:
 
 
 def estimate_pitch(
-    frames: Sequence[PitchFrame], policy: CalibrationPolicy, start: Pitch | None = None
+    frames: Sequence[PitchFrame],
+    policy: CalibrationPolicy,
+    start: Pitch | None = None,
+    *,
+    one_match: bool = True,
 ) -> PitchEstimate:
     """The size of the pitch that explains the lines of many frames best.
 
@@ -108,9 +120,11 @@ def estimate_pitch(
         frames: Of one match.
         policy: How frames are calibrated.
         start: Where to begin, 105 x 68 m by default; the answer does not depend on it.
+        one_match: Whether the frames are known to be of one match.
 
     Raises:
-        DegenerateGeometryError: Too few frames show enough markings.
+        DegenerateGeometryError: Too few frames show enough markings, or frames that nobody says
+            are of one match show pitches of several sizes.
     """
     pitch = start or Pitch()
     seen = [_Seen.of(frames[index], pitch, policy) for index in choose_frames(frames)]
@@ -126,8 +140,13 @@ def estimate_pitch(
     pitch, seen, shares = _adjust(
         pitch, [item for item, kept in zip(seen, fits, strict=True) if kept]
     )
+    if not one_match and _disagree(shares):
+        raise DegenerateGeometryError(
+            f"{len(seen)} frames show pitches of several sizes; import them with their matches"
+        )
     sigma = _sigmas(shares)
-    known = (sigma <= UNKNOWN_SIGMA_M) & (_voices(shares) >= MIN_VOICES) & _is_inside(pitch)
+    heard = (_voices(shares) >= MIN_VOICES) | _is_confirmed(shares)
+    known = (sigma <= UNKNOWN_SIGMA_M) & heard & _is_inside(pitch)
     return PitchEstimate(
         length=pitch.length if known[0] else None,
         width=pitch.width if known[1] else None,
@@ -279,11 +298,41 @@ def _sigmas(shares: Sequence[_Share]) -> FloatArray:
     return sigmas
 
 
+def _disagree(shares: Sequence[_Share]) -> bool:
+    """Whether frames differ about length or width by more than chance makes frames of one pitch.
+
+    A frame's gradient is zero but for chance, with its information as variance.
+    """
+    pulls = np.array([gradient for gradient, _ in shares])
+    told = np.array([np.diag(information) for _, information in shares])
+    speaks = told > SPEAKS
+    squares = np.where(speaks, pulls**2 / np.maximum(told, SPEAKS), 0.0).sum(axis=0)
+    freedom = np.maximum(speaks.sum(axis=0) - 1, 1)
+    return bool((chdtrc(freedom, squares) < SEVERAL_P_VALUE).any())
+
+
 def _voices(shares: Sequence[_Share]) -> FloatArray:
     """How many frames speak of length and of width, as if all of them said as much, shape (2,)."""
     told = np.array([np.diag(information) for _, information in shares])
     voices: FloatArray = told.sum(axis=0) ** 2 / np.maximum((told**2).sum(axis=0), 1e-30)
     return voices
+
+
+def _is_confirmed(shares: Sequence[_Share]) -> npt.NDArray[np.bool_]:
+    """Whether all frames but the one that says most know a size as well, and agree, shape (2,).
+
+    A gradient is that of one frame at the size that all agree on: its share of the information
+    takes it to the size that the frame alone says.
+    """
+    pulls = np.array([gradient for gradient, _ in shares])
+    told = np.maximum([np.diag(information) for _, information in shares], 1e-30)
+    loudest = told.argmax(axis=0), range(2)
+    others = told.sum(axis=0) - told[loudest]
+    apart = pulls[loudest] / told[loudest] - (pulls.sum(axis=0) - pulls[loudest]) / others
+    chance = 1 / told[loudest] + 1 / others
+    known: npt.NDArray[np.bool_] = others >= UNKNOWN_SIGMA_M**-2
+    alike: npt.NDArray[np.bool_] = apart**2 <= AGREES**2 * chance
+    return known & alike
 
 
 def _is_inside(pitch: Pitch) -> npt.NDArray[np.bool_]:

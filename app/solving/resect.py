@@ -12,14 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.errors import DegenerateGeometryError
-from app.geometry.arrays import FloatArray
+from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
-from app.geometry.least_squares import (
-    Fit,
-    NormalEquations,
-    levenberg_marquardt,
-    require_determined,
-)
+from app.geometry.least_squares import Fit, require_determined
 from app.geometry.resection import (
     ARC,
     KAPPA,
@@ -30,7 +25,7 @@ from app.geometry.resection import (
     Z,
     camera_from_parameters,
     distances,
-    normal_equations,
+    fit_curves,
     parameters_from_camera,
     residuals,
 )
@@ -39,7 +34,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import CIRCLES, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.line_noise import LineNoise, line_noise
+from app.solving.line_noise import LineEvidence, LineNoise, LinePrior, line_evidence, line_noise
 from app.solving.observations import Observations, observe, principal_point
 from app.solving.starts import STANDS, stand_starts
 
@@ -78,7 +73,7 @@ MAIN_SIGMA = np.array([np.radians(0.4), 2.0, 11.0, 4.5])
 """Roll (radians) and position (metres) of main cameras in real stadiums."""
 MAIN_FREEDOM = 10.0
 """Degrees of freedom of that prior's Student distribution: some stadiums are unlike the others."""
-MATCH_FREEDOM, MATCH_CLICKS = 4.0, 4.0
+MATCH_FREEDOM, MATCH_CLICKS = 4.0, 9.0
 """The same of what other frames of a match say of the position. Clicks on one marking, and what the
 lens differs from its model, err together: against other frames so many of them count as one."""
 MAIN_ROUNDS = 3
@@ -88,7 +83,7 @@ POINTS_PER_LINE, POINTS_PER_CIRCLE = 4, 8
 """Points that the search looks at; the later stages use them all."""
 
 
-CONTRADICTION = 16.0
+CONTRADICTION = 64.0
 """A prior of the position that costs the lines more than this, in clicks' variances, is dropped."""
 
 
@@ -135,24 +130,39 @@ class ResectionProblem:
         robust_scale_px: Scale of the final soft-L1 loss at 960 x 540.
         distortion_mean: Mean of the prior on kappa.
         distortion_sigma: Its standard deviation.
+        line_sigma_px: Noise of the clicks of the dataset at 960 x 540, where that is known.
+        line_share: Of its variance, what the points of a marking have in common, if known.
     """
 
     size: ImageSize
     robust_scale_px: float
     distortion_mean: float
     distortion_sigma: float
+    line_sigma_px: float | None = None
+    line_share: float | None = None
 
     @staticmethod
     def of(size: ImageSize, policy: CalibrationPolicy) -> ResectionProblem:
         """The problem of one image under a policy."""
         return ResectionProblem(
-            size, policy.robust_scale_px, policy.distortion_mean, policy.distortion_sigma
+            size,
+            policy.robust_scale_px,
+            policy.distortion_mean,
+            policy.distortion_sigma,
+            policy.line_sigma_px,
+            policy.line_share,
         )
 
     @property
     def unit(self) -> float:
         """Pixels of this image for a pixel at 960 x 540."""
         return self.size.diagonal / REFERENCE_DIAGONAL
+
+    @property
+    def noise(self) -> LinePrior:
+        """What is known of the noise of its clicks before any is seen, pixels of this image."""
+        sigma, floor = self.line_sigma_px or CLICK_SIGMA_PX, MIN_CLICK_SIGMA_PX
+        return LinePrior(sigma * self.unit, min(floor, sigma) * self.unit, self.line_share)
 
     def resect(self, observations: Observations) -> Resection:
         """The best camera; where it fits badly, also sought without the circles first.
@@ -243,6 +253,16 @@ class ResectionProblem:
         Raises:
             DegenerateGeometryError: The lines leave a combination of parameters open.
         """
+        return line_noise(*self.noise_rows(parameters, observations), self.noise)
+
+    def noise_rows(
+        self, parameters: FloatArray, observations: Observations
+    ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
+        """Residuals, Jacobian, marking and prior at a minimum as ``line_noise`` takes them.
+
+        Raises:
+            DegenerateGeometryError: The lines leave a combination of parameters open.
+        """
         offsets, jacobians = residuals(
             parameters, observations.curves, observations.sightings(), self.size.diagonal / 2
         )
@@ -257,14 +277,8 @@ class ResectionProblem:
         prior[KAPPA] = self.distortion_sigma**-2
         jacobian *= weight[rows, None]
         require_determined(jacobian.T @ jacobian + np.diag(prior))
-        return line_noise(
-            np.append(offsets[:, 0], offsets[beyond, 1]) * weight[rows],
-            jacobian,
-            np.append(observations.marking, -1 - beyond),
-            prior,
-            CLICK_SIGMA_PX * self.unit,
-            MIN_CLICK_SIGMA_PX * self.unit,
-        )
+        apart = np.append(offsets[:, 0], offsets[beyond, 1]) * weight[rows]
+        return apart, jacobian, np.append(observations.marking, -1 - beyond), prior
 
     def click_variance(self, parameters: FloatArray, observations: Observations) -> float:
         """Variance of the clicks' distances, from the robust fit, pixels squared."""
@@ -292,28 +306,17 @@ class ResectionProblem:
         damping: float = 1e-3,
         prior: Prior | None = None,
     ) -> Fit:
-        scale_px = stage.scale_px or self.robust_scale_px
-        equations = self._equations(observations, scale_px, prior or self.prior())
-        return levenberg_marquardt(
-            equations, starts, stage.steps, tolerance=stage.tolerance, damping=damping
+        return fit_curves(
+            starts,
+            observations.curves,
+            observations.sightings(),
+            prior or self.prior(),
+            (stage.scale_px or self.robust_scale_px) * self.unit,
+            self.size.diagonal / 2,
+            stage.steps,
+            tolerance=stage.tolerance,
+            damping=damping,
         )
-
-    def _equations(
-        self, observations: Observations, scale_px: float, prior: Prior
-    ) -> NormalEquations:
-        sightings = observations.sightings()
-
-        def equations(parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            return normal_equations(
-                parameters,
-                observations.curves,
-                sightings,
-                prior,
-                scale_px * self.unit,
-                self.size.diagonal / 2,
-            )
-
-        return equations
 
     def prior(self) -> Prior:
         """Wide enough to decide nothing that a few points decide; it keeps the rest on earth."""
@@ -354,10 +357,30 @@ def view_line_noise(
     Raises:
         DegenerateGeometryError: It has no camera, or its lines leave that open.
     """
+    problem, parameters = _at(calibration, size, policy)
+    return problem.line_noise(parameters, observe(lines, pitch, size))
+
+
+def view_line_evidence(
+    calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+) -> LineEvidence:
+    """What the clicks of a view say of the noise of its dataset, pixels at 960 x 540.
+
+    Raises:
+        DegenerateGeometryError: It has no camera, or its lines leave that open.
+    """
+    problem, parameters = _at(calibration, size, policy)
+    rows = problem.noise_rows(parameters, observe(lines, pitch, size))
+    return line_evidence(*rows).in_units(problem.unit)
+
+
+def _at(
+    calibration: Calibration, size: ImageSize, policy: CalibrationPolicy
+) -> tuple[ResectionProblem, FloatArray]:
     if calibration.camera is None:
         raise DegenerateGeometryError("without a camera there are no residuals")
     problem = ResectionProblem.of(size, policy)
-    return problem.line_noise(problem.parameters(calibration.camera), observe(lines, pitch, size))
+    return problem, problem.parameters(calibration.camera)
 
 
 def best(fit: Fit, count: int) -> FloatArray:

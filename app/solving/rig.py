@@ -178,7 +178,7 @@ def make_rig(
 
 def adjust(rig: Rig) -> RigFit:
     """The cameras that explain lines and balls best, and how well they are known."""
-    anchors = [_anchor(camera) for camera in rig.cameras]
+    anchors = [grass_in_view(camera) for camera in rig.cameras]
     observed = [_observed(camera, rig.pitch) for camera in rig.cameras]
     parameters, ball_sigma, line_sigma = rig.start, 1.0, LINE_SIGMA_PX
     for scale in (WIDE, TIGHT, TIGHT):
@@ -339,10 +339,6 @@ def _require_adjustable(camera: RigCamera) -> None:
             f"the lens of camera {camera.key} has terms that cannot be adjusted",
             hint="One focal length and one radial term can be; leave this camera as it is.",
         )
-
-
-def _anchor(camera: RigCamera) -> FloatArray:
-    return grass_in_view(camera)
 
 
 def _observed(camera: RigCamera, pitch: Pitch) -> Observations:

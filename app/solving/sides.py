@@ -61,7 +61,11 @@ def turned_camera(camera: Camera) -> Camera:
 
 
 def find_swaps(
-    first: Sight | None, usable: Sequence[Sight], pitch: Pitch, policy: Policy
+    first: Sight | None,
+    usable: Sequence[Sight],
+    pitch: Pitch,
+    policy: Policy,
+    doubtful: Sequence[Sight] = (),
 ) -> tuple[Swap, ...]:
     """Views whose ball meets that of the others only after a half turn.
 
@@ -74,17 +78,18 @@ def find_swaps(
         usable: Of the views that no gate drops.
         pitch: Tells which meeting points are plausible.
         policy: Holds tau.
+        doubtful: Views whose lines fit too badly to be used: they take no part in what is said of
+            others, but that they are labelled from the other end the others can still tell.
     """
     if first is not None and first.camera.position[1] < 0 and _from_lines(first):
         others = _others(first, usable)
         swap = _swap(first, others, first, pitch, policy) if first in usable else None
         return (swap or Swap(first.view, None, None, confidence=0.9),)
-    if len(usable) < 2:
-        return ()
     swaps = (
-        _swap(replay, _others(replay, usable), first, pitch, policy)
-        for replay in usable
+        _swap(replay, others, first, pitch, policy)
+        for replay in (*usable, *doubtful)
         if replay is not first and _from_lines(replay)
+        if (others := _others(replay, usable))
     )
     return tuple(swap for swap in swaps if swap is not None)
 

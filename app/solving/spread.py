@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from threading import Lock
 
 import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.geometry.camera import Camera
 from app.geometry.resection import PARAMETERS, parameters_from_camera, projection_jacobians
 from app.soccer.frames import ImageSize
+from app.soccer.picture import camera_aspect, taken_camera
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
 from app.solving.facts import STEP_PX, Facts
@@ -23,7 +26,11 @@ _ROUNDING = 1e-9
 
 
 def click_variance(
-    diagonal: FloatArray, ball_px: FloatArray, policy: Policy, bare: BoolArray | None = None
+    diagonal: FloatArray,
+    ball_px: FloatArray,
+    policy: Policy,
+    bare: BoolArray | None = None,
+    noise: FloatArray | float = 1.0,
 ) -> FloatArray:
     """Variance of each coordinate of annotated ball centres, square pixels, shape (N,).
 
@@ -34,6 +41,7 @@ def click_variance(
         ball_px: Diameter of the annotated boxes, 0 without one, pixels, shape (N,).
         policy: Holds the noises.
         bare: Whether their camera is given, of unknown exactness, shape (N,); none by default.
+        noise: Sigma beside that of the dataset's balls, shape (N,) or one for all.
     """
     click = policy.click_sigma_px * diagonal / CLICK_DIAGONAL
     sigma = np.hypot(click, policy.box_sigma_share * ball_px)
@@ -41,7 +49,7 @@ def click_variance(
         given = policy.given_sigma_px * diagonal / CLICK_DIAGONAL
         sigma = np.where(bare, np.hypot(sigma, given), sigma)
     # As Python squares a float; the square of an array differs in the last bit now and then.
-    return np.float_power(sigma, 2)
+    return np.float_power(noise * sigma, 2)
 
 
 def carried_spreads(
@@ -60,6 +68,65 @@ def carried_spreads(
     return carried
 
 
+def picture_spreads(
+    parameters: FloatArray,
+    covariances: FloatArray,
+    points: FloatArray,
+    diagonals: FloatArray,
+    pictures: FloatArray,
+    stretches: FloatArray,
+) -> FloatArray:
+    """``carried_spreads`` where pictures may have been stretched or cropped, (N, 2, 2).
+
+    A wider picture moves what is beside the axis, another axis moves everything: both go together
+    with the camera, so neither is known as badly as it would be alone.
+
+    Args:
+        parameters: Of the cameras as the pictures were taken, shape (N, 8).
+        covariances: Of the parameters, shape (N, 8, 8).
+        points: As in ``carried_spreads``.
+        diagonals: As there.
+        pictures: Covariances of aspect and shifts with all eleven numbers, shape (N, 3, 11).
+        stretches: Aspect, and how far right of the axis the point is seen, pixels, shape (N, 2).
+    """
+    half = diagonals / 2
+    jacobians = np.zeros((len(points), 2, PARAMETERS + 3))
+    jacobians[:, :, :PARAMETERS] = projection_jacobians(parameters, points, half)
+    jacobians[:, 0, :PARAMETERS] *= stretches[:, :1]
+    jacobians[:, 0, PARAMETERS] = stretches[:, 1]
+    jacobians[:, 0, PARAMETERS + 1] = jacobians[:, 1, PARAMETERS + 2] = half
+    whole = np.zeros((len(points), PARAMETERS + 3, PARAMETERS + 3))
+    whole[:, :PARAMETERS, :PARAMETERS] = covariances
+    whole[:, PARAMETERS:] = pictures
+    whole[:, :PARAMETERS, PARAMETERS:] = pictures[:, :, :PARAMETERS].transpose(0, 2, 1)
+    spreads: FloatArray = jacobians @ whole @ jacobians.transpose(0, 2, 1)
+    return spreads
+
+
+def known_spreads(facts: Facts, views: IntArray, points: FloatArray) -> FloatArray:
+    """Covariance of balls' pixels due to calibrations whose covariance is known, (N, 2, 2).
+
+    Args:
+        facts: The groups.
+        views: Rows of the views, shape (N,).
+        points: The ball of each of them, pitch frame, metres, shape (N, 3).
+    """
+    numbers = facts.view_parameters[views], facts.view_covariance[views]
+    diagonals, pictures = facts.view_diagonal[views], facts.view_picture[views]
+    spreads = carried_spreads(*numbers, points, diagonals)
+    rows = np.flatnonzero(pictures.any(axis=(1, 2)))
+    if len(rows):
+        spreads[rows] = picture_spreads(
+            numbers[0][rows],
+            numbers[1][rows],
+            points[rows],
+            diagonals[rows],
+            pictures[rows],
+            facts.view_stretch[views[rows]],
+        )
+    return spreads
+
+
 def click_spreads(facts: Facts, views: IntArray, policy: Policy) -> FloatArray:
     """Covariance of the ball's pixel by the click and by given cameras, square pixels, (N, 2, 2).
 
@@ -69,7 +136,11 @@ def click_spreads(facts: Facts, views: IntArray, policy: Policy) -> FloatArray:
         policy: Holds the noises.
     """
     noise = click_variance(
-        facts.view_diagonal[views], facts.view_ball_px[views], policy, facts.view_bare[views]
+        facts.view_diagonal[views],
+        facts.view_ball_px[views],
+        policy,
+        facts.view_bare[views],
+        facts.view_noise[views],
     )
     spreads: FloatArray = noise[:, None, None] * np.eye(2)
     return spreads
@@ -87,12 +158,7 @@ def pixel_spreads(facts: Facts, views: IntArray, points: FloatArray, policy: Pol
     spreads = click_spreads(facts, views, policy)
     known = np.flatnonzero(facts.view_known[views])
     rows = views[known]
-    spreads[known] += carried_spreads(
-        facts.view_parameters[rows],
-        facts.view_covariance[rows],
-        points[known],
-        facts.view_diagonal[rows],
-    )
+    spreads[known] += known_spreads(facts, rows, points[known])
     return spreads
 
 
@@ -106,10 +172,32 @@ def calibration_spread(calibration: Calibration, size: ImageSize, point: FloatAr
     """
     if calibration.covariance is None or calibration.camera is None:
         return np.zeros((2, 2))
+    if calibration.picture_covariance is not None:
+        width = PARAMETERS + 3
+        whole = np.array(calibration.picture_covariance).reshape(width, width)
+        return _picture_spread(whole, calibration.camera, size, point)
     parameters = parameters_from_camera(calibration.camera, size.diagonal / 2)
     covariance = np.array(calibration.covariance).reshape(1, PARAMETERS, PARAMETERS)
     diagonal = np.array([size.diagonal])
     spread: FloatArray = carried_spreads(parameters[None], covariance, point[None], diagonal)[0]
+    return spread
+
+
+def _picture_spread(
+    whole: FloatArray, camera: Camera, size: ImageSize, point: FloatArray
+) -> FloatArray:
+    """``calibration_spread`` of a stretched or cropped picture; ``whole``: shape (11, 11)."""
+    pixel = camera.project(point[None])[0]
+    parameters = parameters_from_camera(taken_camera(camera), size.diagonal / 2)
+    stretch = np.array([camera_aspect(camera), pixel[0] - camera.principal_point[0]])
+    spread: FloatArray = picture_spreads(
+        parameters[None],
+        whole[None, :PARAMETERS, :PARAMETERS],
+        point[None],
+        np.array([size.diagonal]),
+        whole[None, PARAMETERS:],
+        stretch[None],
+    )[0]
     return spread
 
 
@@ -119,9 +207,39 @@ def pixel_spread(sight: Sight, point: FloatArray, policy: Policy) -> FloatArray:
     The noise of the click, that of a given camera, and, where the camera comes from lines, the covariance of its
     calibration carried to the ball.
     """
-    diagonal, diameter = np.array([sight.size.diagonal]), np.array([sight.diameter_px])
-    noise = click_variance(diagonal, diameter, policy, np.array([sight.is_bare]))
-    return noise * np.eye(2) + calibration_spread(sight.calibration, sight.size, point)
+    spread: FloatArray = sight_spreads([sight], point[None], policy)[0]
+    return spread
+
+
+def sight_spreads(sights: Sequence[Sight], points: FloatArray, policy: Policy) -> FloatArray:
+    """``pixel_spread`` of several sights at a point each, square pixels, shape (N, 2, 2).
+
+    Args:
+        sights: One for each point.
+        points: Pitch frame, metres, shape (N, 3).
+        policy: Holds the noises.
+    """
+    diagonals = np.array([sight.size.diagonal for sight in sights])
+    noise = click_variance(
+        diagonals,
+        np.array([sight.diameter_px for sight in sights]),
+        policy,
+        np.array([sight.is_bare for sight in sights]),
+        np.array([sight.noise for sight in sights]),
+    )
+    spreads: FloatArray = noise[:, None, None] * np.eye(2)
+    plain = []
+    for row, sight in enumerate(sights):
+        if sight.covariance is not None:
+            plain.append(row)
+        else:
+            # Nothing is known of the uncertainty of a given camera: zeros.
+            spreads[row] += calibration_spread(sight.calibration, sight.size, points[row])
+    if plain:
+        numbers = np.array([sights[row].parameters for row in plain])
+        covariances = np.array([sights[row].covariance for row in plain])
+        spreads[plain] += carried_spreads(numbers, covariances, points[plain], diagonals[plain])
+    return spreads
 
 
 def longest_sigma(covariances: FloatArray) -> FloatArray:
@@ -176,6 +294,12 @@ class MeanSpread:
         self._slope = np.zeros((len(facts.view_group), 2, 3))
         self._carried = np.zeros((len(facts.view_group), 2, 2))
 
+    @property
+    def nbytes(self) -> int:
+        """Memory of what is kept."""
+        arrays = (self._bit, self._long, self._pairs, self._used, self._slope, self._carried)
+        return sum(array.nbytes for array in arrays)
+
     def covariances(
         self, valid: BoolArray, groups: IntArray, points: FloatArray, policy: Policy
     ) -> FloatArray:
@@ -217,12 +341,7 @@ class MeanSpread:
         self._used[fresh[facts.view_group]] = False
         self._used[views], self._slope[views] = True, slopes
         known = views[facts.view_known[views]]
-        self._carried[known] = carried_spreads(
-            facts.view_parameters[known],
-            facts.view_covariance[known],
-            place[facts.view_group[known]],
-            facts.view_diagonal[known],
-        )
+        self._carried[known] = known_spreads(facts, known, place[facts.view_group[known]])
 
 
 def _mean_slopes(facts: Facts, pairs: IntArray) -> tuple[IntArray, FloatArray]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import MIN_DEPTH, Camera
+from app.geometry.resection import PARAMETERS, parameters_from_camera
 from app.geometry.triangulation import parallax_angle, triangulate_pairs
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import View
@@ -27,6 +28,7 @@ class Sight:
         center: Annotated centre, pixels as the image shows them.
         diameter_px: Of the annotated box, 0 for a point.
         size: Annotated size.
+        noise: Sigma of the click beside that of the dataset's.
     """
 
     view: str
@@ -34,6 +36,7 @@ class Sight:
     center: ImagePoint
     diameter_px: float
     size: ImageSize
+    noise: float = 1.0
 
     @property
     def camera(self) -> Camera:
@@ -66,6 +69,20 @@ class Sight:
         if not self.camera.is_wide:
             return np.eye(2)
         return self.camera.undistort_jacobian(np.array(self.center))
+
+    @cached_property
+    def parameters(self) -> FloatArray:
+        """Numbers of the camera that its calibration's covariance is about, shape (8,)."""
+        return parameters_from_camera(self.camera, self.size.diagonal / 2)
+
+    @cached_property
+    def covariance(self) -> FloatArray | None:
+        """Of the parameters, shape (8, 8); None for a given camera, and for a picture that may have
+        been stretched or cropped, of whom more is said."""
+        calibration = self.calibration
+        if calibration.covariance is None or calibration.picture_covariance is not None:
+            return None
+        return np.array(calibration.covariance).reshape(PARAMETERS, PARAMETERS)
 
     def tau_px(self, policy: Policy) -> float:
         """Largest reprojection error of a valid pair, pixels."""
@@ -111,7 +128,14 @@ def sights_of(views: Sequence[View], calibrations: Sequence[Calibration]) -> lis
         calibrations: Of each view.
     """
     sights = [
-        Sight(view.key, calibration, center, ball.box.diameter if ball.box else 0.0, view.size)
+        Sight(
+            view.key,
+            calibration,
+            center,
+            ball.box.diameter if ball.box else 0.0,
+            view.size,
+            view.noise,
+        )
         for view, calibration in zip(views, calibrations, strict=True)
         if view.included and calibration.camera is not None
         if (ball := view.ball) is not None and not ball.inferred

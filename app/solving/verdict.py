@@ -38,8 +38,8 @@ class Verdict:
 
     Attributes:
         jac: Of each view at the policy's gamma, NaN where it cannot be measured, shape (V,).
-        view_failed: First gate that drops an included view, or ``PASSES``, shape (V,).
-        pair_failed: First gate that makes a pair invalid, or ``PASSES``, shape (P,).
+        view_failed: First gate that drops an included view, or ``PASSES``, bytes, shape (V,).
+        pair_failed: First gate that makes a pair invalid, or ``PASSES``, bytes, shape (P,).
         failed: Whether a group fails a gate that the policy asks for, shape (10, G).
         baseline: Widest of the views that are left, metres, 0 where one camera sees the ball
             twice, NaN where no two see it, shape (G,).
@@ -66,7 +66,10 @@ class Verdict:
     @cached_property
     def first(self) -> IntArray:
         """First gate that each group fails, or ``PASSES``, shape (G,)."""
-        return np.where(self.failed.any(axis=0), self.failed.argmax(axis=0), PASSES)
+        first = np.full(self.failed.shape[1], PASSES)
+        for gate in reversed(range(PASSES)):
+            first[self.failed[gate]] = gate
+        return first
 
     @cached_property
     def passes(self) -> BoolArray:
@@ -75,18 +78,21 @@ class Verdict:
         return passing
 
 
-def judge(facts: Facts, policy: Policy, spread: MeanSpread) -> Verdict:
+def judge(
+    facts: Facts, policy: Policy, spread: MeanSpread, jac: FloatArray | None = None
+) -> Verdict:
     """Judge every group by the thresholds of a policy.
 
     Args:
         facts: The groups.
         policy: The thresholds.
         spread: Of the same facts, kept where several policies are tried one after the other.
+        jac: ``view_jac`` at the policy's gamma, where it is known, shape (V,).
     """
-    jac = view_jac(facts, policy.jac_gamma_percent)
-    view_failed = _view_failed(facts, jac, policy)
+    if jac is None:
+        jac = view_jac(facts, policy.jac_gamma_percent)
+    view_failed, pair_failed = failures(facts, jac, policy)
     left = facts.view_included & (view_failed == PASSES)
-    pair_failed = _pair_failed(facts, view_failed, policy)
     point, parallax, distance = _mean(facts, pair_failed == PASSES)
     baseline = _baseline(facts, left)
     failed = np.zeros((PASSES, facts.groups), bool)
@@ -107,6 +113,35 @@ def judge(facts: Facts, policy: Policy, spread: MeanSpread) -> Verdict:
     return Verdict(jac, view_failed, pair_failed, failed, baseline, point, parallax, distance)
 
 
+def compare_again(
+    known: Verdict, policy: Policy, sigma: FloatArray | None, p_value: FloatArray | None
+) -> BoolArray:
+    """``Verdict.failed`` under other thresholds, of groups whose views and pairs stand as before.
+
+    Args:
+        known: What another policy makes of them.
+        policy: The thresholds.
+        sigma: ``longest_sigma`` of each group, NaN without a ball, shape (G,); None: not asked for.
+        p_value: Of each group, infinite where it cannot be tested, shape (G,); None likewise.
+    """
+    failed = known.failed.copy()
+    failed[_BASELINE] = ~(known.baseline >= policy.min_baseline_m)
+    failed[_PARALLAX:PASSES] = False
+    if policy.min_parallax_degrees is not None:
+        failed[_PARALLAX] = ~(known.parallax >= policy.min_parallax_degrees)
+    if sigma is not None and policy.max_sigma_m is not None:
+        failed[_SIGMA] = ~(policy.max_sigma_m - sigma >= 0)
+    if p_value is not None and policy.min_p_value is not None:
+        failed[_CHI_SQUARE] = ~(p_value >= policy.min_p_value)
+    return failed
+
+
+def failures(facts: Facts, jac: FloatArray, policy: Policy) -> tuple[IntArray, IntArray]:
+    """First gate that drops each view, shape (V,), and each pair, (P,), or ``PASSES``."""
+    view_failed = _view_failed(facts, jac, policy)
+    return view_failed, _pair_failed(facts, view_failed, policy)
+
+
 def views_of(facts: Facts, pairs: BoolArray) -> BoolArray:
     """Views in any of the pairs, shape (V,)."""
     found = np.zeros(len(facts.view_group), bool)
@@ -125,7 +160,7 @@ def view_jac(facts: Facts, gamma_percent: float) -> FloatArray:
 
 
 def _view_failed(facts: Facts, jac: FloatArray, policy: Policy) -> IntArray:
-    failed = np.full(len(facts.view_group), PASSES)
+    failed: IntArray = np.full(len(facts.view_group), PASSES).astype(np.int8)
     # NaN where there is nothing to measure, and then nothing falls.
     if policy.min_agreement is not None:
         failed[facts.view_agreement < policy.min_agreement] = _AGREEMENT
@@ -138,7 +173,7 @@ def _view_failed(facts: Facts, jac: FloatArray, policy: Policy) -> IntArray:
 def _pair_failed(facts: Facts, view_failed: IntArray, policy: Policy) -> IntArray:
     tau_px = policy.tau_percent / 100 * facts.view_diagonal
     a, b = (facts.pair_errors <= tau_px[facts.pair_view]).T
-    failed = np.where(a & b & facts.pair_front, PASSES, _REPROJECTION)
+    failed = np.where(a & b & facts.pair_front, np.int8(PASSES), np.int8(_REPROJECTION))
     failed[facts.pair_baseline < policy.min_baseline_m] = _BASELINE
     a, b = view_failed[facts.pair_view].T
     first: IntArray = np.minimum(failed, np.minimum(a, b))

@@ -143,6 +143,13 @@ class TestCalibrationKey:
         ]
         assert len({key, *others}) == 7
 
+    def test_knows_the_noise_of_lines_only_where_lines_make_the_camera(self):
+        noisy = [replace(POLICY, line_sigma_px=1.4), replace(POLICY, line_share=0.6)]
+        clicked = Station("7.png", SIZE, lines=click(MAIN))
+        given = replace(clicked, given=MAIN, calibration="given")
+        assert len({calibration_key(clicked, PITCH, policy) for policy in (POLICY, *noisy)}) == 3
+        assert len({calibration_key(given, PITCH, policy) for policy in (POLICY, *noisy)}) == 1
+
     def test_does_not_depend_on_the_name_or_the_order_of_lines(self):
         lines = click(MAIN)
         station = Station("7.png", SIZE, lines=lines)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from app.soccer.annotation import BallAnnotation
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
-from app.solving.chi_square import Residuals, residuals_of
+from app.solving.chi_square import Residuals, residuals_of, residuals_without
 from app.solving.facts import Facts, group_facts, join
 from app.solving.solve import solve
 from app.solving.spread import MeanSpread
@@ -156,3 +156,20 @@ class TestGivenCameras:
         assert (one.is_bare, none.is_bare) == (False, True)
         of = group_facts(views("abc"), [one, none, replace(one, covariance=None)])
         assert of.view_bare.tolist() == [False, True, True]
+
+
+class TestResidualsWithout:
+    @given(st.integers(0, 10_000), st.integers(0, 1000))
+    @settings(max_examples=25, deadline=None)
+    def test_each_row_has_the_residuals_of_the_other_views_bit_by_bit(self, seed, policy_seed):
+        of, policy = group_facts(*random_views(seed)), random_policy(policy_seed)
+        verdict = judge(of, policy, MeanSpread(of))
+        used = views_of(of, verdict.valid)
+        rows = residuals_without(of, used, verdict.point, policy)
+        assert len(rows.chi_square) == used.sum()
+        for row, place in enumerate(np.flatnonzero(used)):
+            others = used & (np.arange(len(used)) != place)
+            alone = residuals_of(of, others, verdict.point, policy)
+            for item in fields(Residuals):
+                one, other = getattr(rows, item.name)[row], getattr(alone, item.name)[0]
+                assert np.array_equal(one, other, equal_nan=True), item.name

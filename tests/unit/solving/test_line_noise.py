@@ -2,7 +2,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from app.solving.line_noise import line_noise
+from app.solving.line_noise import (
+    MIN_VIEWS,
+    LinePrior,
+    estimate_line_noise,
+    line_evidence,
+    line_noise,
+)
 
 MARKINGS, EACH, UNKNOWNS = 14, 6, 4
 NO_PRIOR = np.zeros(UNKNOWNS)
@@ -22,7 +28,7 @@ def fitted(share, sigma=1.0, seed=0):
 
 def noise_of(share, sigma=1.0, seed=0):
     jacobian, residuals, marking, off = fitted(share, sigma, seed)
-    return line_noise(residuals, jacobian, marking, NO_PRIOR, 1.0, 0.1), off
+    return line_noise(residuals, jacobian, marking, NO_PRIOR, LinePrior(1.0, 0.1)), off
 
 
 def held(share):
@@ -32,7 +38,52 @@ def held(share):
     return np.mean([off @ np.linalg.solve(item.parameters, off) < limit for item, off in found])
 
 
+def evidence_of(share, sigma=1.0, seed=0):
+    jacobian, residuals, marking, _ = fitted(share, sigma, seed)
+    return line_evidence(residuals, jacobian, marking, NO_PRIOR)
+
+
+class TestEstimateLineNoise:
+    @pytest.mark.parametrize(("share", "sigma"), [(0.0, 0.6), (0.45, 0.6), (0.6, 1.5)])
+    def test_all_images_together_know_both_numbers(self, share, sigma):
+        found = estimate_line_noise([evidence_of(share, sigma, seed) for seed in range(60)])
+        assert found.views == 60
+        assert found.sigma.low < sigma < found.sigma.high
+        assert found.share.low - 0.01 <= share <= found.share.high
+        assert found.sigma.high < 1.3 * found.sigma.low
+        assert found.share.high - found.share.low < 0.3
+
+    def test_an_image_of_wrong_points_in_ten_changes_little(self):
+        good = [evidence_of(0.3, 1.0, seed) for seed in range(54)]
+        bad = [evidence_of(0.3, 20.0, seed) for seed in range(6)]
+        assert estimate_line_noise(good + bad).sigma.value == pytest.approx(1.0, rel=0.3)
+
+    def test_few_images_say_nothing(self):
+        assert estimate_line_noise([evidence_of(0.3)] * (MIN_VIEWS - 1)) is None
+
+    def test_pixels_of_a_larger_image_count_as_those_of_the_smaller(self):
+        large = [evidence_of(0.3, 2.0, seed).in_units(2.0) for seed in range(30)]
+        small = [evidence_of(0.3, 1.0, seed) for seed in range(30)]
+        assert estimate_line_noise(large).sigma.value == pytest.approx(
+            estimate_line_noise(small).sigma.value
+        )
+
+
 class TestLineNoise:
+    @pytest.mark.parametrize("share", [0.0, 0.5])
+    def test_what_the_dataset_knows_makes_the_ellipsoid_neither_too_wide_nor_too_narrow(
+        self, share
+    ):
+        limit, half = chi2.ppf([0.95, 0.5], UNKNOWNS)
+        apart = []
+        for seed in range(400):
+            jacobian, residuals, marking, off = fitted(share, 0.5, seed)
+            known = LinePrior(0.5, 0.05, share)
+            found = line_noise(residuals, jacobian, marking, NO_PRIOR, known).parameters
+            apart.append(off @ np.linalg.solve(found, off))
+        assert 0.925 < np.mean(np.array(apart) < limit) < 0.975
+        assert np.median(apart) == pytest.approx(half, rel=0.15)
+
     @pytest.mark.parametrize("share", [0.0, 0.5, 0.8])
     def test_the_ellipsoid_holds_whatever_the_points_of_a_marking_share(self, share):
         assert 0.92 < held(share) < 0.985
@@ -48,17 +99,21 @@ class TestLineNoise:
 
     def test_a_perfect_fit_is_not_believed_beyond_the_floor(self):
         jacobian, residuals, marking, _ = fitted(0.0)
-        found = line_noise(0 * residuals, jacobian, marking, NO_PRIOR, 1.0, 0.5)
+        found = line_noise(0 * residuals, jacobian, marking, NO_PRIOR, LinePrior(1.0, 0.5))
         assert found.variance >= 0.25
 
     def test_markings_of_one_point_have_nothing_to_share(self):
         jacobian, residuals, _, _ = fitted(0.0)
-        found = line_noise(residuals, jacobian, np.arange(len(residuals)), NO_PRIOR, 1.0, 0.1)
+        found = line_noise(
+            residuals, jacobian, np.arange(len(residuals)), NO_PRIOR, LinePrior(1.0, 0.1)
+        )
         plain = np.linalg.inv(jacobian.T @ jacobian) * (residuals**2).mean()
         assert np.diag(found.parameters) == pytest.approx(np.diag(plain), rel=0.2)
 
     def test_a_prior_stands_in_for_what_the_points_do_not_show(self):
         jacobian, residuals, marking, _ = fitted(0.0)
         blind = jacobian * [1, 1, 1, 0]
-        found = line_noise(residuals, blind, marking, np.array([0, 0, 0, 25.0]), 1.0, 0.1)
+        found = line_noise(
+            residuals, blind, marking, np.array([0, 0, 0, 25.0]), LinePrior(1.0, 0.1)
+        )
         assert found.parameters[3, 3] == pytest.approx(0.04)

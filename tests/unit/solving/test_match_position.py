@@ -4,14 +4,8 @@ import pytest
 from app.soccer.annotation import make_lines
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate, calibrate_near
-from app.solving.match_position import (
-    NO_PLACES,
-    Place,
-    Places,
-    guess_matches,
-    place_of,
-    share_position,
-)
+from app.solving.match_model import Place
+from app.solving.match_position import NO_PLACES, Places, place_of, share_position
 from app.solving.resect import PositionPrior, match_prior
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, PITCH, click
@@ -79,16 +73,21 @@ class TestPrior:
         spoilt = Places([*around(STAND, 10), place(off(0.0, 9.0, -3.0))]).prior(0.5)
         assert spoilt.mean == pytest.approx(clean.mean, abs=0.1)
 
-    def test_frames_that_look_the_same_way_count_more(self):
-        here, there = around(STAND, 5), around(off(2.0, 0.0, 0.0), 5)
-        turned = [Place(item.position, item.covariance, -0.6) for item in there]
-        prior = Places([*here, *turned]).prior(0.5)
-        assert prior.mean[0] - STAND[0] < 0.8
+    def test_the_place_moves_with_the_direction_of_view(self):
+        turned = [
+            Place(it.position + np.array([2.0 * pan, 0.0, 0.0]), it.covariance, pan)
+            for pan in (-0.6, -0.3, 0.3, 0.6)
+            for it in around(STAND, 5, seed=int(10 * pan) + 9)
+        ]
+        left, right = (Places(turned).prior(pan).mean for pan in (-0.5, 0.5))
+        assert right - left == pytest.approx([2.0, 0.0, 0.0], abs=0.4)
 
-    def test_many_frames_that_look_elsewhere_say_no_more_than_their_common_drift(self):
+    def test_frames_that_look_elsewhere_say_less(self):
         turned = [Place(it.position, it.covariance, -0.6) for it in around(STAND, 100)]
-        assert (Places(turned).prior(0.5).sigma > 0.6).all()
-        assert (Places(turned).prior(-0.6).sigma < 0.2).all()
+        there, elsewhere = (Places(turned).prior(pan).sigma for pan in (-0.6, 0.5))
+        assert (there < 0.2).all()
+        assert elsewhere[0] > 1.0
+        assert (elsewhere > there).all()
 
     def test_one_is_left_out_without_a_copy_of_the_others(self):
         odd = place(off(0.0, 9.0, -3.0))
@@ -96,7 +95,12 @@ class TestPrior:
         rest = every.without(3)
         assert rest.prior(0.5).mean == pytest.approx(Places(around(STAND, 3)).prior(0.5).mean)
         assert Places(around(STAND, 3)).without(0).prior(0.5) is None
-        assert rest._positions is every._positions
+        assert rest._equations is every._equations
+
+    def test_what_is_known_with_a_frame_is_not_known_without_it(self):
+        every = Places(around(STAND, 3))
+        assert every.prior(0.5) is not None
+        assert every.without(0).prior(0.5) is None
 
     def test_frames_of_several_stadiums_say_nothing(self):
         mixed = [
@@ -155,26 +159,3 @@ class TestSharePosition:
     def test_without_others_nothing_changes(self):
         alone = calibrate(few(0), PITCH, SIZE, POLICY)
         assert share_position(alone, NO_PLACES, few(0), PITCH, SIZE, POLICY) is alone
-
-
-class TestGuessMatches:
-    def test_runs_of_frames_whose_positions_agree_are_matches(self):
-        first, second = around(STAND, 5), around(off(0.0, 12.0, -4.0), 4, seed=1)
-        assert guess_matches([*first, *second]) == [0] * 5 + [1] * 4
-
-    def test_a_frame_that_says_nothing_goes_with_the_one_before(self):
-        first, second = around(STAND, 3), around(off(0.0, 12.0, -4.0), 3, seed=1)
-        found = guess_matches([None, *first, None, *second, None])
-        assert found == [0, 0, 0, 0, 0, 1, 1, 1, 1]
-
-    def test_one_odd_frame_does_not_end_a_match(self):
-        frames = around(STAND, 6)
-        frames[3] = place(off(15.0, 15.0, -10.0))
-        assert guess_matches(frames) == [0, 0, 0, 1, 0, 0]
-
-    def test_where_no_frame_is_sure_each_is_a_match_of_its_own(self):
-        vague = [place(STAND, sigma=2.0) for _ in range(3)]
-        assert guess_matches([None, *vague]) == [0, 1, 2, 3]
-
-    def test_no_frames_are_no_matches(self):
-        assert guess_matches([]) == []

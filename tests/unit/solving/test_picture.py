@@ -53,6 +53,16 @@ class TestFindPicture:
         assert at == pytest.approx(share, abs=0.03)
         assert abs(picture.stretch) < 0.02
 
+    def test_where_errors_are_known_to_be_each_clicks_own_one_picture_says_more(self):
+        known = CalibrationPolicy(line_share=0.0)
+        for seed in range(2):
+            lines = click(stretched(MAIN, 0.05), 1.0, seed)
+            assert calibrate(lines, PITCH, SIZE, POLICY).picture is None
+            picture = calibrate(lines, PITCH, SIZE, known).picture
+            assert picture.stretch == pytest.approx(0.05, abs=0.02)
+            ordinary = click(MAIN, 1.0, seed)
+            assert calibrate(ordinary, PITCH, SIZE, known).picture is None
+
     def test_too_few_points_say_nothing(self):
         lines = click(stretched(BEHIND_GOAL, 1 / 3), 0.5)
         few = make_lines({name: lines[name][:2] for name in list(lines)[:5]})

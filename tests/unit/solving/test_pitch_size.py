@@ -29,6 +29,13 @@ def frames(pitch, count=10, noise_px=0.8):
     ]
 
 
+def among_frames_of_one_end(*telling):
+    """The size that frames tell together with six that say nothing of the length."""
+    one_end = looking((2.0, 62.0, -16.0), (40.0, 0.0, 0.0), 2600.0, bend=BEND)
+    others = [PitchFrame(click(one_end, 0.8, seed, SMALL), SIZE) for seed in range(6)]
+    return estimate_pitch([*others, *telling], POLICY)
+
+
 @pytest.fixture(scope="module")
 def small():
     return estimate_pitch(frames(SMALL), POLICY)
@@ -76,10 +83,18 @@ class TestEstimatePitch:
         assert found.proposal(Pitch()) is None
 
     def test_a_length_that_one_frame_alone_shows_is_unknown(self):
-        one_end = looking((2.0, 62.0, -16.0), (40.0, 0.0, 0.0), 2600.0, bend=BEND)
-        others = [PitchFrame(click(one_end, 0.8, seed, SMALL), SIZE) for seed in range(6)]
-        found = estimate_pitch([*others, frames(SMALL)[5]], POLICY)
-        assert found.length is None
+        assert among_frames_of_one_end(frames(SMALL)[5]).length is None
+
+    def test_a_length_that_a_second_frame_confirms_is_known(self):
+        loud, quiet = frames(SMALL)[3], frames(SMALL)[5]
+        found = among_frames_of_one_end(loud, quiet)
+        assert found.length == pytest.approx(SMALL.length, abs=0.5)
+        assert 0.2 < found.length_sigma_m < 0.5
+
+    @pytest.mark.parametrize("length", [101.2, 104.8])
+    def test_a_length_that_a_second_frame_contradicts_is_unknown(self, length):
+        loud, other = frames(SMALL)[3], frames(Pitch(length, SMALL.width))[5]
+        assert among_frames_of_one_end(loud, other).length is None
 
     def test_too_few_frames_are_refused(self):
         with pytest.raises(DegenerateGeometryError, match="needs 5"):

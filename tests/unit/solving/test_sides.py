@@ -73,6 +73,19 @@ class TestFindSwaps:
     def test_views_too_close_tell_nothing(self):
         assert swaps(A, TURNED, C, min_baseline_m=1000.0) == ()
 
+    def test_a_view_whose_lines_fit_badly_is_still_told_that_it_is_turned(self):
+        (found,) = find_swaps(A, (A, C), PITCH, PAPER, doubtful=(TURNED,))
+        assert (found.view, found.turned_error_px) == ("b", pytest.approx(0.0, abs=1e-3))
+        (alone,) = find_swaps(A, (A,), PITCH, PAPER, doubtful=(TURNED,))
+        assert alone.view == "b"
+
+    def test_a_view_whose_lines_fit_badly_says_nothing_of_others(self):
+        assert find_swaps(A, (A,), PITCH, PAPER, doubtful=(B, C)) == ()
+        assert find_swaps(None, (TURNED,), PITCH, PAPER, doubtful=()) == ()
+        wrong = sight("c", OPPOSITE, labelled=turned_camera(OPPOSITE))
+        named = find_swaps(A, (A, B), PITCH, PAPER, doubtful=(wrong,))
+        assert [swap.view for swap in named] == ["c"]
+
     def test_a_main_camera_on_the_far_side_is_the_one_to_turn(self):
         wrong = sight("a", MAIN, labelled=turned_camera(MAIN))
         (found,) = swaps(wrong, B, C, first=wrong)

@@ -8,17 +8,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.geometry.camera import Camera
+from app.geometry.resection import camera_from_parameters, parameters_from_camera
 from app.geometry.triangulation import triangulate_pairs
 from app.soccer.frames import ImagePoint
+from app.soccer.picture import PictureGeometry
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
 from app.solving.facts import group_facts, join
+from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
+from app.solving.observations import principal_point
+from app.solving.picture_camera import picture_of, warp_of
 from app.solving.spread import (
     CLICK_DIAGONAL,
     MeanSpread,
     calibration_spread,
     click_variance,
     is_within,
+    known_spreads,
     longest_sigma,
     pixel_spread,
 )
@@ -29,6 +35,7 @@ from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 from tests.unit.solving.random_groups import random_policy, random_views
 
 BALL = (38.0, 2.0, -1.4)
+MIDDLE = principal_point(SIZE)
 DIAGONAL = np.array([CLICK_DIAGONAL])
 
 
@@ -74,6 +81,56 @@ class TestCalibrationSpread:
 
     def test_of_a_given_camera_nothing_is_known(self):
         assert not calibration_spread(Calibration("given", MAIN), SIZE, np.array(BALL)).any()
+
+
+class TestPictureSpreads:
+    """Of a picture that was stretched and cropped since it was taken."""
+
+    DONE = PictureGeometry(1.2, (0.2, -0.1))
+    WHOLE = np.diag(np.array([1e-3, 2e-3, 1e-3, 0.3, 0.2, 0.1, 5e-3, 5e-3, 0.02, 0.03, 0.04]) ** 2)
+    HALF = SIZE.diagonal / 2
+
+    def calibration(self, whole):
+        camera = self.DONE.done(camera_from_parameters(self.taken(), MIDDLE, self.HALF), SIZE)
+        covariance = tuple(whole[:8, :8].ravel().tolist())
+        whole_ = tuple(whole.ravel().tolist())
+        return Calibration("lines", camera, covariance=covariance, picture_covariance=whole_)
+
+    def taken(self):
+        return parameters_from_camera(BEHIND_GOAL, self.HALF)
+
+    def pixel(self, unknowns):
+        camera = camera_from_parameters(unknowns[:8], MIDDLE, self.HALF)
+        return picture_of(unknowns[8:], (0, 0, 0)).done(camera, SIZE).project(np.array([BALL]))[0]
+
+    def test_are_those_of_camera_and_picture_together(self):
+        rng = np.random.default_rng(3)
+        mixed = np.eye(11) + 0.3 * rng.normal(size=(11, 11))
+        scale = np.sqrt(np.diag(self.WHOLE))
+        whole = mixed @ mixed.T * np.outer(scale, scale)
+        at = np.append(self.taken(), warp_of(self.DONE))
+        steps = 1e-6 * np.eye(11)
+        slopes = (
+            np.array([self.pixel(at + step) - self.pixel(at - step) for step in steps]).T / 2e-6
+        )
+        expected = slopes @ whole @ slopes.T
+        found = calibration_spread(self.calibration(whole), SIZE, np.array(BALL))
+        np.testing.assert_allclose(found, expected, rtol=1e-4)
+
+    def test_facts_say_the_same_once_they_were_kept(self):
+        calibration = self.calibration(self.WHOLE)
+        views = [
+            given_view("a", calibration.camera, BALL),
+            given_view("b", MAIN, BALL),
+        ]
+        other = Calibration("lines", MAIN, covariance=tuple((1e-6 * np.eye(8)).ravel().tolist()))
+        facts = group_facts(views, [calibration, other])
+        found = facts_from_bytes([facts_to_bytes(facts)])
+        points = np.array([BALL, BALL])
+        spreads = known_spreads(found, np.arange(2), points)
+        for at, one in enumerate((calibration, other)):
+            alone = calibration_spread(one, SIZE, points[at])
+            np.testing.assert_allclose(spreads[at], alone, rtol=2e-3)
 
 
 class TestLongestSigma:
