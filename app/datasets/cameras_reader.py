@@ -6,16 +6,17 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any
 
-from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
 from app.datasets.camera_json import camera_from_json
+from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.json_text import read_json
 from app.datasets.match_info import place_of, read_match_info
 from app.datasets.report import Report
 from app.datasets.sn_calibration import CAMERAS, LINES
 from app.datasets.synloc import camera_from_synloc, images_of, is_synloc
+from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError
 from app.geometry.camera import Camera
 
@@ -24,7 +25,7 @@ _FILE = re.compile(r"(?:camera_)?(.+)\.json", re.ASCII | re.IGNORECASE)
 _NO_CAMERAS = ("manifest.json", "match_info.json", "findings.json", "calibrate.json")
 
 
-def read_cameras(path: Path, report: Report, limits: Limits = DEFAULT_LIMITS) -> dict[str, Camera]:
+def read_cameras(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) -> dict[str, Camera]:
     """Every camera below ``path``, by key.
 
     ``path`` is a folder or zip of ``camera_<stem>.json``, one such file, or a file with ISSIA's

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 
-from app.datasets.archive import resolve_inside
 from app.datasets.camera_json import camera_to_json
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
+from app.datasets.safe_path import resolve_inside
 from app.finite import json_text
 from app.geometry.camera import Camera
 
@@ -16,6 +16,12 @@ from app.geometry.camera import Camera
 def camera_text(camera: Camera) -> str:
     """The text of one camera file."""
     return json_text(camera_to_json(camera), indent=1, ascii_=True) + "\n"
+
+
+def camera_name(key: str) -> str:
+    """Relative path of a camera's file: frames of the same name stay in their folders."""
+    place = PurePosixPath(key)
+    return str(place.with_name(f"camera_{place.name}.json"))
 
 
 def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:
@@ -28,8 +34,7 @@ def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:
     """
     written = []
     for key, camera in cameras.items():
-        place = PurePosixPath(key)
-        path = resolve_inside(root, str(place.with_name(f"camera_{place.name}.json")))
+        path = resolve_inside(root, camera_name(key))
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(camera_text(camera), encoding="utf-8")
         written.append(path)

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any
 
-from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, check_name, open_tree
 from app.datasets.camera_json import camera_from_json
 from app.datasets.coco import CAMERA, OUTSIDE, PREFIX, STATE
+from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.frame_names import IMAGE_SUFFIXES, UNASSIGNED
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
+from app.datasets.safe_path import check_name
 from app.datasets.soccernet_v3 import SPLITS
 from app.datasets.synloc import camera_from_synloc, is_synloc
+from app.datasets.trees import open_tree
 from app.datasets.view_groups import PlacedView, ViewGroups
 from app.datasets.view_state import GroupHead, StateReader
 from app.errors import DatasetFormatError, UnsafePathError
@@ -31,7 +33,7 @@ _FOLDERS = ("", "images/", "train/", "val/", "valid/", "test/")
 
 
 def read_coco(
-    root: Path,
+    root: Root,
     report: Report,
     *,
     calibration: str = "given",
@@ -229,9 +231,7 @@ class _File:
             for folder in _FOLDERS:
                 place = f"{top}{folder}{name}"
                 if place in self._names and PurePosixPath(place).suffix.lower() in IMAGE_SUFFIXES:
-                    if self._tree.path.is_dir():
-                        return Media(self._tree.shown(place))
-                    return Media(str(self._tree.path), place)
+                    return self._tree.media(place)
         return None
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Any
 
 from app.datasets.camera_json import camera_to_json
@@ -92,17 +91,12 @@ class _Instances:
         self._counts = [0, 0]
         categories = [{"id": CATEGORY_ID, "name": CATEGORY, "supercategory": "sports"}]
         head = {"info": dict(info), "licenses": [], "categories": categories}
-        self._images.write(_text(head)[:-1] + ', "images": [')
+        self._images.write(json_text(head)[:-1] + ', "images": [')
 
     def __enter__(self) -> _Instances:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._annotations.close()
         with self._images, self._beside.open(encoding="utf-8") as beside:
             self._images.write('\n], "annotations": [')
@@ -113,17 +107,13 @@ class _Instances:
 
     def add_image(self, value: Mapping[str, Any]) -> None:
         """One image."""
-        self._images.write(("," if self._counts[0] else "") + "\n" + _text(value))
+        self._images.write(("," if self._counts[0] else "") + "\n" + json_text(value))
         self._counts[0] += 1
 
     def add_annotation(self, value: Mapping[str, Any]) -> None:
         """One annotation."""
-        self._annotations.write(("," if self._counts[1] else "") + "\n" + _text(value))
+        self._annotations.write(("," if self._counts[1] else "") + "\n" + json_text(value))
         self._counts[1] += 1
-
-
-def _text(value: Mapping[str, Any]) -> str:
-    return json_text(value)
 
 
 def _image(record: ExportRecord, view: View, identity: int, everything: bool) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import IO, Any
 
-from app.datasets.archive import Limits
+from app.datasets.file_tree import Limits
 from app.errors import DatasetFormatError
 from app.finite import quoted
 
@@ -37,6 +37,13 @@ def cell(value: Value) -> str:
     if isinstance(value, (bool, int)):
         return str(value)
     return repr(float(value)) if math.isfinite(value) else ""
+
+
+def csv_line(values: Iterable[Value]) -> str:
+    """A row of a CSV file with its end."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow([cell(value) for value in values])
+    return text.getvalue()
 
 
 def plain_list(values: Sequence[float | int]) -> str:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 from pathlib import PurePosixPath
 
+from app.object_store.address import unseal
 from app.soccer.group import Group, View
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
@@ -52,7 +53,7 @@ def split_folder(split: str) -> str:
 def likely_suffix(view: View) -> str:
     """Ending that a copy of a view's frame would most likely have."""
     media = view.media
-    name = "" if media is None else media.member or media.path
+    name = "" if media is None else media.member or unseal(media.path)[0]
     suffix = PurePosixPath(name).suffix.lower()
     return suffix if suffix in IMAGE_SUFFIXES else ".jpg"
 

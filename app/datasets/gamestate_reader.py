@@ -5,24 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any
 
 from app.datasets import fields
-from app.datasets.archive import (
-    DEFAULT_LIMITS,
-    FileTree,
-    Limits,
-    check_name,
-    files_inside,
-    open_tree,
-)
+from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
 from app.datasets.gamestate import BALL, LABELS, METADATA, PITCH
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
+from app.datasets.safe_path import check_name
 from app.datasets.sn_calibration_reader import lines_from_json
 from app.datasets.soccernet_record import MAX_SIDE
 from app.datasets.soccernet_v3 import SPLITS
+from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError, UnsafePathError
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import Box, ImageSize
@@ -33,7 +28,7 @@ _FOLDERS = ("img1/", "", "frames/")
 
 
 def read_gamestate(
-    root: Path,
+    root: Root,
     report: Report,
     *,
     calibration: str = "given",
@@ -217,9 +212,7 @@ class _Sequence:
         for folder in _FOLDERS:
             if folder + key in self._inside:
                 name = self._folder + folder + key
-                if self._tree.path.is_dir():
-                    return Media(self._tree.shown(name))
-                return Media(str(self._tree.path), name)
+                return self._tree.media(name)
         self._report.counts["views without frame"] += 1
         return None
 

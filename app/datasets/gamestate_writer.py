@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from app.datasets import fields
-from app.datasets.archive import resolve_inside
 from app.datasets.camera_json import camera_to_json
 from app.datasets.export_record import ExportRecord
 from app.datasets.gamestate import (
@@ -26,6 +25,7 @@ from app.datasets.gamestate import (
     kept_of,
     sequence_folder,
 )
+from app.datasets.safe_path import resolve_inside
 from app.datasets.sn_calibration_writer import lines_to_json
 from app.errors import InputError
 from app.finite import json_text

@@ -11,6 +11,7 @@ from itertools import islice
 from pathlib import Path
 
 from app.nested_zip import open_zip
+from app.object_store.path import StoredPath
 
 MAX_NAMES = 2000
 """Names that are looked at; a large folder must not hold a request up."""
@@ -34,16 +35,23 @@ _NAMES: tuple[tuple[str, re.Pattern[str]], ...] = (
 """The first one that any name fits: exports hold cameras beside their labels."""
 
 
-def guess_format(path: Path) -> str | None:
+def guess_format(path: Path | StoredPath) -> str | None:
     """Name of the format for ``touchline import``, or None where nothing looks familiar."""
-    names = list(islice(_names(path), MAX_NAMES))
+    return guess_of_names(islice(_names(path), MAX_NAMES))
+
+
+def guess_of_names(found: Iterable[str]) -> str | None:
+    """The same of names of files."""
+    names = list(found)
     for name, pattern in _NAMES:
         if any(map(pattern.fullmatch, names)):
             return name
     return None
 
 
-def _names(path: Path) -> Iterable[str]:
+def _names(path: Path | StoredPath) -> Iterable[str]:
+    if isinstance(path, StoredPath):
+        return _stored_names(path)
     if path.is_dir():
         return _below(path, "", MAX_DEPTH)
     if path.suffix.lower() != ".zip" or not path.is_file():
@@ -55,6 +63,13 @@ def _names(path: Path) -> Iterable[str]:
             return archive.namelist()
     except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError):
         return []
+
+
+def _stored_names(path: StoredPath) -> Iterable[str]:
+    if not path.is_dir():
+        return [path.name]
+    start = len(path.key) + 1 if path.key else 0
+    return (item.key[start:] for item in path.store.below(path.key))
 
 
 def _directory_bytes(path: Path) -> int:

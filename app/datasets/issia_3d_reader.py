@@ -5,14 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from contextlib import closing
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 
 from app.datasets import fields
-from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
 from app.datasets.csv_text import is_missing, read_rows
+from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.issia import TABLE_3D
 from app.datasets.issia_reader import IssiaFolder, IssiaOptions, complete, count
 from app.datasets.report import Report
+from app.datasets.trees import open_tree
 from app.datasets.viper_reader import ViperTrack
 from app.errors import DatasetFormatError
 
@@ -20,7 +21,7 @@ _AXES = re.compile(r"x_cam(\d{1,3})", re.ASCII)
 
 
 def open_issia_3d(
-    folder: Path, options: IssiaOptions, report: Report, limits: Limits = DEFAULT_LIMITS
+    folder: Root, options: IssiaOptions, report: Report, limits: Limits = DEFAULT_LIMITS
 ) -> IssiaFolder:
     """Read a folder (or zip, or the table alone) as if it were ISSIA's own ground truth.
 

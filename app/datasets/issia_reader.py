@@ -6,16 +6,18 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any
 
-from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
 from app.datasets.cameras_reader import cameras_of
+from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
+from app.datasets.folder_tree import FolderTree
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, DEFAULT_SIZE, MATCH, FramePersons
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import line_files_of, read_line_files
+from app.datasets.trees import open_tree
 from app.datasets.viper_reader import ViperTrack, read_viper
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
@@ -52,7 +54,7 @@ class IssiaOptions:
 
     frame_offset: int | Mapping[int, int] = DEFAULT_OFFSET
     flipped: frozenset[int] = frozenset()
-    lines: Path | None = None
+    lines: Root | None = None
     calibration: str = "given"
     size: ImageSize = DEFAULT_SIZE
 
@@ -128,7 +130,7 @@ def _split(cameras: list[int]) -> str:
 
 
 def open_issia(
-    folder: Path, options: IssiaOptions, report: Report, limits: Limits = DEFAULT_LIMITS
+    folder: Root, options: IssiaOptions, report: Report, limits: Limits = DEFAULT_LIMITS
 ) -> IssiaFolder:
     """Read a folder (or zip) once, for its groups and its persons.
 
@@ -229,7 +231,7 @@ def _read_given(tree: FileTree, names: list[str], report: Report) -> dict[int, C
     }
 
 
-def _read_lines(path: Path, size: ImageSize, report: Report, limits: Limits) -> dict[int, LineFile]:
+def _read_lines(path: Root, size: ImageSize, report: Report, limits: Limits) -> dict[int, LineFile]:
     side = Report()
     return _by_camera(read_line_files(path, size, side, limits), side, report)
 
@@ -279,12 +281,13 @@ def _find_media(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
         suffix = place.suffix.lower()
         if suffix in _VIDEO_SUFFIXES and _VIDEO.fullmatch(place.stem):
             camera = camera_number(place.stem)
-            if camera is not None:
+            # A video is opened as a file of this machine.
+            if camera is not None and isinstance(tree, FolderTree):
                 found.videos.setdefault(camera, tree.shown(name))
         elif suffix in IMAGE_SUFFIXES and _VIDEO.fullmatch(place.parent.name):
             camera, number = camera_number(place.parent.name), _FRAME.fullmatch(place.stem)
             if camera is not None and number:
-                found.frames.setdefault((camera, int(number[1])), Media(tree.shown(name)))
+                found.frames.setdefault((camera, int(number[1])), tree.media(name))
 
 
 def count(found: IssiaFolder, report: Report) -> None:

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import IO, Any
 from xml.sax.saxutils import quoteattr
 
-from app.datasets.archive import resolve_inside
 from app.datasets.camera_json import camera_to_json
 from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons, frame_number, view_camera
+from app.datasets.safe_path import resolve_inside
 from app.datasets.sn_calibration_writer import line_file_text
 from app.datasets.spill import Key, Spill, open_spill
 from app.finite import json_text

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import PurePosixPath
 
-from app.datasets.archive import FileTree, Limits, ZipTree
+from app.datasets.file_tree import FileTree
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
@@ -29,22 +29,16 @@ class MatchFrames:
         report: Takes one problem when the archive is damaged.
     """
 
-    def __init__(
-        self, tree: FileTree, match: str, names: Collection[str], report: Report, limits: Limits
-    ):
+    def __init__(self, tree: FileTree, match: str, names: Collection[str], report: Report):
         self._tree, self._match = tree, match
         self._loose = {name for name in names if _is_image(name)}
         self._members: set[str] = set()
         if ARCHIVE in names:
-            self._open(report, limits)
+            self._open(report)
 
-    def _open(self, report: Report, limits: Limits) -> None:
-        tree, name = self._tree, self._match + ARCHIVE
+    def _open(self, report: Report) -> None:
         try:
-            if isinstance(tree, ZipTree):
-                archive = tree.nested(name, report)
-            else:
-                archive = ZipTree(tree.path / name, report, limits)
+            archive = self._tree.nested(self._match + ARCHIVE, report)
         except DatasetFormatError as error:
             problem = f"{error.problem} Its match is imported without these frames."
             report.note(error.path, error.record, error.field, problem)
@@ -54,9 +48,7 @@ class MatchFrames:
 
     def _member(self, name: str) -> Media:
         """Where a member of the archive is."""
-        if isinstance(self._tree, ZipTree):
-            return Media(str(self._tree.path), f"{self._match}{ARCHIVE}/{name}")
-        return Media(str(self._tree.path / self._match / ARCHIVE), name)
+        return self._tree.media_inside(self._match + ARCHIVE, name)
 
     @property
     def some(self) -> bool:
@@ -70,10 +62,7 @@ class MatchFrames:
                 return self._member(folder + image)
         for folder in FOLDERS:
             if folder + image in self._loose:
-                name = self._match + folder + image
-                if self._tree.path.is_dir():
-                    return Media(self._tree.shown(name))
-                return Media(str(self._tree.path), name)
+                return self._tree.media(self._match + folder + image)
         return None
 
 

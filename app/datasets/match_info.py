@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
-from types import TracebackType
 from typing import Any
 
-from app.datasets.archive import FileTree, check_name
+from app.datasets.file_tree import FileTree
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
+from app.datasets.safe_path import check_name
 from app.datasets.soccernet_record import IMAGE
 from app.errors import DatasetFormatError, UnsafePathError
 from app.finite import json_text
@@ -105,12 +105,7 @@ class MatchInfoWriter:
     def __enter__(self) -> MatchInfoWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._file.write("\n}\n" if self._count else "{}\n")
         self._file.close()
 

@@ -62,15 +62,16 @@ def _check_free(out: Path) -> None:
         if out.is_dir():
             raise InputError(f"{out} is a folder, not a zip file")
         if os.path.lexists(out) and not _is_earlier_zip(out):
-            raise _foreign(f"{out} is there already and is no earlier export")
+            raise foreign(f"{out} is there already and is no earlier export")
         return
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; name a folder or a file that ends in .zip")
     if out.is_dir() and any(out.iterdir()) and not _is_earlier_export(out):
-        raise _foreign(f"{out} holds other files and is no earlier export")
+        raise foreign(f"{out} holds other files and is no earlier export")
 
 
-def _foreign(sentence: str) -> InputError:
+def foreign(sentence: str) -> InputError:
+    """The refusal of a place that holds something else."""
     return InputError(sentence, hint="Name another place; an earlier export would be replaced.")
 
 
@@ -78,7 +79,7 @@ def _is_earlier_export(out: Path) -> bool:
     """Whether the folder holds what its manifest lists and nothing else."""
     present = {path.relative_to(out).as_posix() for path in out.rglob("*") if not path.is_dir()}
     try:
-        return present <= _listed((out / MANIFEST).read_bytes())
+        return present <= listed((out / MANIFEST).read_bytes())
     except OSError:
         return False
 
@@ -89,13 +90,13 @@ def _is_earlier_zip(out: Path) -> bool:
         with zipfile.ZipFile(out) as archive:
             if archive.getinfo(MANIFEST).file_size > MAX_MANIFEST:
                 return False
-            listed = _listed(archive.read(MANIFEST))
-            return not out.is_symlink() and set(archive.namelist()) <= listed
+            ours = listed(archive.read(MANIFEST))
+            return not out.is_symlink() and set(archive.namelist()) <= ours
     except (OSError, KeyError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error):
         return False
 
 
-def _listed(manifest: bytes) -> set[str]:
+def listed(manifest: bytes) -> set[str]:
     """The files that a manifest of ours lists; none where it is of somebody else."""
     try:
         value = json.loads(manifest)

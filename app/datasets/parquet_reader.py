@@ -10,11 +10,13 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, capped_chunks, open_tree
+from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, capped_chunks
+from app.datasets.folder_tree import FolderTree
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.json_text import read_json
 from app.datasets.parquet import pyarrow_modules
 from app.datasets.report import Report
+from app.datasets.trees import open_tree
 from app.datasets.view_groups import PlacedView, ViewGroups
 from app.datasets.view_state import StateReader, extras_from_json
 from app.errors import DatasetFormatError
@@ -44,7 +46,7 @@ OPTIONAL = (
 _BATCH = 512
 
 
-def read_parquet(root: Path, report: Report, *, limits: Limits = DEFAULT_LIMITS) -> Iterator[Group]:
+def read_parquet(root: Root, report: Report, *, limits: Limits = DEFAULT_LIMITS) -> Iterator[Group]:
     """The groups of every Parquet file below ``root`` that has the columns of our exports.
 
     What was said is read, what was computed is computed again.
@@ -108,7 +110,7 @@ def _rows(tree: FileTree, name: str, limits: Limits) -> Iterator[Mapping[str, An
 @contextmanager
 def _on_disk(tree: FileTree, name: str, limits: Limits) -> Iterator[Path]:
     """A file that can be read from its end; a member of a zip is unpacked for that."""
-    if tree.path.is_dir():
+    if isinstance(tree, FolderTree):
         with tree.open(name) as source:
             yield Path(source.name)
         return
@@ -144,4 +146,4 @@ def _view(row: Mapping[str, Any], path: str, record: str) -> PlacedView:
 def _media(tree: FileTree, name: str, present: set[str]) -> Media | None:
     if name not in present or PurePosixPath(name).suffix.lower() not in IMAGE_SUFFIXES:
         return None
-    return Media(tree.shown(name)) if tree.path.is_dir() else Media(str(tree.path), name)
+    return tree.media(name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from app.errors import DatasetFormatError
+from app.errors import DatasetFormatError, InputError, ReviewError
 
 MAX_PROBLEMS = 10_000
 """Problems kept with their sentence; beyond, they are only counted."""
@@ -39,3 +39,7 @@ class Report:
     def note(self, path: str, record: str | None, where: str | None, problem: str) -> None:
         """The same from its parts."""
         self.skip(DatasetFormatError(path, record, where, problem))
+
+    def refusal(self, nothing: str) -> ReviewError:
+        """Why nothing was read: the first problem, else ``nothing``, a sentence."""
+        return self.problems[0] if self.problems else InputError(nothing)

@@ -6,17 +6,18 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any
 
 from app.datasets import fields
-from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, open_tree
+from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.json_text import read_json
 from app.datasets.match_info import METADATA, PLACE, match_of, place_of, read_match_info
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LARGEST_UNIT, LineFile, split_and_size
 from app.datasets.soccernet_v3 import SPLITS
+from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError, UnknownMarkingError
 from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
@@ -28,7 +29,7 @@ _OTHER_PREFIXES = ("camera_", "Labels-", "match_info")
 
 
 def read_line_files(
-    path: Path,
+    path: Root,
     size: ImageSize,
     report: Report,
     limits: Limits = DEFAULT_LIMITS,
@@ -133,11 +134,7 @@ def _images(names: Iterable[str]) -> dict[str, str]:
 
 
 def _media(tree: FileTree, image: str | None) -> Media | None:
-    if image is None:
-        return None
-    if tree.path.is_dir():
-        return Media(tree.shown(image))
-    return Media(str(tree.path), image)
+    return None if image is None else tree.media(image)
 
 
 def lines_from_json(
@@ -191,7 +188,7 @@ def _marking(name: str, path: str, report: Report) -> str | None:
 
 
 def read_sn_calibration(
-    path: Path,
+    path: Root,
     size: ImageSize,
     report: Report,
     *,

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from app.datasets import fields
-from app.datasets.archive import resolve_inside
 from app.datasets.cameras_writer import write_cameras
 from app.datasets.exact import exact_inverse
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
 from app.datasets.match_info import PLACE, MatchInfoWriter, record_of
+from app.datasets.safe_path import resolve_inside
 from app.datasets.sn_calibration import (
     CAMERAS,
     LARGEST_UNIT,

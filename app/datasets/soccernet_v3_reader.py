@@ -5,20 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any
 
-from app.datasets.archive import (
-    DEFAULT_LIMITS,
-    FileTree,
-    Limits,
-    check_name,
-    files_inside,
-    open_tree,
-)
+from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
 from app.datasets.json_text import read_json
 from app.datasets.match_frames import MatchFrames
 from app.datasets.report import Report
+from app.datasets.safe_path import check_name
 from app.datasets.soccernet_record import GAME, IMAGE, REST, ImageRecord, record_from_json
 from app.datasets.soccernet_v3 import (
     IMAGE_LISTS,
@@ -28,12 +22,13 @@ from app.datasets.soccernet_v3 import (
     SPLITS,
     group_label,
 )
+from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError, UnsafePathError
 from app.soccer.group import Group, Station, View
 
 
 def read_soccernet_v3(
-    root: Path, report: Report, limits: Limits = DEFAULT_LIMITS
+    root: Root, report: Report, limits: Limits = DEFAULT_LIMITS
 ) -> Iterator[Group]:
     """The groups of every match below ``root``: each action with its linked replays.
 
@@ -87,7 +82,7 @@ class MatchReader:
             return
         self.seen[match] = path
         inside = files_inside(self.names, folder)
-        frames = MatchFrames(self.tree, folder, inside, self.report, self.limits)
+        frames = MatchFrames(self.tree, folder, inside, self.report)
         yield from _Match(match, labels, path, frames, self.report).groups()
 
     def _labels(self, folder: str, path: str) -> dict[str, Any]:
@@ -99,7 +94,7 @@ class MatchReader:
         return labels
 
 
-def _match_key(root: Path, folder: str, game: Any) -> str:
+def _match_key(root: Root, folder: str, game: Any) -> str:
     """``<league>/<season>/<match>`` from the folders, or as far as they go from the metadata."""
     parts = PurePosixPath(folder).parts
     if len(parts) >= MATCH_DEPTH:

@@ -8,7 +8,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from app.datasets.archive import resolve_inside
+from app.datasets.safe_path import resolve_inside
 from app.datasets.soccernet_record import GAME, REST, record_to_json
 from app.datasets.soccernet_v3 import JOINED_LISTS, LABELS, MATCH_DEPTH, image_numbers
 from app.errors import InputError

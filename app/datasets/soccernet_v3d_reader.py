@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any
 
-from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits, files_inside, open_tree
 from app.datasets.camera_json import camera_from_json
+from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
 from app.datasets.match_frames import MatchFrames
 from app.datasets.report import Report
 from app.datasets.soccernet_record import GAME, IMAGE
@@ -21,6 +21,7 @@ from app.datasets.soccernet_v3 import group_label
 from app.datasets.soccernet_v3_reader import MatchReader
 from app.datasets.soccernet_v3d import LABELS, TABLE
 from app.datasets.soccernet_v3d_table import SnTable, TableRow, read_snv3d_table
+from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError
 from app.soccer.group import Group, Station, View
 
@@ -38,7 +39,7 @@ COMPUTED = (
 
 
 def read_soccernet_v3d(
-    root: Path,
+    root: Root,
     report: Report,
     *,
     calibration: str = "given",
@@ -122,7 +123,7 @@ class _Reader:
                 continue
             folder = f"{self._table.folder}{match}/"
             inside = files_inside(names, folder)
-            frames = MatchFrames(tree, folder, inside, self._report, limits)
+            frames = MatchFrames(tree, folder, inside, self._report)
             for main in new:
                 self._report.read += 1
                 group = self._group(match, main, actions[main], frames)

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 
 from app.datasets import fields
-from app.datasets.archive import FileTree, Limits, check_name
 from app.datasets.camera_json import camera_from_json
 from app.datasets.csv_text import is_missing, numbers_in, read_rows
+from app.datasets.file_tree import FileTree, Limits
 from app.datasets.json_text import parse_literal
 from app.datasets.report import Report
+from app.datasets.safe_path import check_name
 from app.datasets.soccernet_record import MAX_SIDE
 from app.datasets.soccernet_v3d import SPLIT_FILES, TABLE
 from app.errors import DatasetFormatError, UnsafePathError

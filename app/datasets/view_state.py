@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.datasets import fields
-from app.datasets.archive import check_name
 from app.datasets.camera_json import camera_from_json, camera_to_json
+from app.datasets.safe_path import check_name
 from app.datasets.soccernet_record import MAX_SIDE
 from app.errors import DatasetFormatError, InputError, UnknownMarkingError, UnsafePathError
 from app.geometry.camera import camera_covariance

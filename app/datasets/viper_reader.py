@@ -14,7 +14,7 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import iterparse
 
 from app.datasets import fields
-from app.datasets.archive import DEFAULT_LIMITS, FileTree, Limits
+from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
 from app.finite import quoted

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.datasets.archive import DEFAULT_LIMITS, Limits
 from app.datasets.csv_text import Table, cell, is_missing, numbers_in, plain_list, read_rows
+from app.datasets.file_tree import DEFAULT_LIMITS, Limits
 from app.errors import DatasetFormatError
 
 

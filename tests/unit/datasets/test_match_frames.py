@@ -6,16 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from app.datasets.archive import DEFAULT_LIMITS, Limits, open_tree
+from app.datasets.file_tree import DEFAULT_LIMITS, Limits
 from app.datasets.match_frames import MatchFrames
 from app.datasets.report import Report
+from app.datasets.trees import open_tree
 from app.soccer.group import Media
 
 
 def _frames(folder: Path, report: Report) -> MatchFrames:
     tree = open_tree(folder, report)
     assert tree is not None
-    return MatchFrames(tree, "", tree.names(), report, DEFAULT_LIMITS)
+    return MatchFrames(tree, "", tree.names(), report)
 
 
 class TestMatchFrames:
@@ -57,7 +58,7 @@ class TestMatchFrames:
         path = make_zip({"m/frames/7.png": b"x"})
         tree = open_tree(path, report)
         assert tree is not None
-        frames = MatchFrames(tree, "m/", ["frames/7.png"], report, DEFAULT_LIMITS)
+        frames = MatchFrames(tree, "m/", ["frames/7.png"], report)
         assert frames.find("7.png") == Media(str(path), "m/frames/7.png")
 
 
@@ -136,4 +137,4 @@ def _zipped(path: Path, report: Report, limits: Limits = DEFAULT_LIMITS) -> Matc
     tree = open_tree(path, report, limits)
     assert tree is not None
     inside = [name.removeprefix("m/") for name in tree.names()]
-    return MatchFrames(tree, "m/", inside, report, limits)
+    return MatchFrames(tree, "m/", inside, report)

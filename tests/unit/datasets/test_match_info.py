@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from app.datasets.archive import open_tree
 from app.datasets.match_info import MatchInfoWriter, match_of, read_match_info, record_of
 from app.datasets.report import Report
+from app.datasets.trees import open_tree
 from app.soccer.group import Group
 
 

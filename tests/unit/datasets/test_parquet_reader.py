@@ -9,8 +9,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from app.datasets.archive import Limits
 from app.datasets.export_record import ExportRecord
+from app.datasets.file_tree import Limits
 from app.datasets.parquet_reader import read_parquet
 from app.datasets.parquet_writer import write_parquet
 from app.datasets.report import Report

@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
-from app.datasets.archive import DEFAULT_LIMITS, open_tree
+from app.datasets.file_tree import DEFAULT_LIMITS
 from app.datasets.report import Report
 from app.datasets.soccernet_v3d_table import SnTable, read_snv3d_table
+from app.datasets.trees import open_tree
 from app.soccer.frames import Box, ImageSize
 
 MATCH = "lea/2030-2031/2030-08-17 - 18-00 A 1 - 0 B"

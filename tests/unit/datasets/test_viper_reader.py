@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from app.datasets import viper_reader
-from app.datasets.archive import Limits, open_tree
+from app.datasets.file_tree import Limits
 from app.datasets.report import Report
+from app.datasets.trees import open_tree
 from app.datasets.viper_reader import ViperTrack, read_viper
 
 HEAD = (

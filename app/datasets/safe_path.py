@@ -1,0 +1,80 @@
+"""Paths that stay where they belong, whoever wrote them."""
+
+from __future__ import annotations
+
+import os
+import re
+import unicodedata
+from pathlib import Path
+from urllib.parse import unquote
+
+from app.errors import UnsafePathError
+from app.finite import quoted
+
+_DRIVE = re.compile(r"[A-Za-z]:")
+MAX_PART = 255
+"""Most bytes of the name of a file or folder; what is longer fits on no disk."""
+
+
+def check_name(path: str) -> str:
+    """The relative path unchanged, when it stays inside whatever folder it is joined to.
+
+    Raises:
+        UnsafePathError: Empty, absolute, longer than disks take, with a drive letter, ``..``,
+            backslash or control character; also when only its decoded or normalised spelling is so.
+    """
+    for spelling in _spellings(path):
+        problem = _unsafe(spelling)
+        if problem:
+            raise UnsafePathError(f"the path {quoted(path, 200)} {problem}")
+    if any(len(part.encode()) > MAX_PART for part in path.split("/")):
+        raise UnsafePathError(
+            f"the path {quoted(path, 200)} has a part of more than {MAX_PART} bytes"
+        )
+    return path
+
+
+def resolve_inside(root: Path, path: str) -> Path:
+    """The real path of ``path`` below ``root``; symbolic links may not lead out of it.
+
+    Args:
+        root: Folder that must contain the result; may itself be a symbolic link.
+        path: Relative, with forward slashes; need not exist.
+
+    Raises:
+        UnsafePathError: The path would leave the folder.
+    """
+    check_name(path)
+    real_root = Path(os.path.realpath(root))
+    real = Path(os.path.realpath(real_root / path))
+    if real != real_root and real_root not in real.parents:
+        raise UnsafePathError(f"the path {quoted(path, 200)} leads out of its folder")
+    return real
+
+
+def _spellings(path: str) -> list[str]:
+    spellings = [path, unicodedata.normalize("NFKC", path)]
+    decoded = path
+    for _ in range(3):
+        decoded = unquote(decoded)
+        spellings += [decoded, unicodedata.normalize("NFKC", decoded)]
+    return spellings
+
+
+def _unsafe(path: str) -> str | None:
+    if not path:
+        return "is empty"
+    if "\\" in path or any(ord(letter) < 32 or letter == "\x7f" for letter in path):
+        return "holds a backslash or a control character"
+    if any(0xD800 <= ord(letter) <= 0xDFFF for letter in path):
+        return "is not valid text"
+    if path.startswith("/") or _DRIVE.match(path):
+        return "is absolute"
+    if ".." in path.split("/"):
+        return "holds '..'"
+    return None
+
+
+def is_hidden(name: str) -> bool:
+    """Whether a file or folder of that name is none that people mean."""
+    return (name.startswith(".") and name not in (".", "..")) or name == "__MACOSX"

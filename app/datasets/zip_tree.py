@@ -1,0 +1,163 @@
+"""The members of a zip file, read in place."""
+
+from __future__ import annotations
+
+import stat
+import zipfile
+from collections import Counter
+from dataclasses import replace
+from typing import IO
+
+from app.datasets.file_tree import BROKEN, Limits, Root, read_capped
+from app.datasets.report import Report
+from app.datasets.safe_path import check_name, is_hidden
+from app.errors import DatasetFormatError, UnsafePathError
+from app.nested_zip import UNREADABLE, open_nested, open_zip, open_zip_elsewhere
+from app.object_store.path import StoredPath
+from app.soccer.group import Media
+
+_RATIO_FLOOR = 1024 * 1024
+
+
+class ZipTree:
+    """The members of a zip file, read in place.
+
+    Raises:
+        DatasetFormatError: Not a complete zip file, or beyond the limits.
+    """
+
+    def __init__(
+        self, path: Root, report: Report, limits: Limits, archive: zipfile.ZipFile | None = None
+    ):
+        self.path = path
+        self._limits = limits
+        self._archive = _open_zip(path) if archive is None else archive
+        self._count = self._total = 0
+        try:
+            self._members = self._checked(report)
+        except DatasetFormatError:
+            self._archive.close()
+            raise
+
+    def nested(self, name: str, report: Report) -> ZipTree:
+        """The members of a zip file that is itself a member, read in place.
+
+        What the zip files inside hold counts toward the limits of the one around them. A zip
+        file inside one of them is a file like any other, and is not opened.
+
+        Raises:
+            DatasetFormatError: It is damaged, or beyond the limits.
+        """
+        shown = self.shown(name)
+        member = self._members.get(name)
+        if member is None:
+            raise DatasetFormatError(shown, None, None, "is not in the zip file")
+        grown = max(member.file_size, 1) / max(member.compress_size, 1)
+        limits = replace(
+            self._limits,
+            members=self._limits.members - self._count,
+            total_bytes=self._limits.total_bytes - self._total + member.file_size,
+            ratio=max(int(self._limits.ratio / max(grown, 1.0)), 1),
+        )
+        try:
+            archive = open_nested(self._archive, self.path, member)
+        except (*BROKEN, ValueError, UnicodeError) as error:
+            problem = f"cannot be opened inside the zip file ({error})."
+            raise DatasetFormatError(shown, None, None, problem) from error
+        inner = ZipTree(self.path / name, report, limits, archive)
+        self._count += inner._count
+        self._total += inner._total - member.file_size
+        return inner
+
+    def names(self) -> list[str]:
+        """Every member that is a safe plain file, sorted."""
+        return sorted(self._members)
+
+    def read_bytes(self, name: str) -> bytes:
+        """The whole content of one member."""
+        with self.open(name) as file:
+            return read_capped(file, self._limits.file_bytes, self.shown(name))
+
+    def open(self, name: str) -> IO[bytes]:
+        """The content as a stream."""
+        member = self._members.get(name)
+        if member is None:
+            raise DatasetFormatError(self.shown(name), None, None, "is not in the zip file")
+        try:
+            return self._archive.open(member)
+        except (*BROKEN, UnicodeError) as error:
+            problem = "is damaged or encrypted inside the zip file"
+            raise DatasetFormatError(self.shown(name), None, None, problem) from error
+
+    def shown(self, name: str) -> str:
+        """The name as a person knows it."""
+        return f"{self.path}/{name}"
+
+    def media(self, name: str) -> Media:
+        """Where a member can be read later."""
+        if isinstance(self.path, StoredPath):
+            return Media(self.path.sealed(), name)
+        return Media(str(self.path), name)
+
+    def media_inside(self, name: str, member: str) -> Media:
+        """Where a member of a zip file that is a member can be read later."""
+        return self.media(f"{name}/{member}")
+
+    def close(self) -> None:
+        """Close the zip file."""
+        self._archive.close()
+
+    def _checked(self, report: Report) -> dict[str, zipfile.ZipInfo]:
+        members = self._archive.infolist()
+        self._check_totals(members)
+        # Names that differ in case alone are one file on some disks: which one is meant?
+        folded = Counter(member.filename.rstrip("/").casefold() for member in members)
+        checked = {}
+        for member in members:
+            # A name that begins with NUL is empty, which ``is_dir`` does not survive.
+            if member.filename.endswith("/") or any(map(is_hidden, member.filename.split("/"))):
+                continue
+            problem = self._problem(member, folded)
+            if problem is None:
+                checked[member.filename] = member
+            else:
+                report.note(str(self.path), member.filename[:200], None, problem)
+        return checked
+
+    def _check_totals(self, members: list[zipfile.ZipInfo]) -> None:
+        limits, shown = self._limits, str(self.path)
+        if len(members) > limits.members:
+            problem = f"has {len(members):,} members; at most {limits.members:,} are read"
+            raise DatasetFormatError(shown, None, None, problem)
+        total = sum(member.file_size for member in members)
+        if total > limits.total_bytes:
+            problem = f"unpacks to {total:,} bytes; at most {limits.total_bytes:,} are read"
+            raise DatasetFormatError(shown, None, None, problem)
+        self._count, self._total = len(members), total
+
+    def _problem(self, member: zipfile.ZipInfo, folded: Counter[str]) -> str | None:
+        kind = stat.S_IFMT(member.external_attr >> 16)
+        if kind not in (0, stat.S_IFREG):
+            return "is a link or device, not a plain file"
+        if member.flag_bits & UNREADABLE:
+            return "has a name that is no text, so it cannot be read"
+        if folded[member.filename.casefold()] > 1:
+            return "is there more than once, or under names that differ in case alone"
+        if member.file_size > _RATIO_FLOOR and (
+            member.file_size > self._limits.ratio * max(member.compress_size, 1)
+        ):
+            return f"grows more than {self._limits.ratio} times when it is unpacked"
+        try:
+            # ZipInfo itself cuts a name at NUL and turns backslashes; look at the original.
+            check_name(member.orig_filename)
+        except UnsafePathError as error:
+            return error.message
+        return None
+
+
+def _open_zip(path: Root) -> zipfile.ZipFile:
+    try:
+        return open_zip_elsewhere(path) if isinstance(path, StoredPath) else open_zip(path)
+    except (*BROKEN, ValueError, UnicodeError) as error:
+        problem = "is not a complete zip file; was it cut off while it was copied?"
+        raise DatasetFormatError(str(path), None, None, problem) from error

@@ -1,0 +1,166 @@
+"""Folders and objects of stores with as much of ``Path`` as readers of datasets use."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+from app.config import Settings, StoreSettings
+from app.errors import NotFoundError
+from app.object_store.address import SCHEME, seal, split_address
+from app.object_store.store import ObjectStore, Stored, open_configured, open_store
+
+AHEAD = 128 * 1024
+"""Bytes that a range read takes at least: a member of a zip and its header come in one or two."""
+
+
+@dataclass(frozen=True)
+class StoredPath:
+    """A folder or an object of a store.
+
+    It travels between processes: the store is opened where it is used, with the keys of then.
+
+    Attributes:
+        store_name: The store.
+        settings: What the operator says of it.
+        key: Inside the store; empty: all of it.
+        stored: The object as it was when it was looked up; None of a folder.
+    """
+
+    store_name: str
+    settings: StoreSettings
+    key: str
+    stored: Stored | None = None
+
+    @property
+    def store(self) -> ObjectStore:
+        """Where it lies."""
+        return open_configured(self.store_name, self.settings)
+
+    @property
+    def name(self) -> str:
+        """The last part of its key, or the store's name."""
+        return self.key.rpartition("/")[2] or self.store_name
+
+    @property
+    def suffix(self) -> str:
+        """Ending of its name."""
+        return PurePosixPath(self.name).suffix
+
+    @property
+    def stem(self) -> str:
+        """Its name without the ending."""
+        return PurePosixPath(self.name).stem
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Store and folders, as those of an absolute path: the first one is no name."""
+        return (SCHEME, self.store_name, *PurePosixPath(self.key).parts)
+
+    @property
+    def parent(self) -> StoredPath:
+        """The folder that it lies in."""
+        return StoredPath(self.store_name, self.settings, self.key.rpartition("/")[0])
+
+    @property
+    def size(self) -> int:
+        """Bytes of the object."""
+        assert self.stored is not None
+        return self.stored.size
+
+    def is_dir(self) -> bool:
+        """Whether it is a folder."""
+        return self.stored is None
+
+    def resolve(self) -> StoredPath:
+        """Itself: there are no links."""
+        return self
+
+    def of(self, stored: Stored) -> StoredPath:
+        """An object of the same store."""
+        return StoredPath(self.store_name, self.settings, stored.key, stored)
+
+    def reads(self, ahead: int = AHEAD) -> RangeReads:
+        """Begin to read the object in ranges."""
+        return RangeReads(self, ahead)
+
+    def sealed(self) -> str:
+        """Address of the object with what its content is called: another content is not it."""
+        assert self.stored is not None
+        return seal(str(self), self.stored.etag)
+
+    def __truediv__(self, inside: str) -> StoredPath:
+        key = "/".join(filter(None, (self.key, inside.strip("/"))))
+        return StoredPath(self.store_name, self.settings, key)
+
+    def __str__(self) -> str:
+        return f"{SCHEME}{self.store_name}/{self.key}"
+
+
+def find_path(settings: Settings, address: str) -> StoredPath:
+    """What lies under an address: an object, else a folder.
+
+    Raises:
+        InputError: It is no address.
+        NotFoundError: There is no such store, or nothing there.
+        StorageError: The store cannot be asked.
+    """
+    name, key = split_address(address)
+    store = open_store(settings, name)
+    path = StoredPath(name, store.settings, key)
+    if key:
+        with suppress(NotFoundError):
+            return path.of(store.head(key))
+    if next(store.below(key), None) is None:
+        raise NotFoundError(f"there is nothing at {path}")
+    return path
+
+
+def target_path(settings: Settings, address: str) -> StoredPath:
+    """Where an address is, whatever lies there.
+
+    Raises:
+        InputError: It is no address.
+        NotFoundError: There is no such store.
+        StorageError: Its keys cannot be used.
+    """
+    name, key = split_address(address)
+    return StoredPath(name, open_store(settings, name).settings, key)
+
+
+class RangeReads:
+    """An object read in ranges; nothing between them is fetched.
+
+    Args:
+        path: The object, as it was when it was looked up.
+        ahead: Bytes that are fetched at least.
+    """
+
+    def __init__(self, path: StoredPath, ahead: int = AHEAD):
+        self._path, self._size, self._ahead = path, path.size, ahead
+        self._span, self._start = b"", 0
+
+    def pread(self, count: int, at: int) -> bytes:
+        """So many bytes from there, fewer at the end; the last range that was fetched is kept."""
+        end = min(at + count, self._size)
+        if at >= end:
+            return b""
+        have = self._start + len(self._span)
+        if not self._start <= at < have:
+            start = min(at, max(self._size - self._ahead, 0))
+            self._span = self._fetch(start, max(end, min(start + self._ahead, self._size)))
+            self._start = start
+        elif end > have:
+            self._span = self._span[at - self._start :] + self._fetch(have, end)
+            self._start = at
+        return self._span[at - self._start : end - self._start]
+
+    def _fetch(self, start: int, end: int) -> bytes:
+        stored = self._path.stored
+        assert stored is not None
+        return self._path.store.read(stored.key, start, end, stored.etag)
+
+    def close(self) -> None:
+        """Let go of what was fetched."""
+        self._span = b""
