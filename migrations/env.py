@@ -7,7 +7,7 @@ from app.store.tables import Base
 context.configure(
     connection=context.config.attributes["connection"],
     target_metadata=Base.metadata,
-    # The connection has begun IMMEDIATE, and SQLite's DDL is transactional.
+    # The connection has begun a transaction that writes, and both engines' DDL is transactional.
     transactional_ddl=True,
 )
 context.run_migrations()

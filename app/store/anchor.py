@@ -24,12 +24,17 @@ from app.config import Settings
 from app.durable import replace_file, sync
 from app.errors import DamagedError
 from app.finite import json_text
+from app.store.dialect.dialect import dialect_of
 
 ANCHOR_BYTES = 512
 AGAIN_SECONDS = 0.01
 """A reader beside a writer may see half of an anchor: after so long it is read once more."""
 RESTORE = (
     "Run touchline restore BACKUP; touchline restore {file} goes on with what that file holds."
+)
+RESTORE_SERVER = (
+    "Restore it with pg_restore, or let TOUCHLINE_DATABASE_URL name the database of this home. Where"
+    " it is the right one all the same, move home.json away."
 )
 
 
@@ -117,7 +122,7 @@ def anchor_of(connection: Connection) -> Anchor | None:
     key, created, schema, entries, last = connection.execute(
         text(
             "SELECT installation.key, created, version_num, coalesce(log.id, 0), log.hash"
-            " FROM installation JOIN alembic_version"
+            " FROM installation CROSS JOIN alembic_version"
             " LEFT JOIN log ON log.id = (SELECT max(id) FROM log)"
         )
     ).one()
@@ -137,7 +142,11 @@ def _require_own(engine: Engine, settings: Settings) -> None:
     anchor = read_anchor(settings.database_file)
     if anchor is not None:
         with engine.connect() as connection:
-            _require_anchored(connection, anchor, settings.database_file)
+            if dialect_of(settings).is_file:
+                file = settings.database_file
+                _require_anchored(connection, anchor, str(file), RESTORE.format(file=file))
+            else:
+                _require_anchored(connection, anchor, settings.database_name, RESTORE_SERVER)
 
 
 def renew_anchor(engine: Engine, settings: Settings, *, alone: bool) -> None:
@@ -158,8 +167,7 @@ def _without_end(anchor: Anchor) -> Anchor:
     return replace(anchor, entries=0, hash="")
 
 
-def _require_anchored(connection: Connection, anchor: Anchor, database: Path) -> None:
-    hint = RESTORE.format(file=database)
+def _require_anchored(connection: Connection, anchor: Anchor, database: str, hint: str) -> None:
     tables = inspect(connection).get_table_names()
     if "log" not in tables:
         raise DamagedError(

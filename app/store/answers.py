@@ -9,12 +9,12 @@ from datetime import UTC, datetime, timedelta
 from typing import TypeVar, cast
 
 from sqlalchemy import Table, bindparam, delete, or_, select, text
-from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
 from app.finite import json_text
 from app.store.clock import now
 from app.store.codecs import Json, inflate, parse
+from app.store.dialect.statements import insert
 from app.store.job_models import AnswerModel
 
 T = TypeVar("T")
@@ -45,7 +45,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Progress:
+class SavedProgress:
     """How far work of several transactions has come that was asked for under a key.
 
     Saved in each transaction, it lets the same request go on where a stopped server left it.
@@ -120,7 +120,7 @@ def shorten_answers(session: Session, most: int) -> int:
     Returns:
         How many lost it.
     """
-    return len(session.scalars(_SHORTEN, {"most": most}).all())
+    return len(session.scalars(_SHORTEN, {"most": most, "empty": b""}).all())
 
 
 def _oldest() -> str:
@@ -129,9 +129,10 @@ def _oldest() -> str:
 
 
 _SHORTEN = text(
-    "UPDATE answer SET body = x'' WHERE rowid IN (SELECT rowid FROM (SELECT rowid, status,"
-    " length(body) AS size, sum(length(body)) OVER (ORDER BY at DESC, rowid DESC) AS total"
-    " FROM answer) WHERE total > :most AND size > 0 AND status >= 200) RETURNING key"
+    "UPDATE answer SET body = :empty WHERE (key, actor) IN (SELECT key, actor FROM (SELECT key,"
+    " actor, status, length(body) AS size, sum(length(body)) OVER (ORDER BY at DESC, key, actor)"
+    " AS total FROM answer) AS sized WHERE total > :most AND size > 0 AND status >= 200)"
+    " RETURNING key"
 )
 _FIND = select(*_ANSWER.columns).where(
     _ANSWER.c.key == bindparam("key"),

@@ -10,10 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.nested_zip import nested_name, open_nested, open_zip
+from app.nested_zip import nested_name, open_nested, open_zip, open_zip_elsewhere
+from app.object_store.path import StoredPath
 
 MAX_OPEN = 16
 
+_Place = Path | StoredPath
 _Key = tuple[str, int, int, str]
 """Path, time of change and size: a file that was replaced is another archive. The name of the zip
 inside it last, or empty."""
@@ -30,7 +32,7 @@ class Archives:
         self._open: OrderedDict[_Key, zipfile.ZipFile] = OrderedDict()
         self._lock = threading.Lock()
 
-    def read(self, path: Path, member: str, limit: int) -> bytes:
+    def read(self, path: _Place, member: str, limit: int) -> bytes:
         """The content of a member.
 
         Raises:
@@ -73,7 +75,7 @@ class Archives:
             while self._open:
                 self._open.popitem()[1].close()
 
-    def _find(self, path: Path, member: str) -> tuple[zipfile.ZipFile, str]:
+    def _find(self, path: _Place, member: str) -> tuple[zipfile.ZipFile, str]:
         """The open archive that a member lies in, and its name there."""
         key = _key(path)
         archive = self._get(key, lambda: _open(path))
@@ -93,20 +95,20 @@ class Archives:
             return self._open[key]
 
 
-def _open(path: Path) -> zipfile.ZipFile:
+def _open(path: _Place) -> zipfile.ZipFile:
     try:
-        return open_zip(path)
+        return open_zip_elsewhere(path) if isinstance(path, StoredPath) else open_zip(path)
     except (zipfile.BadZipFile, NotImplementedError, ValueError) as error:
         raise ImageError(f"{path.name} is no complete zip archive") from error
     except OSError as error:
         raise StorageError(f"{path.name} cannot be read") from error
 
 
-def _open_inside(path: Path, info: zipfile.ZipInfo) -> zipfile.ZipFile:
+def _open_inside(path: _Place, info: zipfile.ZipInfo) -> zipfile.ZipFile:
     shown = f"{path.name}/{info.filename}"
     try:
         # Opened anew: one that is kept open may be closed for others' sake meanwhile.
-        with open_zip(path) as archive:
+        with _open(path) as archive:
             return open_nested(archive, path, info)
     except OSError as error:
         raise StorageError(f"{shown} cannot be read") from error
@@ -114,7 +116,9 @@ def _open_inside(path: Path, info: zipfile.ZipInfo) -> zipfile.ZipFile:
         raise ImageError(f"{shown} cannot be read: {error}") from error
 
 
-def _key(path: Path) -> _Key:
+def _key(path: _Place) -> _Key:
+    if isinstance(path, StoredPath):
+        return path.sealed(), 0, path.size, ""
     try:
         status = path.stat()
     except OSError as error:

@@ -27,6 +27,7 @@ from app.errors import EXAMINE, InputError, StorageError
 from app.finite import json_text
 from app.store.anchor import require_own_database
 from app.store.clock import now
+from app.store.dialect.dialect import dialect_of
 from app.store.engine import make_engine, reported
 from app.store.examination import examine_database
 from app.store.first_look import require_sound, signs_of_use
@@ -77,8 +78,9 @@ def back_up(settings: Settings, out: Path, folders: Sequence[str] = ()) -> Manif
     """``write_backup`` of a home whose files belong together, beside whoever works in it.
 
     Raises:
-        InputError: The home has no database.
+        InputError: The home has no database, or it is a server's.
     """
+    require_file(settings, "backed up", "pg_dump --format=custom --file=OUT DATABASE")
     if not settings.database_file.exists() and not any(signs_of_use(settings)):
         raise InputError(f"there is no database in {settings.home}", hint="Set TOUCHLINE_HOME.")
     lock = DatabaseLock(settings)
@@ -89,6 +91,15 @@ def back_up(settings: Settings, out: Path, folders: Sequence[str] = ()) -> Manif
         return write_backup(settings, out, folders)
     finally:
         lock.release()
+
+
+def require_file(settings: Settings, done: str, command: str) -> None:
+    """Raise InputError where the database is a server's, whose own programs copy it."""
+    if not dialect_of(settings).is_file:
+        raise InputError(
+            f"{settings.database_name} is {done} by the programs of its server",
+            hint=f"Run {command}; the files of the home (uploads, exports) are copied as files.",
+        )
 
 
 def write_backup(

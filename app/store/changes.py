@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from app.store.log import DEEDS
 from app.store.models import GroupModel, LogModel, SolutionModel, ViewModel
 
 
@@ -25,7 +26,11 @@ class StoredChange:
 def logged_changes(session: Session, after: int) -> Iterator[StoredChange]:
     """What the log tells after an entry, in order; a static camera's stand once for each group."""
     columns = (LogModel.id, LogModel.dataset_id, LogModel.kind, LogModel.actor)
-    new = (LogModel.id > after, LogModel.dataset_id.is_not(None))
+    new = (
+        LogModel.id > after,
+        LogModel.dataset_id.is_not(None),
+        LogModel.kind.not_in(DEEDS),
+    )
     plain = select(*columns, LogModel.group_id).where(*new)
     of_station = (
         select(*columns, ViewModel.group_id)

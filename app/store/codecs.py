@@ -309,8 +309,8 @@ def left_out_from_json(value: Mapping[str, Any] | None) -> LeftOut | None:
 def view_to_json(view: View, station: Json | None = None) -> Json:
     """A view; ``station`` stands in for the station's own JSON (a shared one is a key).
 
-    ``left_out`` stands there only where somebody said why, so that digests of all other views
-    are what they always were.
+    ``left_out`` and ``noise`` stand there only where they say something, so that digests of all
+    other views are what they always were.
     """
     why = left_out_to_json(view.left_out)
     return {
@@ -321,6 +321,7 @@ def view_to_json(view: View, station: Json | None = None) -> Json:
         "included": view.included,
         "extras": extras_to_json(view.extras),
         **({} if why is None else {"left_out": why}),
+        **({} if view.noise == 1 else {"noise": float(view.noise)}),
     }
 
 
@@ -334,6 +335,7 @@ def view_from_json(value: Mapping[str, Any], station: Station | None = None) -> 
         included=value["included"],
         extras=extras_from_json(value["extras"]),
         left_out=left_out_from_json(value.get("left_out")),
+        noise=float(value.get("noise", 1.0)),
     )
 
 

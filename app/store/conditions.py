@@ -6,12 +6,16 @@ import operator
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, func, not_, or_, select
+from sqlalchemy import ColumnElement, and_, not_, or_
 from sqlalchemy.orm import InstrumentedAttribute
 
-from app.finite import json_text
+from app.store.agreement import groups_that_came_to
+from app.store.dialect.statements import numbers_in
 from app.store.models import QueueModel
 from app.store.proposals import groups_with_open
+from app.store.takes import groups_with_takes
+from app.store.threads import groups_that_mention, groups_with_threads
+from app.store.work import groups_in_batches
 
 Condition = ColumnElement[bool]
 """Whether a group is meant; made and combined by the functions here."""
@@ -22,6 +26,13 @@ _COMPARED: Mapping[str, Callable[[Any, Any], Any]] = {
     ">": operator.gt,
     ">=": operator.ge,
     "=": operator.eq,
+}
+_NOT: Mapping[str, Callable[[Any, Any], Any]] = {
+    "<": operator.ge,
+    "<=": operator.gt,
+    ">": operator.le,
+    ">=": operator.lt,
+    "=": operator.ne,
 }
 
 
@@ -68,14 +79,40 @@ def has_all_pictures() -> Condition:
 
 def is_one_of(ids: Iterable[int]) -> Condition:
     """The group's id is one of these."""
-    # One parameter, however many there are: a statement takes a limited number of them.
-    listed = func.json_each(json_text(list(ids))).table_valued("value")
-    return QueueModel.group_id.in_(select(listed.c.value))
+    return QueueModel.group_id.in_(numbers_in(ids))
 
 
 def has_open_proposal(outcome: str | None = None) -> Condition:
-    """A view without lines was looked at for a proposal; with that outcome, where one is named."""
+    """A view without a camera was looked at; with that outcome, where one is named."""
     return QueueModel.group_id.in_(groups_with_open(outcome))
+
+
+def is_in_batch(ids: Iterable[int]) -> Condition:
+    """The group is in one of these batches of work."""
+    return QueueModel.group_id.in_(groups_in_batches(list(ids)))
+
+
+def has_thread(state: str | None = None) -> Condition:
+    """People have said something to each other about it; in an ``open`` or ``resolved`` thread."""
+    return QueueModel.group_id.in_(groups_with_threads(state))
+
+
+def mentions(name: str | None = None) -> Condition:
+    """An open thread mentions somebody, or the person of a name."""
+    return QueueModel.group_id.in_(groups_that_mention(name))
+
+
+def has_takes(op: str, number: float) -> Condition:
+    """So many people have handed in an annotation of their own; most groups have none."""
+    if not _COMPARED[op](0, number):
+        return QueueModel.group_id.in_(groups_with_takes(_COMPARED[op], number))
+    # The few that are not meant are looked up, instead of the many that are.
+    return QueueModel.group_id.not_in(groups_with_takes(_NOT[op], number))
+
+
+def came_to(state: str) -> Condition:
+    """Its annotations were compared, in some batch, and came to that."""
+    return QueueModel.group_id.in_(groups_that_came_to(state))
 
 
 def either(conditions: Iterable[Condition]) -> Condition:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 from typing import Any
 
-from sqlalchemy import insert, select, update
+from sqlalchemy import exists, func, insert, select, update
 from sqlalchemy.orm import Session
 
 from app.soccer.policy import Policy
 from app.store.codecs import as_written, canonical, parse, policy_from_json, policy_to_json
-from app.store.group_rows import next_id
 from app.store.models import DatasetModel, GroupModel
+from app.store.sight import COPIES
+from app.store.view_models import COPIES_USED, UsedIdModel
 
 MAX_ID = 2**63 - 1
+_DIGITS = 19
+"""No id has more."""
 _ROWS = select(*DatasetModel.__table__.columns)
 
 
@@ -26,13 +29,15 @@ def policy_of(text: str) -> Policy:
 
 
 def dataset_rows(session: Session) -> Sequence[Any]:
-    """The rows of all datasets, by name."""
+    """The rows of all datasets, those of copies too, by name."""
     return session.execute(_ROWS.order_by(DatasetModel.name)).all()
 
 
 def find_dataset(session: Session, dataset: str | int) -> Any | None:
     """The row of a dataset by name or id, or None."""
-    if isinstance(dataset, int) or (dataset.isascii() and dataset.isdigit()):
+    if isinstance(dataset, int) or (
+        len(dataset) <= _DIGITS and dataset.isascii() and dataset.isdigit()
+    ):
         if int(dataset) > MAX_ID:
             return None
         statement = _ROWS.where(DatasetModel.id == int(dataset))
@@ -41,9 +46,21 @@ def find_dataset(session: Session, dataset: str | int) -> Any | None:
     return session.execute(statement).one_or_none()
 
 
-def insert_dataset_row(session: Session, name: str, policy: Policy, at: str) -> int:
-    """Insert a dataset; returns its id."""
-    identity = next_id(session, DatasetModel)
+def next_dataset_id(session: Session, *, copies: bool = False) -> int:
+    """The id that the next dataset gets, or the next one of ``copies``."""
+    column = DatasetModel.id
+    mine = column > COPIES if copies else column <= COPIES
+    newest = session.scalar(select(func.max(column)).where(mine))
+    name = COPIES_USED if copies else DatasetModel.__tablename__
+    used = session.scalar(select(UsedIdModel.id).where(UsedIdModel.table == name))
+    return max(newest or 0, used or 0, COPIES if copies else 0) + 1
+
+
+def insert_dataset_row(
+    session: Session, name: str, policy: Policy, at: str, *, copies: bool = False
+) -> int:
+    """Insert a dataset, one of ``copies`` if so; returns its id."""
+    identity = next_dataset_id(session, copies=copies)
     values = {"id": identity, "name": name, "created": at, **_policy_values(policy)}
     session.execute(insert(DatasetModel), [values])
     return identity
@@ -55,10 +72,21 @@ def update_policy(session: Session, dataset_id: int, policy: Policy) -> None:
     session.execute(update(DatasetModel).where(mine).values(_policy_values(policy)))
 
 
-def group_ids(session: Session, dataset_id: int) -> list[int]:
-    """Ids of the groups of a dataset."""
+def group_ids(
+    session: Session, dataset_id: int, matches: Collection[str] | None = None
+) -> list[int]:
+    """Ids of the groups of a dataset, of these matches where they are named, in order."""
     statement = select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
-    return list(session.scalars(statement))
+    if matches is not None:
+        statement = statement.where(GroupModel.match.in_(matches))
+    return list(session.scalars(statement.order_by(GroupModel.id)))
+
+
+def has_match(session: Session, dataset_id: int, match: str) -> bool:
+    """Whether a dataset has a group of a match; none is counted."""
+    group = GroupModel
+    found = exists().where(group.dataset_id == dataset_id, group.match == match)
+    return bool(session.scalar(select(found)))
 
 
 def dataset_name(session: Session, dataset_id: int) -> str:

@@ -43,7 +43,8 @@ def station_digest(station: Station) -> str:
 def view_digest(view: View) -> str:
     """Digest of a view's key, its balls and whether it takes part; its station has its own.
 
-    Why it was left out changes nothing that is computed, so it has no part in this.
+    Why it was left out changes nothing that is computed, so it has no part in this. Nor has how
+    noisy its ball is, which is no word of a dataset's: ``inputs_hash`` has it.
     """
     return digest([view.key, view.included, [ball_to_json(ball) for ball in view.balls]])
 
@@ -53,23 +54,27 @@ def inputs_hash(
     views: Iterable[tuple[str, str]],
     positions: Mapping[str, SharedPosition],
     paint: Mapping[str, str],
+    noise: Mapping[str, float],
 ) -> str:
     """Digest of what solving a group reads, from (view digest, station digest) in order of views.
 
     Made of digests, so that a station shared by a thousand groups costs a thousand short sums.
-    A group without shared positions and paint keeps the digest that it always had.
+    A group without shared positions, paint and noise keeps the digest that it always had.
 
     Args:
         pitch: The pitch.
         views: Digests of each view and its station.
         positions: What the match shares, by view.
         paint: Digest of what was read of the picture's paint, by view.
+        noise: Of balls, where it is another than the dataset's, by view.
     """
     parts: list[Json] = [float(pitch.length), float(pitch.width), [list(pair) for pair in views]]
     if positions or paint:
         parts.append(positions_to_json(positions))
     if paint:
         parts.append(dict(paint))
+    if noise:
+        parts.append({"noise": dict(noise)})
     return digest(parts)
 
 
@@ -77,7 +82,7 @@ def group_inputs_hash(group: Group, paint: Mapping[str, str] | None = None) -> s
     """``inputs_hash`` of a group at hand; ``paint`` as there, where the readings are not."""
     pairs = ((view_digest(view), station_digest(view.station)) for view in group.views)
     read = paint_to_json(group.paint) if paint is None else paint
-    return inputs_hash(group.pitch, pairs, group.positions, read)
+    return inputs_hash(group.pitch, pairs, group.positions, read, group.noise)
 
 
 def source_hash(group: Group) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 from sqlalchemy import delete, insert, select
 from sqlalchemy.orm import Session
 
+from app.store.aliases import columns_shown
 from app.store.codecs import Json, canonical, pack, parse, unpack
 from app.store.group_rows import next_id
 from app.store.models import DatasetModel
@@ -17,7 +18,7 @@ from app.store.prediction_models import EvaluationFrameModel, EvaluationModel
 _BATCH = 2000
 _MOST = 500
 """Runs of a dataset that are listed."""
-_EVALUATIONS = select(*EvaluationModel.__table__.columns, DatasetModel.name.label("dataset")).join(
+_EVALUATIONS = select(*columns_shown(EvaluationModel), DatasetModel.name.label("dataset")).join(
     DatasetModel, DatasetModel.id == EvaluationModel.dataset_id
 )
 

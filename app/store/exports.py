@@ -6,9 +6,11 @@ from sqlalchemy import false, func, not_, or_, select
 from sqlalchemy.orm import Session
 
 from app.store.listing import Listing
+from app.store.log import DEEDS
 from app.store.models import LogModel, QueueModel
 from app.store.order import Order
 
+_NO_WORD = ("freeze", "comment", *DEEDS)
 _ACCEPTED = QueueModel.status == "accepted"
 _CURRENT = not_(QueueModel.stale)
 _SOLVED = QueueModel.solved.is_(True)
@@ -18,9 +20,9 @@ _QUALIFIES = or_(QueueModel.passes.is_(True), _OVERRIDDEN)
 
 
 def newest_word(session: Session, dataset_id: int) -> str | None:
-    """Time of the newest thing that was said about a dataset; freezing it says nothing."""
+    """Time of the newest thing that was said about a dataset; freezing it, and comments, say nothing of it."""
     statement = select(func.max(LogModel.at)).where(
-        LogModel.dataset_id == dataset_id, LogModel.kind != "freeze"
+        LogModel.dataset_id == dataset_id, LogModel.kind.not_in(_NO_WORD)
     )
     return session.scalar(statement)
 

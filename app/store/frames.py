@@ -16,11 +16,12 @@ from typing import Any
 from app.child import Allowance, ChildEnded
 from app.child_pool import ChildPool, PoolTask
 from app.config import Settings
-from app.errors import ImageError, ReviewError, TooLargeError
+from app.errors import ImageError, ReviewError, StorageError, TooLargeError
 from app.soccer.group import Media
 from app.store.image_header import JPEG
 from app.store.media import cached_frame, content_type, frame_name, frame_stamp, read_frame
 from app.store.neighbours import neighbours
+from app.store.object_frames import fetch_frame, is_kept, is_stored
 
 ALLOWANCE = Allowance(memory=1024 * 2**20, processor=10.0, silence=60.0)
 """For one picture: one of 50 megapixels takes a few hundred MiB and two seconds."""
@@ -28,6 +29,10 @@ READING = Allowance(memory=2 * 2**30, processor=60.0, silence=180.0)
 """For reading what a picture shows; the first time it is compiled, which takes eleven seconds."""
 READERS = 2
 """Pictures that are read at once; apart from those that are made, so that nobody's view waits."""
+FETCHING = Allowance(memory=1024 * 2**20, processor=20.0, silence=120.0)
+"""For one frame of an object store; the time that a store may take is a setting of it."""
+FETCHERS = 2
+"""Frames that are fetched from stores at once; apart, so that a slow store delays no other frame."""
 WAITING = 64
 """Pictures that may wait; one more is told to come back."""
 REMEMBERED = 256
@@ -63,6 +68,7 @@ class Frames:
         self._settings = settings
         self._pool = ChildPool(ALLOWANCE, settings.image_workers, WAITING, "pictures")
         self._readers = ChildPool(READING, READERS, WAITING, "pictures")
+        self._fetchers = ChildPool(FETCHING, FETCHERS, WAITING, "pictures")
         self._refused: OrderedDict[str, ReviewError] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -84,6 +90,16 @@ class Frames:
         data = cached_frame(media, width, flipped, self._settings)
         return None if data is None else Picture.of(JPEG, data)
 
+    def ask_fetch(self, media: Media) -> PoolTask | None:
+        """Have a frame brought to this disk; None where it is there, and lies in no store.
+
+        Its future may have the errors of ``fetch_frame``.
+
+        Raises:
+            OverloadedError: Too many wait.
+        """
+        return self._fetch(media, bounded=True)
+
     def ask(self, media: Media, width: int | None, flipped: bool) -> PoolTask:
         """Have a picture made; its future has it, or the errors of ``read_frame``.
 
@@ -97,6 +113,9 @@ class Frames:
         found = self.cached(media, width, flipped)
         if found is not None:
             return found
+        fetching = self._fetch(media, bounded=False)
+        if fetching is not None:
+            fetching.future.result()
         made: Picture = self._submit(media, width, flipped, bounded=False).future.result()
         return made
 
@@ -114,6 +133,7 @@ class Frames:
         """End the processes."""
         self._pool.close()
         self._readers.close()
+        self._fetchers.close()
 
     def ask_of(
         self, media: Media, flipped: bool, work: Callable[..., Any], *arguments: Any
@@ -143,6 +163,17 @@ class Frames:
             OverloadedError: Too many wait.
         """
         return self._readers.submit(work, *arguments, self._settings)
+
+    def _fetch(self, media: Media, *, bounded: bool) -> PoolTask | None:
+        if not is_stored(media) or is_kept(media, self._settings):
+            return None
+
+        def explain(error: ChildEnded) -> ReviewError:
+            return StorageError(f"{frame_name(media)} {error}", hint="Try again in a moment.")
+
+        return self._fetchers.submit(
+            fetch_frame, media, self._settings, explain=explain, bounded=bounded
+        )
 
     def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
         def explain(error: ChildEnded) -> ReviewError:

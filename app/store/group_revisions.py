@@ -56,7 +56,7 @@ def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
         revision=stored.revision + 1,
         changed=at,
         inputs_hash=inputs_hash(
-            group.pitch, pairs, group.positions, codecs.paint_to_json(group.paint)
+            group.pitch, pairs, group.positions, codecs.paint_to_json(group.paint), group.noise
         ),
         group=group,
         stations=stations,
@@ -182,6 +182,8 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
             GroupModel.pitch_width,
             GroupModel.positions,
             GroupModel.paint,
+            ViewModel.key.label("view"),
+            ViewModel.noise,
             ViewModel.digest,
             StationModel.digest.label("station_digest"),
         )
@@ -192,14 +194,18 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
     )
     heads: dict[int, Any] = {}
     pairs: dict[int, list[tuple[str, str]]] = {}
+    noise: dict[int, dict[str, float]] = {}
     for row in session.execute(statement):
         heads.setdefault(row.id, row)
         pairs.setdefault(row.id, []).append((row.digest, row.station_digest))
+        if row.noise is not None:
+            noise.setdefault(row.id, {})[row.view] = row.noise
     rows = []
     for key, row in heads.items():
         positions = positions_of(row.positions)
         pitch = Pitch(row.pitch_length, row.pitch_width)
-        digest = inputs_hash(pitch, pairs[key], positions, paint_digests(row.paint))
+        paint = paint_digests(row.paint)
+        digest = inputs_hash(pitch, pairs[key], positions, paint, noise.get(key, {}))
         rows.append({"id": key, "inputs_hash": digest})
     session.execute(update(GroupModel), rows)
 

@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 
 from app.soccer.group import Group, Station, View
 from app.store import codecs
+from app.store.dialect.statements import larger
 from app.store.digest import group_inputs_hash, station_digest, view_digest
 from app.store.models import GroupModel, StationModel, ViewModel
 from app.store.view_models import UsedIdModel
@@ -46,6 +47,7 @@ def view_values(view: View, position: int) -> dict[str, Any]:
         "position": position,
         "included": view.included,
         "left_out": None if why is None else codecs.canonical(why),
+        "noise": None if view.noise == 1 else view.noise,
         "balls": codecs.canonical([codecs.ball_to_json(ball) for ball in view.balls]),
         "media_path": None if media is None else media.path,
         "media_member": None if media is None else media.member,
@@ -98,7 +100,7 @@ def _last_id(model: Any) -> Select[Any]:
     table, used_id = model.__table__, UsedIdModel.__table__
     newest = select(func.coalesce(func.max(table.c.id), 0)).scalar_subquery()
     used = select(used_id.c.id).where(used_id.c.table == table.name)
-    return select(func.max(newest, func.coalesce(used.scalar_subquery(), 0)))
+    return select(larger(newest, func.coalesce(used.scalar_subquery(), 0)))
 
 
 @dataclass

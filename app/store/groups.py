@@ -27,13 +27,14 @@ from app.store.models import (
     StationModel,
     ViewModel,
 )
+from app.store.noise import Factors, factors_of
 from app.store.paint import paint_digests, read_readings
 from app.store.stations import StoredStation, stored_station
 
 
 @dataclass(frozen=True)
 class StoredGroup:
-    """A group with its row's keeping, and its dataset's name and policy.
+    """A group with its row's keeping, and its dataset's name, policy and accepted noise.
 
     Attributes:
         view_ids: Id of each view, by key.
@@ -45,6 +46,7 @@ class StoredGroup:
     dataset_id: int
     dataset: str
     policy: Policy
+    factors: Factors
     number: int
     revision: int
     changed: str
@@ -86,7 +88,12 @@ _IDS: BindParameter[Any] = bindparam("ids", expanding=True)
 
 def _whole(*columns: Any) -> Any:
     """Groups with these columns of their views: a row a view, or one without any."""
-    head = (*_GROUP.columns, _DATASET.c.name.label("dataset"), _DATASET.c.policy)
+    head = (
+        *_GROUP.columns,
+        _DATASET.c.name.label("dataset"),
+        _DATASET.c.policy,
+        _DATASET.c.noise.label("factors"),
+    )
     return (
         select(*head, *columns, *_STATION.columns)
         .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
@@ -165,6 +172,7 @@ def _stored_group(
         dataset_id=head.dataset_id,
         dataset=head.dataset,
         policy=policy_of(head.policy),
+        factors=factors_of(head.factors),
         number=head.number,
         revision=head.revision,
         changed=head.changed,
@@ -190,6 +198,7 @@ def _view_from_row(row: Any, station: Station) -> View:
         included=row.included,
         extras=Extras() if extras is None else _extras(extras),
         left_out=None if why is None else _left_out(why),
+        noise=1.0 if row.noise is None else row.noise,
     )
 
 

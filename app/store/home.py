@@ -12,6 +12,7 @@ from pathlib import Path
 from app.config import Settings
 from app.durable import PARTIAL
 from app.errors import StorageError
+from app.store.dialect.dialect import dialect_of
 
 NETWORK_FILE_SYSTEMS = frozenset(
     {"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "fuse.sshfs", "fuse.s3fs", "9p", "glusterfs"}
@@ -21,7 +22,9 @@ FOLDERS = ("uploads", "exports", "cache", "sample", "practice", "backups")
 """What we make in a home beside the database and its side files."""
 ASIDE, RESTORING = "before-restore-", f".restore{PARTIAL}"
 """Folders of a restore: how those with what was there before begin, and where it works."""
-LOCKS = SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK = "server.lock", "database.lock", "opening.lock"
+SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK = "server.lock", "database.lock", "opening.lock"
+PRACTICE_LOCK = "practice.lock"
+LOCKS = SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK, PRACTICE_LOCK
 FOLDER_MODE, FILE_MODE = 0o700, 0o600
 
 _MOUNTS = Path("/proc/mounts")
@@ -31,7 +34,7 @@ def make_home(settings: Settings) -> Path:
     """Make the home folder, readable by its owner alone, and check where it lies.
 
     Raises:
-        StorageError: It cannot be made, or lies on a network file system.
+        StorageError: It cannot be made, or its database would lie on a network file system.
     """
     try:
         settings.home.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
@@ -41,7 +44,8 @@ def make_home(settings: Settings) -> Path:
             hint="Set TOUCHLINE_HOME to a folder that this user may write to.",
         ) from error
     kind = file_system(settings.home)
-    if kind in NETWORK_FILE_SYSTEMS:
+    # A database on a server lets several machines share the files.
+    if kind in NETWORK_FILE_SYSTEMS and dialect_of(settings).is_file:
         raise StorageError(
             f"the home folder lies on a network file system ({kind})",
             hint="Set TOUCHLINE_HOME to a folder on a local disk.",

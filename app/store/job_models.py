@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sqlalchemy import Index, LargeBinary
+from sqlalchemy import Index, LargeBinary, false
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.store.models import Base
@@ -12,7 +12,7 @@ class JobModel(Base):
     """A piece of background work and how far it is.
 
     ``tries`` counts the times that it was begun and neither ended nor was stopped in good order.
-    ``request`` (JSON) is what it was asked for, enough to start it again where its kind can be;
+    ``ending``: somebody wants the running one to end. ``request`` (JSON) is what it was asked for, enough to start it again where its kind can be;
     ``result`` and ``problem`` (JSON) are what came of it. A dataset may be gone before its jobs.
     """
 
@@ -35,6 +35,7 @@ class JobModel(Base):
     ended: Mapped[str | None]
     actor: Mapped[str]
     tries: Mapped[int] = mapped_column(server_default="0")
+    ending: Mapped[bool] = mapped_column(server_default=false())
 
 
 class AnswerModel(Base):

@@ -11,11 +11,14 @@ from sqlalchemy import case, delete, func, insert, select, update
 from sqlalchemy.orm import Session
 
 from app.finite import finite
+from app.store.aliases import columns_shown
 from app.store.clock import now
 from app.store.codecs import Json, canonical, parse
+from app.store.dialect.statements import member
 from app.store.group_rows import next_id
 from app.store.job_models import JobModel
 from app.store.models import DatasetModel
+from app.store.sight import EVERYTHING, Sight
 
 WAITING, RUNNING = "waiting", "running"
 DONE, FAILED, CANCELLED = "done", "failed", "cancelled"
@@ -38,6 +41,7 @@ class Job:
         request: What it was asked for.
         problem: ``{"detail", "hint", "pointer"}`` of what failed.
         tries: How often it was begun and neither ended nor was stopped in good order.
+        ending: Somebody wants the running one to end.
     """
 
     id: int
@@ -57,6 +61,7 @@ class Job:
     ended: str | None
     actor: str
     tries: int
+    ending: bool = False
 
 
 @dataclass(frozen=True)
@@ -114,6 +119,7 @@ def read_jobs(
     states: Sequence[str] = (),
     before: int | None = None,
     limit: int = 50,
+    sight: Sight = EVERYTHING,
 ) -> list[Job]:
     """Jobs, the newest first.
 
@@ -124,10 +130,14 @@ def read_jobs(
         states: In these states alone.
         before: Those older than the job of this id.
         limit: How many at most.
+        sight: Those that somebody sees.
     """
     statement = _SELECT.order_by(JobModel.id.desc()).limit(limit)
     if dataset_id is not None:
         statement = statement.where(JobModel.dataset_id == dataset_id)
+    seen = sight.condition(JobModel.dataset_id, JobModel.actor)
+    if seen is not None:
+        statement = statement.where(seen)
     if kinds:
         statement = statement.where(JobModel.kind.in_(kinds))
     if states:
@@ -135,6 +145,27 @@ def read_jobs(
     if before is not None:
         statement = statement.where(JobModel.id < before)
     return [_job(row) for row in session.execute(statement)]
+
+
+def job_ids(session: Session, dataset_id: int, kind: str) -> list[int]:
+    """Ids of all jobs of a kind in a dataset."""
+    mine = (JobModel.dataset_id == dataset_id, JobModel.kind == kind)
+    return list(session.scalars(select(JobModel.id).where(*mine).order_by(JobModel.id)))
+
+
+def jobs_of(
+    session: Session, dataset_id: int, kinds: Sequence[str], states: Sequence[str]
+) -> list[int]:
+    """Ids of a dataset's jobs in some states, of some kinds or, without any, of all."""
+    found = select(JobModel.id).where(JobModel.dataset_id == dataset_id, JobModel.state.in_(states))
+    if kinds:
+        found = found.where(JobModel.kind.in_(kinds))
+    return list(session.scalars(found.order_by(JobModel.id)))
+
+
+def is_asked_to_end(session: Session, job_id: int) -> bool:
+    """Whether somebody wants a running job to end."""
+    return bool(session.scalar(select(JobModel.ending).where(JobModel.id == job_id)))
 
 
 def count_jobs(session: Session) -> dict[tuple[str, str], int]:
@@ -190,9 +221,9 @@ def _job(row: Any) -> Job:
 _TO_BE = case(
     (
         (JobModel.kind == "import") & JobModel.dataset_id.is_(None),
-        func.json_extract(JobModel.request, "$.dataset"),
+        member(JobModel.request, "dataset"),
     )
 )
 _SELECT = select(
-    *JobModel.__table__.columns, func.coalesce(DatasetModel.name, _TO_BE).label("dataset")
+    *columns_shown(JobModel), func.coalesce(DatasetModel.name, _TO_BE).label("dataset")
 ).outerjoin(DatasetModel, DatasetModel.id == JobModel.dataset_id)

@@ -6,31 +6,55 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Integer, Select, cast, func, select
+from sqlalchemy import Column, ColumnElement, Select, case, func, select
 from sqlalchemy.orm import Session
+from sqlalchemy.sql.visitors import iterate
 
 from app.store.conditions import Condition
-from app.store.models import QueueModel
-from app.store.order import Key, Order
+from app.store.models import QUEUE_SCANNED, QueueModel
+from app.store.order import SORTED, Key, Order
 from app.store.policies import judged_since
+
+_TABLE = QueueModel.__table__
+_FILE_ORDER = "queue_number"
+"""Groups lie in the file as they are numbered."""
+_SCAN = "queue_scanned"
+"""Most columns of every group in the same order, without the rest of their rows."""
+_FEW = 10
+"""Of so many groups that match, one page is looked for in order; of less, in all of them."""
 
 
 @dataclass(frozen=True)
 class Listing:
-    """The groups of a dataset that fulfil all conditions, as a session sees them."""
+    """The groups of a dataset that fulfil all conditions, as a session sees them.
+
+    What an index sorts by is read from there. What no index holds is read in the order in which
+    the rows lie in the file: to fetch them one by one as an index has them takes ten times as long.
+    """
 
     session: Session
     dataset_id: int
-    conditions: Iterable[Condition] = ()
+    conditions: Sequence[Condition] = ()
 
     def count(self) -> int:
         """How many groups there are."""
-        statement = select(func.count()).select_from(QueueModel).where(*self._where)
-        return self.session.scalar(statement) or 0
+        found: int | None = self.session.scalar(self._all(select(func.count())))
+        return found or 0
+
+    def place(self, order: Order, keys: Sequence[Key], group_id: int) -> tuple[int | None, int]:
+        """How many groups come before some keys, None where the group is not here; and how many
+        there are."""
+        here = func.sum(case((QueueModel.group_id == group_id, 1), else_=0))
+        before = func.sum(case((order.before(keys), 1), else_=0))
+        statement = self._all(select(func.count(), here, before), order)
+        total, found, index = self.session.execute(statement).one()
+        return (index if found else None), total
 
     def columns(self, names: Iterable[str], *, by_number: bool = False) -> Sequence[Any]:
         """Some columns of each group."""
-        statement = _columns(names).where(*self._where)
+        names = list(names)
+        asked = _names(self.conditions) | set(names)
+        statement = _by(_through(asked), _columns(names).where(*self._where))
         if by_number:
             statement = statement.order_by(QueueModel.number)
         return self.session.execute(statement).all()
@@ -55,17 +79,19 @@ class Listing:
         if count <= 0:
             return []
         behind = total - start - count
+        ids = self._page(order, min(start, behind) + count, total)
         if start <= behind:
-            return self._scalars(self._ids.order_by(*order.ascending).offset(start).limit(count))
-        backwards = self._ids.order_by(*order.backwards).offset(behind).limit(count)
+            return self._scalars(ids.order_by(*order.ascending).offset(start).limit(count))
+        backwards = ids.order_by(*order.backwards).offset(behind).limit(count)
         return self._scalars(backwards)[::-1]
 
     def ids_around(
-        self, order: Order, keys: Sequence[Key], limit: int
+        self, order: Order, keys: Sequence[Key], limit: int, total: int
     ) -> tuple[list[int], list[int]]:
-        """Ids just before some keys and just after, the nearest first."""
-        before = self._ids.where(order.before(keys)).order_by(*order.backwards).limit(limit)
-        after = self._ids.where(order.after(keys)).order_by(*order.ascending).limit(limit)
+        """Ids just before some keys and just after, the nearest first, out of ``total``."""
+        ids = self._page(order, limit, total)
+        before = ids.where(order.before(keys)).order_by(*order.backwards).limit(limit)
+        after = ids.where(order.after(keys)).order_by(*order.ascending).limit(limit)
         return self._scalars(before), self._scalars(after)
 
     @property
@@ -76,8 +102,48 @@ class Listing:
     def _ids(self) -> Select[int]:
         return select(QueueModel.group_id).where(*self._where)
 
+    def _all(self, statement: Any, order: Order | None = None) -> Select[Any]:
+        """The statement over all groups."""
+        asked = statement.select_from(QueueModel).where(*self._where)
+        names = _names(self.conditions) | (set() if order is None else _names(order.keys))
+        return asked if _is_sorted(names) else _by(_through(names), asked)
+
+    def _page(self, order: Order, reach: int, total: int) -> Select[int]:
+        """Ids of which ``reach`` are read in order, out of ``total``."""
+        few = self.conditions and reach * _FEW > total
+        if few:
+            return _by(_through(_names(self.conditions) | _names(order.keys)), self._ids)
+        return _by(order.index, self._ids)
+
     def _scalars(self, statement: Select[int]) -> list[int]:
         return list(self.session.scalars(statement))
+
+
+def _names(expressions: Iterable[ColumnElement[Any]]) -> set[str]:
+    """Columns of the queue that expressions read."""
+    return {
+        part.name
+        for expression in expressions
+        for part in iterate(expression)
+        if isinstance(part, Column) and part.table is _TABLE
+    }
+
+
+def _is_sorted(names: set[str]) -> bool:
+    """Whether one index holds all of these columns."""
+    return names <= SORTED and len(names - {"number"}) <= 1
+
+
+def _through(names: set[str]) -> str:
+    """The index through which all groups are read by their number, for these columns."""
+    return _SCAN if names <= {*QUEUE_SCANNED, "dataset_id", "group_id"} else _FILE_ORDER
+
+
+def _by(index: str | None, statement: Select[Any]) -> Select[Any]:
+    """The statement by an index, where there is one; SQLite would choose by what it guesses."""
+    if index is None:
+        return statement
+    return statement.with_hint(QueueModel, f"INDEXED BY {index}", "sqlite")
 
 
 def read_rows(session: Session, ids: Sequence[int], order: Order) -> Sequence[Any]:
@@ -94,6 +160,15 @@ def read_columns(
     return session.execute(statement.order_by(QueueModel.number)).all()
 
 
+def columns_from(
+    session: Session, dataset_id: int, names: Iterable[str], after: int, limit: int
+) -> Sequence[Any]:
+    """Some columns of the groups of a dataset by id, from the one after an id on."""
+    mine = (QueueModel.dataset_id == dataset_id, QueueModel.group_id > after)
+    statement = _columns(names).where(*mine).order_by(QueueModel.group_id).limit(limit)
+    return session.execute(statement).all()
+
+
 def find_place(session: Session, group_id: int, order: Order) -> tuple[int, list[Key]] | None:
     """The dataset of a group and its keys in an order; None where there is no such group."""
     statement = select(QueueModel.dataset_id, *order.keys).where(QueueModel.group_id == group_id)
@@ -108,7 +183,7 @@ def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[Any]:
             QueueModel.dataset_id,
             QueueModel.status,
             func.count().label("groups"),
-            func.sum(cast(QueueModel.solved, Integer)).label("solved"),
+            func.sum(case((QueueModel.solved, 1), else_=0)).label("solved"),
         )
         .where(QueueModel.dataset_id.in_(dataset_ids))
         .group_by(QueueModel.dataset_id, QueueModel.status)

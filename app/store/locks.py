@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from app.config import Settings
 from app.errors import StorageError
-from app.store.home import DATABASE_LOCK, OPENING_LOCK, SERVER_LOCK, make_home, refused
+from app.store.home import (
+    DATABASE_LOCK,
+    OPENING_LOCK,
+    PRACTICE_LOCK,
+    SERVER_LOCK,
+    make_home,
+    refused,
+)
+
+AGAIN_S = 0.1
+"""Between two looks whether a lock is free."""
 
 
 class DatabaseLock:
@@ -64,8 +75,8 @@ def database_alone(settings: Settings, why: str) -> Iterator[None]:
 
 
 @contextmanager
-def server_lock(settings: Settings) -> Iterator[None]:
-    """Hold the home for one server; the file tells its process id.
+def server_lock(settings: Settings, *, shared: bool = False) -> Iterator[None]:
+    """Hold the home for one server, or ``shared`` for several; the file tells a process id.
 
     Raises:
         StorageError: Another server holds it.
@@ -73,7 +84,8 @@ def server_lock(settings: Settings) -> Iterator[None]:
     handle = _open(make_home(settings) / SERVER_LOCK)
     try:
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+            fcntl.flock(handle, kind | fcntl.LOCK_NB)
         except BlockingIOError as error:
             holder = os.pread(handle, 32, 0).decode(errors="replace").strip()
             process = f" (process {holder})" if holder.isdigit() else ""
@@ -83,6 +95,23 @@ def server_lock(settings: Settings) -> Iterator[None]:
             ) from error
         os.ftruncate(handle, 0)
         os.pwrite(handle, f"{os.getpid()}\n".encode(), 0)
+        yield
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def practice_lock(settings: Settings, waiting: Callable[[], None]) -> Iterator[None]:
+    """Hold the practice groups while they are made; ``waiting`` is called while others make them."""
+    handle = _open(make_home(settings) / PRACTICE_LOCK)
+    try:
+        while True:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                waiting()
+                time.sleep(AGAIN_S)
         yield
     finally:
         os.close(handle)

@@ -18,6 +18,8 @@ from app.store.models import LogModel
 GENESIS = "0" * 64
 """The hash before the first row."""
 
+DEEDS = ("person", "job", "deed")
+"""Kinds of entries that say who did something, and change nothing that was said."""
 LOG_END = "touchline_log_end"
 """Where a session notes id and hash of the last entry that it wrote."""
 _BATCH = 500
@@ -29,7 +31,8 @@ class Entry:
 
     ``kind`` is ``dataset``, ``policy``, ``station``, ``import``, ``camera``, ``spare``,
     ``edit``, ``undo``, ``redo``, the same after ``station_``, ``pitch``, ``position``,
-    ``verdict``, or ``freeze``; ``body`` is JSON that suffices to do it again.
+    ``verdict``, ``comment``, ``freeze``, ``person``,
+    ``job``, or ``deed``; ``body`` is JSON that suffices to do it again.
     """
 
     kind: str
@@ -73,6 +76,8 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
 
 _LOG = cast(Table, LogModel.__table__)
 _LAST = select(_LOG.c.id, _LOG.c.hash).order_by(_LOG.c.id.desc()).limit(1)
+_CHANGES = LogModel.kind.not_in(("verdict", "comment"))
+"""Entries that change what a group is."""
 _STEPS = (
     select(_LOG.c.group_id, _LOG.c.id, _LOG.c.kind)
     .where(
@@ -81,11 +86,25 @@ _STEPS = (
     )
     .order_by(_LOG.c.id)
 )
+_NEWEST_STEPS = (
+    select(_LOG.c.id, _LOG.c.kind)
+    .where(
+        _LOG.c.group_id == bindparam("group"), _LOG.c.kind.in_(bindparam("kinds", expanding=True))
+    )
+    .order_by(_LOG.c.id.desc())
+    .limit(bindparam("most"))
+)
 
 
 def group_steps(session: Session, group_ids: Sequence[int], kinds: Iterable[str]) -> Sequence[Any]:
     """Rows (group_id, id, kind) of the entries of some kinds about groups, in order."""
     return session.execute(_STEPS, {"groups": list(group_ids), "kinds": list(kinds)}).all()
+
+
+def newest_steps(session: Session, group_id: int, kinds: Iterable[str], most: int) -> Sequence[Any]:
+    """Rows (id, kind) of the newest entries of some kinds about a group, the newest first."""
+    asked = {"group": group_id, "kinds": list(kinds), "most": most}
+    return session.execute(_NEWEST_STEPS, asked).all()
 
 
 def station_steps(session: Session, station_id: int, kinds: Iterable[str]) -> Sequence[Any]:
@@ -103,10 +122,23 @@ def newest_entry(session: Session) -> int:
     return session.scalar(select(func.max(LogModel.id))) or 0
 
 
+def entry_hash(session: Session, log_id: int) -> str | None:
+    """Hash of an entry; None where there is no such entry."""
+    found: str | None = session.scalar(select(LogModel.hash).where(LogModel.id == log_id))
+    return found
+
+
 def group_entries(session: Session, group_id: int, *, verdicts: bool = True) -> list[LogEntry]:
-    """Everything that was said about a group, oldest first; without its verdicts, if need be."""
-    where = [] if verdicts else [LogModel.kind != "verdict"]
+    """Everything that was said about a group, oldest first; without verdicts and comments, if need be."""
+    where = [] if verdicts else [_CHANGES]
     return list(read_log(session, LogModel.group_id == group_id, *where))
+
+
+def read_entries_of(
+    session: Session, group_ids: Sequence[int], kinds: Iterable[str]
+) -> Iterator[LogEntry]:
+    """Entries of some kinds about groups, oldest first."""
+    return read_log(session, LogModel.group_id.in_(group_ids), LogModel.kind.in_(list(kinds)))
 
 
 def station_entries(session: Session, station_id: int) -> list[LogEntry]:
@@ -116,10 +148,10 @@ def station_entries(session: Session, station_id: int) -> list[LogEntry]:
 
 
 def groups_with_past(session: Session, group_ids: Sequence[int]) -> set[int]:
-    """Those of the groups of which more was said than their first import, but for verdicts."""
+    """Those of the groups of which more was said than their first import, but for verdicts and comments."""
     statement = (
         select(LogModel.group_id)
-        .where(LogModel.group_id.in_(group_ids), LogModel.kind != "verdict")
+        .where(LogModel.group_id.in_(group_ids), _CHANGES)
         .group_by(LogModel.group_id)
         .having(func.count() > 1)
     )

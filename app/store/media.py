@@ -16,9 +16,11 @@ import numpy.typing as npt
 from app.config import Settings
 from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
+from app.object_store.address import unseal
 from app.soccer.group import Media
 from app.store.archives import Archives
 from app.store.image_header import ImageHeader, check_size, read_header
+from app.store.object_frames import is_stored, read_object
 from app.store.video import open_video
 
 JPEG_QUALITY = 88
@@ -45,7 +47,7 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
         ImageError: It is no image of these kinds, or damaged.
         TooLargeError: It is larger than the limits, in bytes or in declared pixels.
     """
-    _require_contained(Path(media.path), settings)
+    _require_contained(media, settings)
     if media.frame is None and width is None and not flipped:
         return _checked(_source(media, settings), settings, frame_name(media))
     found = cached_frame(media, width, flipped, settings)
@@ -75,7 +77,7 @@ def read_pixels(
     Raises:
         NotFoundError, ImageError, TooLargeError: As ``read_frame`` does.
     """
-    _require_contained(Path(media.path), settings)
+    _require_contained(media, settings)
     if media.frame is not None:
         picture = _video_frame(Path(media.path), media.frame, settings)
         digest = _digest(np.ascontiguousarray(picture).tobytes())
@@ -109,9 +111,13 @@ def cached_frame(
 def frame_stamp(media: Media) -> str:
     """Name of a frame by content: another file under the same path has another time or size.
 
+    The address of one in an object store says its content itself.
+
     Raises:
         NotFoundError: The file is not there.
     """
+    if is_stored(media):
+        return repr((media.path, media.member))
     status = _stat(Path(media.path))
     place = (media.path, media.member, media.frame)
     return repr((*place, status.st_ino, status.st_mtime_ns, status.st_size))
@@ -128,14 +134,19 @@ def content_type(data: bytes) -> str:
 
 def frame_name(media: Media) -> str:
     """How a complaint calls a frame: by its file and its place in it, without the folder."""
-    file = Path(media.path).name
+    file = Path(unseal(media.path)[0]).name
     if media.member is not None:
         return f"frame {media.member} of {file}"
     return f"frame {file}" if media.frame is None else f"frame {media.frame} of {file}"
 
 
 def media_facts(media: Media) -> dict[str, int]:
-    """Size in bytes, and CRC-32 where an archive knows it; empty when the file is gone."""
+    """Size in bytes, and CRC-32 where an archive knows it; empty when the file is gone.
+
+    Empty, too, of a frame in an object store: it is known by its address.
+    """
+    if is_stored(media):
+        return {}
     try:
         if media.member is None:
             return {"bytes": _stat(Path(media.path)).st_size}
@@ -167,6 +178,8 @@ def _decode(media: Media, settings: Settings) -> Any:
 
 
 def _source(media: Media, settings: Settings) -> bytes:
+    if is_stored(media):
+        return read_object(media, settings)
     path = Path(media.path)
     if media.member is not None:
         return _ARCHIVES.read(path, media.member, settings.max_file_bytes)
@@ -193,7 +206,7 @@ def decode_frame(media: Media, flipped: bool, settings: Settings) -> npt.NDArray
         ImageError: It is no image of these kinds, or damaged.
         TooLargeError: It is larger than the limits, in bytes or in declared pixels.
     """
-    _require_contained(Path(media.path), settings)
+    _require_contained(media, settings)
     return _as_annotated(_decode(media, settings), flipped)
 
 
@@ -289,8 +302,11 @@ def _stat(path: Path) -> os.stat_result:
     return status
 
 
-def _require_contained(path: Path, settings: Settings) -> None:
+def _require_contained(media: Media, settings: Settings) -> None:
     """Refuse a file that a folder on its way, swapped for a link, leads out of its root."""
+    if is_stored(media):
+        return
+    path = Path(media.path)
     for root in (settings.home, *settings.import_folders):
         if not path.is_relative_to(root.absolute()):
             continue

@@ -12,6 +12,7 @@ from app.errors import StorageError
 from app.folders import own_folder
 from app.store.anchor import renew_anchor, require_own_database
 from app.store.backup import write_backup
+from app.store.dialect.dialect import Dialect, dialect_of
 from app.store.engine import WRITE, make_engine, reported
 from app.store.first_look import require_sound
 from app.store.home import make_file
@@ -36,11 +37,27 @@ KNOWN_REVISIONS = (
     "0017",
     "0018",
     "0019",
+    "0020",
+    "0021",
+    "0022",
+    "0023",
+    "0024",
+    "0025",
+    "0026",
+    "0027",
+    "0028",
+    "0029",
+    "0030",
+    "0031",
+    "0032",
+    "0033",
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]
 """The revision that this version works with."""
 COPY = "before-schema-{}.zip"
+UNFINISHED = "transfer"
+"""The revision of a database into which another one is being copied: nothing else opens it."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +66,8 @@ class Migrated:
 
     Attributes:
         revision: The schema's revision now.
-        copy: The backup that was taken before; None where nothing had to be changed.
+        copy: The backup that was taken before; None where nothing had to be changed, and of a
+            database on a server, whose backups are the server's (``pg_dump``).
     """
 
     revision: str
@@ -79,7 +97,7 @@ def migrate(settings: Settings) -> Migrated:
     """
     lock = DatabaseLock(settings)
     try:
-        if lock.alone:
+        if lock.alone and dialect_of(settings).is_file:
             require_sound(settings)
         return bring_up_to_date(settings, alone=lock.alone)
     finally:
@@ -88,7 +106,9 @@ def migrate(settings: Settings) -> Migrated:
 
 def bring_up_to_date(settings: Settings, *, alone: bool) -> Migrated:
     """The same for who holds the database's lock; ``alone``: and nobody else has it open."""
-    make_file(settings.database_file)
+    dialect = dialect_of(settings)
+    if dialect.is_file:
+        make_file(settings.database_file)
     engine = make_engine(settings)
     copy = None
     try:
@@ -103,10 +123,11 @@ def bring_up_to_date(settings: Settings, *, alone: bool) -> Migrated:
                         " changed meanwhile",
                         hint="Stop it, then run touchline migrate.",
                     )
-                copy = _backups(settings) / COPY.format(SCHEMA_REVISION)
-                write_backup(settings, copy, replace=True)
+                if dialect.is_file:
+                    copy = _backups(settings) / COPY.format(SCHEMA_REVISION)
+                    write_backup(settings, copy, replace=True)
             if revision != SCHEMA_REVISION:
-                _run(engine)
+                make_schema(engine, dialect, new=revision is None)
             renew_anchor(engine, settings, alone=alone)
     finally:
         engine.dispose()
@@ -115,14 +136,18 @@ def bring_up_to_date(settings: Settings, *, alone: bool) -> Migrated:
     return Migrated(SCHEMA_REVISION, copy)
 
 
-def _run(engine: Engine) -> None:
+def make_schema(engine: Engine, dialect: Dialect, *, new: bool) -> None:
+    """Run what is missing of the migrations, in one transaction; ``new``: of an empty database."""
     # Alembic is slow to import and seldom needed.
     from alembic import command
     from alembic.config import Config
 
     config = Config()
     config.set_main_option("script_location", str(migrations_folder()).replace("%", "%%"))
-    with engine.execution_options(**WRITE).begin() as connection:
+    with (
+        engine.execution_options(**WRITE).begin() as connection,
+        dialect.migrating(connection, new=new),
+    ):
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
 
@@ -160,6 +185,11 @@ def _refuse_newer(revision: str | None, settings: Settings) -> None:
 
 def newer_schema(revision: str, settings: Settings) -> StorageError:
     """The refusal of a database that a newer version made, with the way back."""
+    if revision == UNFINISHED:
+        return StorageError(
+            "a transfer into this database has not come to its end",
+            hint="Run touchline transfer again, with what it was given.",
+        )
     copy = settings.home / "backups" / COPY.format(revision)
     back = f" To go back to the state before its migration, run touchline restore {copy}."
     return StorageError(

@@ -11,13 +11,50 @@ from __future__ import annotations
 from sqlalchemy import ForeignKey, Index, LargeBinary, UniqueConstraint, text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
+QUEUE_NUMBERS = (
+    "passes",
+    "value",
+    "margin",
+    "min_jac",
+    "agreement",
+    "error_px",
+    "error_percent",
+    "sigma_m",
+    "parallax_degrees",
+    "size_ratio",
+    "height_m",
+    "distance_m",
+)
+"""Columns of the queue with an index of their own."""
+QUEUE_SCANNED = (
+    "number",
+    "status",
+    "stale",
+    "fixed",
+    "solved",
+    "views",
+    "pictures",
+    *QUEUE_NUMBERS,
+    "box_px",
+    "x_m",
+    "y_m",
+    "gate",
+    "split",
+    "findings",
+)
+"""Columns of the queue that one index holds, in its order: what is asked of every group of a
+dataset is read from there, a third of what the rows take."""
+
 
 class Base(DeclarativeBase):
     """Base of all tables."""
 
 
 class DatasetModel(Base):
-    """A dataset and the policy that judges it (canonical JSON)."""
+    """A dataset and the policy that judges it (canonical JSON).
+
+    ``noise`` (JSON) is that of the balls of cameras and people unlike the dataset's, as accepted.
+    """
 
     __tablename__ = "dataset"
 
@@ -26,6 +63,7 @@ class DatasetModel(Base):
     created: Mapped[str]
     policy: Mapped[str]
     policy_hash: Mapped[str]
+    noise: Mapped[str | None]
 
 
 class StationModel(Base):
@@ -99,7 +137,8 @@ class GroupModel(Base):
 class ViewModel(Base):
     """One image of a group: balls (JSON), media, and extras (compressed JSON).
 
-    ``left_out`` (JSON) is why a person left it out, where they said so.
+    ``left_out`` (JSON) is why a person left it out, where they said so. ``noise`` is that of its
+    ball beside the dataset's, where it is another.
     """
 
     __tablename__ = "view"
@@ -115,6 +154,7 @@ class ViewModel(Base):
     key: Mapped[str]
     included: Mapped[bool]
     left_out: Mapped[str | None]
+    noise: Mapped[float | None]
     balls: Mapped[str]
     media_path: Mapped[str | None]
     media_member: Mapped[str | None]
@@ -271,6 +311,9 @@ class QueueModel(Base):
     __table_args__ = (
         Index("queue_number", "dataset_id", "number"),
         Index("queue_status", "dataset_id", "status", "number"),
+        Index("queue_scanned", "dataset_id", *QUEUE_SCANNED),
+        # Sorted by any of them, a page of a million groups is read from where it begins.
+        *(Index(f"queue_{name}", "dataset_id", name, "number") for name in QUEUE_NUMBERS),
     )
 
     group_id: Mapped[int] = mapped_column(ForeignKey("groups.id"), primary_key=True)

@@ -16,6 +16,7 @@ import cv2
 from app.errors import ImageError, NotFoundError, StorageError
 from app.soccer.group import Media
 from app.store.media import has_member
+from app.store.object_frames import is_stored
 from app.store.video import open_video
 
 FARTHEST = 5
@@ -28,6 +29,8 @@ _LAST_NUMBER = re.compile(r"([0-9]+)[^0-9]*")
 
 def counts_time(media: Media, group: str, static: bool) -> bool:
     """Whether the name of a frame counts time, so that there may be neighbours; opens nothing."""
+    if is_stored(media):
+        return False
     return media.frame is not None or _numbered(media, group, static) is not None
 
 
@@ -38,7 +41,11 @@ def neighbours(media: Media, group: str, static: bool) -> dict[int, Media]:
         media: Where the view's own frame lies.
         group: Key of the view's group, which is the number of its frame for static cameras.
         static: Whether the camera stands still, so that its files are numbered by frames.
+
+    None of a frame in an object store, which would have to be asked for each.
     """
+    if is_stored(media):
+        return {}
     try:
         if media.frame is not None:
             return dict(_of_video(media, media.frame))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Label, and_, case, func, or_
+from sqlalchemy import ColumnElement, Label, and_, case, false, func, or_
 
 from app.soccer.solution import GATES
-from app.store.models import QueueModel
+from app.store.models import QUEUE_NUMBERS, QueueModel
 
-Key = int | float | str
-"""What a group is sorted by."""
+Key = int | float | str | None
+"""What a group is sorted by; None where it has no such number."""
 
 _COMPUTED: Mapping[str, ColumnElement[Any]] = {
     "findings": func.length(QueueModel.findings)
@@ -21,49 +22,83 @@ _COMPUTED: Mapping[str, ColumnElement[Any]] = {
     ),
 }
 """Findings are sorted by how many kinds there are, gates by the order in which they are judged."""
-_TEXTS = frozenset({"status", "split", "reviewer", "label"})
-_PRESENT = frozenset({"number", "changed"})
-"""Columns that every row has, sorted by as they are."""
+SORTED = frozenset(("number", "status", *QUEUE_NUMBERS))
+"""Columns by which an index sorts the groups of a dataset."""
+_PRESENT = frozenset({"number", "changed", "views", "status", "split", "label"})
+"""Columns that every row has."""
+
+
+@dataclass(frozen=True)
+class _SortKey:
+    """One column of an order; rows without it come last either way."""
+
+    column: Label[Any]
+    descending: bool
+    present: bool
+
+    def sorted(self, *, backwards: bool) -> ColumnElement[Any]:
+        """The ORDER BY of it. NULLS LAST lets an index of the plain column serve both ways."""
+        sort = self.column.desc() if self.descending != backwards else self.column.asc()
+        if self.present:
+            return sort
+        return sort.nulls_first() if backwards else sort.nulls_last()
+
+    def equals(self, value: Key) -> ColumnElement[bool]:
+        """Whether a row has this value."""
+        return self.column.element.is_(None) if value is None else self.column.element == value
+
+    def beyond(self, value: Key, *, forward: bool) -> ColumnElement[bool]:
+        """Whether a row's value comes after this one, or before it."""
+        column = self.column.element
+        if value is None:
+            return false() if forward else column.is_not(None)
+        further = column < value if self.descending == forward else column > value
+        return further if self.present or not forward else or_(further, column.is_(None))
+
+
+def _value(column: str | ColumnElement[Any]) -> Any:
+    if not isinstance(column, str):
+        return column
+    return _COMPUTED.get(column, getattr(QueueModel, column))
 
 
 class Order:
-    """A total order of groups: keys without NULL, the number last, so that no two are equal.
+    """A total order of groups: the number comes last, so that no two are equal.
 
-    Groups without the number that is sorted by come last either way.
+    Groups without what is sorted by come last either way.
 
     Args:
-        column: Name of a column of the queue.
+        column: Name of a column of the queue, or what takes the place of one.
         descending: The largest first.
     """
 
-    def __init__(self, column: str, descending: bool = False):
-        value = _COMPUTED.get(column, getattr(QueueModel, column))
-        keys: list[tuple[Any, bool]] = []
-        if column in _PRESENT:
-            keys.append((value, descending))
-        else:
-            keys.append((case((value.is_(None), 1), else_=0), False))
-            keys.append((func.coalesce(value, "" if column in _TEXTS else 0.0), descending))
-        if column != "number":
-            keys.append((QueueModel.number, False))
-        self._keys: list[tuple[Label[Any], bool]] = [
-            (key.label(f"key{place}"), down) for place, (key, down) in enumerate(keys)
+    def __init__(self, column: str | ColumnElement[Any], descending: bool = False):
+        name = column if isinstance(column, str) else ""
+        keys = [(_value(column), descending, name in _PRESENT)]
+        if name != "number":
+            keys.append((QueueModel.number, False, True))
+        self._keys = [
+            _SortKey(key.label(f"key{place}"), down, present)
+            for place, (key, down, present) in enumerate(keys)
         ]
+
+        self.index = f"queue_{name}" if name in SORTED else None
+        """Name of the index that has this order; None: there is none."""
 
     @property
     def keys(self) -> list[Label[Any]]:
         """The keys as columns."""
-        return [key for key, _ in self._keys]
+        return [key.column for key in self._keys]
 
     @property
     def ascending(self) -> list[ColumnElement[Any]]:
         """ORDER BY of the order."""
-        return [key.desc() if down else key.asc() for key, down in self._keys]
+        return [key.sorted(backwards=False) for key in self._keys]
 
     @property
     def backwards(self) -> list[ColumnElement[Any]]:
         """ORDER BY of the reverse."""
-        return [key.asc() if down else key.desc() for key, down in self._keys]
+        return [key.sorted(backwards=True) for key in self._keys]
 
     def keys_of(self, row: Any) -> list[Key]:
         """The keys of a row that was read with them."""
@@ -79,12 +114,8 @@ class Order:
 
     def _beyond(self, values: Sequence[Key], forward: bool) -> ColumnElement[bool]:
         alternatives = []
-        for place, (labelled, down) in enumerate(self._keys):
-            equal = [
-                key.element == value
-                for (key, _), value in zip(self._keys[:place], values, strict=False)
-            ]
-            key, value = labelled.element, values[place]
-            beyond = key < value if down == forward else key > value
-            alternatives.append(and_(*equal, beyond))
+        for place, (key, value) in enumerate(zip(self._keys, values, strict=True)):
+            pairs = zip(self._keys[:place], values, strict=False)
+            equal = [before.equals(other) for before, other in pairs]
+            alternatives.append(and_(*equal, key.beyond(value, forward=forward)))
         return or_(*alternatives)

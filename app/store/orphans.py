@@ -7,22 +7,20 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from sqlalchemy import select, text
+from sqlalchemy import delete, select, true
 from sqlalchemy.orm import Session
 
 from app.config import Settings
-from app.finite import json_text
+from app.object_store.address import is_address
+from app.store.dialect.statements import items_of, texts_in
 from app.store.leftovers import DAY, last_written
-from app.store.models import QueueModel, ViewModel
+from app.store.models import CalibrationModel, QueueModel, SolutionModel, ViewModel
 from app.store.uploads import list_uploads
 
-_NAMED = "SELECT json_each.value FROM solution, json_each(solution.calibrations)"
-_SPARE = text(f"SELECT key FROM calibration WHERE key NOT IN ({_NAMED})")
-_ASKED = "SELECT value FROM json_each(:keys)"
-_DELETE = text(
-    f"DELETE FROM calibration WHERE key IN ({_ASKED})"
-    f" AND key NOT IN ({_NAMED} WHERE json_each.value IN ({_ASKED})) RETURNING key"
-)
+_KEY = CalibrationModel.key
+_items = items_of(SolutionModel.calibrations)
+_NAMED = select(_items.c.value).select_from(SolutionModel).join(_items, true())
+_SPARE = select(_KEY).where(_KEY.not_in(_NAMED))
 
 
 def spare_calibrations(session: Session) -> list[str]:
@@ -40,7 +38,10 @@ def delete_calibrations(session: Session, keys: Sequence[str]) -> int:
     """
     if _has_unsolved(session):
         return 0
-    return len(session.scalars(_DELETE, {"keys": json_text(keys)}).all())
+    named = _NAMED.where(_items.c.value.in_(texts_in(keys)))
+    asked = (_KEY.in_(texts_in(keys)), _KEY.not_in(named))
+    gone = delete(CalibrationModel).where(*asked).returning(_KEY)
+    return len(session.scalars(gone).all())
 
 
 def _has_unsolved(session: Session) -> bool:
@@ -52,7 +53,7 @@ def _has_unsolved(session: Session) -> bool:
 def unread_uploads(session: Session, settings: Settings) -> list[str]:
     """Ids of uploads that are kept for their frames, though no view has its frame there."""
     statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
-    paths = [Path(path) for path in session.scalars(statement) if path is not None]
+    paths = [Path(path) for path in session.scalars(statement) if path and not is_address(path)]
     folders = {parent for path in paths for parent in path.parents}
     return [
         upload.id

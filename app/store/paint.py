@@ -9,11 +9,11 @@ from functools import lru_cache
 from typing import Any, cast
 
 from sqlalchemy import BindParameter, Table, bindparam, func, select, true
-from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session
 
 from app.soccer.paint_evidence import PaintReading, reading_from_text
 from app.store.codecs import as_written, inflate, parse
+from app.store.dialect.statements import any_of, insert, values_of
 from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, LogModel, PaintEvidenceModel, StationModel, ViewModel
 
@@ -24,7 +24,7 @@ FOLLOWS = "follows"
 _EVIDENCE = cast(Table, PaintEvidenceModel.__table__)
 _DIGESTS: BindParameter[Any] = bindparam("digests", expanding=True)
 _READINGS = (
-    select(_EVIDENCE.c.digest, func.min(_EVIDENCE.c.body).label("body"))
+    select(_EVIDENCE.c.digest, any_of(_EVIDENCE.c.body).label("body"))
     .where(_EVIDENCE.c.digest.in_(_DIGESTS))
     .group_by(_EVIDENCE.c.digest)
 )
@@ -145,7 +145,7 @@ def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
 def _reasons(session: Session, dataset_id: int) -> dict[str, dict[str | None, int]]:
     """How many readings each match has by their reason; nothing of them is decoded."""
     group = GroupModel
-    named = func.json_each(group.paint).table_valued("value")
+    named = values_of(group.paint)
     statement = (
         select(group.match, _EVIDENCE.c.reason, func.count())
         .select_from(group)

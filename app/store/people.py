@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import delete, func, insert, select, update
+from sqlalchemy import delete, exists, func, insert, or_, select, update
 from sqlalchemy.orm import Session
 
 from app.store.clock import now
-from app.store.people_models import LoginModel, OneTimeLinkModel, PersonModel
+from app.store.people_models import IdentityModel, LoginModel, OneTimeLinkModel, PersonModel
 
 _PEOPLE = select(*PersonModel.__table__.columns)
 _SEEN = (
@@ -46,7 +46,10 @@ def count_able(session: Session, role: str, *, but: int | None = None) -> int:
     statement = select(func.count()).where(
         PersonModel.role == role,
         PersonModel.disabled.is_(False),
-        PersonModel.password.is_not(None),
+        or_(
+            PersonModel.password.is_not(None),
+            exists().where(IdentityModel.person_id == PersonModel.id),
+        ),
     )
     if but is not None:
         statement = statement.where(PersonModel.id != but)

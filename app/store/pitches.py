@@ -13,6 +13,7 @@ from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.store.codecs import lines_from_json, parse, picture_from_json
+from app.store.dialect.statements import insert_or_replace
 from app.store.digest import digest
 from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, ImportFindingModel, LogModel, StationModel, ViewModel
@@ -41,11 +42,11 @@ class MatchPitch:
 
 
 def match_pitches(session: Session, dataset_id: int) -> list[MatchPitch]:
-    """Every match of a dataset, by name; groups without a match belong to none."""
+    """Every match of a dataset, by name; groups without a match are one, without a name."""
     model = GroupModel
     statement = (
         select(model.match, model.pitch_length, model.pitch_width, func.count(), func.min(model.id))
-        .where(model.dataset_id == dataset_id, model.match != "")
+        .where(model.dataset_id == dataset_id)
         .group_by(model.match, model.pitch_length, model.pitch_width)
         .order_by(model.match, func.count().desc())
     )
@@ -112,9 +113,7 @@ def _cameras(*columns: Any, dataset_id: int) -> Any:
         select(GroupModel.match, *columns)
         .join(ViewModel, ViewModel.group_id == GroupModel.id)
         .join(StationModel, StationModel.id == ViewModel.station_id)
-        .where(
-            GroupModel.dataset_id == dataset_id, GroupModel.match != "", StationModel.lines != "{}"
-        )
+        .where(GroupModel.dataset_id == dataset_id, StationModel.lines != "{}")
         .distinct()
     )
 
@@ -128,13 +127,16 @@ def read_estimates(session: Session, dataset_id: int) -> dict[str, Any]:
 
 def save_estimate(session: Session, dataset_id: int, match: str, **values: Any) -> None:
     """Put an estimate in the place of the one before."""
-    statement = insert(PitchEstimateModel).prefix_with("OR REPLACE")
+    statement = insert_or_replace(PitchEstimateModel)
     session.execute(statement, [{"dataset_id": dataset_id, "match": match, **values}])
 
 
 def edited_pitches(session: Session, dataset_id: int, matches: Iterable[str]) -> dict[str, Pitch]:
-    """The size that a person gave to matches last, where one did."""
-    newest = _newest(dataset_id).where(GroupModel.match.in_(set(matches)))
+    """The size that a person gave to matches last, where one did.
+
+    Groups without a match have none in common: nobody knows whether others come from that pitch.
+    """
+    newest = _newest(dataset_id).where(GroupModel.match.in_(set(matches) - {""}))
     statement = (
         select(GroupModel.match, GroupModel.pitch_length, GroupModel.pitch_width)
         .join(LogModel, LogModel.group_id == GroupModel.id)
@@ -143,14 +145,41 @@ def edited_pitches(session: Session, dataset_id: int, matches: Iterable[str]) ->
     return {match: Pitch(*size) for match, *size in session.execute(statement)}
 
 
+def is_pitch_edited(session: Session, group_id: int) -> bool:
+    """Whether a person gave a group the size of its pitch."""
+    statement = select(LogModel.id).where(LogModel.group_id == group_id, LogModel.kind == PITCH)
+    return session.scalar(statement.limit(1)) is not None
+
+
 def last_changes(session: Session, dataset_id: int) -> dict[str, LogEntry]:
-    """The newest log entry that said how large the pitch of each match is, where one did."""
+    """The newest log entry that said how large the pitch of each match is, where one did.
+
+    Of groups without a match only where it was said of all that there are, and all had one size.
+    """
     entries = {
         entry.group_id: entry for entry in read_log(session, LogModel.id.in_(_newest(dataset_id)))
     }
     model = GroupModel
     rows = session.execute(select(model.id, model.match).where(model.id.in_(entries)))
-    return {row.match: entries[row.id] for row in rows}
+    changes = {row.match: entries[row.id] for row in rows}
+    if "" in changes and not _is_of_all(session, dataset_id, changes[""]):
+        del changes[""]
+    return changes
+
+
+def _is_of_all(session: Session, dataset_id: int, newest: LogEntry) -> bool:
+    """Whether all groups without a match were given another size with an entry, and had one."""
+    groups = set(groups_of_match(session, dataset_id, ""))
+    nameless = select(GroupModel.id).where(
+        GroupModel.dataset_id == dataset_id, GroupModel.match == ""
+    )
+    where = (LogModel.group_id.in_(nameless), LogModel.kind == PITCH, LogModel.at == newest.at)
+    same = (
+        entry.group_id
+        for entry in read_log(session, *where)
+        if entry.body["inverse"] == newest.body["inverse"]
+    )
+    return groups <= set(same)
 
 
 def _newest(dataset_id: int) -> Any:
@@ -158,7 +187,7 @@ def _newest(dataset_id: int) -> Any:
     return (
         select(func.max(LogModel.id))
         .join(GroupModel, GroupModel.id == LogModel.group_id)
-        .where(LogModel.kind == PITCH, GroupModel.dataset_id == dataset_id, GroupModel.match != "")
+        .where(LogModel.kind == PITCH, GroupModel.dataset_id == dataset_id)
         .group_by(GroupModel.match)
     )
 

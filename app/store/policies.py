@@ -8,6 +8,7 @@ from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.soccer.policy import Policy
+from app.store.aliases import shown_actor
 from app.store.codecs import policy_from_json, unpack
 from app.store.models import LogModel
 
@@ -29,7 +30,7 @@ _JUDGED = text("kind IN ('dataset', 'policy')")
 def policy_history(session: Session, dataset_id: int) -> tuple[PolicyVersion, ...]:
     """The policies of a dataset, oldest first."""
     statement = (
-        select(LogModel.at, LogModel.actor, LogModel.body)
+        select(LogModel.at, shown_actor(LogModel.actor, LogModel.at).label("actor"), LogModel.body)
         .where(LogModel.dataset_id == dataset_id, _JUDGED)
         .order_by(LogModel.id)
     )

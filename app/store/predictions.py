@@ -10,6 +10,7 @@ from sqlalchemy import ColumnElement, delete, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.geometry.camera import Camera
+from app.store.aliases import columns_shown
 from app.store.codecs import Json, as_written, camera_from_json, camera_to_json, canonical, parse
 from app.store.digest import digest
 from app.store.group_rows import next_id
@@ -178,8 +179,11 @@ def read_predicted_cameras(session: Session, set_id: int) -> dict[int, Camera]:
 
 
 def _sets(session: Session, where: ColumnElement[bool]) -> list[PredictionSet]:
-    columns = PredictionSetModel.__table__.columns
-    statement = select(*columns).where(where).order_by(PredictionSetModel.id.desc())
+    statement = (
+        select(*columns_shown(PredictionSetModel))
+        .where(where)
+        .order_by(PredictionSetModel.id.desc())
+    )
     return [
         PredictionSet(**{**row._mapping, "report": parse(row.report)})
         for row in session.execute(statement)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from sqlalchemy import delete, insert, select, text
 from sqlalchemy.orm import Session
 
+from app.store.dialect.statements import DeferReferences
 from app.store.groups import StoredGroup, read_groups
 from app.store.models import (
     GroupModel,
@@ -20,6 +22,7 @@ from app.store.models import (
 )
 from app.store.pitches import FINDING
 from app.store.stations import StoredStation, stored_station
+from app.store.tables import Base
 
 _BATCH = 500
 Rows = Sequence[Mapping[str, Any]]
@@ -61,20 +64,50 @@ def rewrite(
 ) -> None:
     """Put rows in the place of all stations, groups, views and what hangs on them.
 
-    Datasets, verdicts and solutions stay; the queue is the caller's to refresh.
+    Datasets, verdicts and solutions stay, and so do predictions and proposals of views that are
+    there afterwards; the queue is the caller's to refresh.
     """
     # Solutions and verdicts refer to groups, which are gone for a moment.
-    session.execute(text("PRAGMA defer_foreign_keys = ON"))
-    for model in (QueueModel, ImportFindingModel, SpareFrameModel, ViewModel):
-        session.execute(delete(model))
-    session.execute(delete(GroupModel))
-    session.execute(delete(StationModel))
-    for table, rows in (
-        (StationModel, stations),
-        (GroupModel, groups),
-        (ViewModel, views),
-        (ImportFindingModel, noticed),
-        (SpareFrameModel, spare),
-    ):
-        if rows:
-            session.execute(insert(table), rows)
+    session.execute(DeferReferences())
+    with _kept_of_views(session):
+        for model in (QueueModel, ImportFindingModel, SpareFrameModel, ViewModel):
+            session.execute(delete(model))
+        session.execute(delete(GroupModel))
+        session.execute(delete(StationModel))
+        for table, rows in (
+            (StationModel, stations),
+            (GroupModel, groups),
+            (ViewModel, views),
+            (ImportFindingModel, noticed),
+            (SpareFrameModel, spare),
+        ):
+            if rows:
+                session.execute(insert(table), rows)
+
+
+@contextmanager
+def _kept_of_views(session: Session) -> Iterator[None]:
+    """What goes with its view and is in no log comes back after this, where its view did."""
+    for table in _going_with_views():
+        session.execute(text(f"CREATE TEMP TABLE kept_{table} AS SELECT * FROM {table}"))
+    yield
+    for table in _going_with_views():
+        session.execute(
+            text(
+                f"INSERT INTO {table} SELECT * FROM kept_{table}"
+                " WHERE view_id IN (SELECT id FROM view)"
+            )
+        )
+        session.execute(text(f"DROP TABLE kept_{table}"))
+
+
+def _going_with_views() -> list[str]:
+    """Names of the tables whose rows are deleted with the view that they are about."""
+    return [
+        table.name
+        for table in Base.metadata.sorted_tables
+        if any(
+            key.column.table is ViewModel.__table__ and key.ondelete == "CASCADE"
+            for key in table.foreign_keys
+        )
+    ]

@@ -6,7 +6,7 @@ accepts becomes an edit of the view's lines, in the log like any other.
 
 from __future__ import annotations
 
-from sqlalchemy import ForeignKey, Index
+from sqlalchemy import ForeignKey, Index, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.store.models import Base
@@ -16,7 +16,8 @@ class ProposalModel(Base):
     """What was proposed for one view when its picture was looked at last; ``lines`` are JSON.
 
     ``frame`` is the digest of the picture's bytes (empty: there were none), ``sought_with`` that
-    of all else that was known, ``version`` that of what read the picture.
+    of all else that was known, ``version`` that of what read the picture. ``beside`` is the digest
+    of the station whose lines determined no camera then (empty: it had none); it is open beside those.
     """
 
     __tablename__ = "proposal"
@@ -36,3 +37,4 @@ class ProposalModel(Base):
     frame: Mapped[str]
     sought_with: Mapped[str]
     version: Mapped[str]
+    beside: Mapped[str] = mapped_column(server_default=text("''"))

@@ -1,7 +1,7 @@
-"""Proposals in the database: what was proposed for views without lines, and which are open.
+"""Proposals in the database: what was proposed for views without a camera, and which are open.
 
-A proposal is open while its view has neither lines nor a given camera. What was accepted stays,
-so that undo opens it again.
+A proposal is open while its view has no given camera, and no lines, or those beside which it was
+made because they determined no camera. What was accepted stays, so that undo opens it again.
 """
 
 from __future__ import annotations
@@ -11,13 +11,21 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, cast
 
 from sqlalchemy import ColumnElement, Select, Table, and_, case, delete, func, or_, select
-from sqlalchemy.dialects.sqlite import insert
 from sqlalchemy.orm import Session, aliased
 
 from app.soccer.annotation import Lines
 from app.store.codecs import as_written, canonical, lines_from_json, lines_to_json, parse
-from app.store.models import GroupModel, StationModel, ViewModel
+from app.store.dialect.statements import insert, items_of, numbers_in
+from app.store.models import (
+    DatasetModel,
+    GroupModel,
+    QueueModel,
+    SolutionModel,
+    StationModel,
+    ViewModel,
+)
 from app.store.proposal_models import ProposalModel
+from app.store.solutions import is_current, undetermined
 
 _PROPOSAL = cast(Table, ProposalModel.__table__)
 _BATCH = 500
@@ -29,12 +37,14 @@ class Proposal:
 
     Attributes:
         outcome: ``proposed``, ``unsure`` or ``nothing``.
-        sentence: Why nothing is proposed; empty where something is.
-        lines: Points on the paint, pixels of the annotated size; none unless proposed.
+        sentence: Why nothing is proposed, or which drawn lines lie elsewhere; else empty.
+        lines: Points on the paint of markings that nobody drew, pixels of the annotated size; none
+            unless proposed.
         supported, explained, points, error_px, runner_up: As of ``paint.view_proposal``.
         frame: Digest of the picture's bytes; empty where there were none.
         sought_with: Digest of what else was known then.
         version: Of what read the picture.
+        beside: Digest of the station that had lines then, which determined no camera; else empty.
     """
 
     view_id: int
@@ -49,6 +59,7 @@ class Proposal:
     frame: str
     sought_with: str
     version: str
+    beside: str = ""
 
 
 @dataclass(frozen=True)
@@ -56,8 +67,9 @@ class MatchProposals:
     """How far the views of one match are.
 
     Attributes:
-        views: Without lines and camera, and with a picture; static cameras count once.
-        looked: How many of them were looked at; ``proposed``, ``unsure`` and ``nothing`` add up to it.
+        views: Without a camera, given or of their lines, and with a picture; static cameras count
+            once.
+        looked: How many of them were looked at as they are now; ``proposed``, ``unsure`` and ``nothing`` add up to it.
         accepted: Views whose lines are as they were proposed, at least in part.
     """
 
@@ -70,12 +82,22 @@ class MatchProposals:
     accepted: int
 
 
-def _is_open() -> ColumnElement[bool]:
+def _is_bare() -> ColumnElement[bool]:
     return and_(StationModel.lines == "{}", StationModel.given.is_(None))
 
 
-def _is_asked() -> ColumnElement[bool]:
-    """Whether a view is one to look at: of a static camera that is the first with a picture."""
+def _is_open() -> ColumnElement[bool]:
+    """Whether a view is as it was when it was looked at, as far as lines and camera go."""
+    beside = ProposalModel.beside
+    return or_(and_(_is_bare(), beside == ""), and_(beside != "", beside == StationModel.digest))
+
+
+def _is_asked(lost: Collection[int]) -> ColumnElement[bool]:
+    """Whether a view is one to look at: of a static camera that is the first with a picture.
+
+    Args:
+        lost: Ids of the views to look at whose lines determine no camera (``lost_views``).
+    """
     view, station = aliased(ViewModel), aliased(StationModel)
     # One look at all of them: asked view by view, a camera of many views would cost their square.
     first = (
@@ -85,7 +107,41 @@ def _is_asked() -> ColumnElement[bool]:
         .group_by(view.station_id)
     )
     alone = or_(StationModel.shared.is_(False), ViewModel.id.in_(first))
-    return and_(_is_open(), ViewModel.media_path.is_not(None), alone)
+    bare = and_(_is_bare(), ViewModel.media_path.is_not(None), alone)
+    return or_(bare, ViewModel.id.in_(numbers_in(sorted(lost))))
+
+
+def lost_views(
+    session: Session, dataset_id: int, matches: Collection[str] | None = None
+) -> set[int]:
+    """Ids of views with a picture and lines that determine no camera, as they are solved now.
+
+    Of a static camera the first one. Groups that wait to be solved have none.
+    """
+    named = items_of(SolutionModel.calibrations)
+    statement = (
+        select(ViewModel.id, ViewModel.station_id, named.c.value.label("calibration"))
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .join(QueueModel, QueueModel.group_id == GroupModel.id)
+        .join(SolutionModel, is_current())
+        .join(named, named.c.key == ViewModel.position)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(
+            GroupModel.dataset_id == dataset_id,
+            # The finding of such views, told of their groups: the others need not be looked at.
+            QueueModel.findings.contains(",under_constrained,"),
+            StationModel.lines != "{}",
+            StationModel.given.is_(None),
+            ViewModel.media_path.is_not(None),
+        )
+        .order_by(ViewModel.id.desc())
+    )
+    if matches is not None:
+        statement = statement.where(GroupModel.match.in_(matches))
+    rows = session.execute(statement).all()
+    left_open = undetermined(session, {row.calibration for row in rows})
+    return set({row.station_id: row.id for row in rows if row.calibration in left_open}.values())
 
 
 def groups_with_open(outcome: str | None = None) -> Select[Any]:
@@ -102,18 +158,19 @@ def groups_with_open(outcome: str | None = None) -> Select[Any]:
 def views_to_look_at(
     session: Session, dataset_id: int, matches: Collection[str] | None = None
 ) -> list[tuple[int, list[int]]]:
-    """Groups with the ids of those of their views that have no lines and no camera but a picture.
+    """Groups with the ids of those of their views that have no camera but a picture.
 
     Args:
         session: Any session.
         dataset_id: The dataset.
         matches: By name; None: all.
     """
+    lost = lost_views(session, dataset_id, matches)
     statement = (
         select(ViewModel.group_id, ViewModel.id)
         .join(GroupModel, GroupModel.id == ViewModel.group_id)
         .join(StationModel, StationModel.id == ViewModel.station_id)
-        .where(GroupModel.dataset_id == dataset_id, _is_asked())
+        .where(GroupModel.dataset_id == dataset_id, _is_asked(lost))
         .order_by(GroupModel.match, GroupModel.number, ViewModel.position)
     )
     if matches is not None:
@@ -124,9 +181,14 @@ def views_to_look_at(
     return list(found.items())
 
 
-def match_proposals(session: Session, dataset_id: int) -> list[MatchProposals]:
-    """How far each match of a dataset is, by name."""
-    asked, outcome = _is_asked(), ProposalModel.outcome
+def match_proposals(
+    session: Session, dataset_id: int, matches: Collection[str] | None = None
+) -> list[MatchProposals]:
+    """How far each match of a dataset is, or each of these, by name."""
+    lost = lost_views(session, dataset_id, matches)
+    asked, outcome = _is_asked(lost), ProposalModel.outcome
+    # What was said of a view as it was before says nothing of it now.
+    looked = and_(asked, _is_open())
 
     def number(*conditions: ColumnElement[bool]) -> ColumnElement[int]:
         return func.coalesce(func.sum(case((and_(*conditions), 1), else_=0)), 0)
@@ -135,8 +197,8 @@ def match_proposals(session: Session, dataset_id: int) -> list[MatchProposals]:
         select(
             GroupModel.match,
             number(asked),
-            number(asked, outcome.is_not(None)),
-            *(number(asked, outcome == name) for name in ("proposed", "unsure", "nothing")),
+            number(looked),
+            *(number(looked, outcome == name) for name in ("proposed", "unsure", "nothing")),
             number(outcome == "proposed", StationModel.proposed.is_not(None)),
         )
         .join(ViewModel, ViewModel.group_id == GroupModel.id)
@@ -146,6 +208,8 @@ def match_proposals(session: Session, dataset_id: int) -> list[MatchProposals]:
         .group_by(GroupModel.match)
         .order_by(GroupModel.match)
     )
+    if matches is not None:
+        statement = statement.where(GroupModel.match.in_(matches))
     rows: Iterable[Any] = session.execute(statement)
     return [MatchProposals(*row) for row in rows]
 
@@ -184,7 +248,9 @@ def save_proposals(session: Session, proposals: Sequence[Proposal]) -> None:
     if rows:
         statement = insert(_PROPOSAL)
         changed = {name: statement.excluded[name] for name in rows[0] if name != "view_id"}
-        session.execute(statement.on_conflict_do_update(["view_id"], set_=changed), rows)
+        session.execute(
+            statement.on_conflict_do_update(index_elements=["view_id"], set_=changed), rows
+        )
 
 
 def delete_proposals(session: Session, dataset_id: int) -> int:

@@ -13,7 +13,6 @@ from sqlalchemy import (
     and_,
     bindparam,
     func,
-    insert,
     literal,
     or_,
     select,
@@ -22,6 +21,8 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Session
 
+from app.store.aliases import shown_actor
+from app.store.dialect.statements import insert_or_replace
 from app.store.groups import StoredGroup
 from app.store.models import (
     DatasetModel,
@@ -129,7 +130,7 @@ def _refresh(session: Session, ids: Sequence[int]) -> None:
         row.update(_computed(summary, [item.kind for item in findings[head.id]]))
         rows.append(row)
     if rows:
-        statement = insert(QueueModel).prefix_with("OR REPLACE")
+        statement = insert_or_replace(QueueModel)
         session.execute(statement, rows, execution_options={"render_nulls": True})
 
 
@@ -165,9 +166,9 @@ def _verdicts(session: Session, ids: Sequence[int]) -> dict[int, Any]:
         .where(VerdictModel.group_id.in_(ids))
         .group_by(VerdictModel.group_id)
     )
-    rows = session.execute(
-        select(*VerdictModel.__table__.columns).where(VerdictModel.id.in_(newest))
-    )
+    plain = [column for column in VerdictModel.__table__.columns if column.name != "actor"]
+    actor = shown_actor(VerdictModel.actor, VerdictModel.at).label("actor")
+    rows = session.execute(select(*plain, actor).where(VerdictModel.id.in_(newest)))
     return {row.group_id: row for row in rows}
 
 

@@ -10,13 +10,14 @@ from sqlalchemy import (
     Table,
     delete,
     func,
-    insert,
     or_,
     select,
-    text,
+    update,
 )
 from sqlalchemy.orm import Session
 
+from app.store.datasets import next_dataset_id
+from app.store.dialect.statements import DeferReferences, insert_or_replace
 from app.store.models import (
     DatasetModel,
     GroupModel,
@@ -24,8 +25,9 @@ from app.store.models import (
     StationModel,
     VerdictModel,
 )
+from app.store.sight import COPIES
 from app.store.tables import Base
-from app.store.view_models import UsedIdModel
+from app.store.view_models import COPIES_USED, UsedIdModel
 
 _TABLES = Base.metadata.tables
 _COUNTED = {
@@ -38,6 +40,8 @@ _COUNTED = {
     "evaluations": "evaluation",
 }
 """What a person is told of, by the name of its table."""
+_ACCESS = ("dataset_role", "access_token", "webhook")
+"""Who may, or hears, what in a dataset; nothing that was said of its groups."""
 
 
 def count_contents(session: Session, dataset_id: int) -> dict[str, int]:
@@ -64,12 +68,32 @@ def delete_solutions(session: Session, ids: Sequence[int]) -> None:
 def keep_used_ids(session: Session) -> None:
     """No id is ever given again: the log speaks of what had it."""
     used = dict(session.execute(select(UsedIdModel.table, UsedIdModel.id)).all())
-    for table in Base.metadata.sorted_tables:
-        if list(table.primary_key.columns.keys()) == ["id"]:
-            newest = session.scalar(select(func.max(table.c.id)))
-            if newest is not None and newest >= used.get(table.name, 0):
-                statement = insert(UsedIdModel).prefix_with("OR REPLACE")
-                session.execute(statement, [{"table": table.name, "id": newest}])
+    newest = {
+        table.name: session.scalar(select(func.max(table.c.id)))
+        for table in Base.metadata.sorted_tables
+        if list(table.primary_key.columns.keys()) == ["id"]
+    }
+    newest[DatasetModel.__tablename__] = next_dataset_id(session) - 1
+    copies = next_dataset_id(session, copies=True) - 1
+    newest[COPIES_USED] = copies if copies > COPIES else None
+    for name, identity in newest.items():
+        if identity and identity >= used.get(name, 0):
+            statement = insert_or_replace(UsedIdModel)
+            session.execute(statement, [{"table": name, "id": identity}])
+
+
+def move_access(session: Session, dataset_id: int) -> int:
+    """Let roles, tokens and webhooks of a dataset be those of the next that is made; returns its id.
+
+    It has to be made in the same transaction.
+    """
+    session.execute(DeferReferences())
+    heir_id = next_dataset_id(session)
+    for name in _ACCESS:
+        table = _TABLES[name]
+        mine = table.c.dataset_id == dataset_id
+        session.execute(update(table).where(mine).values(dataset_id=heir_id))
+    return heir_id
 
 
 def delete_rows(session: Session, dataset_id: int) -> None:
@@ -77,7 +101,7 @@ def delete_rows(session: Session, dataset_id: int) -> None:
 
     Tables that cascade (versions, predictions, evaluations) follow the rows that they hang on.
     """
-    session.execute(text("PRAGMA defer_foreign_keys = ON"))
+    session.execute(DeferReferences())
     dataset, groups = _TABLES[DatasetModel.__tablename__], _TABLES[GroupModel.__tablename__]
     verdicts = _TABLES[VerdictModel.__tablename__]
     # The database lets verdicts go while their group still tells whose they are.

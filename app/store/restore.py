@@ -19,6 +19,7 @@ from app.store.backup import (
     DATABASE,
     EXPORTS,
     FRAMES,
+    require_file,
     verify_backup,
 )
 from app.store.examination import examine_database
@@ -67,6 +68,7 @@ def restore(settings: Settings, source: Path) -> Restored:
         DamagedError: The database in it is damaged.
         StorageError: Somebody uses the home, or the disk is full.
     """
+    require_file(settings, "restored", "pg_restore --clean --if-exists --dbname=DATABASE FILE")
     if not source.is_file():
         raise InputError(f"there is no file {source}")
     with (
@@ -179,6 +181,8 @@ def _new_folder(home: Path) -> Path:
 
 def _move_in(settings: Settings, folder: Path, anchor: Anchor) -> None:
     """The database last: without it nothing is served."""
+    # Their marks are those of the changes of another database.
+    shutil.rmtree(settings.yields, ignore_errors=True)
     for path in folder.iterdir():
         if path.is_dir():
             shutil.move(path, settings.home / path.name)

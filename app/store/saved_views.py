@@ -8,11 +8,15 @@ from typing import Any
 from sqlalchemy import delete, insert, select
 from sqlalchemy.orm import Session
 
+from app.store.aliases import shown_actor
 from app.store.clock import now
 from app.store.group_rows import next_id
 from app.store.view_models import SavedViewModel
 
-_SAVED = select(*SavedViewModel.__table__.columns)
+_SAVED = select(
+    *(column for column in SavedViewModel.__table__.columns if column.name != "actor"),
+    shown_actor(SavedViewModel.actor, SavedViewModel.created).label("actor"),
+)
 
 
 def dataset_saved_views(session: Session, dataset_id: int) -> Sequence[Any]:

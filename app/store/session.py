@@ -6,11 +6,9 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
-from typing import Any
 
 import structlog
-from sqlalchemy import Engine
-from sqlalchemy.exc import OperationalError
+from sqlalchemy import Engine, event
 from sqlalchemy.orm import Session as Session
 
 from app.config import Settings
@@ -22,7 +20,9 @@ from app.store.anchor import (
     require_own_database,
     sync_anchor,
 )
-from app.store.engine import WRITE, make_engine, reported, require_pragmas
+from app.store.dialect.dialect import dialect_of
+from app.store.dialect.sharing import AGAIN
+from app.store.engine import WRITE, make_engine, reported
 from app.store.first_look import require_sound
 from app.store.home import make_file
 from app.store.locks import DatabaseLock
@@ -38,12 +38,11 @@ from app.store.soundness import file_faults
 
 log = structlog.get_logger("touchline.store")
 
+COMMITTED = "committed"
+"""What other processes are told of a commit."""
 TURN_SECONDS = 10.0
 """How long a thread waits for the writes of others in its process; SQLite waits for other
 processes (``busy_timeout``)."""
-
-STEPS = 10_000
-"""Of SQLite's machine between two looks whether to go on: some microseconds each."""
 
 
 class Turn:
@@ -67,6 +66,14 @@ class Turn:
         self._lock.release()
 
 
+def once_kept(session: Session, tell: Callable[[], None]) -> None:
+    """Call a function once a write session is kept, before the next one of its process begins.
+
+    What was not kept is not told of. It must be quick, and not ask the database.
+    """
+    event.listen(session, "after_commit", lambda _: tell(), once=True)
+
+
 class Store:
     """The database of one home: short read transactions, and one write at a time.
 
@@ -74,6 +81,7 @@ class Store:
 
     Attributes:
         turn: Held while something is written; writers of one process wait for it.
+        sharing: What processes with the same database leave to one of them, and tell each other.
     """
 
     def __init__(
@@ -85,7 +93,12 @@ class Store:
     ):
         self.settings = settings
         self._engine = engine
+        self._reader = dialect_of(settings).reading(engine)
         self._writer = engine.execution_options(**WRITE)
+        self._glancer = dialect_of(settings).glancing(engine)
+        # Connections of its own: one that waits for no disk must never carry what was promised.
+        self._passing = make_engine(settings, lasting=False).execution_options(**WRITE)
+        self.sharing = dialect_of(settings).sharing(engine, lambda: reported(settings))
         self._lock = lock
         self.turn = turn
         self._listeners: list[Callable[[], None]] = []
@@ -105,7 +118,7 @@ class Store:
             StorageError: The schema is older or newer than this version's, or SQLite does not keep
                 the promises asked of it.
             DamagedError: The database is not what was written, or not the one of its home.
-            InputError: The URL is not one of SQLite.
+            InputError: The URL is neither one of SQLite nor of PostgreSQL.
         """
         lock = DatabaseLock(settings)
         engine: Engine | None = None
@@ -122,26 +135,47 @@ class Store:
     @contextmanager
     def read(self) -> Iterator[Session]:
         """A session on one consistent snapshot; nothing that it changes is kept."""
-        with self._watched(), Session(self._engine, autoflush=False) as session:
+        with self._watched(), Session(self._reader, autoflush=False) as session:
             yield session
 
     @contextmanager
-    def write(self) -> Iterator[Session]:
+    def glance(self) -> Iterator[Session]:
+        """A session for one statement, which is a snapshot by itself and needs no transaction.
+
+        For what every request asks.
+        """
+        with self._watched(), Session(self._glancer, autoflush=False) as session:
+            yield session
+
+    @contextmanager
+    def write(self, *, lasting: bool = True) -> Iterator[Session]:
         """A session that holds the database's write lock from its start and commits at its end.
 
         Threads of one process wait for their turn here, processes in SQLite. It does not nest.
+
+        Args:
+            lasting: False: nobody waits until it is on the disk, and a power cut may take it back,
+                as a whole. For what nobody would miss; the log is not written so.
 
         Raises:
             StorageError: Others were writing all the while; nothing was changed.
         """
         self.require_undamaged()
-        with self.turn, self._watched(), Session(self._writer) as session:
+        writer = self._writer if lasting else self._passing
+        with self.turn, self._watched(), Session(writer) as session:
             # Take the lock before anything is read, so that what is read is still true when it
             # is written.
             session.connection()
             yield session
+            if not lasting and LOG_END in session.info:
+                raise RuntimeError("what the log says must last")
+            if lasting:
+                self.sharing.tell(session, COMMITTED)
             session.commit()
             self._anchored(session)
+        self._tell_listeners()
+
+    def _tell_listeners(self) -> None:
         for listener in self._listeners:
             try:
                 listener()
@@ -161,7 +195,8 @@ class Store:
 
         It ends early, without a word, once it is no longer ``wanted``.
         """
-        with self.read() as session, _interrupted(session, lambda: not wanted()):
+        dialect = dialect_of(self.settings)
+        with self.read() as session, dialect.interrupted(session, lambda: not wanted()):
             faults = file_faults(session, 1)
             if faults:
                 file = self.settings.database_file
@@ -197,40 +232,47 @@ class Store:
             self._anchor_refused = False
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Call a function after each commit of this process; it must be quick."""
+        """Call a function after each commit of this process; it must be quick.
+
+        Once ``follow`` was called, after those of others on the same server of databases, too.
+        """
         self._listeners.append(listener)
+
+    def follow(self) -> None:
+        """Hear of what other processes commit, where the database tells."""
+        self.sharing.hear(self._hear)
+        self.sharing.listen()
+
+    def say(self, word: str) -> None:
+        """Say a word to the other processes, where there may be some; see ``sharing``."""
+        if self.sharing.is_shared:
+            with self.glance() as session:
+                self.sharing.tell(session, word)
+
+    def _hear(self, word: str) -> None:
+        if word in (COMMITTED, AGAIN):
+            self._tell_listeners()
 
     def close(self) -> None:
         """Close all connections."""
+        self.sharing.close()
         self._engine.dispose()
+        self._passing.dispose()
         try:
             sync_anchor(self.settings.database_file)
         finally:
             self._lock.release()
 
 
-@contextmanager
-def _interrupted(session: Session, ends: Callable[[], bool]) -> Iterator[None]:
-    """End what SQLite is at, and what is done here, once a function says so."""
-    driver: Any = session.connection().connection.driver_connection
-    driver.set_progress_handler(ends, STEPS)
-    try:
-        yield
-    except OperationalError:
-        if not ends():
-            raise
-    finally:
-        driver.set_progress_handler(None, 0)
-
-
 def _open(settings: Settings, alone: bool) -> Engine:
-    engine = make_engine(settings)
-    if alone:
-        require_sound(settings)
-    make_file(settings.database_file)
+    dialect, engine = dialect_of(settings), make_engine(settings)
+    if dialect.is_file:
+        if alone:
+            require_sound(settings)
+        make_file(settings.database_file)
     try:
         with reported(settings):
-            require_pragmas(engine)
+            dialect.require_promises(engine)
             if schema_revision(engine) is None:
                 bring_up_to_date(settings, alone=alone)
             _require_schema(engine, settings)

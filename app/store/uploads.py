@@ -9,11 +9,13 @@ it gets its name.
 from __future__ import annotations
 
 import errno
+import fcntl
 import hashlib
 import json
 import os
 import re
 import shutil
+import threading
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -35,6 +37,7 @@ _UNSAFE = re.compile(r"[^A-Za-z0-9._ -]")
 _MAX_NAME = 120
 _RECORD = "upload.json"
 _CONTENT = "content"
+_WRITING = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,7 @@ class Upload:
         name: As it was sent, without what no file's name should have.
         kept: Whether a dataset reads frames from it, so that it does not expire.
         format: What it most likely holds, as was seen when it came.
+        by: Who sent it, each of whom it belongs to.
     """
 
     id: str
@@ -53,6 +57,21 @@ class Upload:
     created: str
     kept: bool = False
     format: str | None = None
+    by: tuple[str, ...] = ()
+
+
+@contextmanager
+def _writing(settings: Settings) -> Iterator[None]:
+    """Held from reading a record until what follows from it is written, among all processes."""
+    with _WRITING:
+        with _reported():
+            settings.uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
+            folder = os.open(settings.uploads, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(folder)
 
 
 def upload_path(settings: Settings, upload_id: str) -> Path:
@@ -88,22 +107,37 @@ def list_uploads(settings: Settings) -> list[Upload]:
 
 def keep_upload(settings: Settings, upload_id: str) -> None:
     """Let an upload never expire: a dataset reads frames from it."""
-    upload = get_upload(settings, upload_id)
-    if not upload.kept:
-        with _reported():
-            _write_record(settings.uploads / upload_id, replace(upload, kept=True))
+    with _writing(settings):
+        upload = get_upload(settings, upload_id)
+        if not upload.kept:
+            with _reported():
+                _write_record(settings.uploads / upload_id, replace(upload, kept=True))
 
 
-def delete_upload(settings: Settings, upload_id: str) -> None:
-    """Delete an upload.
+def delete_upload(
+    settings: Settings, upload_id: str, mine: Callable[[str], bool] = lambda _actor: True
+) -> None:
+    """Delete an upload, or be among those who sent it no more while others have sent it, too.
+
+    Args:
+        settings: Where it lies.
+        upload_id: Which.
+        mine: Whether whoever asks is that sender.
 
     Raises:
         NotFoundError: There is none of that id.
         InputError: A dataset reads frames from it.
     """
-    if get_upload(settings, upload_id).kept:
-        raise InputError("a dataset reads its frames from this upload, so it stays")
-    _remove(settings.uploads / upload_id)
+    with _writing(settings):
+        upload = get_upload(settings, upload_id)
+        if upload.kept:
+            raise InputError("a dataset reads its frames from this upload, so it stays")
+        others = tuple(actor for actor in upload.by if not mine(actor))
+        if not others:
+            _remove(settings.uploads / upload_id)
+            return
+        with _reported():
+            _write_record(settings.uploads / upload_id, replace(upload, by=others))
 
 
 def expire_uploads(settings: Settings) -> int:
@@ -113,8 +147,11 @@ def expire_uploads(settings: Settings) -> int:
     for upload in list(_all(settings)):
         age = day - datetime.fromisoformat(upload.created)
         if not upload.kept and age > timedelta(days=settings.upload_days):
-            _remove(settings.uploads / upload.id)
-            gone += 1
+            with _writing(settings):
+                known = _read(settings.uploads / upload.id)
+                if known is None or not known.kept:
+                    _remove(settings.uploads / upload.id)
+                    gone += 1
     return gone
 
 
@@ -128,10 +165,11 @@ def _all(settings: Settings) -> Iterator[Upload]:
 def _read(folder: Path) -> Upload | None:
     """The upload of a folder; None where its record is missing or is none of ours."""
     try:
-        upload = Upload(**json.loads((folder / _RECORD).read_bytes()))
+        values = json.loads((folder / _RECORD).read_bytes())
+        upload = Upload(**{**values, "by": tuple(values.get("by", ()))})
         named = upload.id == folder.name and upload.name == safe_name(upload.name)
         sound = named and datetime.fromisoformat(upload.created).tzinfo is not None
-    except (OSError, ValueError, TypeError, InputError):
+    except (OSError, ValueError, TypeError, AttributeError, InputError):
         return None
     return upload if sound else None
 
@@ -181,11 +219,14 @@ class UploadWriter:
         with _reported():
             self._file.write(chunk)
 
-    def finish(self, guess: Callable[[Path], str | None] = lambda path: None) -> Upload:
+    def finish(
+        self, guess: Callable[[Path], str | None] = lambda path: None, *, by: str | None = None
+    ) -> Upload:
         """Make it an upload.
 
         Args:
             guess: From the file to the format that it most likely has.
+            by: Who sends it.
 
         Raises:
             InputError: Nothing was sent.
@@ -198,11 +239,11 @@ class UploadWriter:
             os.fsync(self._file.fileno())
             self._file.close()
         upload = Upload(self._digest.hexdigest()[:32], self._name, self.bytes, now())
-        known = _read(self._settings.uploads / upload.id)
-        if known is not None:
+        shared = _shared(self._settings, upload.id, by)
+        if shared is not None:
             self.abort()
-            return known
-        upload = replace(upload, format=guess(Path(self._file.name)))
+            return shared
+        upload = replace(upload, format=guess(Path(self._file.name)), by=(by,) if by else ())
         with _reported():
             sync(self._folder / _CONTENT)
             _write_record(self._folder, upload)
@@ -220,10 +261,10 @@ class UploadWriter:
             else:
                 sync(place.parent)
                 return upload
-            known = _read(place)
-            if known is not None:
+            shared = _shared(self._settings, upload.id, *upload.by)
+            if shared is not None:
                 self.abort()
-                return known
+                return shared
             # What lies there has no record, so nobody can have been told of it.
             _remove(place)
         raise StorageError("the upload could not be put in its place", hint="Send it again.")
@@ -242,6 +283,18 @@ def require_size(settings: Settings, size: int) -> None:
             f"an upload may have at most {settings.max_upload_bytes:,} bytes",
             hint="Import larger data from a folder that the operator allows.",
         )
+
+
+def _shared(settings: Settings, upload_id: str, by: str | None = None) -> Upload | None:
+    """An upload that somebody has sent again, which is theirs as well; None where it is not there."""
+    with _writing(settings):
+        upload = _read(settings.uploads / upload_id)
+        if upload is None or by is None or by in upload.by:
+            return upload
+        shared = replace(upload, by=(*upload.by, by))
+        with _reported():
+            _write_record(settings.uploads / upload_id, shared)
+        return shared
 
 
 def _write_record(folder: Path, upload: Upload) -> None:

@@ -9,9 +9,13 @@ from typing import Any, cast
 from sqlalchemy import Table, bindparam, case, func, insert, select
 from sqlalchemy.orm import Session
 
+from app.store.aliases import shown_actor
 from app.store.group_rows import next_id
 from app.store.log import Entry, append
 from app.store.models import GroupModel, VerdictModel
+from app.store.settling import settle_judged
+from app.store.sight import COPIES
+from app.store.takes import note_verdict
 
 
 @dataclass(frozen=True)
@@ -37,8 +41,9 @@ _OF_GROUPS = (
     .where(_VERDICT.c.group_id.in_(bindparam("ids", expanding=True)))
     .order_by(_VERDICT.c.id.desc())
 )
+_SHOWN = [column for column in _VERDICT.columns if column.name != "actor"]
 _LAST_OF_EACH = (
-    select(*_VERDICT.columns)
+    select(*_SHOWN, shown_actor(_VERDICT.c.actor, _VERDICT.c.at).label("actor"))
     .where(
         _VERDICT.c.id.in_(
             select(func.max(_VERDICT.c.id))
@@ -58,7 +63,7 @@ def read_verdicts(session: Session, group_ids: Sequence[int]) -> dict[int, list[
 def read_last_verdicts(
     session: Session, group_ids: Sequence[int]
 ) -> dict[int, list[StoredVerdict]]:
-    """Like ``read_verdicts``, but of each person the last alone."""
+    """Like ``read_verdicts``, but of each person the last alone, under the name that is shown."""
     return _by_group(session.execute(_LAST_OF_EACH, {"ids": list(group_ids)}))
 
 
@@ -102,15 +107,16 @@ def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[An
     """Rows (actor, last, groups): everybody who judged a group of a dataset, when for the last
     time, and how many groups since some time."""
     recent = case((VerdictModel.at >= since, VerdictModel.group_id))
+    actor = shown_actor(VerdictModel.actor, VerdictModel.at)
     statement = (
         select(
-            VerdictModel.actor,
+            actor.label("actor"),
             func.max(VerdictModel.at).label("last"),
             func.count(recent.distinct()).label("groups"),
         )
         .join(GroupModel, GroupModel.id == VerdictModel.group_id)
         .where(GroupModel.dataset_id == dataset_id)
-        .group_by(VerdictModel.actor)
+        .group_by(actor)
     )
     return session.execute(statement).all()
 
@@ -123,7 +129,8 @@ def next_verdict_id(session: Session) -> int:
 def insert_verdicts(
     session: Session, dataset_id: int, given: Sequence[StoredVerdict], *, actor: str, at: str
 ) -> None:
-    """Insert verdicts on groups of a dataset, and log them under who gives them."""
+    """Insert verdicts on groups of a dataset, and log them under who gives them; work on these groups
+    that was given out is over by that."""
     rows = [dict(vars(verdict)) for verdict in given]
     session.execute(insert(_VERDICT), rows)
     entries = []
@@ -131,3 +138,24 @@ def insert_verdicts(
         body = {name: value for name, value in row.items() if name not in ("id", "group_id")}
         entries.append(Entry("verdict", actor, at, body, dataset_id, row["group_id"]))
     append(session, entries)
+    if dataset_id <= COPIES:
+        states = {verdict.group_id: verdict.state for verdict in given}
+        settle_judged(session, states, actor=actor, at=at)
+        return
+    for row in rows:
+        note_verdict(session, row["group_id"], row["state"], at)
+
+
+def newest_verdict(session: Session) -> int:
+    """Id of the last verdict of any group; 0 where there is none."""
+    return session.scalar(select(func.max(VerdictModel.id))) or 0
+
+
+def judged_since(session: Session, dataset_id: int, after: int) -> list[int]:
+    """Ids of the groups of a dataset that somebody judged after a verdict, or took that back."""
+    statement = (
+        select(VerdictModel.group_id)
+        .join(GroupModel, GroupModel.id == VerdictModel.group_id)
+        .where(GroupModel.dataset_id == dataset_id, VerdictModel.id > after)
+    )
+    return list(session.scalars(statement))

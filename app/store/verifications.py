@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import insert, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.soccer.solution import SOLVER_VERSION
 from app.store.clock import now
 from app.store.codecs import Json, canonical, parse
+from app.store.dialect.statements import insert_or_replace
 from app.store.session import Store
 from app.store.version_models import VersionCheckModel
 
@@ -46,7 +47,7 @@ def keep_verification(
         "report": None if report is None else canonical(report),
         "problem": problem,
     }
-    statement = insert(VersionCheckModel).prefix_with("OR REPLACE")
+    statement = insert_or_replace(VersionCheckModel)
     with store.write() as session:
         session.execute(statement, [values], execution_options={"render_nulls": True})
 

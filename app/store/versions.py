@@ -9,13 +9,14 @@ from typing import Any
 from sqlalchemy import func, insert, select
 from sqlalchemy.orm import Session
 
+from app.store.aliases import columns_shown
 from app.store.codecs import Json, parse, unpack
 from app.store.group_rows import next_id
 from app.store.models import DatasetModel, QueueModel, VerdictModel
 from app.store.version_models import VersionGroupModel, VersionModel
 
 BATCH = 200
-_VERSIONS = select(*VersionModel.__table__.columns, DatasetModel.name.label("dataset")).join(
+_VERSIONS = select(*columns_shown(VersionModel), DatasetModel.name.label("dataset")).join(
     DatasetModel, DatasetModel.id == VersionModel.dataset_id
 )
 

@@ -50,6 +50,10 @@ class VerdictBatchModel(Base):
     redone: Mapped[int | None]
 
 
+COPIES_USED = "copy_dataset"
+"""Under which name the ids of datasets of copies are remembered, which are counted by themselves."""
+
+
 class UsedIdModel(Base):
     """The largest id of a table that a deleted dataset had; ids are given once and for all."""
 

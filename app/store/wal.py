@@ -3,7 +3,7 @@
 SQLite takes any log that lies beside a database for that database's own: a backup that was copied
 over ``touchline.db`` is mixed with the changes of the file that lay there before, page by page,
 and is malformed from then on. Nothing in the two files speaks against it. So every write of ours
-counts one up in the first page (``user_version``, see ``store.engine``), which also tells the
+counts one up in the first page (``user_version``, see ``store.dialect.sqlite``), which also tells the
 installation (``application_id``); and a log belongs to a database exactly when the log's first
 change is the one that follows on the database's last.
 

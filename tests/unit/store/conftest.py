@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,11 +22,12 @@ from app.store.models import DatasetModel
 from app.store.queue import refresh_queue
 from app.store.session import Store
 from tests.cameras import EVERY_COEFFICIENT
+from tests.databases import Databases
 
 
 @pytest.fixture(scope="session")
 def migrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A migrated, empty database file; copying it is faster than migrating for each test."""
+    """A migrated, empty database file."""
     settings = Settings(home=tmp_path_factory.mktemp("migrated"))
     Store.open(settings).close()
     return settings.home / "touchline.db"
@@ -39,10 +39,8 @@ def settings(tmp_path: Path) -> Settings:
 
 
 @pytest.fixture
-def store(settings: Settings, migrated: Path) -> Iterator[Store]:
-    settings.home.mkdir()
-    shutil.copy(migrated, settings.home / "touchline.db")
-    store = Store.open(settings)
+def store(databases: Databases, tmp_path: Path) -> Iterator[Store]:
+    store = Store.open(databases.settings(tmp_path / "home"))
     yield store
     store.close()
 

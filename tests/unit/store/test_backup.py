@@ -19,6 +19,8 @@ from app.store.backup import EXPORTS, FRAMES, back_up, verify_backup
 from app.store.session import Store
 from tests.unit.store.homes import killed, say
 
+pytestmark = pytest.mark.file_of_sqlite("copies of the file")
+
 
 def place(store: Store, name: str) -> Path:
     path = store.settings.exports / name

@@ -24,7 +24,7 @@ class TestFindDataset:
         assert row is not None
         assert (row.id, row.name) == (1, "demo")
 
-    @pytest.mark.parametrize("dataset", ["Demo", "", "2", 2, 2**63, str(2**63), "١"])
+    @pytest.mark.parametrize("dataset", ["Demo", "", "2", 2, 2**63, str(2**63), "9" * 5000, "١"])
     def test_none_where_there_is_none(self, filled: Store, dataset: str | int) -> None:
         with filled.read() as session:
             assert find_dataset(session, dataset) is None

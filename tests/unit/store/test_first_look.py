@@ -17,6 +17,8 @@ from app.store.migrate import migrate
 from app.store.session import Store
 from tests.unit.store.homes import killed, say
 
+pytestmark = pytest.mark.file_of_sqlite("the file before it is opened")
+
 
 def content(home: Path) -> dict[str, bytes]:
     """The files of a home but its locks."""

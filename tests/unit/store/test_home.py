@@ -38,10 +38,16 @@ class TestFileSystem:
 
 
 class TestMakeHome:
+    @pytest.mark.file_of_sqlite("where the file may lie")
     def test_a_network_file_system_is_refused(self, settings, monkeypatch) -> None:
         monkeypatch.setattr("app.store.home.file_system", lambda _folder: "nfs4")
         with pytest.raises(StorageError, match="network file system"):
             make_home(settings)
+
+    def test_files_of_a_database_on_a_server_may_lie_there(self, settings, monkeypatch) -> None:
+        monkeypatch.setattr("app.store.home.file_system", lambda _folder: "nfs4")
+        other = settings.model_copy(update={"database_url": "postgresql://host/touchline"})
+        assert make_home(other) == settings.home
 
     def test_a_home_that_cannot_be_made_is_said(self, settings, tmp_path: Path) -> None:
         (tmp_path / "file").write_text("")
@@ -51,6 +57,7 @@ class TestMakeHome:
 
 
 class TestMakePrivate:
+    @pytest.mark.file_of_sqlite("permissions of the file")
     def test_a_home_is_its_owners_alone_whatever_the_umask(self, settings) -> None:
         store = Store.open(settings)
         say(store)

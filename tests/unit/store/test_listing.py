@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
+from contextlib import closing
+from pathlib import Path
+
 import pytest
-from sqlalchemy import insert, select
+from sqlalchemy import event, insert, select
 from sqlalchemy.orm import Session
 
+from app.config import Settings
 from app.store.conditions import compares
 from app.store.listing import Listing, count_states, find_place, read_columns, read_rows
 from app.store.models import GroupModel, QueueModel
@@ -86,8 +91,8 @@ class TestOrder:
         assert place is not None
         dataset, keys = place
         assert (dataset, find_place(session, 9, BY_SIGMA)) == (1, None)
-        assert Listing(session, 1, OPEN).ids_around(BY_SIGMA, keys, 5) == ([2], [3, 1])
-        assert Listing(session, 1, OPEN).ids_around(BY_SIGMA, keys, 1) == ([2], [3])
+        assert Listing(session, 1, OPEN).ids_around(BY_SIGMA, keys, 5, total=5) == ([2], [3, 1])
+        assert Listing(session, 1, OPEN).ids_around(BY_SIGMA, keys, 1, total=5) == ([2], [3])
 
     @pytest.mark.parametrize("column", ["number", "changed", "gate", "findings", "label"])
     def test_no_two_groups_have_the_same_keys(self, session: Session, column: str) -> None:
@@ -96,3 +101,33 @@ class TestOrder:
         keys = [tuple(order.keys_of(row)) for row in rows]
         assert len(set(keys)) == 4
         assert keys == sorted(keys)
+
+
+class TestWhatIsRead:
+    @pytest.mark.parametrize(
+        ("conditions", "index"),
+        [
+            (
+                [compares("views", ">", 2), compares("error_px", ">", 5)],
+                "COVERING INDEX queue_scanned",
+            ),
+            ([compares("views", ">", 2), compares("key", "=", "x")], "INDEX queue_number"),
+        ],
+    )
+    @pytest.mark.file_of_sqlite("SQLite's plan of a question")
+    def test_groups_are_counted_without_their_rows_where_one_index_holds_what_is_asked(
+        self, settings: Settings, migrated: Path, conditions, index: str
+    ) -> None:
+        """Plans are those of SQLite, which is told by which index to go."""
+        settings.home.mkdir()
+        shutil.copy(migrated, settings.database_file)
+        statements: list[str] = []
+        with closing(Store.open(settings)) as store, store.read() as session:
+            connection = session.connection()
+            event.listen(
+                connection, "before_cursor_execute", lambda *told: statements.append(told[2])
+            )
+            Listing(session, 1, conditions).count()
+            explain = f"EXPLAIN QUERY PLAN {statements[0]}"
+            plan = connection.exec_driver_sql(explain, (1, 2, 5)).all()
+        assert index in " ".join(row[3] for row in plan)

@@ -6,7 +6,7 @@ import pytest
 
 from app.config import Settings
 from app.errors import StorageError
-from app.store.locks import DatabaseLock, database_alone, server_lock
+from app.store.locks import DatabaseLock, database_alone, practice_lock, server_lock
 
 FLOCK = fcntl.flock
 
@@ -72,3 +72,16 @@ class TestServerLock:
             pass
         with server_lock(settings):
             pass
+
+
+class TestPracticeLock:
+    def test_who_comes_second_waits_until_the_first_is_done(self, settings: Settings) -> None:
+        told, first = [], practice_lock(settings, lambda: None)
+        first.__enter__()
+
+        def waiting() -> None:
+            told.append(True)
+            first.__exit__(None, None, None)
+
+        with practice_lock(settings, waiting):
+            assert told == [True]

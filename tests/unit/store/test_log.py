@@ -17,6 +17,7 @@ from app.store.log import (
     verify_chain,
 )
 from app.store.models import LogModel
+from tests.databases import said_for_sqlite
 
 FIRST = Entry("import", "ann", "2030-01-01T00:00:00+00:00", {"x": 0.1 + 0.2}, 1, 7)
 
@@ -99,7 +100,7 @@ class TestVerifyChain:
         self, store, statement: str, row: int
     ) -> None:
         fill(store, 5)
-        with store.write() as session:
+        with store.write() as session, said_for_sqlite(session):
             for verb in ("update", "delete"):
                 session.execute(text(f"DROP TRIGGER log_refuses_{verb}"))
             session.execute(text(statement))

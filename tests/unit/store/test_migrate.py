@@ -25,6 +25,11 @@ from app.store.session import Store
 from app.store.tables import Base
 from tests.unit.store.homes import say
 
+pytestmark = [
+    pytest.mark.file_of_sqlite("homes of released versions, which had a file, and its backup"),
+    pytest.mark.usefixtures("every_migration"),
+]
+
 RELEASED = KNOWN_REVISIONS[:-1]
 DATASET = "INSERT INTO dataset (name, created, policy, policy_hash) VALUES ('old', '', '', '')"
 
@@ -113,14 +118,14 @@ class TestOldHomes:
     ) -> None:
         make_old(settings, revision)
         script = (
-            "import os, sys; from pathlib import Path; from alembic.operations import Operations\n"
-            "from app.config import Settings; from app.store.migrate import migrate\n"
-            "create_table = Operations.create_table\n"
-            "def killed(self, table, *columns, **options):\n"
-            "    made = create_table(self, table, *columns, **options)\n"
-            "    table == 'login' and os.kill(os.getpid(), 9)\n"
-            "    return made\n"
-            "Operations.create_table = killed\n"
+            "import os, sys; from pathlib import Path\n"
+            "from alembic.runtime.migration import HeadMaintainer\n"
+            "from app.config import Settings; from app.store.migrate import KNOWN_REVISIONS, migrate\n"
+            "note = HeadMaintainer.update_to_step\n"
+            "def killed(self, step):\n"
+            "    KNOWN_REVISIONS[-1] in step.to_revisions and os.kill(os.getpid(), 9)\n"
+            "    note(self, step)\n"
+            "HeadMaintainer.update_to_step = killed\n"
             "migrate(Settings(home=Path(sys.argv[1])))\n"
         )
         command = [sys.executable, "-c", script, str(settings.home)]

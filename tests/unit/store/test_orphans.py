@@ -21,7 +21,7 @@ def solved(filled: Store) -> Store:
             values = {"id": place, "group_id": 1, "inputs_hash": str(place), "policy_hash": "p"}
             values |= {"solver_version": "s", "calibrations": names, "summary": "{}", "body": b""}
             session.execute(insert(SolutionModel), [values])
-        session.execute(text("UPDATE queue SET solved = 1"))
+        session.execute(text("UPDATE queue SET solved = true"))
     return filled
 
 
@@ -44,5 +44,5 @@ class TestSpareCalibrations:
     def test_they_stay_while_a_group_waits_to_be_solved(self, solved: Store) -> None:
         with solved.write() as session:
             delete_solutions(session, [1, 2])
-            session.execute(text("UPDATE queue SET solved = 0"))
+            session.execute(text("UPDATE queue SET solved = false"))
             assert (spare_calibrations(session), delete_calibrations(session, KEYS)) == ([], 0)

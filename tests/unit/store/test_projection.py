@@ -1,8 +1,14 @@
 from __future__ import annotations
 
-from sqlalchemy import insert, select, text
+from sqlalchemy import insert, select
 
-from app.store.models import GroupModel, ImportFindingModel, StationModel, ViewModel
+from app.store.models import (
+    GroupModel,
+    ImportFindingModel,
+    StationModel,
+    ViewModel,
+)
+from app.store.prediction_models import PredictionModel, PredictionSetModel
 from app.store.projection import (
     all_groups,
     all_noticed,
@@ -11,11 +17,17 @@ from app.store.projection import (
     all_verdicts,
     rewrite,
 )
+from app.store.proposals import Proposal, read_proposals, save_proposals
 from app.store.session import Store
+from app.store.soundness import count_lost_references
 from app.store.spare import put_spare
 from app.store.verdicts import StoredVerdict, insert_verdicts
 
 VERDICT = StoredVerdict(7, 1, "ann", "t", "accepted", None, None, "h", "p", False, None)
+
+
+def proposal(view_id: int) -> Proposal:
+    return Proposal(view_id, "unsure", "Odd.", {}, 0.5, 0.4, 30, 0.2, None, "f", "s", "1")
 
 
 class TestAll:
@@ -35,19 +47,47 @@ class TestAll:
             assert [row.sentence for row in all_noticed(session)] == ["kept"]
 
 
+def whole(session):
+    """Rows of stations, groups and views, as they are."""
+    return (
+        [dict(row._mapping) for row in session.execute(select(*model.__table__.columns))]
+        for model in (StationModel, GroupModel, ViewModel)
+    )
+
+
 class TestRewrite:
     def test_rows_are_replaced_while_verdicts_refer_to_them(self, filled: Store) -> None:
         with filled.write() as session:
             insert_verdicts(session, 1, [VERDICT], actor="ann", at="t")
             put_spare(session, 1, {("cam1", "99"): b"x"})
-            stations, groups, views = (
-                [dict(row._mapping) for row in session.execute(select(*model.__table__.columns))]
-                for model in (StationModel, GroupModel, ViewModel)
-            )
+            stations, groups, views = whole(session)
             label = [{**row, "label": "anew"} for row in groups]
             rewrite(session, stations=stations, groups=label, views=views, noticed=[], spare=[])
         with filled.read() as session:
             assert [item.group.label for item in all_groups(session)] == ["anew"]
             assert list(all_spare(session)) == []
             assert len(list(all_verdicts(session))) == 1
-            assert not session.execute(text("PRAGMA foreign_key_check")).all()
+            assert count_lost_references(session) == 0
+
+    def test_what_nobody_said_stays_with_the_views_that_are_there_again(
+        self, filled: Store
+    ) -> None:
+        with filled.write() as session:
+            stations, groups, views = whole(session)
+            ids = [row["id"] for row in views]
+            assert len(ids) > 1
+            save_proposals(session, [proposal(number) for number in ids])
+            named = {"id": 1, "dataset_id": groups[0]["dataset_id"], "name": "detector"}
+            words = dict.fromkeys(("format", "source", "created", "actor", "digest", "report"), "")
+            numbers = dict.fromkeys(("frames", "boxes", "cameras", "unknown"), 0)
+            session.execute(insert(PredictionSetModel), [{**named, **words, **numbers}])
+            box = {"set_id": 1, "x": 1.0, "y": 2.0, "width": 3.0, "height": 4.0, "score": 0.5}
+            session.execute(insert(PredictionModel), [{**box, "view_id": item} for item in ids])
+            before = session.execute(select(*PredictionModel.__table__.columns)).all()
+            rewrite(
+                session, stations=stations, groups=groups, views=views[1:], noticed=[], spare=[]
+            )
+        with filled.read() as session:
+            assert read_proposals(session, ids) == {item: proposal(item) for item in ids[1:]}
+            after = session.execute(select(*PredictionModel.__table__.columns)).all()
+            assert after == before[1:]

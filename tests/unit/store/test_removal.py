@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from sqlalchemy import text
-
 from app.store.datasets import dataset_rows
 from app.store.group_rows import next_id
 from app.store.models import GroupModel
@@ -11,6 +9,7 @@ from app.store.removal import (
     keep_used_ids,
 )
 from app.store.session import Store
+from app.store.soundness import count_lost_references
 
 
 class TestRemoval:
@@ -25,5 +24,5 @@ class TestRemoval:
             keep_used_ids(session)
             delete_rows(session, 1)
             assert dataset_rows(session) == []
-            assert not session.execute(text("PRAGMA foreign_key_check")).all()
+            assert count_lost_references(session) == 0
             assert next_id(session, GroupModel) == 2

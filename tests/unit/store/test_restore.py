@@ -19,6 +19,8 @@ from app.store.restore import restore
 from app.store.session import Store
 from tests.unit.store.homes import killed, say
 
+pytestmark = pytest.mark.file_of_sqlite("the file put back from a copy")
+
 
 @pytest.fixture
 def backup(store: Store, tmp_path: Path) -> Path:

@@ -25,6 +25,10 @@ from app.store import value_codec
 from app.store.models import DatasetModel, GroupModel
 from app.store.solutions import (
     SolutionKey,
+    _leaves_open,
+    decode_calibration,
+    decode_camera,
+    encode_calibration,
     encode_solution,
     insert_solutions,
     read_calibrations,
@@ -129,6 +133,17 @@ class TestRoundTrip:
                 "key-a": solution.views[0].calibration
             }
 
+    def test_whether_lines_leave_a_camera_open_is_told_from_the_text_alone(
+        self, solution, camera
+    ) -> None:
+        found = solution.views[0].calibration
+        none = Calibration("lines", None, reason="no lines")
+        odd = replace(found, unobservable=(), reason='"camera":null, "unobservable":["x"]')
+        told = [found, replace(found, unobservable=()), none, Calibration("given", camera), odd]
+        for item in told:
+            is_open = item.camera is None or item.unobservable != ()
+            assert _leaves_open(encode_calibration(item)) == is_open
+
     def test_known_calibrations_are_not_encoded_again(self, group, solution) -> None:
         encoded = encode_solution(group, solution, known={"key-a"})
         assert set(encoded.calibrations) == {"key-b"}
@@ -154,6 +169,16 @@ class TestValueCodec:
         assert value["paint"]["points"] == 7
         assert value_codec.from_json(Calibration, value) == told
         assert value_codec.from_json(Calibration, value_codec.to_json(bare)) == bare
+
+    def test_markings_can_be_left_out_whatever_texts_say(self) -> None:
+        trap = ',"markings":[],"suspects":[]'
+        fit = MarkingFit(trap, "tp", (0.1,), (ImagePoint(1.0, 2.0),), (ImagePoint(3.0, 4.0),))
+        told = Calibration(
+            "lines", None, trap, markings=(fit, fit), suspects=(Suspect(trap, None, 0.5, 3.0),)
+        )
+        body = encode_calibration(told)
+        assert decode_calibration(body) == told
+        assert decode_camera(body) == replace(told, markings=())
 
     def test_a_type_without_a_codec_is_a_programming_error(self) -> None:
         with pytest.raises(TypeError, match="no codec"):

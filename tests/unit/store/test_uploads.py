@@ -33,11 +33,13 @@ def settings(tmp_path: Path) -> Settings:
     return Settings(home=tmp_path / "home", max_upload_bytes=100)
 
 
-def send(settings: Settings, name: str = "a.zip", content: bytes = b"content") -> Upload:
+def send(
+    settings: Settings, name: str = "a.zip", content: bytes = b"content", by: str | None = None
+) -> Upload:
     writer = UploadWriter(settings, name)
     for start in range(0, len(content), 3):
         writer.write(content[start : start + 3])
-    return writer.finish()
+    return writer.finish(by=by)
 
 
 def files(settings: Settings) -> list[str]:
@@ -214,6 +216,22 @@ class TestGetUpload:
         assert [item.name for item in list_uploads(settings)] == ["a.zip"]
 
 
+class TestKeepUpload:
+    def test_stays_true_while_the_file_is_sent_again(
+        self, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        upload, abort = send(settings, by="ann"), UploadWriter.abort
+
+        def slow(writer: UploadWriter) -> None:
+            keep_upload(settings, upload.id)
+            abort(writer)
+
+        monkeypatch.setattr(UploadWriter, "abort", slow)
+        send(settings, by="ben")
+        found = get_upload(settings, upload.id)
+        assert (found.kept, found.by) == (True, ("ann", "ben"))
+
+
 class TestExpireUploads:
     def test_old_ones_go_and_those_that_a_dataset_reads_stay(self, settings: Settings) -> None:
         old, kept, new = (send(settings, f"{name}.zip") for name in ("old", "kept", "new"))
@@ -241,3 +259,17 @@ class TestDeleteUpload:
         delete_upload(settings, other.id)
         with pytest.raises(NotFoundError):
             delete_upload(settings, other.id)
+
+    def test_what_two_have_sent_goes_with_the_second(self, settings: Settings) -> None:
+        ann, ben = send(settings, by="ann"), send(settings, by="ben")
+        assert (ann.id, ben.by) == (ben.id, ("ann", "ben"))
+        delete_upload(settings, ann.id, "ann".__eq__)
+        assert get_upload(settings, ann.id).by == ("ben",)
+        assert upload_path(settings, ann.id).read_bytes() == b"content"
+        delete_upload(settings, ann.id, "ben".__eq__)
+        assert list_uploads(settings) == []
+
+    def test_who_may_delete_it_for_all_does(self, settings: Settings) -> None:
+        send(settings, by="ann")
+        delete_upload(settings, send(settings, by="ben").id)
+        assert list_uploads(settings) == []

@@ -1,0 +1,129 @@
+"""Dialect: what the store asks of a database engine that the engines do not do alike.
+
+SQLite is a file of the home, PostgreSQL a server. Everything in which they differ is in this
+package: here and in ``sqlite`` and ``postgresql`` what is asked of a connection, in ``statements``
+what is written differently in a statement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from enum import Enum
+from importlib import import_module
+from typing import Protocol, cast
+
+from sqlalchemy import Connection, Engine, Table
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.orm import Session
+
+from app.config import Settings
+from app.errors import InputError
+from app.store.dialect.sharing import Sharing
+
+WRITE = {"touchline_write": True}
+"""Options of an engine whose transactions take the write lock at their start."""
+GLANCE = {"touchline_glance": True}
+"""Options of an engine that begins no transactions: each statement is one."""
+
+
+class Failure(Enum):
+    """Why a database did not do what it was asked."""
+
+    FULL = "full"
+    BUSY = "busy"
+    DAMAGED = "damaged"
+    UNREADABLE = "unreadable"
+    DISK = "disk"
+    AWAY = "away"
+    OTHER = "other"
+
+
+class Dialect(Protocol):
+    """What each engine of databases does in its own way.
+
+    Attributes:
+        name: What people call it.
+        no_fault: What is said of a database without a fault.
+        is_file: Whether the database is a file, which is looked at before it is opened and copied
+            as a whole, and lies in the home.
+    """
+
+    name: str
+    no_fault: str
+    is_file: bool
+
+    def make_engine(self, settings: Settings, *, lasting: bool = True) -> Engine:
+        """An engine whose connections keep our promises and begin transactions as told.
+
+        Args:
+            settings: Where the database is.
+            lasting: False: what its transactions write may be lost in a power cut, as a whole.
+
+        Raises:
+            InputError: The URL is none, or the driver is not installed.
+            StorageError: The library is too old.
+        """
+
+    def reading(self, engine: Engine) -> Engine:
+        """The same engine for transactions that see one snapshot and keep nothing."""
+
+    def glancing(self, engine: Engine) -> Engine:
+        """The same engine without transactions: each statement is one, and sees one snapshot."""
+
+    def sharing(
+        self, engine: Engine, reported: Callable[[], AbstractContextManager[None]]
+    ) -> Sharing:
+        """What processes with this database say to each other; ``reported`` names what fails."""
+
+    def require_promises(self, engine: Engine) -> None:
+        """Raise StorageError where the database does not keep what we promise."""
+
+    def failure(self, error: DBAPIError) -> tuple[Failure, str]:
+        """Why a statement failed, and the engine's name for it."""
+
+    def interrupted(
+        self, session: Session, ends: Callable[[], bool]
+    ) -> AbstractContextManager[None]:
+        """End what the database is at, and what is done here, once a function says so."""
+
+    def migrating(self, connection: Connection, *, new: bool) -> AbstractContextManager[None]:
+        """Run migrations; ``new``: of a database that is empty."""
+
+    def settle(self, connection: Connection, tables: Sequence[Table], key: str) -> None:
+        """Count ids on from rows that were copied, and belong to the installation of a key."""
+
+    def file_faults(self, session: Session, most: int, *, thorough: bool) -> list[str]:
+        """What is wrong with the file, each a line; see ``soundness``."""
+
+    def count_lost_references(self, session: Session) -> int:
+        """How many rows refer to rows that are gone."""
+
+
+_MODULES = {"sqlite": "sqlite", "postgresql": "postgresql", "postgres": "postgresql"}
+
+
+def dialect_of(settings: Settings) -> Dialect:
+    """How the database of a home is spoken to.
+
+    Raises:
+        InputError: The URL is neither one of SQLite nor of PostgreSQL.
+    """
+    kind = settings.database.partition(":")[0].partition("+")[0]
+    if kind not in _MODULES:
+        raise InputError(
+            "only SQLite and PostgreSQL databases are supported",
+            hint="Set TOUCHLINE_DATABASE_URL to postgresql://USER:PASSWORD@HOST/DATABASE, or leave"
+            " it unset.",
+        )
+    return _named(_MODULES[kind])
+
+
+def dialect_in(session: Session) -> Dialect:
+    """How the database of a session is spoken to."""
+    return _named(session.get_bind().dialect.name)
+
+
+def _named(name: str) -> Dialect:
+    # Only the one that is used is imported: a driver takes its time.
+    return cast(Dialect, import_module(f"app.store.dialect.{name}").DIALECT)

@@ -1,0 +1,226 @@
+"""PostgreSQL: a server for teams, spoken to as SQLite is: one writer, snapshots for readers.
+
+Text is ordered and compared by its code points, whatever the database's own collation is, whole
+numbers have 64 bits, and LIKE takes no notice of the case of ASCII letters, as in SQLite.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url
+from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError, OperationalError
+from sqlalchemy.orm import Session
+
+from app.config import Settings
+from app.errors import InputError, StorageError
+from app.store.dialect.dialect import GLANCE, Failure
+from app.store.dialect.postgresql_compiler import Columns, Statements, Types
+from app.store.dialect.postgresql_sharing import Reported, ServerSharing
+from app.store.dialect.postgresql_triggers import carry_out
+from app.store.dialect.sharing import Sharing
+
+MIN_SERVER = 15
+"""The oldest major version that the tests have seen."""
+WRITE_LOCK = 0x746F756368
+"""The advisory lock of the one writer; it is the database's, and ends with its transaction."""
+LOCK_SECONDS = 5
+"""How long a writer waits for others, and a migration for a table."""
+LOOK_SECONDS = 0.2
+"""Between two looks whether a statement is still wanted."""
+
+_FAILURES = {
+    "53100": Failure.FULL,
+    "55P03": Failure.BUSY,
+    "40P01": Failure.BUSY,
+    "40001": Failure.BUSY,
+    "XX001": Failure.DAMAGED,
+    "XX002": Failure.DAMAGED,
+    "25006": Failure.UNREADABLE,
+    "42501": Failure.UNREADABLE,
+    "58030": Failure.DISK,
+    "53300": Failure.AWAY,
+    "57P01": Failure.AWAY,
+    "57P02": Failure.AWAY,
+    "57P03": Failure.AWAY,
+}
+"""By SQLSTATE (PostgreSQL, Appendix A)."""
+
+
+class PostgreSQL:
+    """A database of a server; files of the home stay in the home."""
+
+    name = "PostgreSQL"
+    no_fault = "PostgreSQL looks after its own files, and lets no reference be lost"
+    is_file = False
+
+    def make_engine(self, settings: Settings, *, lasting: bool = True) -> Engine:
+        """See ``Dialect``."""
+        try:
+            engine = create_engine(
+                _address(settings.database),
+                # A server that was started again is found again.
+                pool_pre_ping=True,
+                # One at a time writes what need not last.
+                pool_size=16 if lasting else 1,
+                max_overflow=16 if lasting else 1,
+                # What a statement carries may be somebody's password.
+                hide_parameters=True,
+            )
+        except (ImportError, NoSuchModuleError) as error:
+            raise InputError(
+                "the driver of PostgreSQL is not installed",
+                hint="Run pip install 'touchline[postgres]', or leave TOUCHLINE_DATABASE_URL unset.",
+            ) from error
+        dialect: Any = engine.dialect
+        dialect.statement_compiler = Statements
+        dialect.ddl_compiler = Columns
+        dialect.type_compiler_instance = Types(dialect)
+        event.listen(engine, "connect", partial(_set_up, lasting))
+        event.listen(engine, "begin", _begin)
+        return engine
+
+    def reading(self, engine: Engine) -> Engine:
+        """See ``Dialect``."""
+        return engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
+
+    def glancing(self, engine: Engine) -> Engine:
+        """See ``Dialect``."""
+        return engine.execution_options(**GLANCE, isolation_level="AUTOCOMMIT")
+
+    def sharing(self, engine: Engine, reported: Reported) -> Sharing:
+        """See ``Dialect``."""
+        return ServerSharing(engine, reported)
+
+    def require_promises(self, engine: Engine) -> None:
+        """See ``Dialect``."""
+        with engine.connect() as connection:
+            show = connection.exec_driver_sql
+            version = int(show("SHOW server_version_num").scalar_one()) // 10_000
+            if version < MIN_SERVER:
+                raise StorageError(
+                    f"PostgreSQL {version} is too old", hint=f"Take {MIN_SERVER} or a newer one."
+                )
+            if show("SHOW server_encoding").scalar_one() != "UTF8":
+                raise StorageError(
+                    "the database does not hold every text",
+                    hint="Create it with ENCODING 'UTF8' TEMPLATE template0.",
+                )
+
+    def failure(self, error: DBAPIError) -> tuple[Failure, str]:
+        """See ``Dialect``."""
+        state = str(getattr(error.orig, "sqlstate", None) or "")
+        if error.connection_invalidated or state.startswith("08"):
+            return Failure.AWAY, state
+        # Nobody answered, so nobody said why.
+        if not state and isinstance(error, OperationalError):
+            return Failure.AWAY, state
+        # Who we are (28) and what there is (3D) is asked before anything else.
+        if state.startswith(("28", "3D")):
+            return Failure.AWAY, state
+        return _FAILURES.get(state, Failure.OTHER), state
+
+    @contextmanager
+    def interrupted(self, session: Session, ends: Callable[[], bool]) -> Iterator[None]:
+        """See ``Dialect``; a thread looks, for the driver waits for the server meanwhile."""
+        driver: Any = session.connection().connection.driver_connection
+        done = threading.Event()
+
+        def look() -> None:
+            while not done.wait(LOOK_SECONDS):
+                if ends():
+                    driver.cancel_safe()
+                    return
+
+        watcher = threading.Thread(target=look, name="postgresql-watcher", daemon=True)
+        watcher.start()
+        try:
+            yield
+        except OperationalError:
+            if not ends():
+                raise
+        finally:
+            done.set()
+            watcher.join()
+
+    @contextmanager
+    def migrating(self, connection: Connection, *, new: bool) -> Iterator[None]:
+        """See ``Dialect``: what is written for SQLite is said in PostgreSQL's words."""
+
+        def translate(
+            _connection: Any, cursor: Any, statement: str, parameters: Any, *_: Any
+        ) -> tuple[str, Any]:
+            return carry_out(cursor, statement, new=new), parameters
+
+        event.listen(connection, "before_cursor_execute", translate, retval=True)
+        try:
+            yield
+        finally:
+            event.remove(connection, "before_cursor_execute", translate)
+
+    def settle(self, connection: Connection, tables: Sequence[Table], key: str) -> None:
+        """See ``Dialect``."""
+        for table in tables:
+            if table.autoincrement_column is not None:
+                name = table.name
+                connection.exec_driver_sql(
+                    f"SELECT setval(pg_get_serial_sequence('{name}', 'id'), coalesce(max(id), 1),"
+                    f' max(id) IS NOT NULL) FROM "{name}"'
+                )
+
+    def file_faults(self, session: Session, most: int, *, thorough: bool) -> list[str]:
+        """See ``Dialect``; a server looks after its own files."""
+        return []
+
+    def count_lost_references(self, session: Session) -> int:
+        """See ``Dialect``; constraints are always checked here."""
+        return 0
+
+
+DIALECT = PostgreSQL()
+
+
+def _address(url: str) -> URL:
+    """The URL for psycopg.
+
+    Raises:
+        InputError: It is none; what it says is not repeated, for it holds a password.
+    """
+    try:
+        return make_url(url).set(drivername="postgresql+psycopg")
+    except (ArgumentError, ValueError) as error:
+        # Without its cause, which repeats what it was given.
+        del error
+    raise InputError(
+        "TOUCHLINE_DATABASE_URL is no URL",
+        hint="Write it as postgresql://USER:PASSWORD@HOST/DATABASE; characters such as @ and / in"
+        " the password are written as %40 and %2F.",
+    )
+
+
+def _set_up(lasting: bool, connection: Any, _record: object) -> None:
+    from psycopg.types.numeric import FloatLoader
+
+    # Sums of whole numbers are numeric, and Decimal in Python; SQLite's are int.
+    class _Number(FloatLoader):
+        def load(self, data: Any) -> Any:
+            text = bytes(data)
+            return int(text) if text.lstrip(b"-").isdigit() else float(text)
+
+    connection.adapters.register_loader("numeric", _Number)
+    was, connection.autocommit = connection.autocommit, True
+    # With ``off`` a power cut loses acknowledged edits.
+    connection.execute(f"SET synchronous_commit = {'on' if lasting else 'off'}")
+    connection.execute(f"SET lock_timeout = '{LOCK_SECONDS}s'")
+    connection.execute("SET TIME ZONE 'UTC'")
+    connection.autocommit = was
+
+
+def _begin(connection: Connection) -> None:
+    """Wait for the write lock: only then the first statement of a writer takes its snapshot."""
+    if connection.get_execution_options().get("touchline_write", False):
+        connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({WRITE_LOCK})")

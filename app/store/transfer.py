@@ -1,0 +1,226 @@
+"""Transfer: a whole database copied into another one, of either engine, and compared with it.
+
+What a killed transfer has copied stays, and the next one goes on behind it: rows go over in the
+order of their keys. Until the two are equal the target says that it is unfinished
+(``migrate.UNFINISHED``), and nothing else opens it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, Engine, Table, func, insert, inspect, select, text
+from sqlalchemy.orm import Session
+
+from app.config import Settings
+from app.errors import DamagedError, InputError
+from app.store.anchor import anchor_of
+from app.store.dialect.dialect import Dialect, dialect_of
+from app.store.engine import WRITE, make_engine, reported
+from app.store.home import make_file
+from app.store.locks import database_alone, server_lock
+from app.store.log import verify_chain
+from app.store.migrate import UNFINISHED, make_schema, schema_revision
+from app.store.session import Store
+from app.store.tables import Base
+
+_BATCH = 500
+_INSTALLATION, _VERSION, _MARKS = "installation", "version", "group_change"
+_REVISION = text("UPDATE alembic_version SET version_num = :revision")
+
+
+@dataclass(frozen=True)
+class Transferred:
+    """What a transfer came to.
+
+    Attributes:
+        rows: Rows by table, in both.
+        copied: How many of them this run has copied; the others an earlier one had.
+        entries: Length of the log, whose hash chain was followed in the target.
+        versions: Hash of each frozen version, by dataset and name.
+    """
+
+    rows: dict[str, int]
+    copied: int
+    entries: int
+    versions: dict[str, str]
+
+
+def transfer(
+    source: Settings, target: Settings, tell: Callable[[str, int], None] = lambda *_: None
+) -> Transferred:
+    """Copy a database into an empty one, or go on with a copy that was stopped.
+
+    Args:
+        source: What is copied; no server may run on its home.
+        target: Where to.
+        tell: Told the name of each table, and how many rows of it have been copied.
+
+    Raises:
+        InputError: They are the same, or the target holds something else.
+        StorageError: A server runs, or one of them cannot be read or written.
+        DamagedError: The source is damaged, or the copy is not equal to it.
+    """
+    if source.database == target.database:
+        raise InputError("a database cannot be transferred into itself")
+    dialect = dialect_of(target)
+    with ExitStack() as held:
+        held.enter_context(server_lock(source))
+        if target.home != source.home:
+            held.enter_context(server_lock(target))
+        store = held.enter_context(closing(Store.open(source)))
+        if dialect.is_file:
+            held.enter_context(database_alone(target, "nothing can be copied into it"))
+            make_file(target.database_file)
+        engine = make_engine(target)
+        held.callback(engine.dispose)
+        held.enter_context(reported(target))
+        with store.read() as session:
+            writer = engine.execution_options(**WRITE)
+            return _transfer(session, writer, dialect, target.yields, tell)
+
+
+def _transfer(
+    session: Session,
+    target: Engine,
+    dialect: Dialect,
+    yields: Path,
+    tell: Callable[[str, int], None],
+) -> Transferred:
+    anchor = anchor_of(session.connection())
+    if anchor is None:
+        raise InputError("the database has no installation yet", hint="Run touchline migrate.")
+    dialect.require_promises(target)
+    _begin(target, dialect, anchor.installation)
+    copied = 0
+    for tables in _steps():
+        copied += _copy(session, target, tables, tell)
+    with target.begin() as connection:
+        rows = _require_equal(session, connection)
+        entries = _require_chain(connection, anchor.entries, anchor.hash)
+        dialect.settle(connection, _tables(), anchor.installation)
+        # Their marks are those of the changes of another database.
+        shutil.rmtree(yields, ignore_errors=True)
+        connection.execute(_REVISION, {"revision": anchor.schema})
+        return Transferred(rows, copied, entries, _versions(connection))
+
+
+def _begin(target: Engine, dialect: Dialect, installation: str) -> None:
+    """Make an empty schema that says that it is unfinished; or see that it is one of ours.
+
+    Raises:
+        InputError: The target is in use.
+    """
+    revision = schema_revision(target)
+    if revision is None:
+        with target.connect() as connection:
+            if inspect(connection).get_table_names():
+                raise InputError("the target holds tables of something else", hint=_EMPTY)
+        make_schema(target, dialect, new=True)
+        with target.begin() as connection:
+            connection.execute(text("DELETE FROM installation"))
+            connection.execute(_REVISION, {"revision": UNFINISHED})
+        return
+    with target.connect() as connection:
+        keys = list(connection.execute(text("SELECT key FROM installation")).scalars())
+    if revision != UNFINISHED or keys not in ([], [installation]):
+        raise InputError("the target is in use already", hint=_EMPTY)
+
+
+_EMPTY = "Name a database without tables, or a home that does not exist yet."
+
+
+def _tables() -> list[Table]:
+    """What is copied; marks of changes are made by the target's own triggers."""
+    return [table for table in Base.metadata.sorted_tables if table.name != _MARKS]
+
+
+def _steps() -> Iterator[list[Table]]:
+    """Tables after those that they refer to; the groups of versions with these, which seal them."""
+    together = [table for table in _tables() if table.name in (f"{_VERSION}_group", _VERSION)]
+    together.sort(key=lambda table: table.name == _VERSION)
+    # Whose it is first: then a target of another installation is known.
+    yield [Base.metadata.tables[_INSTALLATION]]
+    for table in _tables():
+        if table.name == _VERSION:
+            yield together
+        elif table not in together and table.name != _INSTALLATION:
+            yield [table]
+
+
+def _copy(
+    session: Session, target: Engine, tables: Sequence[Table], tell: Callable[[str, int], None]
+) -> int:
+    """Copy what is missing of tables; several go over in one transaction."""
+    copied = 0
+    with ExitStack() as held:
+        connection = held.enter_context(target.connect())
+        for table in tables:
+            # Rows went over in this order: so many of the first ones are there.
+            present = connection.execute(select(func.count()).select_from(table)).scalar_one()
+            rows = iter(_rows(session.connection(), table, present))
+            while batch := list(islice(rows, _BATCH)):
+                connection.execute(insert(table), batch)
+                copied += len(batch)
+                if len(tables) == 1:
+                    connection.commit()
+                tell(table.name, present + copied)
+        connection.commit()
+    return copied
+
+
+def _rows(connection: Connection, table: Table, after: int = 0) -> Iterator[dict[str, Any]]:
+    """The rows of a table by key, a few at a time."""
+    statement = select(table).order_by(*table.primary_key.columns).offset(after)
+    found = connection.execute(statement, execution_options={"yield_per": _BATCH})
+    for row in found:
+        yield dict(row._mapping)
+
+
+def _require_equal(session: Session, connection: Connection) -> dict[str, int]:
+    """Rows by table, where every row of the copy is that of the source."""
+    counts = {}
+    for table in _tables():
+        ours, theirs = _digest(connection, table), _digest(session.connection(), table)
+        if ours != theirs:
+            raise DamagedError(
+                f"table {table.name} of the copy is not equal: {ours[0]:,} rows of {theirs[0]:,}",
+                hint="Empty the target and run touchline transfer again.",
+            )
+        counts[table.name] = ours[0]
+    return counts
+
+
+def _digest(connection: Connection, table: Table) -> tuple[int, str]:
+    """How many rows there are, and a digest of their values in order."""
+    count, digest = 0, hashlib.sha256()
+    for row in _rows(connection, table):
+        count += 1
+        digest.update(repr(list(row.values())).encode())
+    return count, digest.hexdigest()
+
+
+def _require_chain(connection: Connection, entries: int, last: str) -> int:
+    with Session(connection) as session:
+        count = verify_chain(session)
+        found = session.connection().execute(
+            text("SELECT hash FROM log WHERE id = :id"), {"id": entries}
+        )
+        if count != entries or (found.scalar() or "") != last:
+            raise DamagedError("the log of the copy does not end as the source's does")
+        return count
+
+
+def _versions(connection: Connection) -> dict[str, str]:
+    statement = text(
+        "SELECT dataset.name AS dataset, version.name AS name, version.hash AS hash FROM version"
+        " JOIN dataset ON dataset.id = version.dataset_id ORDER BY version.id"
+    )
+    return {f"{row.dataset}/{row.name}": row.hash for row in connection.execute(statement)}
