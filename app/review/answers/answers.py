@@ -11,8 +11,26 @@ from app.store.session import Session, Store
 
 def find_first(store: Store, key: str, actor: str) -> Answer | None:
     """The answer that is kept under a key, or None."""
-    with store.read() as session:
+    with store.glance() as session:
         return find_answer(session, key, actor)
+
+
+def claim(store: Store, key: str, actor: str) -> bool:
+    """Let no other process answer under a key; False where one does at the moment.
+
+    Raises:
+        StorageError: The database cannot be asked.
+    """
+    return store.sharing.take(_claim(key, actor))
+
+
+def end_claim(store: Store, key: str, actor: str) -> None:
+    """Let others answer under it: what they find is kept by now."""
+    store.sharing.give_back(_claim(key, actor))
+
+
+def _claim(key: str, actor: str) -> str:
+    return f"answer/{actor}/{key}"
 
 
 def keep_first(store: Store, key: str, actor: str, answer: Answer) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,10 +12,12 @@ from app.errors import InputError, NotFoundError
 from app.soccer.policy import Policy
 from app.store.clock import now
 from app.store.codecs import policy_to_json
+from app.store.copy_datasets import CopiesOf, insert_copy_dataset
 from app.store.datasets import (
     dataset_rows,
     find_dataset,
     group_ids,
+    has_match,
     insert_dataset_row,
     policy_of,
     update_policy,
@@ -24,6 +26,7 @@ from app.store.listing import count_states
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
+from app.store.sight import COPIES, EVERYTHING, Sight
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
 
@@ -44,12 +47,26 @@ class Dataset:
     unreviewed: int
 
 
-def insert_dataset(session: Session, name: str, policy: Policy, actor: str) -> int:
-    """Insert a dataset and its log entry; returns its id."""
+@dataclass(frozen=True)
+class DatasetHead:
+    """A dataset without how far it is, for which all its groups would be counted."""
+
+    id: int
+    name: str
+    policy: Policy
+
+
+def insert_dataset(
+    session: Session, name: str, policy: Policy, actor: str, copies: CopiesOf | None = None
+) -> int:
+    """Insert a dataset and its log entry; returns its id. ``copies``: of what it holds copies."""
     require_name(name)
     at = now()
-    identity = insert_dataset_row(session, name, policy, at)
+    identity = insert_dataset_row(session, name, policy, at, copies=copies is not None)
     body = {"name": name, "policy": policy_to_json(policy)}
+    if copies is not None:
+        insert_copy_dataset(session, identity, copies)
+        body["copies"] = vars(copies)
     append(session, [Entry("dataset", actor, at, body, dataset_id=identity)])
     return identity
 
@@ -64,10 +81,11 @@ def require_name(name: str, pointer: str = "/name") -> None:
         )
 
 
-def list_datasets(store: Store) -> list[Dataset]:
-    """All datasets, by name."""
+def list_datasets(store: Store, sight: Sight = EVERYTHING) -> list[Dataset]:
+    """The datasets that somebody sees, by name; those of copies are in no list."""
     with store.read() as session:
-        return _datasets(session, dataset_rows(session))
+        rows = [row for row in dataset_rows(session) if row.id <= COPIES]
+        return _datasets(session, [row for row in rows if sight.sees(row.id)])
 
 
 def get_dataset(store: Store, dataset: str | int) -> Dataset:
@@ -100,6 +118,23 @@ def read_dataset(session: Session, dataset: str | int) -> Dataset:
     if row is None:
         raise NotFoundError(f'there is no dataset "{dataset}"')
     return _datasets(session, [row])[0]
+
+
+def require_matches(
+    session: Session, dataset: str | int, matches: Collection[str] | None = None
+) -> DatasetHead:
+    """The head of a dataset that has all of these matches; nothing is counted.
+
+    Raises:
+        NotFoundError: There is no such dataset or match.
+    """
+    row = find_dataset(session, dataset)
+    if row is None:
+        raise NotFoundError(f'there is no dataset "{dataset}"')
+    for match in matches or ():
+        if not has_match(session, row.id, match):
+            raise NotFoundError(f'"{row.name}" has no match {match}')
+    return DatasetHead(row.id, row.name, policy_of(row.policy))
 
 
 def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -> None:

@@ -8,10 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.errors import ConflictError
-from app.review.datasets.dataset import dataset_id, read_dataset
+from app.review.datasets.dataset import dataset_id, insert_dataset, read_dataset
 from app.review.datasets.spare_calibrations import delete_spare_calibrations
+from app.soccer.policy import Policy
 from app.store import removal
 from app.store.clock import now
+from app.store.copy_datasets import copies_of
 from app.store.log import Entry, append
 from app.store.session import Session, Store
 
@@ -40,7 +42,12 @@ def read_contents(store: Store, dataset: str | int) -> DatasetContents:
 
 
 def delete_dataset(
-    store: Store, dataset: str | int, *, confirm: str, actor: str
+    store: Store,
+    dataset: str | int,
+    *,
+    confirm: str,
+    actor: str,
+    afresh: Policy | None = None,
 ) -> DatasetContents:
     """Delete a dataset with everything that belongs to it; returns what that was.
 
@@ -52,6 +59,8 @@ def delete_dataset(
         dataset: Name or id.
         confirm: The name, once more.
         actor: Who wants it.
+        afresh: Policy of an empty dataset of the same name, which is made in its place with its
+            roles, tokens and webhooks; None: none is.
 
     Raises:
         NotFoundError: There is no such dataset.
@@ -65,13 +74,20 @@ def delete_dataset(
             pointer="/confirm",
         )
     identity = dataset_id(store, found.id)
+    with store.read() as session:
+        copies = copies_of(session, identity)
+    for row in copies:
+        delete_dataset(store, row.dataset_id, confirm=row.name, actor=actor)
     _delete_solutions(store, identity)
     with store.write() as session:
         contents = _contents(session, identity)
         removal.keep_used_ids(session)
         body = {"name": contents.name, "counts": contents.counts}
         append(session, [Entry(KIND, actor, now(), body, identity)])
+        heir = None if afresh is None else removal.move_access(session, identity)
         removal.delete_rows(session, identity)
+        if afresh is not None:
+            assert insert_dataset(session, contents.name, afresh, actor) == heir
     delete_spare_calibrations(store)
     return contents
 

@@ -8,7 +8,8 @@ from itertools import takewhile
 from typing import TypeVar
 
 AHEAD = 8
-"""Tasks that may wait for a worker, so that memory stays flat however many there are."""
+"""Tasks under way, so that memory stays flat however many there are; an executor of more workers
+says its own number (``ahead``)."""
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -40,10 +41,11 @@ def fan_out(
         yield from map(work, takewhile(lambda _: not stop(), tasks))
         return
     running: set[Future[R]] = set()
+    ahead = getattr(executor, "ahead", AHEAD)
     try:
         for task in tasks:
             running.add(executor.submit(work, task))
-            while len(running) >= AHEAD and not stop():
+            while len(running) >= ahead and not stop():
                 done, running = wait(running, LOOK_S, FIRST_COMPLETED)
                 yield from (future.result() for future in done)
             if stop():

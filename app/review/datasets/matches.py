@@ -7,12 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.datasets.archive import Limits
 from app.datasets.csv_text import read_rows
+from app.datasets.file_tree import Limits
 from app.datasets.json_text import read_json
 from app.datasets.sn_calibration import LineFile
 from app.errors import DatasetFormatError
-from app.solving.match_position import NO_PLACES, Place, Places, guess_matches
+from app.solving.match_model import Place
+from app.solving.match_position import NO_PLACES, Places
+from app.solving.match_runs import guess_matches
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 
 from app.config import Settings
-from app.datasets.archive import Limits, open_tree, resolve_inside
 from app.datasets.cameras_reader import read_cameras
-from app.datasets.cameras_writer import write_cameras
+from app.datasets.cameras_writer import camera_name, write_cameras
+from app.datasets.file_tree import Limits
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
+from app.datasets.safe_path import resolve_inside
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import lines_from_json
 from app.datasets.sn_calibration_writer import write_line_files
+from app.datasets.trees import open_tree
 from app.durable import replace_file
 from app.errors import GeometryError, InputError, ReviewError
 from app.finite import json_text
@@ -74,19 +76,14 @@ def snap_files(
     values = _line_values(lines, settings, report)
     match = _Match(values, images, settings)
     rows: list[dict[str, Any]] = []
-    names = FrameNames()
-    for picture in read_pictures(images, settings, report):
-        key = match.key(picture.stem)
-        if key is None:
-            continue
-        frame = names.name(picture.stem)
+    for picture, frame, key in match.pictures(report):
         row, camera, snapped = _snap_picture(picture, frame, values[key], report)
         _keep(out, frame, camera, snapped)
         rows.append(row)
         if progress is not None:
             progress(len(rows))
     if not rows:
-        raise _nothing(report, f"no picture has a line file of its name in {lines}")
+        raise report.refusal(f"no picture has a line file of its name in {lines}")
     _write(out / "snap.json", rows)
     return rows
 
@@ -109,16 +106,12 @@ def agree_files(
     found = read_cameras(cameras, report)
     match = _Match(found, images, settings)
     rows: list[dict[str, Any]] = []
-    names = FrameNames()
-    for picture in read_pictures(images, settings, report):
-        key = match.key(picture.stem)
-        if key is None:
-            continue
-        rows.append(_agree_picture(picture, names.name(picture.stem), found[key]))
+    for picture, frame, key in match.pictures(report):
+        rows.append(_agree_picture(picture, frame, found[key]))
         if progress is not None:
             progress(len(rows))
     if not rows:
-        raise _nothing(report, f"no picture has a camera of its name in {cameras}")
+        raise report.refusal(f"no picture has a camera of its name in {cameras}")
     return rows
 
 
@@ -130,27 +123,34 @@ class _Match:
     """
 
     def __init__(self, values: Mapping[str, Any], images: Sequence[Path], settings: Settings):
-        self._keys = set(values)
+        self._keys, self._images, self._settings = set(values), images, settings
         self._bare: dict[str, list[str]] = {}
         for key in values:
             self._bare.setdefault(PurePosixPath(key).name, []).append(key)
         places = picture_stems(images, settings)
-        self._pictures = Counter(PurePosixPath(stem).name for stem in places)
+        self._stems = Counter(PurePosixPath(stem).name for stem in places)
 
-    def key(self, stem: str) -> str | None:
-        """The key of a picture's file; None where it has none."""
+    def pictures(self, report: Report) -> Iterator[tuple[PictureFile, str, str]]:
+        """Each picture that has a file, with the name of its frame and the key of its file."""
+        names = FrameNames()
+        for picture in read_pictures(self._images, self._settings, report):
+            key = self._key(picture.stem)
+            if key is not None:
+                yield picture, names.name(picture.stem), key
+
+    def _key(self, stem: str) -> str | None:
         if stem in self._keys:
             return stem
         bare = PurePosixPath(stem).name
         keys = self._bare.get(bare, [])
-        return keys[0] if len(keys) == 1 and self._pictures[bare] == 1 else None
+        return keys[0] if len(keys) == 1 and self._stems[bare] == 1 else None
 
 
 def _line_values(lines: Path, settings: Settings, report: Report) -> dict[str, Any]:
     """What the line files hold, by stem with folders; an error where it cannot be read."""
     tree = open_tree(lines, report, Limits.of(settings))
     if tree is None:
-        raise _nothing(report, f"{lines} holds no line files")
+        raise report.refusal(f"{lines} holds no line files")
     values: dict[str, Any] = {}
     with closing(tree):
         for name in tree.names():
@@ -247,8 +247,7 @@ def _row(frame: str, outcome: str, **known: Any) -> dict[str, Any]:
 def _keep(out: Path, stem: str, camera: Camera | None, snapped: Snapped | None) -> None:
     """Write the camera of a frame and the points that were snapped; what an earlier run left
     there goes where there is nothing to write."""
-    place = PurePosixPath(stem)
-    old = resolve_inside(out, str(place.with_name(f"camera_{place.name}.json")))
+    old = resolve_inside(out, camera_name(stem))
     old_lines = resolve_inside(out, f"lines/{stem}.json")
     try:
         if snapped is None:
@@ -275,7 +274,3 @@ def _write(path: Path, rows: list[dict[str, Any]]) -> None:
         replace_file(path, text.encode(), durable=False, private=False)
     except OSError as error:
         raise InputError(f"{path.parent} cannot be written ({error.strerror})") from error
-
-
-def _nothing(report: Report, sentence: str) -> ReviewError:
-    return report.problems[0] if report.problems else InputError(sentence)

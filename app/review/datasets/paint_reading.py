@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.paint.evidence import Image
 from app.paint.picture_scale import why_unreadable
-from app.paint.view_paint import paint_of
+from app.paint.view_paint import hiding_boxes, paint_of
 from app.soccer.group import Group, View
 from app.soccer.paint_evidence import (
     EXTRACTOR_VERSION,
@@ -20,6 +21,7 @@ from app.soccer.paint_evidence import (
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_clicks
+from app.store.digest import digest
 from app.store.media import read_pixels
 
 NOTHING = PaintEvidence({})
@@ -50,9 +52,12 @@ class PaintTask:
 
     @property
     def fitting(self) -> PaintReading | None:
-        """What was read before, where it was for the same clicks and read as today."""
+        """What was read before, where it was for the same clicks beside the same people, and as
+        it is read today."""
         old = self.old
         if old is None or old.reason == NO_FRAME or old.sought_for != self.sought_for:
+            return None
+        if old.people != people_digest(self.view):
             return None
         return old if old.evidence.version == EXTRACTOR_VERSION else None
 
@@ -67,6 +72,43 @@ class PaintTask:
         return PaintReading("", self.sought_for, NOTHING, NO_FRAME)
 
 
+def people_digest(view: View) -> str:
+    """Digest of the boxes that hide paint in a view; empty where there are none."""
+    boxes = hiding_boxes(view.extras.places, view.size)
+    if not boxes:
+        return ""
+    return digest(sorted([box.x, box.y, box.width, box.height] for box in boxes))
+
+
+def outdated_beside_others(
+    group: Group, readings: Mapping[str, PaintReading]
+) -> dict[str, PaintReading]:
+    """Readings as they are given to a group: of those that were made beside other people than its
+    views have now, solving goes without and names the mending."""
+    given = {}
+    for key, reading in readings.items():
+        view = group.view(key)
+        if view is not None and reading.reason != NO_FRAME:
+            fits = reading.people == people_digest(view)
+            reading = reading if fits else replace(reading, sought_for="")
+        given[key] = reading
+    return given
+
+
+def outdated_where_people_moved(old: Group, new: Group) -> dict[str, PaintReading]:
+    """The readings of a group after others hide paint in some of its views.
+
+    Those say nothing of any clicks any more: solving goes without them and names the mending.
+    """
+    readings = {}
+    for key, reading in old.paint.items():
+        was, now = old.view(key), new.view(key)
+        if was is not None and now is not None and people_digest(was) != people_digest(now):
+            reading = replace(reading, sought_for="")
+        readings[key] = reading
+    return readings
+
+
 def read_view_paint(task: PaintTask, settings: Settings) -> PaintReading | None:
     """What is to be kept of a view's picture; None where its clicks give no camera, or where no
     import ever brought one.
@@ -79,24 +121,32 @@ def read_view_paint(task: PaintTask, settings: Settings) -> PaintReading | None:
         return fitting
     try:
         known = "" if fitting is None else fitting.frame
-        digest, image = read_pixels(media, task.view.station.flipped, settings, known)
+        frame, image = read_pixels(media, task.view.station.flipped, settings, known)
     except NotFoundError:
         return fitting or task.without_frame
     except (ImageError, StorageError, TooLargeError):
         return task.without_frame
     if image is None:
         return fitting
-    return _read(task, digest, image)
+    return _read(task, frame, image)
 
 
-def _read(task: PaintTask, digest: str, image: Image) -> PaintReading | None:
+def _read(task: PaintTask, frame: str, image: Image) -> PaintReading | None:
     size, policy = task.view.size, task.policy
     clicked = task.clicked or calibrate_clicks(task.group, task.view, policy)
     if clicked.camera is None:
         return None
     if why_unreadable(image, size) is not None:
-        return replace(task.without_frame, frame=digest)
+        return replace(task.without_frame, frame=frame)
     seen = paint_of(image, size, clicked, task.group.pitch, policy, task.view.extras.places)
     reason = NO_PAINT if seen.outcome == "nothing" else seen.reason
     evidence = seen.evidence if reason is None else NOTHING
-    return PaintReading(digest, task.sought_for, evidence, reason, seen.supported, seen.explained)
+    return PaintReading(
+        frame,
+        task.sought_for,
+        evidence,
+        reason,
+        seen.supported,
+        seen.explained,
+        people_digest(task.view),
+    )

@@ -12,9 +12,10 @@ import numpy.typing as npt
 
 from app.child import Child, ChildEnded
 from app.config import Settings
-from app.datasets.archive import Limits, open_tree
+from app.datasets.file_tree import Limits
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.report import Report
+from app.datasets.trees import open_tree
 from app.errors import ReviewError
 from app.store.frames import ALLOWANCE
 from app.store.media import decode_picture

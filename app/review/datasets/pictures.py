@@ -12,7 +12,7 @@ from app.datasets.plain_file import read_plain
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import read_line_files
-from app.errors import DatasetFormatError, GeometryError, InputError
+from app.errors import DatasetFormatError, GeometryError
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
 from app.soccer.policy import CalibrationPolicy
@@ -29,7 +29,7 @@ def estimate_picture_of_files(source: Path, *, size: ImageSize) -> dict[str, Any
     report = Report()
     files = list(read_line_files(source, size, report))
     if not files:
-        raise report.problems[0] if report.problems else InputError(f"{source} holds no line files")
+        raise report.refusal(f"{source} holds no line files")
     found = _estimated(files, size)
     values = _values(found)
     return {**values, "problems": [problem.message for problem in report.problems]}

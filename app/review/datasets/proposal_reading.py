@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.geometry.camera import Camera
+from app.paint.drawn_lines import beside_drawn
 from app.paint.view_proposal import ViewProposal, proposal_of
+from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
 from app.soccer.paint_evidence import EXTRACTOR_VERSION
@@ -27,8 +29,10 @@ class ProposalTask:
     Attributes:
         size: Annotated size.
         known: Cameras of the match's other groups.
-        sought_with: Digest of all of this but the picture.
+        sought_with: Digest of all of this but the picture and what is drawn.
         old: What was proposed before.
+        drawn: Lines of the view, which determine no camera.
+        beside: Digest of the station that has them; empty where there are none.
     """
 
     view_id: int
@@ -40,6 +44,8 @@ class ProposalTask:
     policy: CalibrationPolicy
     sought_with: str
     old: Proposal | None
+    drawn: Lines = field(default_factory=dict)
+    beside: str = ""
 
     @property
     def fitting_frame(self) -> str:
@@ -49,7 +55,7 @@ class ProposalTask:
         the match by now.
         """
         old = self.old
-        if old is None or old.version != EXTRACTOR_VERSION:
+        if old is None or old.version != EXTRACTOR_VERSION or old.beside != self.beside:
             return ""
         told = old.outcome == "proposed" or old.sought_with == self.sought_with
         return old.frame if told else ""
@@ -66,6 +72,7 @@ class ProposalTask:
             frame=frame,
             sought_with=self.sought_with,
             version=EXTRACTOR_VERSION,
+            beside=self.beside,
         )
 
 
@@ -80,4 +87,5 @@ def read_proposal(task: ProposalTask, settings: Settings) -> Proposal | None:
         return task.without_picture(UNREADABLE)
     if image is None:
         return None
-    return task.said(proposal_of(image, task.size, task.known, task.pitch, task.policy), digest)
+    found = proposal_of(image, task.size, task.known, task.pitch, task.policy)
+    return task.said(beside_drawn(found, task.drawn, task.pitch, task.size, task.policy), digest)

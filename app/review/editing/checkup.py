@@ -10,10 +10,14 @@ import cv2
 import pysqlite3.dbapi2
 
 from app.config import Settings
-from app.errors import StorageError
+from app.errors import ConflictError, InputError, StorageError
 from app.review.editing.check import Check
+from app.review.editing.store_check import examine_stores
+from app.review.people.identities import linked_admins
+from app.review.people.provider import Provider
+from app.review.people.sign_on_rules import read_rules
 from app.store.anchor import read_anchor
-from app.store.engine import MIN_SQLITE
+from app.store.dialect.sqlite import MIN_SQLITE
 from app.store.home import open_to_others
 from app.store.leftovers import leftovers
 from app.store.log import last_time
@@ -28,15 +32,16 @@ _FORMATS = (".jpg", ".png", ".webp")
 
 def examine_home(settings: Settings) -> list[Check]:
     """What can be said of a home without its database."""
-    examined = (_settings, _permissions, _room, _anchor)
-    return [*(examine(settings) for examine in examined), _versions()]
+    examined = (_settings, _permissions, _room, _anchor, _sign_on)
+    return [*(examine(settings) for examine in examined), _versions(), *examine_stores(settings)]
 
 
 def examine_surroundings(store: Store) -> list[Check]:
     """What lies around the tables of a database that can be opened."""
-    settings = store.settings
+    settings, admins = store.settings, _linked_admins(store)
     with store.read() as session:
         return [
+            *([admins] if admins else []),
             _clock(session),
             _leftovers(settings),
             _calibrations(session),
@@ -55,6 +60,37 @@ def _settings(settings: Settings) -> Check:
         sentence = f"TOUCHLINE_IMPORT_FOLDERS names {', '.join(gone)}, which is no folder"
         return Check("settings", False, sentence, "Make the folder, or take it out.")
     return Check("settings", True, f"home {settings.home}")
+
+
+def _sign_on(settings: Settings) -> Check:
+    """Whether single sign-on is set up whole, and its provider answers."""
+    name, mend = "single sign-on", "Look at the settings TOUCHLINE_SSO_...; docs/teams.md has them."
+    try:
+        # Whether it is a team that is served, serve is told on its own command line.
+        rules = read_rules(settings.model_copy(update={"team": True}))
+        if rules is None:
+            return Check(name, True, "not set up")
+        return Check(name, True, Provider(rules).examine())
+    except (InputError, ConflictError) as error:
+        return Check(
+            name, False, error.message, error.hint if isinstance(error, InputError) else mend
+        )
+
+
+def _linked_admins(store: Store) -> Check | None:
+    """Whether an admin can come in where there is no other way; None: there is one."""
+    try:
+        rules = read_rules(store.settings.model_copy(update={"team": True}))
+    except InputError:
+        return None
+    if rules is None or not rules.only:
+        return None
+    count = linked_admins(store, rules)
+    sentence = f"{count} admins are linked with {rules.label}, by which alone people log in"
+    mend = (
+        None if count else "touchline users reset NAME prints a link with which an admin is linked."
+    )
+    return Check("admins", count > 0, sentence, mend)
 
 
 def _permissions(settings: Settings) -> Check:

@@ -13,6 +13,7 @@ from app.review.editing.edit import (
     SetBalls,
     SetCalibrationSource,
     SetLines,
+    SetNoise,
     SetPaint,
     SetPicture,
     SetPitch,
@@ -20,6 +21,7 @@ from app.review.editing.edit import (
     SetStationCalibration,
     SetStationCamera,
     SetStationLines,
+    Several,
     StationEdit,
 )
 from app.soccer.frames import ImagePoint
@@ -45,11 +47,12 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
         case SetLines(view, lines, proposed):
             said = {"lines": _lines_to_json(lines), **_source(proposed)}
             return {"edit": "set_lines", "view": view, **said}
-        case SetBalls(view, balls):
-            return {"edit": "set_balls", "view": view, "balls": [*map(ball_to_json, balls)]}
-        case SetBall(view, ball):
-            one = [] if ball is None else [ball_to_json(ball)]
-            return {"edit": "set_balls", "view": view, "balls": one}
+        case SetBalls(view, balls, noise):
+            said = {"balls": [*map(ball_to_json, balls)], **_noise(noise)}
+            return {"edit": "set_balls", "view": view, **said}
+        case SetBall(view, ball, noise):
+            said = {"balls": [] if ball is None else [ball_to_json(ball)], **_noise(noise)}
+            return {"edit": "set_balls", "view": view, **said}
         case IncludeView(view, included, reason, note):
             why = {} if reason is None else {"reason": reason, "note": note}
             return {"edit": "include_view", "view": view, "included": included, **why}
@@ -61,6 +64,10 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
             return {"edit": "set_pitch", "length": float(length), "width": float(width)}
         case SetPositions(positions):
             return {"edit": "set_positions", "positions": positions_to_json(positions)}
+        case SetNoise(noise):
+            return {"edit": "set_noise", "noise": {view: float(of) for view, of in noise.items()}}
+        case Several(edits):
+            return {"edit": "several", "edits": [*map(edit_to_json, edits)]}
         case SetPaint(paint):
             return {"edit": "set_paint", "paint": paint_to_json(paint)}
         case SetStationLines(lines, proposed):
@@ -84,7 +91,8 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
         case "set_lines":
             return SetLines(value["view"], _lines_from_json(value["lines"]), _proposed(value))
         case "set_balls":
-            return SetBalls(value["view"], tuple(map(ball_from_json, value["balls"])))
+            balls = tuple(map(ball_from_json, value["balls"]))
+            return SetBalls(value["view"], balls, float(value.get("noise", 1.0)))
         case "include_view":
             why = value.get("reason"), value.get("note")
             return IncludeView(value["view"], value["included"], *why)
@@ -96,6 +104,10 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
             return SetPitch(value["length"], value["width"])
         case "set_positions":
             return SetPositions(positions_from_json(value["positions"]))
+        case "set_noise":
+            return SetNoise(value["noise"])
+        case "several":
+            return Several(tuple(map(edit_from_json, value["edits"])))
     raise ValueError(f"the log holds an unknown edit: {value['edit']}")
 
 
@@ -114,6 +126,11 @@ def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
                 value["calibration"],
             )
     raise ValueError(f"the log holds an unknown edit: {value['edit']}")
+
+
+def _noise(noise: float) -> Json:
+    """Only where there is something to say, as of ``_source``."""
+    return {} if noise == 1 else {"noise": float(noise)}
 
 
 def _source(proposed: tuple[str, ...]) -> Json:

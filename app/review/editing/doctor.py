@@ -13,7 +13,7 @@ from app.review.editing.recompute import stale_groups
 from app.review.editing.replay import replay
 from app.store.log import newest_entry
 from app.store.session import Session, Store
-from app.store.soundness import count_lost_references, file_faults
+from app.store.soundness import count_lost_references, file_faults, no_fault
 
 REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
 RESTORE = "Run touchline restore BACKUP: it takes the place of the database, which is kept."
@@ -50,13 +50,13 @@ def examine(store: Store) -> list[Check]:
 
 
 def _file(session: Session) -> Check:
-    """SQLite's own look at its pages and indexes, and at references to rows that are gone."""
+    """The database's own look at its pages and indexes, and at references to rows that are gone."""
     faults, lost = file_faults(session), count_lost_references(session)
     if faults:
         return Check("file", False, f"SQLite finds it damaged: {'; '.join(faults)}", RESTORE)
     if lost:
         return Check("file", False, f"{lost} rows refer to rows that are gone", RESTORE)
-    return Check("file", True, "SQLite finds no fault")
+    return Check("file", True, no_fault(session))
 
 
 def _tables(said: Ledger, present: Ledger) -> list[Check]:

@@ -199,16 +199,20 @@ class SetBalls:
 
     view: str
     balls: tuple[BallAnnotation, ...]
+    noise: float = 1.0
+    """Of whoever says it with this camera, beside that of the dataset's balls."""
 
     def apply(self, group: Group) -> Group:
         """The group with these balls in the view."""
         for ball in self.balls:
             _check_ball(ball)
-        return group.with_view(replace(need_view(group, self.view), balls=self.balls))
+        view = need_view(group, self.view)
+        return group.with_view(replace(view, balls=self.balls, noise=self.noise))
 
     def inverse(self, group: Group) -> SetBalls:
         """The balls as they were."""
-        return SetBalls(self.view, need_view(group, self.view).balls)
+        view = need_view(group, self.view)
+        return SetBalls(self.view, view.balls, view.noise)
 
 
 @dataclass(frozen=True)
@@ -217,6 +221,8 @@ class SetBall:
 
     view: str
     ball: BallAnnotation | None
+    noise: float = 1.0
+    """As of ``SetBalls``."""
 
     def apply(self, group: Group) -> Group:
         """The group with this ball in the view."""
@@ -227,7 +233,7 @@ class SetBall:
         return self._all().inverse(group)
 
     def _all(self) -> SetBalls:
-        return SetBalls(self.view, () if self.ball is None else (self.ball,))
+        return SetBalls(self.view, () if self.ball is None else (self.ball,), self.noise)
 
 
 @dataclass(frozen=True)
@@ -302,6 +308,43 @@ class SetPaint:
     def inverse(self, group: Group) -> SetPaint:
         """The readings as they were."""
         return SetPaint(group.paint)
+
+
+@dataclass(frozen=True)
+class SetNoise:
+    """Say how noisy the balls of a group's views are beside the dataset's; others are like it."""
+
+    noise: Mapping[str, float]
+
+    def apply(self, group: Group) -> Group:
+        """The group with this noise, for views that it has."""
+        views = (replace(view, noise=self.noise.get(view.key, 1.0)) for view in group.views)
+        return replace(group, views=tuple(views))
+
+    def inverse(self, group: Group) -> SetNoise:
+        """The noise as it was."""
+        return SetNoise(group.noise)
+
+
+@dataclass(frozen=True)
+class Several:
+    """Edits that are one: done one after the other, and taken back together."""
+
+    edits: tuple[Edit, ...]
+
+    def apply(self, group: Group) -> Group:
+        """The group after all of them."""
+        for edit in self.edits:
+            group = edit.apply(group)
+        return group
+
+    def inverse(self, group: Group) -> Several:
+        """What takes the last one back first."""
+        back: list[Edit] = []
+        for edit in self.edits:
+            back.insert(0, edit.inverse(group))
+            group = edit.apply(group)
+        return Several(tuple(back))
 
 
 STATION_EDITS = (SetLines, SetCalibrationSource, SetPicture)

@@ -7,17 +7,21 @@ left alone. A run can be killed anywhere; the next one goes on where it was.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
 
 from app.child import Allowance, ChildEnded
 from app.child_pool import ChildPool, PoolTask
-from app.errors import ConflictError, ImageError, NotFoundError
+from app.errors import ConflictError, ImageError
 from app.progress import Progress
-from app.review.datasets.dataset import Dataset, read_dataset
-from app.review.datasets.paint_reading import PaintTask, read_view_paint
+from app.review.datasets.dataset import DatasetHead, need_dataset, require_matches
+from app.review.datasets.paint_reading import (
+    PaintTask,
+    outdated_beside_others,
+    read_view_paint,
+)
 from app.review.editing.codec import edit_to_json
 from app.review.editing.edit import SetPaint
 from app.review.editing.known import known_calibrations
@@ -25,6 +29,7 @@ from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, Paint
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import clicks_key
 from app.store.clock import now
+from app.store.datasets import group_ids
 from app.store.group_revisions import next_revision, save_revision
 from app.store.groups import StoredGroup, read_groups
 from app.store.log import Entry, append
@@ -58,8 +63,8 @@ class PaintState:
         views: Views of moving cameras with lines.
         without_picture: How many of them have no picture.
         read: How many were read.
-        old: How many were read for other lines than they have, or by an older extractor; None: too
-            many were read to compare them. Whether a picture is still the same only reading says.
+        old: How many were read for other lines or beside other people than they have, or by an
+            older extractor; None: too many were read to compare them. Whether a picture is still the same only reading says.
         painted: How many of those have a camera from their paint, as far as the lines are still
             those that it was read for.
         no_paint: How many show too little of it.
@@ -120,7 +125,7 @@ def get_paint(store: Store, dataset: str | int) -> DatasetPaint:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = require_matches(session, dataset)
         matches = match_paint(session, found.id)
         old = _old(session, found, matches)
     items = tuple(_state(item, None if old is None else old[item.match]) for item in matches)
@@ -136,6 +141,7 @@ def read_paint(
     run: str | None = None,
     children: int | None = None,
     progress: Progress | None = None,
+    require_wanted: Callable[[], None] | None = None,
 ) -> DatasetPaint:
     """Read the paint of pictures and give it to their groups; stale until solved.
 
@@ -149,18 +155,24 @@ def read_paint(
         run: Name of this reading, by which it is taken back; None: the time.
         children: How many pictures are read at once; None: as the settings say.
         progress: Called with groups done and in all; an error that it raises ends the run.
+        require_wanted: Called in each transaction that gives something, before it does; what is
+            not wanted any more it stops with an error.
 
     Raises:
         ConflictError: The dataset's policy does not use paint.
         NotFoundError: There is no such dataset or match.
     """
-    found, ids = require_readable(store, dataset, matches)
+    found = require_readable(store, dataset, matches)
+    with store.read() as session:
+        ids = group_ids(session, found.id, matches)
     run, count, done = run or now(), children or store.settings.image_workers, 0
     with closing(ChildPool(ALLOWANCE, count, 0, "pictures")) as pool:
         for start in range(0, len(ids), _A_CHILD * count):
             some = ids[start : start + _A_CHILD * count]
             readings = _readings(store, pool, _tasks(store, some, found))
             with store.write() as session:
+                if require_wanted is not None:
+                    require_wanted()
                 _give(session, found.id, readings, actor, {"run": run})
             done += len(some)
             if progress is not None:
@@ -170,30 +182,21 @@ def read_paint(
 
 def require_readable(
     store: Store, dataset: str | int, matches: Collection[str] | None = None
-) -> tuple[Dataset, list[int]]:
-    """The dataset and the ids of the groups whose pictures would be read.
+) -> DatasetHead:
+    """The dataset, unless nothing would use what is read.
 
     Raises:
         ConflictError: The dataset's policy does not use paint.
         NotFoundError: There is no such dataset or match.
     """
     with store.read() as session:
-        found = read_dataset(session, dataset)
-        known = {item.match: item.groups for item in match_paint(session, found.id)}
-    for match in matches or ():
-        if match not in known:
-            raise NotFoundError(f'"{found.name}" has no match {match}')
+        found = require_matches(session, dataset, matches)
     if found.policy.calibration.source != "paint":
         raise ConflictError(
             f'the policy of "{found.name}" does not use the paint of pictures',
             hint="Choose the policy touchline, or set calibration.source to paint, first.",
         )
-    return found, sorted(
-        number
-        for match, groups in known.items()
-        if matches is None or match in matches
-        for number in groups
-    )
+    return found
 
 
 def take_back_paint(store: Store, dataset: str | int, *, actor: str) -> DatasetPaint:
@@ -210,10 +213,19 @@ def take_back_paint(store: Store, dataset: str | int, *, actor: str) -> DatasetP
     return get_paint(store, dataset)
 
 
-def apply_take_back(session: Session, dataset: str | int, *, actor: str) -> None:
-    """``take_back_paint`` within a write session."""
-    found = read_dataset(session, dataset)
+def apply_take_back(
+    session: Session, dataset: str | int, *, actor: str, stopped: Collection[str] = ()
+) -> None:
+    """``take_back_paint`` within a write session.
+
+    Args:
+        stopped: Readings that were stopped for it: the last of those is taken back as far as it
+            came, and where none came to anything no earlier one is.
+    """
+    found = require_matches(session, dataset)
     entries = last_run(session, found.id)
+    if stopped and not (entries and entries[0].body["run"] in stopped):
+        return
     if not entries:
         raise ConflictError(f'no paint was read in "{found.name}"')
     before: dict[int, Mapping[str, str]] = {}
@@ -242,7 +254,8 @@ def _give(
     for start in range(0, len(ids), _BATCH):
         entries, changed = [], []
         for stored in read_groups(session, ids[start : start + _BATCH]).values():
-            edit = SetPaint(wanted[stored.id])
+            fitting = outdated_beside_others(stored.group, wanted[stored.id])
+            edit = SetPaint(fitting)
             group = edit.apply(stored.group)
             is_told = "takes_back" in body and stored.id == ids[0]
             if group == stored.group and not is_told:
@@ -259,7 +272,7 @@ def _give(
         refresh_queue(session, changed)
 
 
-def _tasks(store: Store, ids: Sequence[int], dataset: Dataset) -> dict[int, list[PaintTask]]:
+def _tasks(store: Store, ids: Sequence[int], dataset: DatasetHead) -> dict[int, list[PaintTask]]:
     """What is to be read for each group; groups without a view that takes paint have none."""
     with store.read() as session:
         stored = read_groups(session, ids)
@@ -327,12 +340,12 @@ def has_pictures(store: Store, dataset: str | int) -> bool:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        found = read_dataset(session, dataset)
-        return any(item.views > item.without_picture for item in match_paint(session, found.id))
+        number = need_dataset(session, dataset)
+        return any(item.views > item.without_picture for item in match_paint(session, number))
 
 
 def _old(
-    session: Session, dataset: Dataset, matches: Sequence[MatchPaint]
+    session: Session, dataset: DatasetHead, matches: Sequence[MatchPaint]
 ) -> dict[str, int] | None:
     """How many readings of each match do not fit any more; None where they are too many."""
     ids = [number for item in matches for number in item.painted]
@@ -340,7 +353,7 @@ def _old(
         return None
     old = {item.match: 0 for item in matches}
     for start in range(0, len(ids), _BATCH):
-        some = read_groups(session, ids[start : start + _BATCH], extras=False)
+        some = read_groups(session, ids[start : start + _BATCH])
         for stored in some.values():
             tasks = _group_tasks(stored, dataset.policy.calibration, {})
             old[stored.group.match] += sum(task.is_old for task in tasks)

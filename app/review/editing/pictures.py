@@ -8,13 +8,13 @@ its own geometry, and a finding of the view offers what its own lines say.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
 from app.errors import GeometryError
 from app.progress import Progress
-from app.review.datasets.dataset import read_dataset
+from app.review.datasets.dataset import need_dataset, read_dataset, require_matches
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.codec import edit_to_json
 from app.review.editing.edit import SetPicture
@@ -26,6 +26,7 @@ from app.store.clock import now
 from app.store.group_revisions import next_revision, save_revision
 from app.store.groups import read_groups
 from app.store.log import Entry, append
+from app.store.pictures import MatchPictures, match_pictures
 from app.store.pitches import groups_of_match, match_pitches
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
@@ -56,6 +57,19 @@ class PictureState:
         found = None if self.estimate is None else self.estimate.proposal
         return None if found == self.picture else found
 
+    @property
+    def sentence(self) -> str:
+        """What people read of it."""
+        if self.estimate is None:
+            return self.problem or ""
+        found, sigma = self.estimate.picture, self.estimate.picture.sigma
+        wide, right, down = 100 * (found.aspect - 1), *found.shift
+        return (
+            f"pixels {abs(wide):.1f} % {'wide' if wide > 0 else 'narrow'} (sigma {100 * sigma[0]:.1f}), axis "
+            f"{right:+.3f} right and {down:+.3f} down, in half diagonals "
+            f"(sigma {sigma[1]:.3f} and {sigma[2]:.3f})"
+        )
+
 
 @dataclass(frozen=True)
 class _Task:
@@ -65,11 +79,22 @@ class _Task:
     policy: CalibrationPolicy
 
 
+def read_pictures(store: Store, dataset: str | int) -> list[MatchPictures]:
+    """What main cameras' pictures of a dataset's matches are taken to be.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        return match_pictures(session, need_dataset(session, dataset))
+
+
 def estimate_pictures(
     store: Store,
     dataset: str | int,
     executor: Executor | None = None,
     progress: Progress | None = None,
+    only: Collection[str] | None = None,
 ) -> list[PictureState]:
     """What the lines of each match's main cameras say of their pictures; saves nothing.
 
@@ -78,13 +103,15 @@ def estimate_pictures(
         dataset: Name or id.
         executor: Where matches are worked on; None: here, one after the other.
         progress: Called with matches done and in all.
+        only: These matches; None: all.
 
     Raises:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
         found = read_dataset(session, dataset)
-        matches = [item.match for item in match_pitches(session, found.id)]
+        names = (item.match for item in match_pitches(session, found.id) if item.match)
+        matches = [match for match in names if only is None or match in only]
     tasks = (_task(store, found.id, match, found.policy.calibration) for match in matches)
     states = []
     for state in fan_out(_estimate, tasks, executor):
@@ -112,11 +139,26 @@ def change_pictures(
         actor: Who says so.
     """
     with store.write() as session:
-        found = read_dataset(session, dataset)
-        return sum(
-            _give(session, found.id, groups_of_match(session, found.id, match), picture, actor)
-            for match, picture in wanted.items()
-        )
+        return apply_pictures(session, dataset, wanted, actor=actor)
+
+
+def apply_pictures(
+    session: Session,
+    dataset: str | int,
+    wanted: Mapping[str, PictureGeometry | None],
+    *,
+    actor: str,
+) -> int:
+    """``change_pictures`` within a write session.
+
+    Raises:
+        NotFoundError: There is no such dataset or match.
+    """
+    found = require_matches(session, dataset, [*wanted])
+    return sum(
+        _give(session, found.id, groups_of_match(session, found.id, match), picture, actor)
+        for match, picture in wanted.items()
+    )
 
 
 def _give(

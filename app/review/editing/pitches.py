@@ -48,7 +48,7 @@ _BATCH = 100
 
 @dataclass(frozen=True)
 class PitchState:
-    """The pitch of one match.
+    """The pitch of one match, or of the groups that have none, whose ``match`` is empty.
 
     Attributes:
         group_id: Of the first of its groups, like ``group`` (the key).
@@ -80,9 +80,10 @@ class PitchState:
         assert found is not None and self.proposed is not None
         sizes = f"{self.proposed.length:g} x {self.proposed.width:g} m"
         used = f"{self.pitch.length:g} x {self.pitch.width:g} m"
+        whole = "whole match" if self.match else "groups without a match"
         return (
             f"The lines of {found.frames} frames show a pitch of {sizes}, and it is solved as "
-            f"{'several sizes' if self.mixed else used}; accept the size for the whole match "
+            f"{'several sizes' if self.mixed else used}; accept the size for the {whole} "
             "under Statistics."
         )
 
@@ -270,6 +271,7 @@ def _read(
     items = tuple(
         _state(item, shown.get(item.match, (None, None)), changes.get(item.match))
         for item in match_pitches(session, found.id)
+        if item.match or item.match in shown
     )
     return DatasetPitches(found.id, found.name, items)
 
@@ -277,7 +279,7 @@ def _read(
 def _shown(session: Session, dataset_id: int, policy: CalibrationPolicy) -> dict[str, _Shown]:
     """What was estimated of the lines as they are now; the other matches are not computed."""
     stale = {match for match, _ in _stale(session, dataset_id, policy)}
-    shown: dict[str, _Shown] = {}
+    shown: dict[str, _Shown] = dict.fromkeys(stale, (None, None))
     for match, row in read_estimates(session, dataset_id).items():
         if match in stale:
             continue
@@ -346,7 +348,7 @@ def _estimate(task: _Task) -> tuple[str, dict[str, Any]]:
     nothing = PitchEstimate(None, None, None, None, 0)
     problem = None
     try:
-        found = estimate_pitch(task.frames, task.policy)
+        found = estimate_pitch(task.frames, task.policy, one_match=task.match != "")
     except GeometryError as error:
         found, problem = nothing, error.message
     return task.match, {

@@ -7,7 +7,7 @@ again, as an entry of the log for each group; ``solve`` reads it like the size o
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -25,7 +25,8 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.solving.calibrate import calibrate_station, calibration_key
-from app.solving.match_position import Place, Places, pan_of, place_of
+from app.solving.match_model import Place
+from app.solving.match_position import Places, pan_of, place_of
 from app.store.clock import now
 from app.store.digest import digest
 from app.store.group_revisions import next_revision, save_revision
@@ -134,6 +135,7 @@ def share_positions(
     actor: str,
     executor: Executor | None = None,
     progress: Progress | None = None,
+    require_wanted: Callable[[], None] | None = None,
 ) -> DatasetPositions:
     """Estimate where matches' main cameras stand, and give it to their groups; stale until solved.
 
@@ -145,6 +147,8 @@ def share_positions(
         actor: Who wants it.
         executor: Where matches are worked on; None: here.
         progress: Called with matches done and in all; an error that it raises ends the run.
+        require_wanted: Called in each transaction that gives something, before it does; what is
+            not wanted any more it stops with an error.
 
     Raises:
         ConflictError: The dataset's policy does not use shared positions.
@@ -158,6 +162,8 @@ def share_positions(
     for done, (task, positions) in enumerate(fan_out(_estimate, tasks, executor), start=1):
         edits = {group: SetPositions(at) for group, at in positions.items()}
         with store.write() as session:
+            if require_wanted is not None:
+                require_wanted()
             then = position_inputs(session, found.id, task.match).get(task.match)
             body = {"match": task.match, "inputs": task.inputs, "before": then}
             _give(session, found.id, edits, actor, body)
@@ -202,11 +208,25 @@ def take_back_positions(
     return get_positions(store, dataset)
 
 
-def apply_take_back(session: Session, dataset: str | int, match: str, *, actor: str) -> None:
-    """``take_back_positions`` within a write session."""
+def apply_take_back(
+    session: Session,
+    dataset: str | int,
+    match: str,
+    *,
+    actor: str,
+    stopped: Sequence[str | None] = (),
+) -> None:
+    """``take_back_positions`` within a write session.
+
+    Args:
+        stopped: When shares that were stopped for it had begun; None: never. One that came to the
+            match is taken back, and where none did no earlier one is.
+    """
     found = read_dataset(session, dataset)
     _chosen(session, found, [match])
     entries = last_share(session, found.id, match)
+    if stopped and not any(begun and entries and begun <= entries[0].at for begun in stopped):
+        return
     if not entries:
         raise ConflictError(f"nothing is shared in {match}")
     edits = {entry.group_id or 0: edit_from_json(entry.body["inverse"]) for entry in entries}

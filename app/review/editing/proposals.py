@@ -1,4 +1,4 @@
-"""Proposals of a dataset: cameras for views without lines, as predictions that nobody said yet.
+"""Proposals of a dataset: cameras for views that have none, as predictions that nobody said yet.
 
 They are kept beside the groups and no solve reads them. A person accepts one as lines, an edit
 like any other whose source is ``proposed``. A run can be killed anywhere; the next one leaves
@@ -7,7 +7,7 @@ alone what was looked at, and goes on.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,14 +15,15 @@ from typing import Any
 from app.child import Allowance, ChildEnded
 from app.child_pool import ChildPool
 from app.errors import ImageError, NotFoundError
+from app.paint.propose import SEARCH_VERSION
 from app.progress import Progress
-from app.review.datasets.dataset import Dataset, read_dataset
+from app.review.datasets.dataset import DatasetHead, need_dataset, require_matches
 from app.review.datasets.proposal_reading import UNREADABLE, ProposalTask, read_proposal
 from app.review.editing.etags import read_head
 from app.review.editing.view_paint import known_cameras
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import camera_to_json
-from app.store.digest import digest
+from app.store.digest import digest, station_digest
 from app.store.groups import StoredGroup, read_groups
 from app.store.proposals import (
     MatchProposals,
@@ -50,10 +51,9 @@ class DatasetProposals:
     dataset: str
     items: tuple[MatchProposals, ...]
 
-    def count(self, name: str, matches: Collection[str] | None = None) -> int:
+    def count(self, name: str) -> int:
         """Sum of a count over the matches."""
-        found = (item for item in self.items if matches is None or item.match in matches)
-        return sum(getattr(item, name) for item in found)
+        return sum(getattr(item, name) for item in self.items)
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class ProposalRun:
     """What one run did.
 
     Attributes:
-        views: Views without lines and camera that have a picture on record.
+        views: Views without a camera, given or of their lines, that have a picture on record.
         left: Whose proposal still stood.
         proposed, unsure, nothing: What became of the others.
         changed: Whose picture is another one than when it was looked at before.
@@ -90,19 +90,22 @@ class ProposalRun:
         )
 
 
-def get_proposals(store: Store, dataset: str | int) -> DatasetProposals:
-    """What was proposed for the views of a dataset's matches.
+def get_proposals(
+    store: Store, dataset: str | int, matches: Collection[str] | None = None
+) -> DatasetProposals:
+    """What was proposed for the views of a dataset's matches; of all, or of these.
 
     Raises:
-        NotFoundError: There is no such dataset.
+        NotFoundError: There is no such dataset or match.
     """
     with store.read() as session:
-        found = read_dataset(session, dataset)
-        return DatasetProposals(found.id, found.name, tuple(match_proposals(session, found.id)))
+        found = require_matches(session, dataset, matches)
+        items = match_proposals(session, found.id, matches)
+    return DatasetProposals(found.id, found.name, tuple(items))
 
 
 def get_group_proposals(store: Store, group_id: int) -> list[tuple[str, bool, Proposal]]:
-    """Key of the view, whether it still has no lines, and what was proposed for it.
+    """Key of the view, whether the proposal is open, and what was proposed for it.
 
     Raises:
         NotFoundError: There is no such group.
@@ -113,22 +116,6 @@ def get_group_proposals(store: Store, group_id: int) -> list[tuple[str, bool, Pr
         return group_proposals(session, group_id)
 
 
-def require_matches(
-    store: Store, dataset: str | int, matches: Collection[str] | None = None
-) -> DatasetProposals:
-    """``get_proposals``, for these matches.
-
-    Raises:
-        NotFoundError: There is no such dataset or match.
-    """
-    found = get_proposals(store, dataset)
-    known = {item.match for item in found.items}
-    for match in matches or ():
-        if match not in known:
-            raise NotFoundError(f'"{found.dataset}" has no match {match}')
-    return found
-
-
 def propose_views(
     store: Store,
     dataset: str | int,
@@ -136,8 +123,12 @@ def propose_views(
     *,
     children: int | None = None,
     progress: Progress | None = None,
+    require_wanted: Callable[[], None] | None = None,
 ) -> ProposalRun:
-    """Look at the pictures of all views that have neither lines nor a given camera.
+    """Look at the pictures of all views that have neither a given camera nor one of their lines.
+
+    Lines that determine no camera stay; what is proposed beside them are other markings. Which those
+    are the last solution of their group says: groups that wait to be solved are left for later.
 
     Args:
         store: The database.
@@ -145,13 +136,14 @@ def propose_views(
         matches: By name; None: all.
         children: How many pictures are looked at at once; None: as the settings say.
         progress: Called with views done and in all; an error that it raises ends the run.
+        require_wanted: Called in each transaction that keeps something, before it does; what is
+            not wanted any more it stops with an error.
 
     Raises:
         NotFoundError: There is no such dataset or match.
     """
-    require_matches(store, dataset, matches)
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = require_matches(session, dataset, matches)
         asked = views_to_look_at(session, found.id, matches)
     count, total = children or store.settings.image_workers, sum(len(views) for _, views in asked)
     run = ProposalRun()
@@ -160,6 +152,8 @@ def propose_views(
             tasks = _tasks(store, found, dict(asked[start : start + _A_CHILD * count]))
             answers = _answers(store, pool, tasks)
             with store.write() as session:
+                if require_wanted is not None:
+                    require_wanted()
                 save_proposals(session, [item for item in answers if item is not None])
             for task, answer in zip(tasks, answers, strict=True):
                 run = run.then(task, answer)
@@ -177,12 +171,12 @@ def forget_proposals(store: Store, dataset: str | int, *, keep: Keep[int] = keep
         NotFoundError: There is no such dataset.
     """
     with store.write() as session:
-        gone = delete_proposals(session, read_dataset(session, dataset).id)
+        gone = delete_proposals(session, need_dataset(session, dataset))
         keep(gone)(session)
     return gone
 
 
-def _tasks(store: Store, dataset: Dataset, asked: dict[int, list[int]]) -> list[ProposalTask]:
+def _tasks(store: Store, dataset: DatasetHead, asked: dict[int, list[int]]) -> list[ProposalTask]:
     tasks = []
     with store.read() as session:
         old = read_proposals(session, [view for views in asked.values() for view in views])
@@ -196,13 +190,14 @@ def _tasks(store: Store, dataset: Dataset, asked: dict[int, list[int]]) -> list[
 
 
 def _task(
-    stored: StoredGroup, key: str, known: Sequence[Any], dataset: Dataset, old: Proposal | None
+    stored: StoredGroup, key: str, known: Sequence[Any], dataset: DatasetHead, old: Proposal | None
 ) -> ProposalTask | None:
     view, policy = stored.group.view(key), dataset.policy.calibration
     if view is None or view.media is None:
         return None
     station, pitch = view.station, stored.group.pitch
     said = [
+        SEARCH_VERSION,
         [camera_to_json(camera) for camera in known],
         [float(pitch.length), float(pitch.width)],
         [view.size.width, view.size.height, station.flipped],
@@ -218,6 +213,8 @@ def _task(
         policy=policy,
         sought_with=digest(said),
         old=old,
+        drawn=station.lines,
+        beside=station_digest(station) if station.lines else "",
     )
 
 

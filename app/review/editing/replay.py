@@ -31,6 +31,7 @@ from app.store.codecs import (
 from app.store.digest import station_digest, view_digest
 from app.store.group_rows import head_values, station_values, view_values
 from app.store.log import LogEntry, read_log, verify_chain
+from app.store.noise import NOISE
 from app.store.paint import PAINT
 from app.store.pitches import PITCH
 from app.store.positions import POSITION
@@ -66,7 +67,8 @@ def apply_entry(ledger: Ledger, entry: LogEntry, number: int = 0) -> None:
 def rebuild(store: Store) -> int:
     """Write groups, views, stations and what belongs to them anew from the log.
 
-    Datasets, verdicts, solutions and the log itself stay. Returns the number of groups.
+    Datasets, verdicts, solutions and the log itself stay, and so do predictions and proposals as
+    far as their views do. Returns the number of groups.
     """
     with store.write() as session:
         ledger = replay(session)
@@ -175,6 +177,12 @@ def _edit(ledger: Ledger, entry: LogEntry) -> None:
             _save_station(ledger, record.dataset_id, item.station_id, after.station, None)
     record.head = replace(record.head, pitch=changed.pitch, positions=changed.positions)
     record.revision, record.changed = record.revision + 1, entry.at
+
+
+def _noise(ledger: Ledger, entry: LogEntry) -> None:
+    # What is accepted for a dataset changes none of its groups by itself.
+    if entry.group_id is not None:
+        _edit(ledger, entry)
 
 
 def _paint(ledger: Ledger, entry: LogEntry) -> None:
@@ -313,6 +321,7 @@ _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
     "redo": _edit,
     PITCH: _edit,
     POSITION: _edit,
+    NOISE: _noise,
     PAINT: _paint,
     "station_edit": _station_edit,
     "station_undo": _station_edit,
@@ -325,6 +334,16 @@ _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
     "verdict_batch_undo": lambda _ledger, _entry: None,
     # Versions have tables of their own, which nothing rebuilds and nothing changes.
     "freeze": lambda _ledger, _entry: None,
-    # So do accounts.
+    # What was taken over from a person's own annotation stands in the edits and the verdict.
+    "take": lambda _ledger, _entry: None,
+    "agreement": lambda _ledger, _entry: None,
+    # Gold groups, guidelines, comments, accounts and work that is given out have tables of their own.
+    "gold": lambda _ledger, _entry: None,
+    "guideline": lambda _ledger, _entry: None,
+    "comment": lambda _ledger, _entry: None,
+    # Jobs and other deeds change nothing that was said.
+    "job": lambda _ledger, _entry: None,
+    "deed": lambda _ledger, _entry: None,
     "person": lambda _ledger, _entry: None,
+    "work": lambda _ledger, _entry: None,
 }

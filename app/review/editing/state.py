@@ -183,10 +183,19 @@ def read_state(session: Session, group_id: int) -> GroupState:
     return record.state(read_solutions(session, [key]).get(group_id))
 
 
-def read_states(session: Session, group_ids: Sequence[int]) -> list[GroupState]:
-    """Groups with their solutions, in the order asked for; at most a few hundred."""
+def read_states(
+    session: Session, group_ids: Sequence[int], *, markings: bool = True
+) -> list[GroupState]:
+    """Groups with their solutions, in the order asked for; at most a few hundred.
+
+    Args:
+        session: Any session.
+        group_ids: Which groups.
+        markings: Whether calibrations hold their markings.
+    """
     records = read_records(session, group_ids)
-    found = read_solutions(session, [record.solution_key for record in records])
+    keys = [record.solution_key for record in records]
+    found = read_solutions(session, keys, markings=markings)
     return [record.state(found.get(record.stored.id)) for record in records]
 
 

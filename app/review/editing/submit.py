@@ -12,9 +12,11 @@ from dataclasses import dataclass, replace
 from typing import NotRequired, TypedDict, Unpack
 
 from app.errors import ConflictError, NotFoundError, SharedStationError
+from app.review.editing.ball_noise import keeping_noise, with_noise
 from app.review.editing.codec import edit_from_json, edit_to_json
+from app.review.editing.copies import require_open
 from app.review.editing.edit import STATION_EDITS, Edit, SetPaint, SetPicture, need_view
-from app.review.editing.etags import read_etags, read_head, require_said, require_unchanged
+from app.review.editing.etags import read_etags, require_said, require_unchanged
 from app.review.editing.follow_paint import PaintFollower
 from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points_in_all
@@ -29,7 +31,7 @@ from app.store.clock import now
 from app.store.codecs import Json
 from app.store.group_revisions import next_revision, save_revision
 from app.store.groups import StoredGroup, group_of_view, read_groups
-from app.store.log import Entry, LogEntry, append, group_entries
+from app.store.log import Entry, append
 from app.store.paint import FOLLOWS, PAINT, insert_readings
 from app.store.queue import refresh_queue, update_row
 from app.store.session import Session, Store
@@ -74,7 +76,7 @@ class _How(TypedDict):
 
 
 _Find = Callable[[Session], int]
-_Plan = Callable[[Session, Record], _Change]
+_Plan = Callable[[Session, Record, str], _Change]
 
 
 def load(store: Store, group_id: int) -> GroupState:
@@ -176,20 +178,11 @@ def preview(
             if isinstance(edit, SetPicture):
                 refuse_shared(stored, edit)
         for edit in edits:
-            group = edit.apply(group)
+            group = keeping_noise(group, edit).apply(group)
         known = known_calibrations(session, [group], stored.policy)
     if paint is not None:
         group = paint.follow(group, stored.policy.calibration, known)
     return group, solve(group, stored.policy, known)
-
-
-def history(store: Store, group_id: int) -> list[LogEntry]:
-    """Everything that was said about a group, oldest first."""
-    with store.read() as session:
-        # The log remembers groups of datasets that were deleted, too.
-        if read_head(session, group_id) is None:
-            raise NotFoundError(f"there is no group {group_id}")
-        return group_entries(session, group_id)
 
 
 def load_solved(store: Store, group_id: int) -> GroupState:
@@ -204,6 +197,16 @@ def load_solved(store: Store, group_id: int) -> GroupState:
 def solved(store: Store, group_id: int) -> GroupState:
     """A group as it is now, its solution computed and kept if that was still to do."""
     record, solution = read_solved(store, group_id)
+    return record.state(solution)
+
+
+def solved_in(session: Session, group_id: int) -> GroupState:
+    """A group as a session sees it, its solution computed if that was still to do; saves nothing."""
+    record = read_record(session, group_id)
+    solution = read_solutions(session, [record.solution_key]).get(group_id)
+    if solution is None:
+        group, policy = record.stored.group, record.stored.policy
+        solution = solve(group, policy, known_calibrations(session, [group], policy))
     return record.state(solution)
 
 
@@ -250,7 +253,7 @@ def _change(
             before = read_record(session, find(session))
             what = f"group {before.stored.group.key}"
             require_said(session, before.stored.id, before.said, if_match, what)
-            change = plan(session, before)
+            change = plan(session, before, actor)
             if change.group == before.stored.group:
                 found = read_solutions(session, [before.solution_key])
                 return before.state(found.get(before.stored.id))
@@ -263,6 +266,7 @@ def _change(
         kept = keep(state)
         with store.write() as session:
             judge = require_unchanged(session, state.id, if_match, what)
+            require_open(session, state.dataset_id, state.id)
             if judge == before.stored.policy.hash:
                 _save(session, outcome, actor)
                 kept(session)
@@ -306,8 +310,9 @@ def _read_beside(outcome: _Outcome) -> Json:
 
 
 def _plan_edit(edit_of: Callable[[StoredGroup], Edit]) -> _Plan:
-    def plan(_session: Session, record: Record) -> _Change:
+    def plan(session: Session, record: Record, actor: str) -> _Change:
         edit, group = edit_of(record.stored), record.stored.group
+        edit = with_noise(record.stored.factors, group, edit, actor)
         refuse_shared(record.stored, edit)
         require_few_points_in_all(group, [edit])
         body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(group))}
@@ -319,7 +324,7 @@ def _plan_edit(edit_of: Callable[[StoredGroup], Edit]) -> _Plan:
 def _plan_step(kind: str) -> _Plan:
     """Undo or redo."""
 
-    def plan(session: Session, record: Record) -> _Change:
+    def plan(session: Session, record: Record, _actor: str) -> _Change:
         body = next_step(session, record.stacks, kind, "in this group")
         try:
             group = edit_from_json(body["edit"]).apply(record.stored.group)

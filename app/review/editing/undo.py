@@ -7,17 +7,20 @@ from dataclasses import dataclass
 
 from app.errors import ConflictError
 from app.store.codecs import Json
-from app.store.log import group_steps, read_entry, station_steps
+from app.store.log import group_steps, newest_steps, read_entry, station_steps
 from app.store.session import Session
 
 GROUP_KINDS = {"edit": "edit", "undo": "undo", "redo": "redo"}
 STATION_KINDS = {"station_edit": "edit", "station_undo": "undo", "station_redo": "redo"}
 
+_FIRST_LOOK, _FURTHER = 8, 8
+"""Steps that are read of a group's history at first, and how many times more when they say too little."""
+
 
 @dataclass(frozen=True)
 class Stacks:
     """Ids of log entries: the last of ``done`` is what undo takes back, of ``undone`` what redo
-    does again."""
+    does again. Of a long history ``done`` may hold the newest alone, and then at least two."""
 
     done: tuple[int, ...] = ()
     undone: tuple[int, ...] = ()
@@ -64,10 +67,38 @@ def next_step(session: Session, stacks: Stacks, kind: str, where: str) -> Json:
 
 def read_stacks(session: Session, group_ids: Sequence[int]) -> Mapping[int, Stacks]:
     """The stacks of each group."""
+    if len(group_ids) == 1:
+        return {group_ids[0]: _read_newest(session, group_ids[0])}
     steps: dict[int, list[tuple[str, int]]] = {number: [] for number in group_ids}
     for row in group_steps(session, group_ids, GROUP_KINDS):
         steps[row.group_id].append((GROUP_KINDS[row.kind], row.id))
     return {number: _stacks_of(taken) for number, taken in steps.items()}
+
+
+def _read_newest(session: Session, group_id: int) -> Stacks:
+    """The stacks of one group from as little of its history as tells them."""
+    most = _FIRST_LOOK
+    while True:
+        rows = newest_steps(session, group_id, GROUP_KINDS, most)
+        steps = [(GROUP_KINDS[row.kind], row.id) for row in reversed(rows)]
+        stacks = _stacks_of(steps) if len(rows) < most else _upper_part(steps)
+        if stacks is not None:
+            return stacks
+        most *= _FURTHER
+
+
+def _upper_part(steps: Sequence[tuple[str, int]]) -> Stacks | None:
+    """The stacks after the newest steps, or None where older ones must be known to tell them.
+
+    An edit leaves nothing undone, whatever was before; so all that follows from it is known, as
+    long as no undo reaches below it. Two edits on the stack also tell what is left after an undo.
+    """
+    first = next((at for at, (kind, _) in enumerate(steps) if kind == "edit"), len(steps))
+    try:
+        stacks = _stacks_of(steps[first:])
+    except IndexError:
+        return None
+    return stacks if len(stacks.done) > 1 else None
 
 
 def read_station_stacks(session: Session, station_id: int) -> Stacks:

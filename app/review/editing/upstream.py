@@ -115,6 +115,9 @@ def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[Kept
         if view_digest(view) not in stored.view_digests[view.key]:
             sentence = f"the dataset has another ball in {view.key}; the edited one stays"
             kept.append(Kept(view.key, sentence))
+    if result.balls == old.balls:
+        # How noisy they are is no word of the dataset's.
+        result = replace(result, noise=old.noise)
     if not view.station.shared:
         followed = follow_station(stored.stations[view.key], view.station)
         result = replace(result, station=followed.station)

@@ -18,6 +18,7 @@ from app.evaluation.figure import Figure
 from app.evaluation.result import NUMBERS, FrameResult
 from app.evaluation.table import Table
 from app.review.datasets.dataset import read_dataset
+from app.review.people.deeds import note_deed
 from app.store import evaluation_frames as frame_rows
 from app.store.codecs import Json
 from app.store.evaluation_frames import FrameCondition
@@ -96,15 +97,16 @@ def get_evaluation(store: Store, evaluation_id: int) -> StoredEvaluation:
         return read_evaluation(session, evaluation_id)
 
 
-def remove_evaluation(store: Store, evaluation_id: int) -> None:
+def remove_evaluation(store: Store, evaluation_id: int, *, actor: str) -> None:
     """Delete a run.
 
     Raises:
         NotFoundError: There is none.
     """
     with store.write() as session:
-        read_evaluation(session, evaluation_id)
+        found = read_evaluation(session, evaluation_id)
         delete_evaluation(session, evaluation_id)
+        note_deed(session, actor, "evaluation deleted", found.dataset_id, evaluation=evaluation_id)
 
 
 def tables_of(evaluation: StoredEvaluation) -> list[Table]:

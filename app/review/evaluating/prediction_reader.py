@@ -9,7 +9,7 @@ from pathlib import Path
 from app.child import Allowance, ChildEnded
 from app.child_pool import ChildPool
 from app.config import Settings
-from app.datasets.archive import Limits
+from app.datasets.file_tree import Limits
 from app.errors import DatasetFormatError, TooLargeError
 from app.evaluation.frame_names import FrameNames
 from app.evaluation.prediction_files import (

@@ -7,8 +7,8 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app.datasets.archive import open_tree
 from app.datasets.report import Report
+from app.datasets.trees import open_tree
 from app.errors import NotFoundError
 from app.progress import Progress
 from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation

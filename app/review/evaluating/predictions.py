@@ -12,7 +12,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from app.datasets.archive import Limits
+from app.datasets.file_tree import Limits
 from app.datasets.report import Report
 from app.errors import ConflictError, InputError, NotFoundError
 from app.evaluation.frame import Detection
@@ -22,6 +22,7 @@ from app.evaluation.prediction_run import ReadPredictions, listed
 from app.geometry.camera import Camera
 from app.review.datasets.dataset import read_dataset
 from app.review.evaluating.prediction_reader import PredictionFiles, Read, read_files
+from app.review.people.deeds import note_deed
 from app.soccer.frames import ImageSize
 from app.store.clock import now
 from app.store.codecs import Json, canonical
@@ -207,15 +208,16 @@ def find_predictions(store: Store, dataset: str | int, name: str) -> PredictionS
     return found
 
 
-def delete_predictions(store: Store, set_id: int) -> None:
+def delete_predictions(store: Store, set_id: int, *, actor: str) -> None:
     """Throw a set away; evaluations of it stay, and so do balls that were accepted from it.
 
     Raises:
         NotFoundError: There is none.
     """
     with store.write() as session:
-        read_set(session, set_id)
+        found = read_set(session, set_id)
         delete_prediction_set(session, set_id)
+        note_deed(session, actor, "predictions deleted", found.dataset_id, name=found.name)
 
 
 def view_predictions(store: Store, view_id: int) -> list[tuple[PredictionSet, list[PredictedBox]]]:

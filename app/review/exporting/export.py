@@ -10,10 +10,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from app.datasets.export_record import ExportRecord
+from app.datasets.file_tree import Root
 from app.datasets.issia import FramePersons
 from app.datasets.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
-from app.datasets.output import output_tree
+from app.datasets.store_output import output_anywhere
 from app.errors import InputError
+from app.object_store.address import is_address
+from app.object_store.path import StoredPath
 from app.progress import Progress
 from app.review.datasets.dataset import read_dataset
 from app.review.datasets.licence import licence_of
@@ -55,7 +58,7 @@ class ExportReport:
         missing_images: Frames that could not be copied, with the reason.
     """
 
-    out: Path
+    out: Root
     format: str
     counts: Mapping[str, int]
     left_out: Mapping[str, int] = field(default_factory=dict)
@@ -75,7 +78,7 @@ class _Options:
         """Whether training data hold every view."""
         return self.everything or self.views == "all"
 
-    def check(self, out: Path) -> None:
+    def check(self, out: Root) -> None:
         for name, value, choices in (
             ("format", self.format, FORMATS),
             ("boxes", self.boxes, BOX_KINDS),
@@ -87,6 +90,8 @@ class _Options:
                     f'"{value}" is not possible for {name}; choose one of {", ".join(choices)}',
                     pointer=f"/{name}",
                 )
+        if self.images == "link" and isinstance(out, StoredPath):
+            raise InputError("a store cannot hold links; copy the images")
         if self.images == "link" and out.suffix.lower() == ".zip":
             raise InputError("a zip cannot hold links; export a folder or copy the images")
 
@@ -95,7 +100,7 @@ def export(
     store: Store,
     dataset: str | int,
     format: str,  # noqa: A002
-    out: Path,
+    out: Root,
     *,
     everything: bool = False,
     boxes: str = "optimized",
@@ -114,7 +119,8 @@ def export(
         store: The database.
         dataset: Name or id.
         format: One of ``FORMATS``.
-        out: Folder, or file that ends in .zip; appears whole or not at all.
+        out: Folder, or file that ends in .zip, on a disk or in an object store; appears whole or
+            not at all.
         everything: Every group, whatever its verdict.
         boxes: ``optimized``, ``annotated`` or ``exact``: which ball box Labels-v3D.json, COCO,
             YOLO and Parquet hold. Other formats have no place for a chosen box, and their
@@ -138,7 +144,7 @@ def export(
         return ExportReport(out, CARRY, carry_out(store, dataset, out, progress))
     with store.read() as session:
         source = _source(session, store, dataset, everything, version)
-        with output_tree(out) as root:
+        with output_anywhere(out, store.settings.exports) as root:
             frames = ExportImages(root, images, read or _here(store), frame_layout(format))
             run = _Run(source, options, frames, progress)
             # A version is the same every time; spare frames are the dataset's as it is.
@@ -190,7 +196,7 @@ def require_possible(
 
 def _require_frames(dataset: str, files: Iterable[str]) -> None:
     """Raises InputError where images are wanted and no file of them is there."""
-    if not any(Path(file).exists() for file in files):
+    if not any(is_address(file) or Path(file).exists() for file in files):
         raise InputError(
             f'none of the images of "{dataset}" is there, so none can go with it',
             hint="Export without images, or import the dataset again with its frames.",

@@ -14,6 +14,7 @@ from typing import Any
 from app.durable import PARTIAL, replace_file
 from app.errors import NotFoundError
 from app.finite import json_text
+from app.object_store.path import StoredPath
 from app.review.exporting.export import ExportReport
 from app.store.clock import now
 from app.store.leftovers import DAY, last_written
@@ -33,6 +34,8 @@ class ExportEntry:
     left_out: dict[str, int]
     missing_images: list[str]
     bytes: int
+    stored: str | None = None
+    """Where in an object store the zip lies, and what its content is called; None: here."""
 
 
 class ExportFolder:
@@ -58,6 +61,9 @@ class ExportFolder:
             request: What was asked for, plain JSON values.
             report: What came of it.
         """
+        stored = None
+        if isinstance(report.out, StoredPath):
+            stored = report.out.of(report.out.store.head(report.out.key))
         entry = ExportEntry(
             id=name,
             request=dict(request),
@@ -65,7 +71,8 @@ class ExportFolder:
             counts=dict(report.counts),
             left_out=dict(report.left_out),
             missing_images=list(report.missing_images),
-            bytes=self.content(name).stat().st_size,
+            bytes=self.content(name).stat().st_size if stored is None else stored.size,
+            stored=None if stored is None else stored.sealed(),
         )
         replace_file(self._record(name), json_text(asdict(entry), ascii_=True).encode())
         return entry
@@ -92,25 +99,24 @@ class ExportFolder:
         return self.folder / f"{name}.zip"
 
     def forget(self, name: str) -> None:
-        """Delete an export, its record first: what is listed has a file."""
+        """Delete an export, its record first: what is listed has a file.
+
+        One that lies in an object store was delivered there, and stays.
+        """
         if _ID.fullmatch(name):
             self._record(name).unlink(missing_ok=True)
             self.content(name).unlink(missing_ok=True)
 
-    def forget_unfinished(self, seconds: float = DAY) -> int:
-        """Delete zips that never got their record, or lost it: nothing lists them.
+    def forget_unfinished(self) -> int:
+        """Delete zips that never got their record, or lost it, and say how many: nothing lists them.
 
-        Args:
-            seconds: So long ago they must have been written; a newer one may get its record yet.
-
-        Returns:
-            How many there were.
+        One that was written within a day may get its record yet.
         """
         gone = 0
         for path in self.folder.glob("*.zip"):
             name, written = path.name.removesuffix(".zip"), last_written(path)
             known = not _ID.fullmatch(name) or self._record(name).exists()
-            if not known and written is not None and written < time.time() - seconds:
+            if not known and written is not None and written < time.time() - DAY:
                 path.unlink(missing_ok=True)
                 gone += 1
         return gone

@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from app.datasets.archive import resolve_inside
 from app.datasets.frame_names import FrameName, match_frame
+from app.datasets.safe_path import resolve_inside
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
+from app.object_store.address import is_address, unseal
 from app.soccer.group import Group, Media, View
 from app.store.frames import Picture
 from app.store.media import media_facts
@@ -63,6 +64,11 @@ class ExportImages:
         facts = media_facts(media) if frozen is None else frozen
         if facts:
             self.media.append({"group": group.key, "view": view.key, **facts})
+        elif is_address(media.path):
+            _, kind, value = unseal(media.path)
+            self.media.append(
+                {"group": group.key, "view": view.key, **({kind: value} if kind else {})}
+            )
         if self._images == "none":
             return
         if frozen and frozen != media_facts(media):
@@ -79,7 +85,7 @@ class ExportImages:
             self.missing.append(f"{group.key}, {view.key}: {why}")
 
     def _place(self, group: Group, view: View, media: Media) -> None:
-        is_file = media.member is None and media.frame is None
+        is_file = media.member is None and media.frame is None and not is_address(media.path)
         # A mirrored picture is turned right: a link would show it as it lies.
         if self._images == "link" and is_file and not view.station.flipped:
             target = self._target(group, view, PurePosixPath(media.path).suffix.lower())

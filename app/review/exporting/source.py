@@ -87,7 +87,8 @@ class LiveSource:
     def items(self) -> Iterator[Item]:
         """Groups in the order of the dataset."""
         for start in range(0, self.count, BATCH):
-            for state in read_states(self._session, self._ids[start : start + BATCH]):
+            ids = self._ids[start : start + BATCH]
+            for state in read_states(self._session, ids, markings=False):
                 yield _live_record(state), None
 
     def require_some(self) -> None:

@@ -12,8 +12,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from app.datasets.file_tree import Root
 from app.datasets.manifest import Manifest, write_manifest
-from app.datasets.output import output_tree
+from app.datasets.store_output import output_anywhere
 from app.finite import json_text
 from app.progress import Progress
 from app.review.datasets.dataset import Dataset, read_dataset
@@ -47,7 +48,7 @@ _BATCH = 200
 
 
 def carry_out(
-    store: Store, dataset: str | int, out: Path, progress: Progress | None = None
+    store: Store, dataset: str | int, out: Root, progress: Progress | None = None
 ) -> dict[str, int]:
     """Write everything that was said about a dataset, from one snapshot; returns counts.
 
@@ -57,7 +58,7 @@ def carry_out(
         out: Folder, or file that ends in .zip; appears whole or not at all.
         progress: Called as groups are written.
     """
-    with store.read() as session, output_tree(out) as root:
+    with store.read() as session, output_anywhere(out, store.settings.exports) as root:
         found = read_dataset(session, dataset)
         counts = {
             "stations": _write_lines(root / STATIONS, _stations(session, found.id)),
@@ -81,8 +82,10 @@ def carried_group(group: Group) -> dict[str, Json]:
     for view in group.views:
         value = view_to_json(view, view.station.key if view.station.shared else None)
         del value["media"]
+        value.pop("noise", None)
         views.append(value)
-    # Where a match puts its cameras follows from its lines, and paint is read in pictures, there as here.
+    # Where a match puts its cameras follows from its lines, how noisy balls are from the balls, and
+    # paint is read in pictures, there as here.
     return {**group_head_to_json(replace(group, positions={}, paint={})), "views": views}
 
 

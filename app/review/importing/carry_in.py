@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from pathlib import Path
 from typing import TypeVar
 
-from app.datasets.archive import FileTree, Limits, open_tree
+from app.datasets.file_tree import FileTree, Limits, Root
 from app.datasets.report import Report
+from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError, InputError
 from app.progress import Progress
 from app.review.datasets.dataset import insert_dataset
@@ -75,7 +75,7 @@ class _Run:
 def carry_in(
     store: Store,
     dataset: str,
-    path: Path,
+    path: Root,
     report: Report,
     limits: Limits,
     *,

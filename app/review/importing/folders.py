@@ -9,9 +9,12 @@ from itertools import islice
 from pathlib import Path
 
 from app.config import Settings
-from app.datasets.archive import MAX_PART, check_name, resolve_inside
-from app.datasets.guess_format import guess_format
+from app.datasets.file_tree import Root
+from app.datasets.guess_format import guess_format, guess_of_names
+from app.datasets.safe_path import MAX_PART, check_name, resolve_inside
 from app.errors import InputError, NotFoundError
+from app.object_store.address import SCHEME, is_address
+from app.object_store.path import StoredPath, find_path
 
 MAX_ITEMS = 1000
 """Entries of a folder that are listed."""
@@ -54,14 +57,16 @@ def allowed_folders(settings: Settings) -> dict[str, Path]:
     return found
 
 
-def resolve_folder(settings: Settings, path: str) -> Path:
-    """The folder or file that a request means by ``<allowed folder>/<inside>``.
+def resolve_folder(settings: Settings, path: str) -> Root:
+    """The folder or file that a request means by ``<allowed folder>/<inside>`` or an address.
 
     Raises:
         UnsafePathError: The path would leave the allowed folder.
         NotFoundError: Nothing is there.
         InputError: The operator allows no folders.
     """
+    if is_address(path):
+        return _resolve_address(settings, path)
     folders = allowed_folders(settings)
     if not folders:
         raise InputError(
@@ -79,18 +84,42 @@ def resolve_folder(settings: Settings, path: str) -> Path:
     return found
 
 
+def _resolve_address(settings: Settings, address: str) -> StoredPath:
+    check_name(address.removeprefix(SCHEME).strip("/"))
+    return find_path(settings, address)
+
+
 def list_folder(settings: Settings, path: str = "") -> FolderListing:
-    """The allowed folders, or what is in one of them."""
+    """The allowed folders and stores, or what is in one of them."""
     if not path:
-        roots = (FolderItem(name, name, True) for name in sorted(allowed_folders(settings)))
+        roots = [FolderItem(name, name, True) for name in sorted(allowed_folders(settings))]
+        stores = (f"{SCHEME}{name}" for name in sorted(settings.stores))
+        roots += [FolderItem(address, address, True) for address in stores]
         return FolderListing("", None, tuple(roots), False)
     found = resolve_folder(settings, path)
+    if isinstance(found, StoredPath):
+        return _list_stored(found)
     if not found.is_dir():
         return FolderListing(path, guess_format(found), (), False)
     items = list(islice(_items(found, path.rstrip("/")), MAX_ITEMS + 1))
     items.sort(key=lambda item: (not item.folder, item.name))
     more = len(items) > MAX_ITEMS
     return FolderListing(path, guess_format(found), tuple(items[:MAX_ITEMS]), more)
+
+
+def _list_stored(found: StoredPath) -> FolderListing:
+    """What is in a folder of a store; one request, so that the format is guessed of this level."""
+    if not found.is_dir():
+        return FolderListing(str(found), guess_of_names([found.name]), (), False)
+    folders, objects = found.store.folder(found.key)
+    at = str(found).rstrip("/")
+    items = [FolderItem(f"{at}/{name}", name, True) for name in folders]
+    names = [stored.key.rpartition("/")[2] for stored in objects]
+    items += [FolderItem(f"{at}/{name}", name, False) for name in names]
+    items = [item for item in items if not item.name.startswith(".") and _is_name(item.name)]
+    items.sort(key=lambda item: (not item.folder, item.name))
+    shown, more = tuple(items[:MAX_ITEMS]), len(items) > MAX_ITEMS
+    return FolderListing(at, guess_of_names(names), shown, more)
 
 
 def _items(folder: Path, path: str) -> Iterator[FolderItem]:

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
+from app.object_store.address import is_address
 from app.progress import Progress
 from app.review.datasets.dataset import insert_dataset
+from app.review.datasets.paint_reading import outdated_where_people_moved
 from app.review.editing.edit import SetPaint, SetPositions
 from app.review.editing.pitches import give_pitch
 from app.review.editing.shared_stations import SharedStations
@@ -18,6 +20,7 @@ from app.review.importing.body import import_body, places_of
 from app.review.importing.missing import GONE, note_gone, of_read_matches
 from app.review.policies.first_policy import first_policy
 from app.soccer.group import Group, View
+from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
 from app.store.clock import now
 from app.store.datasets import find_dataset
@@ -28,7 +31,8 @@ from app.store.group_rows import NewRows
 from app.store.groups import StoredGroup, read_groups
 from app.store.imports import known_groups, newest_imports
 from app.store.log import Entry, append
-from app.store.pitches import edited_pitches
+from app.store.paint import insert_readings
+from app.store.pitches import edited_pitches, is_pitch_edited
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
 
@@ -176,7 +180,7 @@ def _sound(groups: Iterable[Group], seen: set[str], report: IngestReport) -> Ite
 
 
 def _absolute(view: View) -> View:
-    if view.media is None:
+    if view.media is None or is_address(view.media.path):
         return view
     path = Path(view.media.path).absolute()
     # The reader saw where a link leads; one that comes later is not followed.
@@ -213,15 +217,19 @@ def ingest_batch(
             report.unchanged += 1
         else:
             _follow(session, origin, known[group.key].id, group, digest, shared.ids, report)
-    _insert(session, origin, fresh, shared.ids)
+    insert_fresh(session, origin, fresh, shared.ids)
     report.new += len(fresh)
 
 
-def _insert(
+def insert_fresh(
     session: Session, origin: Origin, fresh: Sequence[tuple[Group, str]], shared: dict[str, int]
-) -> None:
+) -> list[int]:
+    """Insert groups that a dataset has not yet, with their source hashes; returns their ids.
+
+    ``shared`` has the ids of its shared stations by key.
+    """
     if not fresh:
-        return
+        return []
     at, rows = now(), NewRows(session, origin.dataset_id)
     ids, entries = [], []
     for group, digest in fresh:
@@ -238,6 +246,7 @@ def _insert(
         if (pitch := pitches.get(group.match)) is not None:
             give_pitch(session, origin.dataset_id, [identity], pitch, origin.actor)
     refresh_queue(session, ids)
+    return ids
 
 
 def _follow(
@@ -251,16 +260,16 @@ def _follow(
 ) -> None:
     stored, at = read_groups(session, [group_id])[group_id], now()
     followed = follow_group(stored, incoming)
-    pitches = edited_pitches(session, origin.dataset_id, {incoming.match})
-    if (pitch := pitches.get(incoming.match)) is not None:
-        # A person gave the match its pitch.
+    if (pitch := _edited_pitch(session, stored, incoming)) is not None:
         followed = replace(followed, group=replace(followed.group, pitch=pitch))
     if incoming.match == stored.group.match:
         # What the match shares comes from its other pictures.
         shared_here = SetPositions(stored.group.positions).apply(followed.group)
         followed = replace(followed, group=shared_here)
     # What was read of a picture says of which, and is read again where that is another.
-    followed = replace(followed, group=SetPaint(stored.group.paint).apply(followed.group))
+    paint = outdated_where_people_moved(stored.group, followed.group)
+    followed = replace(followed, group=SetPaint(paint).apply(followed.group))
+    insert_readings(session, origin.dataset_id, followed.group.paint.values())
     save_group(
         session, stored, followed.group, at=at, source=followed.base, digest=digest, shared=shared
     )
@@ -272,6 +281,15 @@ def _follow(
     refresh_queue(session, [group_id])
     report.changed += 1
     report.findings += len(followed.kept)
+
+
+def _edited_pitch(session: Session, stored: StoredGroup, incoming: Group) -> Pitch | None:
+    """The size that a person gave to a group's match, or to the group itself that has none."""
+    if incoming.match:
+        pitches = edited_pitches(session, stored.dataset_id, {incoming.match})
+        return pitches.get(incoming.match)
+    is_own = not stored.group.match and is_pitch_edited(session, stored.id)
+    return stored.group.pitch if is_own else None
 
 
 def note_kept(session: Session, stored: StoredGroup, kept: Sequence[Kept]) -> list[Kept]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, get_args
 
 from app.config import Settings
-from app.datasets.archive import Limits
 from app.datasets.cameras_reader import read_cameras
 from app.datasets.coco_reader import read_coco
+from app.datasets.file_tree import Limits, Root
 from app.datasets.format_names import ImportFormat
+from app.datasets.frame_list import read_frame_list
 from app.datasets.gamestate_reader import read_gamestate
 from app.datasets.guess_format import guess_format
 from app.datasets.issia import DEFAULT_SIZE as ISSIA_SIZE
@@ -49,16 +49,19 @@ class Source:
         frame_offset: ISSIA: number in the XGTF file minus number in video, also by camera.
         flipped: ISSIA: cameras whose frames are mirrored.
         size: Size of the annotated images, for formats that do not say it; None: the usual one.
+        frames: A list of where the frames lie (``app.datasets.frame_list``), where it is not beside
+            the labels.
         name: What people call it; the log keeps it. Empty: the path.
     """
 
     format: str
-    path: Path
+    path: Root
     size: ImageSize | None = None
-    lines: Path | None = None
+    lines: Root | None = None
     calibration: str = "given"
     frame_offset: int | Mapping[int, int] = 8
     flipped: frozenset[int] = frozenset()
+    frames: Root | None = None
     name: str = ""
 
     @property
@@ -70,7 +73,7 @@ class Source:
         """A text without the place of a source that has a name of its own."""
         if not self.name:
             return text
-        for path in (self.path, self.path.parent, self.lines):
+        for path in (self.path, self.path.parent, self.lines, self.frames):
             if path is not None:
                 text = text.replace(f"{path}/", "").replace(str(path), self.name)
         return text
@@ -194,6 +197,8 @@ def import_source(
         return Imported(source, report, result)
     folder = _static(source, report, limits) if source.format in STATIC else None
     groups = _groups(source, report, limits) if folder is None else folder.groups()
+    if source.frames is not None:
+        groups = read_frame_list(source.frames, settings, report, limits).placed(iter(groups))
     result = ingest(
         store,
         dataset,

@@ -60,7 +60,8 @@ def request_accept(
 
 
 def resume_evaluations(jobs: Jobs, store: Store) -> None:
-    """Let evaluations that an earlier server was at go on."""
+    """Let evaluations that an earlier server was at go on, and another process accept predictions
+    than the one that was asked."""
 
     def work_of(job: Job) -> Work:
         request, dataset_id = EvaluationRequest(**job.request), job.dataset_id or 0
@@ -74,7 +75,14 @@ def resume_evaluations(jobs: Jobs, store: Store) -> None:
 
         return work
 
+    def accepting(job: Job) -> Work:
+        values = dict(job.request["accept"])
+        views = None if values["views"] is None else tuple(values["views"])
+        request = AcceptRequest(**{**values, "views": views})
+        return accept_work(store, job.dataset_id or 0, request, job.actor)
+
     jobs.resumes(EVALUATE, work_of)
+    jobs.makes(ACCEPT, accepting)
 
 
 def evaluation_work(store: Store, dataset_id: int, request: EvaluationRequest, actor: str) -> Work:

@@ -5,6 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from app.datasets.safe_path import check_name
+from app.datasets.store_output import require_absent
+from app.errors import InputError, NotFoundError
+from app.object_store.address import SCHEME
+from app.object_store.path import StoredPath, target_path
 from app.review.datasets.dataset import get_dataset
 from app.review.exporting.export import export, require_possible
 from app.review.exporting.folder import ExportFolder
@@ -47,6 +52,8 @@ def request_export(
     """
     found = get_dataset(store, request["dataset"])
     version = request.get("version")
+    if request.get("to") is not None:
+        require_absent(_target(store, request["to"]))
     require_possible(
         store,
         found.id,
@@ -85,13 +92,14 @@ def export_work(
 
     def work(progress: JobProgress) -> Json:
         name, version = str(progress.job_id), request.get("version")
+        to = request.get("to")
         progress(0, None, f"Writing {request['format']}.")
         folder.prepare()
         report = export(
             store,
             dataset_id,
             request["format"],
-            folder.content(name),
+            folder.content(name) if to is None else _target(store, to),
             everything=request["all"],
             boxes=request["boxes"],
             images=request["images"],
@@ -112,3 +120,17 @@ def export_work(
         }
 
     return work
+
+
+def _target(store: Store, address: str) -> StoredPath:
+    """Where in a store an export goes.
+
+    Raises:
+        InputError: It is no address.
+        NotFoundError: There is no such store.
+    """
+    try:
+        check_name(address.removeprefix(SCHEME))
+        return target_path(store.settings, address)
+    except (InputError, NotFoundError) as error:
+        raise type(error)(error.message, hint=error.hint, pointer="/to") from error

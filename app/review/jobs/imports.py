@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from app.config import Settings
+from app.datasets.file_tree import Root
 from app.errors import InputError
 from app.progress import Progress
 from app.review.datasets.dataset import get_dataset, require_name
@@ -17,7 +17,7 @@ from app.review.importing.import_child import Outcome, import_apart
 from app.review.importing.sources import FORMATS, Source
 from app.review.jobs.job_run import FailedWithReportError, JobProgress, Work
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.paint import request_paint
+from app.review.jobs.paint import PAINT
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
 from app.soccer.policy import POLICIES
@@ -39,6 +39,7 @@ class ImportRequest:
     Attributes:
         source: ``{"upload": id}`` or ``{"folder": path}``.
         lines: The same for ISSIA's line files, or None.
+        frames: The same for a list of frames, or None.
         options: ``calibration``, ``frame_offset``, ``flipped``, ``size`` ([width, height]).
         policy: Name of a shipped one for a dataset that is made; None: as its pictures suggest.
     """
@@ -50,6 +51,7 @@ class ImportRequest:
     options: Mapping[str, Any] = field(default_factory=dict)
     dry_run: bool = False
     policy: str | None = None
+    frames: Mapping[str, str] | None = None
 
     def values(self) -> dict[str, Json]:
         """As a job keeps it."""
@@ -58,6 +60,7 @@ class ImportRequest:
             "format": self.format,
             "source": dict(self.source),
             "lines": None if self.lines is None else dict(self.lines),
+            "frames": None if self.frames is None else dict(self.frames),
             "options": dict(self.options),
             "dry_run": self.dry_run,
             "policy": self.policy,
@@ -154,7 +157,7 @@ def _following(jobs: Jobs, store: Store, dataset: str, actor: str) -> dict[str, 
     found = get_dataset(store, dataset)
     solve, paint = request_solve(jobs, store, found.id, actor=actor), None
     if found.policy.calibration.source == "paint" and has_pictures(store, found.id):
-        paint = request_paint(jobs, store, found.id, None, actor=actor).id
+        paint = PAINT.request(jobs, store, found.id, None, actor=actor).id
     return {"solve_job": solve.id, "paint_job": paint}
 
 
@@ -208,6 +211,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
         path,
         size=None if size is None else ImageSize(*size),
         lines=None if request.lines is None else _place(settings, request.lines)[0],
+        frames=None if request.frames is None else _place(settings, request.frames)[0],
         calibration=options.get("calibration", "given"),
         frame_offset=offset,
         flipped=frozenset(options.get("flipped", ())),
@@ -215,7 +219,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
     )
 
 
-def _place(settings: Settings, source: Mapping[str, str]) -> tuple[Path, str]:
+def _place(settings: Settings, source: Mapping[str, str]) -> tuple[Root, str]:
     if "upload" in source:
         upload = get_upload(settings, source["upload"])
         return upload_path(settings, upload.id), upload.name

@@ -9,11 +9,27 @@ from typing import Any
 
 from app.errors import ConflictError, NotFoundError, StorageError
 from app.review.jobs.job_run import JobRun
-from app.store.jobs import OPEN, Job, delete_job, read_job, read_jobs, update_job
+from app.review.people.bell import RingKind, tell
+from app.soccer.actors import person_of
+from app.store.jobs import (
+    DONE,
+    FAILED,
+    OPEN,
+    Job,
+    delete_job,
+    job_ids,
+    read_job,
+    read_jobs,
+    update_job,
+)
 from app.store.session import Session, Store
+from app.store.sight import EVERYTHING, Sight
 
 TICK = 0.25
 """Seconds between two looks at the progress of the running job."""
+
+_TOLD = {DONE: "done", FAILED: "it failed"}
+"""Ends of jobs of which people are told, in words."""
 
 Listener = Callable[[Job], None]
 
@@ -46,8 +62,9 @@ class JobRecords:
         states: Sequence[str] = (),
         before: int | None = None,
         limit: int = 50,
+        sight: Sight = EVERYTHING,
     ) -> list[Job]:
-        """Jobs, the newest first; ``before`` is the id of the last one of the page before."""
+        """Jobs that somebody sees, the newest first; ``before`` is the last id of the page before."""
         with self._store.read() as session:
             return read_jobs(
                 session,
@@ -56,7 +73,13 @@ class JobRecords:
                 states=states,
                 before=before,
                 limit=limit,
+                sight=sight,
             )
+
+    def every(self, *, dataset_id: int, kind: str) -> list[int]:
+        """Ids of all jobs of a kind in a dataset, however many there are."""
+        with self._store.read() as session:
+            return job_ids(session, dataset_id, kind)
 
     def forget(self, job_id: int) -> None:
         """Delete the record of a job that is over.
@@ -84,6 +107,24 @@ class JobRecords:
         with self._store.write() as session:
             update_job(session, job_id, **values)
             job = read_job(session, job_id)
+        if job is not None:
+            self._announce(job)
+
+    def _save_end(self, job_id: int, **values: Any) -> None:
+        """Save how a job ended, and tell who asked for it, at once."""
+        with self._store.write() as session:
+            update_job(session, job_id, **values)
+            job = read_job(session, job_id)
+            if job is not None and job.state in _TOLD:
+                tell(
+                    session,
+                    person_of(job.actor),
+                    RingKind.JOB,
+                    f"{job.title}: {_TOLD[job.state]}",
+                    actor=job.actor,
+                    address="/jobs",
+                    dataset_id=job.dataset_id if job.dataset is not None else None,
+                )
         if job is not None:
             self._announce(job)
 

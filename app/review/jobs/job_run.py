@@ -66,6 +66,11 @@ class JobProgress:
         self.place = (done, last_total if total is None else total, sentence or last_sentence)
         self.check()
 
+    def require_wanted(self) -> None:
+        """Raise ``JobCancelled`` where somebody cancelled it; a server that stops did not."""
+        if self.cancelled.is_set():
+            raise JobCancelled
+
     def check(self) -> None:
         """Raise ``JobCancelled`` where the work shall end here."""
         if self.cancelled.is_set() or self._closing.is_set():
@@ -94,6 +99,7 @@ class JobRun:
         """Do the work; how it ended, as columns. None where the server stops and the next one
         decides."""
         try:
+            self.progress.require_wanted()
             return {"state": DONE, "result": self.work(self.progress)}
         except JobCancelled:
             if not self.progress.cancelled.is_set():

@@ -8,9 +8,9 @@ knows how (``Jobs.resumes``) and marks the others failed.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from typing import Any
 
@@ -18,11 +18,13 @@ import structlog
 
 from app.errors import (
     ConflictError,
+    NotFoundError,
     OverloadedError,
     StorageError,
 )
 from app.review.jobs.job_records import JobRecords, need_job
 from app.review.jobs.job_run import JobProgress, JobRun, RunQueue, Work
+from app.review.people.deeds import note_job
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
@@ -40,7 +42,7 @@ from app.store.jobs import (
     trim_jobs,
     update_job,
 )
-from app.store.session import Store
+from app.store.session import Session, Store, once_kept
 
 log = structlog.get_logger("touchline.jobs")
 
@@ -56,8 +58,9 @@ KEPT = {"solve": 200, "bulk": 200, "verify": 200}
 MOST_TRIES = 2
 """So many times a server may die at a job before it is left alone."""
 
-Pool = Callable[[], AbstractContextManager[Executor]]
-"""Makes an executor for the length of one large job, so that requests keep their processor."""
+Pool = Callable[[], AbstractContextManager[Executor | None]]
+"""Makes an executor for the length of one large job, so that requests keep their processor;
+``nullcontext`` makes none, and the work stays in this process."""
 
 
 class Jobs(JobRecords):
@@ -66,7 +69,7 @@ class Jobs(JobRecords):
     ``pool`` is for work that is worth processes of its own; without one it stays in this process.
     """
 
-    def __init__(self, store: Store, *, capacity: int = CAPACITY, pool: Pool | None = None):
+    def __init__(self, store: Store, *, capacity: int = CAPACITY, pool: Pool = nullcontext):
         super().__init__(store)
         self._capacity, self.pool = capacity, pool
         # Replaced as a whole and only under ``_changed``, so that it is read without.
@@ -77,6 +80,7 @@ class Jobs(JobRecords):
         self._closing = threading.Event()
         self._worker: threading.Thread | None = None
         self._resumers: dict[str, Callable[[Job], Work]] = {}
+        self._beginners: list[Callable[[], None]] = []
 
     def resumes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
         """Start jobs of a kind again after a restart; to be told before ``start``.
@@ -87,8 +91,25 @@ class Jobs(JobRecords):
         """
         self._resumers[kind] = work_of
 
+    def makes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
+        """How the work of a kind is made from its record, where a process carries out what another
+        one was asked for; it is not begun again after a death."""
+
+    def leads(self) -> bool:
+        """Whether this process carries out jobs and what else is one process's."""
+        return True
+
+    def on_lead(self, begin: Callable[[], None]) -> None:
+        """Call a function once this process leads, on whichever thread finds that out."""
+        self._beginners.append(begin)
+
     def start(self) -> None:
-        """Take up what an earlier server left behind, or say that it is lost."""
+        """Take up what an earlier server left behind, or say that it is lost; then lead."""
+        self._take_up()
+        for begin in self._beginners:
+            begin()
+
+    def _take_up(self) -> None:
         with self._store.write() as session:
             for kind, keep in KEPT.items():
                 trim_jobs(session, kind, keep)
@@ -121,7 +142,8 @@ class Jobs(JobRecords):
             dataset_id: The dataset that it belongs to.
             actor: Who wants it.
             request: What was asked for; a kind that is resumed finds its way from it.
-            once: Where a job of this kind waits for this dataset already, answer that one.
+            once: Where a job of this kind waits for this dataset already, answer that one; without
+                a dataset one's own, for nobody sees another person's.
             keep: Keeps the answer, or whatever else belongs to the job, in its transaction.
 
         Raises:
@@ -131,10 +153,12 @@ class Jobs(JobRecords):
         with ExitStack() as entry, self._store.write() as session:
             # Others that enter wait for the write lock, so that none of them is counted twice.
             enter = entry.enter_context(self._entry())
-            known = self._waiting_for(kind, dataset_id) if once else None
+            known = self._waiting_for(session, new) if once else None
             if not once:
-                self._require_room()
-            job = need_job(session, insert_job(session, new) if known is None else known.id)
+                self._require_room(session)
+            job = need_job(session, insert_job(session, new) if known is None else known)
+            if known is None:
+                note_job(session, actor, job.id, kind, title, dataset_id)
             keep(job)(session)
             if known is None:
                 progress = JobProgress(job.id, self._closing)
@@ -172,19 +196,54 @@ class Jobs(JobRecords):
         if running is not None and running.id == job_id:
             running.dataset_id = dataset_id
 
-    def cancel_all(self, dataset_id: int, seconds: float = CLOSE_SECONDS) -> None:
+    def ids_of(self, dataset_id: int, *kinds: str) -> list[int]:
+        """Ids of a dataset's jobs that wait or run here, of some kinds or, without any, of all.
+
+        Within a write transaction that stays true to its end. A record that is open and that
+        nobody works on is none.
+        """
+        return [
+            run.id
+            for run in self._queue.runs
+            if run.dataset_id == dataset_id and (not kinds or run.kind in kinds)
+        ]
+
+    def end_with(self, session: Session, ids: Collection[int]) -> None:
+        """Let jobs write nothing more, nor begin, once a transaction is kept."""
+        once_kept(session, lambda: self.end_soon(ids))
+
+    def end_soon(self, ids: Collection[int]) -> None:
+        """Let jobs write nothing more, nor begin: without asking the database, so that it can be
+        called when a transaction is kept (``store.session.once_kept``)."""
+        for run in self._queue.runs:
+            if run.id in ids:
+                run.progress.cancelled.set()
+
+    def cancel_each(self, ids: Iterable[int]) -> None:
+        """End jobs as far as they are not over, and wait for nothing."""
+        for number in ids:
+            with suppress(ConflictError, NotFoundError):
+                self.cancel(number)
+
+    def cancel_kind(self, dataset_id: int, *kinds: str) -> None:
+        """End a dataset's jobs of some kinds, or of all where none is named, and wait for nothing.
+
+        Work that asks ``JobProgress.require_wanted`` in its transactions writes nothing in any
+        that begins after this.
+        """
+        self.cancel_each(self.ids_of(dataset_id, *kinds))
+
+    def cancel_all(self, dataset_id: int) -> None:
         """End all jobs of a dataset and wait until none of them runs any more.
 
         Raises:
             ConflictError: The running one has not ended in time.
         """
-        for job in self.find(dataset_id=dataset_id, states=OPEN, limit=1000):
-            with suppress(ConflictError):
-                self.cancel(job.id)
+        self.cancel_kind(dataset_id)
         running = self._queue.running
         if running is None or running.dataset_id != dataset_id:
             return
-        if not running.over.wait(seconds):
+        if not running.over.wait(CLOSE_SECONDS):
             raise ConflictError(f"job {running.id} of this dataset is still running")
 
     def wait(self, job_id: int, seconds: float) -> Job:
@@ -217,16 +276,23 @@ class Jobs(JobRecords):
                 log.warning("a job did not end in time", job=running.id)
                 self._take_back(running)
 
-    def _waiting_for(self, kind: str, dataset_id: int | None) -> JobRun | None:
-        """The waiting job of a kind and dataset."""
-        place = (kind, dataset_id)
-        runs = self._queue.waiting
-        return next((run for run in runs if (run.kind, run.dataset_id) == place), None)
+    def _waiting_for(self, session: Session, new: NewJob) -> int | None:
+        """Id of the waiting job of a kind and dataset; one without a dataset is its maker's."""
+        place = (new.kind, new.dataset_id)
+        for run in self._queue.waiting:
+            if (run.kind, run.dataset_id) != place:
+                continue
+            if new.dataset_id is not None or need_job(session, run.id).actor == new.actor:
+                return run.id
+        return None
 
-    def _require_room(self) -> None:
-        waiting = len(self._queue.waiting)
+    def _require_room(self, session: Session) -> None:
+        waiting = self._count_waiting(session)
         if waiting >= self._capacity:
             raise OverloadedError(f"{waiting} jobs wait already", hint="Send it again in a while.")
+
+    def _count_waiting(self, _session: Session) -> int:
+        return len(self._queue.waiting)
 
     @contextmanager
     def _entry(self) -> Iterator[Callable[[JobRun], None]]:
@@ -304,7 +370,8 @@ class Jobs(JobRecords):
         return self._closing.is_set() or bool(self._queue.waiting and not self._entering)
 
     def _carry_out(self, run: JobRun) -> None:
-        self._save(run.id, state=RUNNING, started=now(), begun=1)
+        if not self._begin(run):
+            return
         run.counted = True
         ended = threading.Event()
         ticker = threading.Thread(target=self._tick, args=(run, ended), daemon=True)
@@ -319,6 +386,11 @@ class Jobs(JobRecords):
         else:
             self._take_back(run)
 
+    def _begin(self, run: JobRun) -> bool:
+        """Write that a job is begun; False where it shall not be."""
+        self._save(run.id, state=RUNNING, started=now(), begun=1)
+        return True
+
     def _take_back(self, run: JobRun) -> None:
         """Let a server that stops in good order count for no death: it is none of this job's doing."""
         with self._changed:
@@ -332,7 +404,7 @@ class Jobs(JobRecords):
         # Where the disk is full for a moment, the record waits for it.
         for _ in range(5):
             try:
-                self._save(run.id, **{**place, "ended": now(), **values})
+                self._save_end(run.id, **{**place, "ended": now(), **values})
             except StorageError as error:
                 log.warning("the record of a job could not be written", error=str(error))
                 self._closing.wait(1.0)

@@ -2,45 +2,15 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
-
-from app.review.datasets.dataset import dataset_id
 from app.review.editing.positions import apply_take_back, require_sharable, share_positions
-from app.review.jobs.job_run import JobProgress, Work, counting
+from app.review.jobs.job_run import JobProgress, counting
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.solve import request_solve, solve_after
+from app.review.jobs.match_job import MatchesAsked, MatchJob
+from app.review.jobs.solve import request_solve
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.session import Session, Store
-
-KIND = "positions"
-
-
-def request_positions(
-    jobs: Jobs,
-    store: Store,
-    dataset: str | int,
-    match: str | None,
-    *,
-    actor: str,
-    keep: Keep[Job] = keep_nothing,
-) -> Job:
-    """Share positions in a match, or wherever what it is estimated from has changed, soon.
-
-    Raises:
-        ConflictError, NotFoundError: As ``editing.positions.share_positions`` does, at once.
-    """
-    matches = None if match is None else [match]
-    found = require_sharable(store, dataset, matches)
-    return jobs.submit(
-        KIND,
-        f"Share the main cameras' positions of {found.name}",
-        _work(jobs, store, found.id, matches, actor),
-        dataset_id=found.id,
-        actor=actor,
-        keep=keep,
-    )
 
 
 def take_positions_back(
@@ -54,29 +24,40 @@ def take_positions_back(
 ) -> Job:
     """Take shared positions of a match back, and solve its dataset, soon.
 
+    A share of it, or of all matches, that waits or runs is cancelled and gives nothing afterwards;
+    it is the last one.
+
     Raises:
         ConflictError, NotFoundError: As ``editing.positions.take_back_positions`` does.
     """
-    number = dataset_id(store, dataset)
 
-    def change(session: Session, job: Job) -> Job:
-        apply_take_back(session, number, match, actor=actor)
-        return job
+    def apply(session: Session, number: int, present: list[Job]) -> list[Job]:
+        ended = [job for job in present if job.request["match"] in (None, match)]
+        stopped = [job.started for job in ended]
+        apply_take_back(session, number, match, actor=actor, stopped=stopped)
+        return ended
 
-    return solve_after(jobs, store, number, change, actor=actor, keep=keep)
+    return POSITIONS.take_back(jobs, store, dataset, apply, actor=actor, keep=keep)
 
 
-def _work(jobs: Jobs, store: Store, dataset: int, matches: list[str] | None, actor: str) -> Work:
-    def work(progress: JobProgress) -> Json:
-        told = counting(progress, "matches")
-        try:
-            with jobs.pool() if jobs.pool is not None else nullcontext() as executor:
-                found = share_positions(
-                    store, dataset, matches, actor=actor, executor=executor, progress=told
-                )
-        finally:
-            # What some matches were given before it ended is solved, however it ended.
-            request_solve(jobs, store, dataset, actor=actor)
-        return {"matches": len(found.items), "shared": sum(item.shared for item in found.items)}
+def _share(asked: MatchesAsked, progress: JobProgress) -> Json:
+    try:
+        with asked.jobs.pool() as executor:
+            found = share_positions(
+                asked.store,
+                asked.dataset_id,
+                asked.matches,
+                actor=asked.actor,
+                executor=executor,
+                progress=counting(progress, "matches"),
+                require_wanted=progress.require_wanted,
+            )
+    finally:
+        # What some matches were given before it ended is solved, however it ended.
+        request_solve(asked.jobs, asked.store, asked.dataset_id, actor=asked.actor)
+    return {"matches": len(found.items), "shared": sum(item.shared for item in found.items)}
 
-    return work
+
+POSITIONS = MatchJob(
+    "positions", "Share the main cameras' positions of {}", _share, require_sharable
+)

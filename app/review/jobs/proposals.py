@@ -4,53 +4,39 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from app.review.editing.proposals import propose_views, require_matches
-from app.review.jobs.job_run import JobProgress, Work, counting
+from app.review.datasets.dataset import dataset_id
+from app.review.editing.proposals import forget_proposals, propose_views
+from app.review.jobs.job_run import JobProgress, counting
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.match_job import MatchesAsked, MatchJob
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
-from app.store.jobs import Job
 from app.store.session import Store
 
-KIND = "proposals"
 
-
-def request_proposals(
-    jobs: Jobs,
-    store: Store,
-    dataset: str | int,
-    match: str | None,
-    *,
-    actor: str,
-    keep: Keep[Job] = keep_nothing,
-) -> Job:
-    """Look at the pictures of a match's views without lines, or of all, soon.
+def stop_and_forget(
+    jobs: Jobs, store: Store, dataset: str | int, *, keep: Keep[int] = keep_nothing
+) -> int:
+    """``forget_proposals``, and no search that was asked for before keeps anything after it.
 
     Raises:
-        NotFoundError: There is no such dataset or match, which is said at once.
+        NotFoundError: There is no such dataset.
     """
-    found = require_matches(store, dataset, None if match is None else [match])
-    request = {"match": match}
-    return jobs.submit(
-        KIND,
-        f"Propose cameras for views of {found.dataset} without lines",
-        _work(store, found.dataset_id, request),
-        dataset_id=found.dataset_id,
-        actor=actor,
-        request=request,
-        keep=keep,
+    number = dataset_id(store, dataset)
+    # Told before the transaction begins: what a search keeps in one before it is forgotten in it.
+    jobs.cancel_kind(number, PROPOSALS.kind)
+    return forget_proposals(store, number, keep=keep)
+
+
+def _propose(asked: MatchesAsked, progress: JobProgress) -> Json:
+    run = propose_views(
+        asked.store,
+        asked.dataset_id,
+        asked.matches,
+        progress=counting(progress, "views looked at"),
+        require_wanted=progress.require_wanted,
     )
+    return asdict(run)
 
 
-def resume_proposals(jobs: Jobs, store: Store) -> None:
-    """Let a search that an earlier server was at go on: what was looked at is left alone."""
-    jobs.resumes(KIND, lambda job: _work(store, job.dataset_id or 0, job.request))
-
-
-def _work(store: Store, dataset: int, request: Json) -> Work:
-    def work(progress: JobProgress) -> Json:
-        told = counting(progress, "views looked at")
-        matches = None if request["match"] is None else [request["match"]]
-        return asdict(propose_views(store, dataset, matches, progress=told))
-
-    return work
+PROPOSALS = MatchJob("proposals", "Propose cameras for views of {} that have none", _propose)

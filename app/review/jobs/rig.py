@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
-
 from app.errors import ConflictError
 from app.review.datasets.dataset import get_dataset
 from app.review.editing.rig import accept, adjustable, proposal_values, propose, take_back
@@ -50,8 +48,19 @@ def request_rig(
         rig_work(jobs, store, found.id, what, inputs, actor),
         dataset_id=found.id,
         actor=actor,
+        request={"what": what, "inputs": inputs},
         keep=keep,
     )
+
+
+def make_rigs(jobs: Jobs, store: Store) -> None:
+    """Let another process adjust the cameras than the one that was asked."""
+
+    def work_of(job: Job) -> Work:
+        what, inputs = job.request["what"], job.request["inputs"]
+        return rig_work(jobs, store, job.dataset_id or 0, what, inputs, job.actor)
+
+    jobs.makes(KIND, work_of)
 
 
 def take_rig_back(
@@ -75,7 +84,7 @@ def rig_work(
 
     def work(progress: JobProgress) -> Json:
         progress(0, None, "Adjusting cameras to lines and balls.")
-        with jobs.pool() if jobs.pool is not None else nullcontext() as executor:
+        with jobs.pool() as executor:
             proposed = propose(store, dataset_id, executor=executor)
         progress.check()
         if what is not None:

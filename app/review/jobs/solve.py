@@ -18,6 +18,7 @@ from app.review.editing.recompute import SolveReport, solve_dataset, stale_group
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs, Pool
 from app.review.policies.policy import PolicyState, apply_policy
+from app.review.yields.store import AT_ONCE, YieldStore
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.store.answers import Keep, Kept, keep_nothing
@@ -160,7 +161,7 @@ def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
             request_solve(jobs, store, dataset.id, actor=actor)
 
 
-def solve_work(store: Store, dataset_id: int, pool: Pool | None = None) -> Work:
+def solve_work(store: Store, dataset_id: int, pool: Pool = nullcontext) -> Work:
     """The work itself: what to do is found in the data when it starts."""
 
     def work(progress: JobProgress) -> Json:
@@ -170,12 +171,15 @@ def solve_work(store: Store, dataset_id: int, pool: Pool | None = None) -> Work:
             len(stale_groups(store, dataset_id)) >= WORTH_A_POOL
             or len(stale_matches(store, dataset_id)) >= MATCHES_WORTH_A_POOL
         )
-        with pool() if pool is not None and large else nullcontext() as executor:
+        with pool() if large else nullcontext() as executor:
             told = counting(progress, "groups solved")
             report = solve_dataset(store, dataset_id, executor, told)
             # It stays at the groups that are solved, and can be stopped all the same.
             total = report.total
             estimate_pitches(store, dataset_id, executor, lambda *_: told(total, total))
+        if report.solved > AT_ONCE:
+            progress(total, total, f"Counting what {found.name} yields.")
+            YieldStore(store).keep_up(dataset_id)
         return {"policy": found.policy.name, **_report(report)}
 
     return work

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from typing import TypeVar
 
 import structlog
@@ -20,6 +21,7 @@ from app.store.leftovers import delete_leftovers
 from app.store.orphans import expire_cache
 from app.store.session import Store
 from app.store.uploads import expire_uploads
+from app.store.webhooks import forget_deliveries, has_old_deliveries
 
 log = structlog.get_logger("touchline.upkeep")
 
@@ -29,6 +31,8 @@ FIRST_SECONDS, BETWEEN_SECONDS, BUSY_SECONDS = 60.0, 3600.0, 60.0
 """After the start, between two rounds, and until the next look while jobs are under way."""
 ROUNDS_BETWEEN_CHECKS = 24
 """SQLite looks at every page of the database once in so many rounds."""
+DELIVERIES_KEPT = timedelta(days=30)
+"""How long it is known what webhooks were told."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,7 @@ class Tidied:
     leftovers: int = 0
     exports: int = 0
     calibrations: int = 0
+    deliveries: int = 0
 
 
 def tidy(store: Store, wanted: Callable[[], bool] = lambda: True) -> Tidied:
@@ -63,6 +68,7 @@ def tidy(store: Store, wanted: Callable[[], bool] = lambda: True) -> Tidied:
         "leftovers": lambda: delete_leftovers(settings),
         "exports": lambda: ExportFolder(settings.exports).forget_unfinished(),
         "calibrations": lambda: delete_spare_calibrations(store, wanted),
+        "deliveries": lambda: forget_old_deliveries(store),
     }
     gone = {name: _attempt(name, step) or 0 for name, step in steps.items() if wanted()}
     _attempt("anchor", lambda: sync_anchor(settings.database_file))
@@ -88,6 +94,20 @@ def _shorten_answers(store: Store) -> int:
 def _forget_jobs(store: Store) -> int:
     with store.write() as session:
         return forget_jobs(session, store.settings.job_days)
+
+
+def forget_old_deliveries(store: Store, at: datetime | None = None) -> int:
+    """Forget what webhooks were told long before a time (None: now); returns how many messages.
+
+    Nothing is written where there is none.
+    """
+    before = (at or datetime.now(UTC)) - DELIVERIES_KEPT
+    text = before.isoformat(timespec="microseconds")
+    with store.read() as session:
+        if not has_old_deliveries(session, text):
+            return 0
+    with store.write() as session:
+        return forget_deliveries(session, text)
 
 
 class Upkeep:
@@ -118,7 +138,7 @@ class Upkeep:
         wait = FIRST_SECONDS
         while not self._closing.wait(wait):
             wait = BUSY_SECONDS
-            if self._jobs.are_idle():
+            if self._jobs.leads() and self._jobs.are_idle():
                 self.round()
                 wait = BETWEEN_SECONDS
 

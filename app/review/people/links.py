@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from typing import Any
 
 from app.errors import ConflictError, NotFoundError
 from app.review.people.names import checked_name, note
@@ -11,6 +12,7 @@ from app.review.people.passwords import hash_password
 from app.review.people.roles import Role
 from app.review.people.tokens import hash_of, new_token
 from app.store.clock import now
+from app.store.identities import identity_of
 from app.store.logins import delete_logins
 from app.store.people import (
     count_able,
@@ -93,17 +95,29 @@ def use(store: Store, token: str, password: str, name: str | None = None) -> str
     # Some tenths of a second: not while the database waits.
     hashed = hash_password(password, chosen)
     with store.write() as session:
-        person_id, meant = _meant(session, token)
-        if person_id is None:
-            person_id = _make_admin(session, chosen)
-            forget_links(session, None)
-        update_person(session, person_id, password=hashed)
-        delete_logins(session, person_id)
-        forget_links(session, person_id)
+        person_id = take(session, token, chosen, password=hashed)
         person = person_by_id(session, person_id)
         assert person is not None
         note(session, person.name, person.name, "password", person.role)
         return str(person.name)
+
+
+def take(session: Session, token: str, name: str | None, *, password: str | None) -> int:
+    """Whose a link is, which is good no more; their sessions end, and they have that password.
+
+    Raises:
+        NotFoundError: It is not good.
+        InputError: The name of the first admin cannot be one.
+        ConflictError: It is taken.
+    """
+    person_id, _ = _meant(session, token)
+    if person_id is None:
+        person_id = _make_admin(session, checked_name(name or ""))
+        forget_links(session, None)
+    update_person(session, person_id, password=password)
+    delete_logins(session, person_id)
+    forget_links(session, person_id)
+    return person_id
 
 
 def _meant(session: Session, token: str) -> tuple[int | None, Meant]:
@@ -118,7 +132,12 @@ def _meant(session: Session, token: str) -> tuple[int | None, Meant]:
     person = person_by_id(session, row.person_id)
     if person is None or person.disabled:
         raise NotFoundError(GONE, hint=ASK)
-    return row.person_id, Meant(person.name, person.password is not None)
+    return row.person_id, Meant(person.name, has_joined(session, person))
+
+
+def has_joined(session: Session, person: Any) -> bool:
+    """Whether somebody has a way in: a password, or an account at the provider of single sign-on."""
+    return person.password is not None or identity_of(session, person.id) is not None
 
 
 def _make_admin(session: Session, name: str) -> int:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from enum import StrEnum
 
 from app.errors import InputError, NotFoundError, NotLoggedInError
+from app.review.people.codes import take_code
 from app.review.people.names import note
 from app.review.people.passwords import LONGEST, hash_password, is_password
-from app.review.people.roles import Role
+from app.review.people.roles import Action, DatasetRoles, Role, Scope, Sight, may
 from app.review.people.tokens import hash_of, new_token
+from app.soccer.actors import with_token
 from app.store.logins import (
     delete_ended,
     delete_login,
@@ -21,8 +24,12 @@ from app.store.logins import (
     touch_login,
 )
 from app.store.people import forget_links, person_by_id, person_by_name, update_person
-from app.store.session import Store
+from app.store.rights import Rights, rights_in, rights_of
+from app.store.second_factors import has_second_factor
+from app.store.session import Session, Store
 
+LEADING = tuple(role for role in Role if may(role, Action.LEAD))
+"""Roles that lead a dataset."""
 IDLE = timedelta(hours=12)
 """A session that nobody has used for so long has ended."""
 LASTS = timedelta(days=14)
@@ -30,19 +37,71 @@ LASTS = timedelta(days=14)
 NOTED_AFTER = timedelta(minutes=5)
 """When a session was used is written down no more often."""
 WRONG = "that name and that password do not belong together"
+ASK_CODE = "the code of your second factor is missing"
+WRONG_CODE = "that is not the code of this moment, or it was used before"
+LOST = "A passkey or a recovery code does as well; without any, an admin can take the second factor away."
 MOST = 20
 """Sessions of one person; the one that was used longest ago makes room."""
 
 
+class Way(StrEnum):
+    """How somebody came in."""
+
+    PASSWORD = "password"
+    PASSKEY = "passkey"
+    SIGN_ON = "sign_on"
+    """By the provider of single sign-on."""
+
+
+@dataclass(frozen=True)
+class TokenUse:
+    """The token with which a script asks.
+
+    Attributes:
+        fresh: It was never used before.
+    """
+
+    name: str
+    scopes: tuple[Scope, ...]
+    fresh: bool = False
+
+
 @dataclass(frozen=True)
 class Login:
-    """Who is logged in, and by which session."""
+    """Who asks, by which session or token (``id`` is that one's), and with which rights."""
 
     id: int
     person_id: int
     name: str
-    role: Role
+    roles: DatasetRoles
     seen: datetime
+    token: TokenUse | None = None
+    must_enrol: bool = False
+    """They need a second factor, and have none: they may do nothing before they have."""
+    way: Way | None = None
+    """How the session began; None: there is none."""
+    created: datetime | None = None
+    """When it began."""
+
+    @property
+    def actor(self) -> str:
+        """What the log calls them: a person, or a person with the name of a token."""
+        return self.name if self.token is None else with_token(self.name, self.token.name)
+
+    @property
+    def role(self) -> Role:
+        """What they are in every dataset in which they are nothing else."""
+        return self.roles.everywhere
+
+    @property
+    def owner(self) -> str:
+        """Under which name it is theirs what belongs to no dataset: a token of one has its own."""
+        return self.actor if self.roles.limited else self.name
+
+    @property
+    def sight(self) -> Sight:
+        """What they see."""
+        return self.roles.sight(self.owner)
 
 
 @dataclass(frozen=True)
@@ -63,26 +122,37 @@ class Logins:
     Args:
         store: Where they are.
         clock: Says what time it is, in UTC.
+        only: Sessions that began in another way are none; None: all are.
     """
 
-    def __init__(self, store: Store, clock: Callable[[], datetime] = lambda: datetime.now(UTC)):
-        self._store, self._clock = store, clock
+    def __init__(
+        self,
+        store: Store,
+        clock: Callable[[], datetime] = lambda: datetime.now(UTC),
+        *,
+        only: Way | None = None,
+    ):
+        self._store, self._clock, self._only = store, clock, only
 
     def log_in(
         self,
         name: str,
         password: str,
         *,
+        code: str | None = None,
+        on_code: Callable[[], None] = lambda: None,
         browser: str = "",
         address: str = "",
         before: str | None = None,
     ) -> str:
         """Begin a session; returns its token. The one that the browser had ``before`` ends.
 
-        A name that nobody has takes as long as a wrong password, and gets the same answer.
+        A name that nobody has takes as long as a wrong password, and gets the same answer. A code is
+        looked at after the password alone; ``on_code`` is called before, to count it.
 
         Raises:
-            NotLoggedInError: Name and password do not belong together, or the account is disabled.
+            NotLoggedInError: Name and password do not belong together, or the account is disabled; or
+                a code is missing or wrong (``pointer`` is then ``/code``).
         """
         name = name.strip().lower()[:LONGEST]
         with self._store.read() as session:
@@ -91,11 +161,46 @@ class Logins:
         if not is_password(password, person.password if person and able else None):
             raise NotLoggedInError(WRONG, hint="An admin can send you a link for a new password.")
         assert person is not None
-        return self._begin(person.id, person.password, browser, address, before)
 
-    def _begin(
-        self, person_id: int, password: str, browser: str, address: str, before: str | None
+        def require_code(session: Session) -> None:
+            if has_second_factor(session, person.id):
+                if code is None:
+                    raise NotLoggedInError(ASK_CODE, hint=LOST, pointer="/code")
+                on_code()
+                if not take_code(session, self._store, person.id, code, self._clock()):
+                    raise NotLoggedInError(WRONG_CODE, hint=LOST, pointer="/code")
+
+        return self.begin(
+            person.id, person.password, browser, address, before, require_code, Way.PASSWORD
+        )
+
+    def begin(
+        self,
+        person_id: int,
+        password: str | None,
+        browser: str,
+        address: str,
+        before: str | None,
+        require: Callable[[Session], None] = lambda _session: None,
+        way: Way = Way.PASSWORD,
+        *,
+        vouched: bool = False,
     ) -> str:
+        """Begin a session of somebody who has shown who they are; returns its token.
+
+        Args:
+            person_id: Who it is.
+            password: The hash of their password as it was then; None: they had none.
+            browser: What their browser calls itself.
+            address: Where it is.
+            before: The token of the session that the browser had, which ends.
+            require: Raises in the transaction of the new session, unless they may.
+            way: How they have shown it.
+            vouched: The provider of single sign-on has asked for a second factor.
+
+        Raises:
+            NotLoggedInError: The password was changed meanwhile, or the account disabled.
+        """
         token, at = new_token(), self._clock()
         values = {
             "token_hash": hash_of(token),
@@ -105,28 +210,41 @@ class Logins:
             "expires": _text(at + LASTS),
             "browser": browser[:200],
             "address": address[:60],
+            "way": way,
+            "vouched": vouched,
         }
         with self._store.write() as session:
             person = person_by_id(session, person_id)
             # The password may have been changed, or the account disabled, since it was asked for.
             if person is None or person.disabled or person.password != password:
                 raise NotLoggedInError(WRONG)
+            require(session)
             delete_ended(session, at=_text(at), idle_since=_text(at - IDLE))
-            if before and (old := find_login(session, hash_of(before), **self._alive(at))):
+            if before and (
+                old := find_login(session, hash_of(before), leading=LEADING, **self._alive(at))
+            ):
                 delete_login(session, old.id, old.person_id)
             for spare in logins_of(session, person_id, **self._alive(at))[MOST - 1 :]:
                 delete_login(session, spare.id, person_id)
             insert_login(session, values)
+            said = {"address": address[:60], "way": way.value}
+            note(session, person.name, person.name, "logged in", person.role, **said)
         return token
 
     def find(self, token: str) -> Login | None:
         """Who a token stands for; None where its session has ended."""
-        with self._store.read() as session:
-            row = find_login(session, hash_of(token), **self._alive(self._clock()))
-        if row is None:
+        alive = self._alive(self._clock())
+        with self._store.glance() as session:
+            row = find_login(session, hash_of(token), leading=LEADING, **alive)
+        if row is None or self._only not in (None, row.way):
             return None
-        seen = datetime.fromisoformat(row.seen)
-        return Login(row.id, row.person_id, row.name, Role(row.role), seen)
+        roles = roles_with(Role(row.role), rights_in(row))
+        seen, created = datetime.fromisoformat(row.seen), datetime.fromisoformat(row.created)
+        enrol = row.must_enrol and not row.vouched
+        way = Way(row.way)
+        return Login(
+            row.id, row.person_id, row.name, roles, seen, None, enrol, way=way, created=created
+        )
 
     def is_stale(self, login: Login) -> bool:
         """Whether it should be written down that a session is used."""
@@ -134,7 +252,7 @@ class Logins:
 
     def touch(self, login: Login) -> None:
         """Write down that a session is used."""
-        with self._store.write() as session:
+        with self._store.write(lasting=False) as session:
             touch_login(session, login.id, _text(self._clock()))
 
     def sessions(self, login: Login) -> list[OpenSession]:
@@ -155,11 +273,14 @@ class Logins:
         with self._store.write() as session:
             if not delete_login(session, session_id, login.person_id):
                 raise NotFoundError(f"you have no session {session_id}")
+            did = "logged out" if session_id == login.id else "session ended"
+            note(session, login.actor, login.name, did, login.role)
 
     def end_others(self, login: Login) -> None:
         """End every session of a person but the one that asks."""
         with self._store.write() as session:
             delete_logins(session, login.person_id, but=login.id)
+            note(session, login.actor, login.name, "other sessions ended", login.role)
 
     def change_password(self, login: Login, old: str, new: str) -> str:
         """Give oneself another password; every session ends, and a new one begins.
@@ -184,10 +305,31 @@ class Logins:
             delete_logins(session, login.person_id)
             forget_links(session, login.person_id)
             note(session, login.name, login.name, "password", login.role)
-        return self._begin(login.person_id, hashed, mine.browser, mine.address, None)
+        way, vouched = Way(mine.way), mine.vouched
+        return self.begin(
+            login.person_id, hashed, mine.browser, mine.address, None, way=way, vouched=vouched
+        )
 
     def _alive(self, at: datetime) -> dict[str, str]:
         return {"at": _text(at), "idle_since": _text(at - IDLE)}
+
+
+def read_roles(session: Session, person_id: int, everywhere: Role) -> DatasetRoles:
+    """The rights of a person, who is that everywhere."""
+    if everywhere is Role.ADMIN:
+        return DatasetRoles(everywhere)
+    return roles_with(everywhere, rights_of(session, person_id, LEADING))
+
+
+def roles_with(everywhere: Role, rights: Rights) -> DatasetRoles:
+    """The rights of somebody who is that everywhere; in copies they are what they are in what those
+    are of."""
+    if everywhere is Role.ADMIN:
+        return DatasetRoles(everywhere)
+    single = {key: Role(role) for key, role in rights.roles.items()}
+    roles = DatasetRoles(everywhere, single)
+    copies = {key: roles.role_in(of_id) for key, of_id in rights.copies.items()}
+    return DatasetRoles(everywhere, {**single, **copies})
 
 
 def _text(at: datetime) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from app.errors import InputError
-from app.soccer.actors import LOCAL_USER
+from app.errors import ForbiddenError, InputError
+from app.soccer.actors import LOCAL_USER, person_of
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session
@@ -32,7 +32,20 @@ def checked_name(said: str) -> str:
     return name
 
 
-def note(session: Session, actor: str, name: str, did: str, role: str) -> None:
+def require_no_token(actor: str) -> None:
+    """Raise ForbiddenError where a token asks: who may come in, and as what, is decided by people."""
+    if person_of(actor) != actor:
+        raise ForbiddenError(
+            "no token makes people or changes their rights",
+            hint="An admin does it in the browser, or touchline users on the machine.",
+        )
+
+
+def note(
+    session: Session, actor: str, name: str, did: str, role: str, **more: str | int | None
+) -> None:
     """Write what became of an account into the log."""
-    body = {"person": name, "did": did, "role": str(role)}
-    append(session, [Entry(PERSON, actor, now(), body)])
+    body = {"person": name, "did": did, "role": str(role), **more}
+    dataset = more.get("dataset_id")
+    where = dataset if isinstance(dataset, int) else None
+    append(session, [Entry(PERSON, actor, now(), body, where)])

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any
 
 from app.errors import ConflictError, ForbiddenError, NotFoundError
 from app.review.people.links import Link, insert_new
-from app.review.people.names import checked_name, note
+from app.review.people.members import SingleRole, single_roles
+from app.review.people.names import checked_name, note, require_no_token
 from app.review.people.roles import Role
+from app.soccer.actors import person_of
+from app.store.access_tokens import count_access_tokens, delete_access_tokens
 from app.store.clock import now
+from app.store.identities import people_with_identity
 from app.store.logins import delete_logins
 from app.store.people import (
     all_people,
@@ -23,6 +28,7 @@ from app.store.people import (
     person_by_name,
     update_person,
 )
+from app.store.second_factors import people_with_second_factor
 from app.store.session import Session, Store
 
 
@@ -31,7 +37,7 @@ class Person:
     """Somebody with an account.
 
     Attributes:
-        joined: They have chosen a password.
+        joined: They have chosen a password, or come by single sign-on.
         invited: A link waits for them with which they can.
         seen: When a session of theirs was used last, in UTC; None: none is open.
     """
@@ -45,13 +51,24 @@ class Person:
     created: str
     created_by: str
     seen: str | None
+    second_factor: bool
+    """A code is asked for after their password."""
+    tokens: int
+    """How many tokens of scripts they have."""
+    sign_on: str | None = None
+    """Their account at the provider of single sign-on, as people know it; None: they have none."""
+    datasets: tuple[SingleRole, ...] = ()
+    """In which datasets they are something else than ``role``."""
 
 
 def list_people(store: Store) -> list[Person]:
     """Everybody, by name."""
     with store.read() as session:
-        waiting = people_with_links(session, now())
-        return [_person(row, waiting) for row in all_people(session)]
+        waiting, single = people_with_links(session, now()), single_roles(session)
+        tokens, factors = count_access_tokens(session), people_with_second_factor(session)
+        ways = people_with_identity(session)
+        people = [_person(row, waiting, tokens, factors, ways) for row in all_people(session)]
+    return [replace(one, datasets=tuple(single.get(one.id, ()))) for one in people]
 
 
 def has_people(store: Store) -> bool:
@@ -64,9 +81,11 @@ def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, 
     """Make an account, and the link with which its person chooses a password.
 
     Raises:
+        ForbiddenError: A token asks.
         InputError: The name cannot be one.
         ConflictError: It is taken.
     """
+    require_no_token(actor)
     name = checked_name(name)
     with store.write() as session:
         if person_by_name(session, name) is not None:
@@ -84,10 +103,19 @@ def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Lin
 
     Raises:
         NotFoundError: There is nobody of that id.
+        ForbiddenError: It is oneself, or a token asks.
         ConflictError: They are disabled.
     """
     with store.write() as session:
         person = _read(session, person_id)
+        if person_of(actor) != actor:
+            raise ForbiddenError(
+                "no token sets a password", hint="An admin makes the link in the browser."
+            )
+        if person.name == actor:
+            raise ForbiddenError(
+                "nobody makes a link for themselves", hint="Change the password under Account."
+            )
         if person.disabled:
             raise ConflictError(f"{person.name} is disabled", hint="Enable them first.")
         note(session, actor, person.name, "link", person.role)
@@ -105,11 +133,14 @@ def change_person(
 ) -> Person:
     """Give somebody another role, disable or enable them; whoever is disabled is logged out.
 
+    Their tokens end with that, too, and for good.
+
     Raises:
         NotFoundError: There is nobody of that id.
-        ForbiddenError: It is oneself.
+        ForbiddenError: It is oneself, or a token asks.
         ConflictError: No admin would be left who can log in.
     """
+    require_no_token(actor)
     with store.write() as session:
         person = _read(session, person_id)
         if person.name == actor:
@@ -130,7 +161,14 @@ def change_person(
         update_person(session, person_id, role=wanted, disabled=off)
         if off:
             delete_logins(session, person_id)
+            delete_access_tokens(session, person_id)
             forget_links(session, person_id)
+        return _read(session, person_id)
+
+
+def get_person(store: Store, person_id: int) -> Person:
+    """Somebody by their id; raises NotFoundError when there is nobody."""
+    with store.read() as session:
         return _read(session, person_id)
 
 
@@ -146,18 +184,29 @@ def _read(session: Session, person_id: int) -> Person:
     row = person_by_id(session, person_id)
     if row is None:
         raise NotFoundError(f"there is nobody with id {person_id}")
-    return _person(row, people_with_links(session, now()))
+    waiting, tokens = people_with_links(session, now()), count_access_tokens(session)
+    factors, ways = people_with_second_factor(session), people_with_identity(session)
+    return _person(row, waiting, tokens, factors, ways)
 
 
-def _person(row: Any, waiting: set[int]) -> Person:
+def _person(
+    row: Any,
+    waiting: set[int],
+    tokens: Mapping[int, int],
+    factors: set[int],
+    ways: Mapping[int, str],
+) -> Person:
     return Person(
         row.id,
         row.name,
         Role(row.role),
         row.disabled,
-        row.password is not None,
+        row.password is not None or row.id in ways,
         row.id in waiting,
         row.created,
         row.created_by,
         getattr(row, "seen", None),
+        row.id in factors,
+        tokens.get(row.id, 0),
+        ways.get(row.id),
     )

@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from app.errors import DegenerateGeometryError, InputError
+from app.review.datasets.dataset import need_dataset
+from app.review.editing.ball_noise import give_factors, read_placed
 from app.review.editing.state import GroupState, read_states
-from app.review.policies.policy import PolicyState, change_policy, read_policy
+from app.review.policies.policy import PolicyState, apply_policy, read_policy
 from app.review.policies.text import CUSTOM, policy_with
-from app.soccer.policy import POLICIES, THRESHOLDS, Policy
+from app.soccer.policy import CALIBRATION, POLICIES, THRESHOLDS, Policy
 from app.solving.ball_noise import BallNoise, Miss, Sigma, estimate_ball_noise, misses_of
-from app.solving.resect import REFERENCE_DIAGONAL, view_line_noise
+from app.solving.line_noise import LineEstimate, LineEvidence, estimate_line_noise
+from app.solving.resect import REFERENCE_DIAGONAL, view_line_evidence, view_line_noise
+from app.solving.source_noise import Source, SourceFactors, SourceNoise, estimate_sources
 from app.solving.triangulate import sights_of
-from app.store.session import Store
+from app.store.noise import Factor, Factors, factor_of, read_factors
+from app.store.session import Session, Store
 from app.store.solutions import present_solutions
 
 MAX_GROUPS = 600
 """Groups that an estimate looks at, spread over the dataset: more say hardly more."""
 CHUNK = 100
 DECIMALS = 2
+WANDER = 0.1
+"""Of a factor: a smaller change is none."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +51,16 @@ class LineNoiseSummary:
 
 @dataclass(frozen=True)
 class Advice:
-    """A threshold of the policy, what it is, and what the dataset says of it."""
+    """A threshold of the policy, what it is, and what the dataset says of it.
+
+    Attributes:
+        present: None where the policy leaves it to each image.
+    """
 
     name: str
     label: str
     unit: str
-    present: float
+    present: float | None
     estimate: float
     low: float
     high: float
@@ -57,7 +68,7 @@ class Advice:
     @property
     def agrees(self) -> bool:
         """Whether the interval holds the present value."""
-        return self.low <= self.present <= self.high
+        return self.present is not None and self.low <= self.present <= self.high
 
     @property
     def short_unit(self) -> str:
@@ -71,6 +82,10 @@ class Noise:
 
     Attributes:
         groups: Groups that were looked at, of ``solved`` ones.
+        stations: Noise of the balls of static cameras of which enough is seen.
+        people: The same of who placed balls last.
+        factors: How noisy balls of both together are, where anything is unlike the dataset.
+        used: The factors that the views of the dataset carry.
         advice: Thresholds of the policy that the dataset says something about.
         notices: Sentences for people: what disagrees, and why nothing is known.
     """
@@ -80,7 +95,12 @@ class Noise:
     groups: int
     solved: int
     ball: BallNoise
+    stations: tuple[SourceNoise, ...]
+    people: tuple[SourceNoise, ...]
+    factors: Factors
+    used: Factors
     lines: LineNoiseSummary | None
+    line_estimate: LineEstimate | None
     advice: tuple[Advice, ...]
     notices: tuple[str, ...]
 
@@ -91,6 +111,11 @@ class Noise:
             return {}
         return {item.name: item.estimate for item in self.advice}
 
+    @property
+    def is_new(self) -> bool:
+        """Whether cameras or people are unlike the dataset in another way than its views carry."""
+        return _are_apart(self.factors, self.used)
+
 
 def read_noise(store: Store, dataset: str | int) -> Noise:
     """The noise that the present solutions of a dataset show; changes nothing.
@@ -100,38 +125,76 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
     """
     state = read_policy(store, dataset)
     misses: list[Miss] = []
-    lines: dict[str, tuple[float, float]] = {}
+    seen: list[tuple[Miss, Mapping[str, Sequence[Source]]]] = []
+    lines: dict[str, _ViewLines] = {}
     ids = _solved(store, state.dataset_id)
     chosen = ids[:: max(-(-len(ids) // MAX_GROUPS), 1)]
-    for group in _groups(store, chosen):
-        misses += _misses(group)
+    for group, placed in _groups(store, chosen):
+        told = _misses(group)
+        misses += told
+        sources = _sources_of(group, placed)
+        seen += [(miss, sources) for miss in told]
         lines.update(_lines(group))
     ball = estimate_ball_noise(misses, state.policy)
-    advice = tuple(_advice(ball, state.policy))
+    found = _sources(seen, ball, state.policy)
+    with store.read() as session:
+        used = read_factors(session, state.dataset_id)
+    evidences = [item.evidence for item in lines.values() if item.evidence is not None]
+    estimate = estimate_line_noise(evidences)
+    advice = (*_advice(ball, state.policy), *_line_advice(estimate, state.policy))
     return Noise(
         dataset_id=state.dataset_id,
         dataset=state.dataset,
         groups=len(chosen),
         solved=len(ids),
         ball=ball,
-        lines=_summary(list(lines.values())),
+        stations=found.of("camera"),
+        people=found.of("person"),
+        factors=_factors(found),
+        used=used,
+        lines=_summary([(item.sigma_px, item.share) for item in lines.values()]),
+        line_estimate=estimate,
         advice=advice,
         notices=tuple(_notices(advice)),
     )
 
 
 def apply_noise(store: Store, noise: Noise, *, actor: str) -> PolicyState:
-    """Judge the dataset by its policy with the noise that was estimated.
+    """Judge the dataset with the noise that was estimated, of it and of its cameras and people.
 
     Raises:
         InputError: The dataset says nothing about its noise, or nothing new.
     """
-    if not noise.values:
-        raise InputError(f'the noise in the policy of "{noise.dataset}" need not change')
+    if not noise.values and not noise.is_new:
+        raise InputError(f'the noise that "{noise.dataset}" is judged with need not change')
     state = read_policy(store, noise.dataset_id)
-    name = CUSTOM if state.policy.name in POLICIES else state.policy.name
-    policy = policy_with(state.policy, noise.values, name=name)
-    return change_policy(store, noise.dataset_id, policy, if_match=state.etag, actor=actor)
+    with store.write() as session:
+        accept_noise(session, noise, state, actor)
+    return read_policy(store, noise.dataset_id)
+
+
+def accept_noise(session: Session, noise: Noise, state: PolicyState, actor: str) -> None:
+    """``apply_noise`` within a write session; where nothing is new nothing changes.
+
+    Raises:
+        StaleRevisionError: The policy is another by now.
+    """
+    if noise.values:
+        name = CUSTOM if state.policy.name in POLICIES else state.policy.name
+        policy = policy_with(state.policy, noise.values, name=name)
+        apply_policy(session, noise.dataset_id, policy, if_match=state.etag, actor=actor)
+    if noise.is_new:
+        give_factors(session, noise.dataset_id, noise.factors, actor)
+
+
+def take_noise_back(store: Store, dataset: str | int, *, actor: str) -> int:
+    """Take all balls to be as noisy as their dataset's; how many groups that changed.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.write() as session:
+        return give_factors(session, need_dataset(session, dataset), (), actor)
 
 
 def _solved(store: Store, dataset_id: int) -> list[int]:
@@ -140,11 +203,55 @@ def _solved(store: Store, dataset_id: int) -> list[int]:
         return [row[0] for row in present_solutions(session, dataset_id) if row[2] is not None]
 
 
-def _groups(store: Store, chosen: Sequence[int]) -> Iterator[GroupState]:
+def _groups(store: Store, chosen: Sequence[int]) -> Iterator[tuple[GroupState, Mapping[str, str]]]:
+    """Groups, and who placed the ball of each view last, as far as somebody did."""
     for start in range(0, len(chosen), CHUNK):
+        batch = chosen[start : start + CHUNK]
         with store.read() as session:
-            states = read_states(session, chosen[start : start + CHUNK])
-        yield from states
+            states = read_states(session, batch)
+            placed = read_placed(session, batch)
+        yield from ((state, placed.get(state.id, {})) for state in states)
+
+
+def _sources_of(state: GroupState, placed: Mapping[str, str]) -> dict[str, list[Source]]:
+    """The static camera of each view, and who placed its ball, by the view's key."""
+    found: dict[str, list[Source]] = {}
+    for view in state.group.views:
+        camera = [Source("camera", view.station.key)] if view.station.shared else []
+        person = [Source("person", placed[view.key])] if view.key in placed else []
+        found[view.key] = camera + person
+    return found
+
+
+def _sources(
+    seen: Sequence[tuple[Miss, Mapping[str, Sequence[Source]]]], ball: BallNoise, policy: Policy
+) -> SourceFactors:
+    """Noise of the sources of some views, beside what is known of the dataset."""
+    click = policy.click_sigma_px if ball.click is None else ball.click.value
+    share = policy.box_sigma_share if ball.share is None else ball.share
+    given = policy.given_sigma_px if ball.given is None else ball.given.value
+    return estimate_sources(seen, click, share, given)
+
+
+def _factors(found: SourceFactors) -> Factors:
+    """Of each camera that is told with each person that is; none where all may be alike."""
+    cameras, people = (
+        ["", *(source.name for source in found.sources if source.kind == kind)]
+        for kind in ("camera", "person")
+    )
+    factors = []
+    for camera in cameras:
+        for person in people:
+            sources = (Source("camera", camera), Source("person", person))
+            factors.append(Factor(camera or None, person or None, found.factor(sources)))
+    return tuple(factors) if any(item.ratio != 1 for item in factors) else ()
+
+
+def _are_apart(wanted: Factors, used: Factors) -> bool:
+    """Whether factors differ by more than their estimate wanders with every new ball."""
+    places = {item[:2] for item in (*wanted, *used)}
+    ratios = [(factor_of(wanted, *at), factor_of(used, *at)) for at in places]
+    return any(abs(new / old - 1) > WANDER for new, old in ratios)
 
 
 def _misses(state: GroupState) -> tuple[Miss, ...]:
@@ -155,8 +262,17 @@ def _misses(state: GroupState) -> tuple[Miss, ...]:
     return misses_of(solution.ball, sights_of(state.group.views, calibrations))
 
 
-def _lines(state: GroupState) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Sigma (pixels at 960 x 540) and shared part of each calibration by its key."""
+@dataclass(frozen=True)
+class _ViewLines:
+    """Noise of the lines of a view, pixels at 960 x 540; its evidence where they made its camera."""
+
+    sigma_px: float
+    share: float
+    evidence: LineEvidence | None
+
+
+def _lines(state: GroupState) -> Iterator[tuple[str, _ViewLines]]:
+    """Noise of the lines of each calibration by its key."""
     if state.solution is None:
         return
     for view, solved in zip(state.group.views, state.solution.views, strict=True):
@@ -164,15 +280,17 @@ def _lines(state: GroupState) -> Iterator[tuple[str, tuple[float, float]]]:
         if calibration.source != "given" and calibration.covariance is not None:
             left_out = {suspect.marking for suspect in calibration.suspects}
             lines = {k: at for k, at in view.station.lines.items() if k not in left_out}
+            asked = calibration, lines, state.group.pitch, size, state.policy.calibration
+            picture = calibration.source != "lines" or view.station.picture is not None
             try:
-                noise = view_line_noise(
-                    calibration, lines, state.group.pitch, size, state.policy.calibration
-                )
+                noise = view_line_noise(*asked)
+                evidence = None if picture else view_line_evidence(*asked)
             except (DegenerateGeometryError, np.linalg.LinAlgError):
                 # Lines that leave the camera open say nothing of their noise.
                 continue
             unit = size.diagonal / REFERENCE_DIAGONAL
-            yield solved.calibration_key, (float(np.sqrt(noise.variance)) / unit, noise.share)
+            sigma = float(np.sqrt(noise.variance)) / unit
+            yield solved.calibration_key, _ViewLines(sigma, noise.share, evidence)
 
 
 def _summary(found: Sequence[tuple[float, float]]) -> LineNoiseSummary | None:
@@ -192,6 +310,13 @@ def _advice(ball: BallNoise, policy: Policy) -> Iterator[Advice]:
         yield _advised("given_sigma_px", _ends(ball.given), policy)
 
 
+def _line_advice(found: LineEstimate | None, policy: Policy) -> Iterator[Advice]:
+    if found is not None:
+        for name, item in (("line_sigma_px", found.sigma), ("line_share", found.share)):
+            ends = item.value, item.low, item.high
+            yield _advised(f"{CALIBRATION}.{name}", ends, policy)
+
+
 def _ends(sigma: Sigma) -> tuple[float, float, float]:
     return sigma.value, sigma.low, sigma.high
 
@@ -202,7 +327,7 @@ def _advised(name: str, found: tuple[float, float, float], policy: Policy) -> Ad
     least, most = threshold.minimum or 0.0, threshold.maximum or np.inf
     estimate = round(float(np.clip(found[0], least, most)), DECIMALS)
     low, high = round(found[1], DECIMALS), round(found[2], DECIMALS)
-    present = float(threshold.value(policy))
+    present = threshold.value(policy)
     return Advice(name, threshold.label, threshold.unit, present, estimate, low, high)
 
 
@@ -212,8 +337,15 @@ def _notices(advice: Sequence[Advice]) -> Iterator[str]:
             "Too few views that agree about a ball to tell how noisy its clicks are: the policy's "
             "sigma is used as it is."
         )
+    loose = [item for item in advice if item.present is None]
+    if loose:
+        known = " and ".join(f"{item.estimate:g}{item.short_unit}" for item in loose)
+        yield (
+            "The noise of lines is weighed image by image. All images together know it better: "
+            f"sigma and shared part are {known}."
+        )
     for item in advice:
-        if not item.agrees:
+        if item.present is not None and not item.agrees:
             word = "small" if item.present < item.low else "large"
             yield (
                 f"{item.label}: the policy says {item.present:g}{item.short_unit}, this dataset "

@@ -22,11 +22,14 @@ from app.review.practice.words import WORDS
 from app.sample.practice import LESSONS, write_practice
 from app.sample.scene import SceneTruth
 from app.sample.truth import TRUTH, read_truth
+from app.soccer.policy import PAPER
 from app.store.codecs import Json
 from app.store.datasets import find_dataset
 from app.store.imports import known_groups
 from app.store.jobs import Job
+from app.store.locks import practice_lock
 from app.store.session import Store
+from app.store.sight import EVERYTHING, Sight
 
 KIND = "practice"
 DATASET = "practice"
@@ -109,6 +112,8 @@ def make_practice_dataset(
 ) -> dict[str, Json]:
     """Draw, import and solve the lessons; done once, nothing more unless ``again``.
 
+    Who comes while others make them waits until they are made.
+
     Returns:
         ``dataset``, ``groups``, ``first`` (id of the first group) and ``made`` (False where
         everything was there already).
@@ -116,27 +121,38 @@ def make_practice_dataset(
     Raises:
         ConflictError: There is a dataset of that name with other groups.
     """
-    _require_own(store, settings)
-    ids = _group_ids(store)
-    if len(ids) == len(LESSONS) and not again and _is_drawn(settings):
-        return {"dataset": DATASET, "groups": len(ids), "first": ids[0], "made": False}
+    with practice_lock(settings, lambda: progress(0, 1, "Somebody else makes them.")):
+        _require_own(store, settings)
+        ids = _group_ids(store)
+        if len(ids) == len(LESSONS) and not again and _is_drawn(settings):
+            return {"dataset": DATASET, "groups": len(ids), "first": ids[0], "made": False}
+        ids = _made(store, settings, progress, again=again and bool(ids), actor=actor)
+    return {"dataset": DATASET, "groups": len(ids), "first": ids[0], "made": True}
+
+
+def _made(
+    store: Store, settings: Settings, progress: Progress, *, again: bool, actor: str
+) -> list[int]:
+    """Ids of the lessons, once they are drawn, imported and solved."""
     folder = settings.home / DATASET
     if not _is_drawn(settings):
         write_practice(folder, telling(progress, "Drawing the pictures."))
-    if again and ids:
-        delete_dataset(store, DATASET, confirm=DATASET, actor=actor)
+    if again:
+        delete_dataset(store, DATASET, confirm=DATASET, actor=actor, afresh=PAPER)
     progress(0, 1, "Reading the groups.")
     source = Source("soccernet-v3", folder.resolve(), name="the practice groups")
     import_source(store, DATASET, source, settings, None, actor=actor)
     solve_dataset(store, DATASET, None, telling(progress, "Solving the groups."))
-    ids = _group_ids(store)
-    return {"dataset": DATASET, "groups": len(ids), "first": ids[0], "made": True}
+    return _group_ids(store)
 
 
-def read_practice(store: Store, settings: Settings) -> Practice:
-    """Every lesson with what has come of it; none where the dataset is not made yet."""
+def read_practice(store: Store, settings: Settings, sight: Sight = EVERYTHING) -> Practice:
+    """Every lesson with what has come of it; none where the dataset is not made yet, or not seen."""
     truths = _truths(settings)
     with store.read() as session:
+        row = find_dataset(session, DATASET)
+        if row is not None and not sight.sees(row.id):
+            return Practice(DATASET, ())
         states = read_states(session, _group_ids(store))
     lessons = [
         _lesson(state, truths) for state in states if truths is not None and state.key in truths

@@ -17,6 +17,8 @@ MANY = 200
 """So many groups of one dataset at once are told as one change of the dataset."""
 FAR = 5000
 """Who was away for more entries than this is told to read everything anew."""
+COMMENT = "comment"
+"""Kind of a change of what people say to each other about a group; the group is what it was."""
 EVERYTHING = "everything"
 """Kind of a change of a dataset in which nothing can be taken to be as it was."""
 SOLVED = "solved"
@@ -107,6 +109,9 @@ def _told(session: Session, found: Iterable[StoredChange]) -> list[Change]:
         replace(item, group_id=None) if sizes[item.dataset_id] > MANY else item for item in items
     )
     names = dataset_names(session)
+    # Of a dataset that is gone there is one thing to tell.
+    ends = {item.dataset_id: item for item in items if item.dataset_id not in names}
+    items = [item for item in items if ends.get(item.dataset_id, item) is item]
     etags = read_etags(session, [item.group_id for item in items if item.group_id is not None])
     return [
         Change(
@@ -125,8 +130,13 @@ def _told(session: Session, found: Iterable[StoredChange]) -> list[Change]:
 
 
 def _merged(found: Iterable[StoredChange]) -> list[StoredChange]:
-    """The last change of each group, and the last one of each kind of each dataset, in order."""
-    last = {
-        (item.dataset_id, item.group_id, "" if item.group_id else item.kind): item for item in found
-    }
+    """The last change of each group, and the last one of each kind of each dataset, in order.
+
+    A comment stands beside the change of its group, which it does not hide.
+    """
+    last = {(item.dataset_id, item.group_id, _beside(item)): item for item in found}
     return sorted(last.values(), key=lambda item: item.id or 0)
+
+
+def _beside(item: StoredChange) -> str:
+    return item.kind if item.group_id is None or item.kind == COMMENT else ""

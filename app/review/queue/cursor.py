@@ -41,12 +41,14 @@ def decode(query: Query, cursor: str) -> list[Key]:
 
 
 def _name(query: Query) -> str:
+    if query.batch is not None:
+        return f"batch {query.batch}"
     return query.sort + ("-desc" if query.descending else "")
 
 
 def _is_key(value: Any) -> bool:
     """Whether the database can compare with a value: no NaN, no Infinity, no endless integer."""
-    if isinstance(value, str):
+    if value is None or isinstance(value, str):
         return True
     if not isinstance(value, (int, float)):
         return False

@@ -88,7 +88,7 @@ _ASKED = (
     _flag("fixed", "edited before it was accepted"),
     QueryField("pictures", "choice", "whether its views have a picture", values=("none", "any", "all")),
     QueryField(
-        "proposal", "choice", "what was proposed from the paint for a view without lines",
+        "proposal", "choice", "what was proposed from a view's paint, as long as its lines stay",
         values=(*WHETHER, *PROPOSAL_OUTCOMES),
     ),
     _text("split", "train, test and so on, all of it"),
@@ -98,7 +98,23 @@ _ASKED = (
     _text("label", "part of the label or of the key, as a bare word", ()),
     _text("key", "key of the group, all of it"),
     _text("override", "gate that an acceptance overrides"),
+    QueryField(
+        "comments", "choice", "what people say to each other about it",
+        values=(*WHETHER, "open", "resolved"),
+    ),
+    _text("mentions", "whom an open comment mentions, by name"),
+    QueryField(
+        "annotations", "choice",
+        "what people's own annotations of it came to; waiting: they differ, and somebody has to "
+        "decide (reviewers)",
+        values=(*WHETHER, "agreed", "waiting", "decided"),
+    ),
+    QueryField(
+        "takes", "number", "how many people handed in an annotation of their own (reviewers)",
+        values=("none",),
+    ),
     QueryField("id", "ids", "groups one by one: id:12,15,19"),
+    QueryField("batch", "ids", "work that was given out: batch:3, in its order where no other is asked for"),
     _number("jac", "min_jac", "smallest JaC of the views at the policy's tolerance, 0 to 1", "", "jac05"),
     _number(
         "agreement", "agreement",
@@ -159,5 +175,7 @@ FIELDS = (
         values=tuple(text for order in ORDERS for text in (order.name, f"{order.name}-desc")),
     ),
 )  # fmt: skip
+BLIND = ("annotations", "takes")
+"""Fields that tell what others made of a group: for those alone who judge."""
 BY_NAME = {name: field for field in FIELDS for name in (field.name, *field.also)}
 """Fields by every name that is understood."""

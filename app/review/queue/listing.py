@@ -6,15 +6,18 @@ position (any place at once, true at the moment of reading).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from app.errors import InputError, NotFoundError
 from app.review.queue import cursor as cursors
 from app.review.queue.query import parse_query
+from app.store.agreement import states_of
 from app.store.listing import Listing, find_place, read_rows
 from app.store.session import Store
+from app.store.takes import count_handed_in
+from app.store.threads import count_open
 
 MAX_PAGE = 500
 MAX_IDS = 100_000
@@ -30,6 +33,10 @@ class GroupRow:
         main_view: Id of the main view, None when it has no frame to show.
         override: The gate that was overridden when the group was accepted, or None.
         findings: Kinds.
+        comments: Threads that are open.
+        takes: How many people handed in an annotation of their own.
+        came_to: What these came to: ``agreed``, ``open`` (somebody has to decide), ``decided``; None:
+            they were not compared.
     """
 
     id: int
@@ -68,6 +75,9 @@ class GroupRow:
     y_m: float | None
     agreement: float | None
     findings: tuple[str, ...]
+    comments: int = 0
+    takes: int = 0
+    came_to: str | None = None
 
 
 @dataclass(frozen=True)
@@ -139,9 +149,18 @@ def list_groups(
         else:
             rows = listing.rows_after(order, keys, limit + 1)
             more = len(rows) > limit
+        ids = [row.group_id for row in rows[:limit]]
+        said, takes = count_open(session, ids), count_handed_in(session, ids)
+        states = states_of(session, list(takes)) if takes else {}
     rows = rows[:limit]
     following = cursors.encode(parsed, order.keys_of(rows[-1])) if more else None
-    return Page([_row(row) for row in rows], following, total)
+    found = [
+        replace(_row(row, said), takes=takes.get(row.group_id, 0), came_to=states.get(row.group_id))
+        if takes
+        else _row(row, said)
+        for row in rows
+    ]
+    return Page(found, following, total)
 
 
 def list_ids(
@@ -176,24 +195,19 @@ def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
             raise NotFoundError(f"there is no group {group_id}")
         dataset_id, keys = place
         listing = Listing(session, dataset_id, parsed.conditions)
-        # One pass over all that match is faster than counting what comes before each time.
-        ids = listing.ids(order)
-        if group_id in ids:
-            return _around(ids, ids.index(group_id))
-        before, after = listing.ids_around(order, keys, _NEIGHBOURS)
-    return Neighbours(None, len(ids), tuple(before), tuple(after))
+        index, total = listing.place(order, keys, group_id)
+        before, after = listing.ids_around(order, keys, _NEIGHBOURS, total)
+    return Neighbours(index, total, tuple(before), tuple(after))
 
 
-def _around(ids: Sequence[int], index: int) -> Neighbours:
-    before = ids[max(index - _NEIGHBOURS, 0) : index]
-    after = ids[index + 1 : index + 1 + _NEIGHBOURS]
-    return Neighbours(index, len(ids), tuple(reversed(before)), tuple(after))
+_STORED = [
+    item.name
+    for item in fields(GroupRow)
+    if item.name not in ("id", "findings", "comments", "takes", "came_to")
+]
 
 
-_STORED = [item.name for item in fields(GroupRow) if item.name not in ("id", "findings")]
-
-
-def _row(row: Any) -> GroupRow:
+def _row(row: Any, said: Mapping[int, int]) -> GroupRow:
     kinds = tuple(row.findings.strip(",").split(",")) if row.findings else ()
     values = {name: getattr(row, name) for name in _STORED}
-    return GroupRow(id=row.group_id, findings=kinds, **values)
+    return GroupRow(id=row.group_id, findings=kinds, comments=said.get(row.group_id, 0), **values)

@@ -24,6 +24,7 @@ from app.review.queue.fields import BY_NAME, FIELDS, ORDERS
 from app.store import conditions
 from app.store.conditions import Condition
 from app.store.order import Order
+from app.store.work import place_in
 
 MAX_LENGTH = 1000
 MAX_LISTED_LENGTH = 100_000
@@ -31,7 +32,7 @@ MAX_LISTED_LENGTH = 100_000
 MAX_TERMS = 30
 MAX_ID = 2**63 - 1
 
-NUMBERS = {name: item.column for name, item in BY_NAME.items() if item.kind == "number"}
+NUMBERS = {name: item.column for name, item in BY_NAME.items() if item.column}
 """Fields that compare with < <= > >= = and with :, which is =, by the column that they mean;
 ``none`` is where there is no number."""
 SORTS = NUMBERS | {order.name: order.column for order in ORDERS}
@@ -48,15 +49,18 @@ _TERM = re.compile(
 
 @dataclass(frozen=True)
 class Query:
-    """A parsed query: conditions that must all hold, and a sort."""
+    """A parsed query: conditions that must all hold, and a sort; that of ``batch`` without one."""
 
     conditions: tuple[Condition, ...] = field(default=())
     sort: str = "number"
     descending: bool = False
+    batch: int | None = None
 
     @property
     def order(self) -> Order:
         """The order in which it lists groups."""
+        if self.batch is not None:
+            return Order(place_in(self.batch))
         # "newest" says the direction itself.
         return Order(SORTS[self.sort], self.descending != (self.sort == "newest"))
 
@@ -80,7 +84,7 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
         InputError: With a pointer ``/q/<position>`` to the term that cannot be understood.
     """
     found: list[Condition] = []
-    sort, descending = "number", False
+    sort, descending, batch = "", False, None
     for negative, term in _terms(text, longest):
         if term.field:
             _require_operator(term)
@@ -94,8 +98,10 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
             sort, descending = _sort(term)
         else:
             condition = _condition(term)
+            if term.field == "batch" and not negative and "," not in term.value:
+                batch = int(term.value)
             found.append(conditions.opposite(condition) if negative else condition)
-    return Query(tuple(found), sort, descending)
+    return Query(tuple(found), sort or "number", descending, None if sort else batch)
 
 
 def _terms(text: str, longest: int) -> Iterator[tuple[bool, _Term]]:
@@ -153,8 +159,14 @@ def _condition(term: _Term) -> Condition:
         term = replace(term, field=field_.name)
     if term.field in NUMBERS:
         return _number(term)
+    if term.field == "takes" and term.value == "none":
+        return conditions.has_takes("=", 0)
+    if term.field == "takes":
+        return conditions.has_takes("=" if term.op == ":" else term.op, _value(term))
     if term.field == "id":
         return _listed_groups(term)
+    if term.field == "batch":
+        return conditions.is_in_batch(_id(term, text) for text in term.value.split(","))
     if field_ is not None and field_.kind == "flag":
         return conditions.is_flag(term.field, _choice(term, term.value) == "yes")
     test = _TESTS[term.field]
@@ -168,11 +180,12 @@ def _listed_groups(term: _Term) -> Condition:
 
 
 def _id(term: _Term, text: str) -> int:
+    what = "batch" if term.field == "batch" else "group"
     digits = text.isascii() and text.isdigit() and len(text) <= len(str(MAX_ID))
     if not digits or not 1 <= int(text) <= MAX_ID:
         raise InputError(
-            f'"{text[:40]}" is not the id of a group',
-            hint="For example id:12,15,19; the id of a group stands in its address.",
+            f'"{text[:40]}" is not the id of a {what}',
+            hint=f"For example {term.field}:12,15,19; the id of a {what} stands in its address.",
             pointer=term.pointer,
         )
     return int(text)
@@ -182,6 +195,10 @@ def _number(term: _Term) -> Condition:
     column = NUMBERS[term.field]
     if term.value == "none":
         return conditions.is_absent(column)
+    return conditions.compares(column, "=" if term.op == ":" else term.op, _value(term))
+
+
+def _value(term: _Term) -> float:
     try:
         value = float(term.value)
     except ValueError:
@@ -192,7 +209,7 @@ def _number(term: _Term) -> Condition:
             hint=f"For example {term.field}<1.5, or {term.field}:none.",
             pointer=term.pointer,
         )
-    return conditions.compares(column, "=" if term.op == ":" else term.op, value)
+    return value
 
 
 def _choice(term: _Term, value: str) -> str:
@@ -204,6 +221,11 @@ def _choice(term: _Term, value: str) -> str:
             pointer=term.pointer,
         )
     return value
+
+
+def _if_any(value: str, some: Condition) -> Condition:
+    """``some``; the opposite for ``none``."""
+    return conditions.opposite(some) if value == "none" else some
 
 
 def _status(term: _Term, value: str) -> Condition:
@@ -234,12 +256,34 @@ def _pictures(term: _Term, value: str) -> Condition:
 
 
 def _proposal(term: _Term, value: str) -> Condition:
-    """What was proposed for a view that has no lines yet."""
+    """What was proposed for a view that has no camera yet."""
     choice = _choice(term, value)
     if choice in ("any", "none"):
-        some = conditions.has_open_proposal()
-        return some if choice == "any" else conditions.opposite(some)
+        return _if_any(choice, conditions.has_open_proposal())
     return conditions.has_open_proposal(choice)
+
+
+def _comments(term: _Term, value: str) -> Condition:
+    """Whether people say something to each other about it, and whether that is settled."""
+    choice = _choice(term, value)
+    if choice in ("any", "none"):
+        return _if_any(choice, conditions.has_thread())
+    return conditions.has_thread(choice)
+
+
+def _annotations(term: _Term, value: str) -> Condition:
+    """What people's own annotations of it came to."""
+    choice = _choice(term, value)
+    if choice in ("any", "none"):
+        return _if_any(choice, conditions.has_takes(">", 0))
+    return conditions.came_to("open" if choice == "waiting" else choice)
+
+
+def _mentions(_term: _Term, value: str) -> Condition:
+    """Whom an open thread mentions."""
+    if value in ("any", "none"):
+        return _if_any(value, conditions.mentions())
+    return conditions.mentions(value.lower())
 
 
 def _view(_term: _Term, value: str) -> Condition:
@@ -273,6 +317,9 @@ _TESTS: dict[str, Callable[[_Term, str], Condition]] = {
     "view": _view,
     "pictures": _pictures,
     "proposal": _proposal,
+    "comments": _comments,
+    "mentions": _mentions,
+    "annotations": _annotations,
     "match": _match,
     "label": _text,
     "": _text,

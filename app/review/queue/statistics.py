@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from app.geometry.arrays import FloatArray, IntArray
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.review.queue.bins import ERROR_PERCENT, SIGMA_M, even, places
 from app.review.queue.query import NUMBERS, parse_query
 from app.store.listing import Listing
@@ -110,32 +111,91 @@ Y_EDGES = even(-40, 40, 16)
 """Cells of 5 m, with a rim around the pitch."""
 
 
+COLUMNS = (
+    "split",
+    "match",
+    "passes",
+    "status",
+    "x_m",
+    "y_m",
+    *(NUMBERS[measure.field] for measure in MEASURES),
+)
+"""Of the queue, what statistics are about."""
+UNKNOWN, NOWHERE = -1, -2
+"""In place of a bin or cell: there is no such number, or it lies in none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Counted:
+    """Groups as statistics count them: 21 bytes each, whatever was measured.
+
+    Attributes:
+        split: Index in ``splits`` of each group, shape (G,); ``match`` likewise.
+        passes: Shape (G,), like ``accepted``.
+        cell: Of the ball on the pitch, by row of y, then x, shape (G,).
+        bins: Of each of ``MEASURES``, shape (9, G).
+    """
+
+    splits: tuple[str, ...]
+    matches: tuple[str, ...]
+    split: npt.NDArray[np.int32]
+    match: npt.NDArray[np.int32]
+    passes: BoolArray
+    accepted: BoolArray
+    cell: npt.NDArray[np.int16]
+    bins: npt.NDArray[np.int8]
+
+    @property
+    def groups(self) -> int:
+        """How many groups there are."""
+        return len(self.split)
+
+
 def statistics(store: Store, dataset_id: int, query: str = "") -> Statistics:
     """Statistics over the groups of a dataset that match a query.
 
     Raises:
         InputError: The query cannot be understood.
     """
-    columns = ("split", "match", "passes", "status", "x_m", "y_m")
-    measured = (NUMBERS[measure.field] for measure in MEASURES)
     conditions = parse_query(query).conditions
     with store.read() as session:
-        rows = Listing(session, dataset_id, conditions).columns((*columns, *measured))
-    nothing: list[tuple[Any, ...]] = [()] * (len(columns) + len(MEASURES))
+        rows = Listing(session, dataset_id, conditions).columns(COLUMNS)
+    return statistics_of(counted(rows))
+
+
+def counted(rows: Sequence[Any]) -> Counted:
+    """Rows of ``COLUMNS`` as they are counted."""
+    nothing: list[tuple[Any, ...]] = [()] * len(COLUMNS)
     split, match, passes, status, *numbers = list(zip(*rows, strict=True)) or nothing
     x, y, *values = (np.array(column, float) for column in numbers)
-    splits = sorted(set(split))
-    of_split = np.array([splits.index(name) for name in split], np.int64)
-    judged = (passes, [state == "accepted" for state in status])
+    splits, matches = sorted(set(split)), sorted(set(match))
+    of_split = {name: place for place, name in enumerate(splits)}
+    of_match = {name: place for place, name in enumerate(matches)}
+    return Counted(
+        splits=tuple(splits),
+        matches=tuple(matches),
+        split=np.array([of_split[name] for name in split], np.int32),
+        match=np.array([of_match[name] for name in match], np.int32),
+        passes=np.array([bool(value) for value in passes], bool),
+        accepted=np.array([state == "accepted" for state in status], bool),
+        cell=_cells(x, y),
+        bins=np.array(
+            [_bins(measure, column) for measure, column in zip(MEASURES, values, strict=True)],
+            np.int8,
+        ).reshape(len(MEASURES), -1),
+    )
+
+
+def statistics_of(found: Counted) -> Statistics:
+    """The statistics of groups."""
     return Statistics(
-        groups=len(rows),
+        groups=found.groups,
         histograms=tuple(
-            _histogram(measure, column, splits, of_split)
-            for measure, column in zip(MEASURES, values, strict=True)
+            _histogram(measure, found.bins[place], found) for place, measure in enumerate(MEASURES)
         ),
-        positions=_positions(x, y),
-        matches=_shares(zip(match, split, strict=True), *judged),
-        splits=_shares((("", name) for name in split), *judged),
+        positions=_positions(found.cell),
+        matches=_shares(found, found.match, found.matches),
+        splits=_shares(found, np.zeros_like(found.match), ("",)),
     )
 
 
@@ -153,41 +213,65 @@ def bin_query(measure: Measure, place: int) -> str:
     return " ".join(parts)
 
 
-def _histogram(
-    measure: Measure, values: FloatArray, splits: Sequence[str], of_split: IntArray
-) -> Histogram:
-    bins = len(measure.edges) - 1
+def _bins(measure: Measure, values: FloatArray) -> IntArray:
     place = places(measure.edges, values, open_low=measure.open_low, open_high=measure.open_high)
-    inside = place >= 0
-    series = []
-    for number, split in enumerate(splits):
-        mine = of_split == number
-        counts = np.bincount(place[mine & inside], minlength=bins)
-        unknown = int((mine & np.isnan(values)).sum())
-        series.append(Series(split, tuple(counts.tolist()), unknown))
-    queries = tuple(bin_query(measure, place) for place in range(bins))
-    return Histogram(measure, queries, tuple(series))
+    return np.where(np.isnan(values), UNKNOWN, np.where(place < 0, NOWHERE, place))
 
 
-def _positions(x: FloatArray, y: FloatArray) -> Positions:
-    known = ~(np.isnan(x) | np.isnan(y))
-    counts, _, _ = np.histogram2d(y[known], x[known], bins=(Y_EDGES, X_EDGES))
-    whole = counts.astype(np.int64)
+def _cells(x: FloatArray, y: FloatArray) -> npt.NDArray[np.int16]:
+    column, row = (
+        places(edges, values, open_low=False, open_high=False)
+        for edges, values in ((X_EDGES, x), (Y_EDGES, y))
+    )
+    cell = row * (len(X_EDGES) - 1) + column
+    outside = np.where((row < 0) | (column < 0), NOWHERE, cell)
+    return np.where(np.isnan(x) | np.isnan(y), UNKNOWN, outside).astype(np.int16)
+
+
+def _histogram(measure: Measure, place: npt.NDArray[np.int8], found: Counted) -> Histogram:
+    bins = len(measure.edges) - 1
+    # NOWHERE, UNKNOWN, and the bins, of each split.
+    width = bins + 2
+    code = found.split * width + (place - NOWHERE)
+    counts = np.bincount(code, minlength=len(found.splits) * width).reshape(-1, width)
+    series = tuple(
+        Series(split, tuple(row[2:].tolist()), int(row[UNKNOWN - NOWHERE]))
+        for split, row in sorted(zip(found.splits, counts, strict=True), key=_name)
+        if row.any()
+    )
+    queries = tuple(bin_query(measure, number) for number in range(bins))
+    return Histogram(measure, queries, series)
+
+
+def _name(pair: tuple[str, Any]) -> str:
+    return pair[0]
+
+
+def _positions(cell: npt.NDArray[np.int16]) -> Positions:
+    rows, columns = len(Y_EDGES) - 1, len(X_EDGES) - 1
+    counts = np.bincount(cell.astype(np.int64) - NOWHERE, minlength=rows * columns + 2)
+    whole = counts[2:].reshape(rows, columns)
     return Positions(
         x_edges=X_EDGES,
         y_edges=Y_EDGES,
         counts=tuple(tuple(row) for row in whole.tolist()),
-        outside=int(known.sum() - whole.sum()),
+        outside=int(counts[0]),
     )
 
 
 def _shares(
-    places: Iterable[tuple[str, str]], passes: Iterable[bool | None], accepted: Iterable[bool]
+    found: Counted, match: npt.NDArray[np.int32], matches: Sequence[str]
 ) -> tuple[Share, ...]:
-    counts: dict[tuple[str, str], list[int]] = {}
-    for place, passing, taken in zip(places, passes, accepted, strict=True):
-        count = counts.setdefault(place, [0, 0, 0])
-        count[0] += 1
-        count[1] += bool(passing)
-        count[2] += taken
-    return tuple(Share(*place, *count) for place, count in sorted(counts.items()))
+    width = max(len(found.splits), 1)
+    code = match.astype(np.int64) * width + found.split
+    size = len(matches) * width
+    groups, passing, accepted = (
+        np.bincount(code[chosen], minlength=size).tolist()
+        for chosen in (slice(None), found.passes, found.accepted)
+    )
+    shares = [
+        Share(matches[place // width], found.splits[place % width], *counts)
+        for place, counts in enumerate(zip(groups, passing, accepted, strict=True))
+        if counts[0]
+    ]
+    return tuple(sorted(shares, key=lambda share: (share.match, share.split)))

@@ -15,7 +15,7 @@ from typing import Any
 from app.errors import ConflictError
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdicts.verdict import Verdict, check_verdict
-from app.store.answers import Keep, Progress, keep_nothing
+from app.store.answers import Keep, SavedProgress, keep_nothing
 from app.store.batches import Batch, Spans, find_batch, insert_batch, read_batches, update_batch
 from app.store.clock import now
 from app.store.listing import Listing, read_columns
@@ -119,7 +119,7 @@ def give_verdicts(
     actor: str,
     expected: int | None = None,
     keep: Keep[BatchReport] = keep_nothing,
-    progress: Progress | None = None,
+    progress: SavedProgress | None = None,
 ) -> BatchReport:
     """Give a verdict to all groups of a query, as each of them is when its turn comes.
 
@@ -234,7 +234,7 @@ class BatchRun:
         verdict: Verdict,
         actor: str,
         again: int | None = None,
-        progress: Progress | None = None,
+        progress: SavedProgress | None = None,
     ):
         self._progress = progress
         self._left: Any = None

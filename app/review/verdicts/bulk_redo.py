@@ -9,7 +9,7 @@ from app.errors import ConflictError
 from app.review.verdicts.bulk import ASKED, BatchRun, Refusal, sort_out
 from app.review.verdicts.bulk_undo import read_batch
 from app.review.verdicts.verdict import check_verdict
-from app.store.answers import Keep, Progress, keep_nothing
+from app.store.answers import Keep, SavedProgress, keep_nothing
 from app.store.batches import Batch, Spans, update_batch
 from app.store.listing import read_columns
 from app.store.session import Session, Store
@@ -40,7 +40,7 @@ def redo_batch(
     *,
     actor: str,
     keep: Keep[RedoReport] = keep_nothing,
-    progress: Progress | None = None,
+    progress: SavedProgress | None = None,
 ) -> RedoReport:
     """Give the verdicts of a batch again after they were taken back.
 

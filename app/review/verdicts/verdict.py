@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from app.errors import InputError
+from app.review.editing.copies import require_unsettled
 from app.review.editing.etags import require_said, require_unchanged
 from app.review.editing.state import GroupState
 from app.review.editing.submit import read_solved
@@ -57,6 +58,7 @@ def set_verdict(
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, f"group {seen.key}")
             require_said(session, group_id, record.said, if_match, f"group {seen.key}")
+            require_unsettled(session, seen.dataset_id, group_id)
             # Under another policy other gates may fail.
             if policy_hash == seen.policy.hash:
                 given = _given(session, seen, verdict, override, actor)

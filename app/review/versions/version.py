@@ -17,7 +17,7 @@ from app.soccer.split import Split
 from app.store.codecs import Json, parse, policy_from_json
 from app.store.frozen import CALIBRATION, json_of, named_texts, read_frozen, thaw_group
 from app.store.session import Session, Store
-from app.store.solutions import decode_calibration, decode_solution
+from app.store.solutions import decode_camera, decode_solution
 from app.store.verifications import Verification, read_verifications
 from app.store.versions import VersionGroup, all_versions, dataset_versions, version_row
 
@@ -165,7 +165,8 @@ def read_version(session: Session, version_id: int) -> Version:
 
 
 def thaw(session: Session, version: Version, rows: Sequence[VersionGroup]) -> list[FrozenGroup]:
-    """Members of a version with their content; at most a few hundred.
+    """Members of a version with their content, calibrations without their markings; at most a few
+    hundred.
 
     Raises:
         StorageError: Content is missing.
@@ -180,9 +181,7 @@ def thaw(session: Session, version: Version, rows: Sequence[VersionGroup]) -> li
     more = read_frozen(session, version.dataset_id, shared | names)
     require_frozen(shared | names, more)
     stations = {key: json_of(more[key]) for key in shared}
-    calibrations = {
-        name.removeprefix(CALIBRATION): decode_calibration(more[name]) for name in names
-    }
+    calibrations = {name.removeprefix(CALIBRATION): decode_camera(more[name]) for name in names}
     return [
         FrozenGroup(
             row,

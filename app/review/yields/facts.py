@@ -1,61 +1,47 @@
-"""Yield facts: the rows of a ``YieldTable`` as they stand beside the solutions, in chunks."""
+"""Yield facts: tables of groups as their facts stand beside the solutions."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from app.review.yields.table import EMPTY, YieldTable, join
-from app.solving.facts import Facts, group_facts
-from app.solving.facts import join as join_facts
-from app.solving.facts_codec import facts_from_bytes
+from app.review.yields.table import YieldTable, join, table_of
+from app.solving.facts import NOTHING, Facts, group_facts
+from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
 from app.store.groups import read_groups
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import read_calibrations, solution_facts
 
 CHUNK = 400
-"""Groups that are read at once, each chunk from a snapshot of its own."""
+"""Groups that are read at once."""
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """A group whose facts are asked for, and the solution that holds them."""
+def read_tables(session: Session, rows: Sequence[Any]) -> tuple[YieldTable, YieldTable]:
+    """The table of the groups that are solved, and that of the others.
 
-    group_id: int
-    inputs: str
-    solution_id: int
-
-
-def read_facts(store: Store, wanted: Sequence[Wanted]) -> YieldTable:
-    """The table of some groups; one whose solution is gone by now is left out."""
-    tables = [EMPTY]
-    for start in range(0, len(wanted), CHUNK):
-        chunk = wanted[start : start + CHUNK]
-        with store.read() as session:
-            found = dict(_facts(session, chunk))
-        there = [item for item in chunk if item.group_id in found]
-        if there:
-            tables.append(
-                YieldTable(
-                    np.array([item.group_id for item in there], np.int64),
-                    np.array([item.inputs for item in there]),
-                    join_facts([found[item.group_id] for item in there]),
-                )
-            )
-    return join(tables)
+    Args:
+        session: A read session.
+        rows: As ``groups_from`` returns them in the same session.
+    """
+    solved, others = [], []
+    tables = []
+    for start in range(0, len(rows), CHUNK):
+        chunk = rows[start : start + CHUNK]
+        found = _facts(session, [row.solution_id for row in chunk if row.solution_id is not None])
+        solved = [row for row in chunk if row.group_id in found]
+        others += [row for row in chunk if row.group_id not in found]
+        tables.append(table_of(solved, facts_from_bytes([found[row.group_id] for row in solved])))
+    return join([table_of([], NOTHING), *tables]), table_of(others, NOTHING)
 
 
-def _facts(session: Session, wanted: Sequence[Wanted]) -> Iterator[tuple[int, Facts]]:
-    """Groups with their facts."""
-    rows = solution_facts(session, [item.solution_id for item in wanted])
-    yield from _gathered(session, [row for row in rows if row.facts is None])
-    for row in rows:
-        if row.facts is not None:
-            yield row.group_id, facts_from_bytes(row.facts)
+def _facts(session: Session, solution_ids: Sequence[int]) -> dict[int, bytes]:
+    """Facts of solutions, by group."""
+    rows = solution_facts(session, solution_ids)
+    found = {row.group_id: row.facts for row in rows if row.facts is not None}
+    bare = [row for row in rows if row.facts is None]
+    found.update((group, facts_to_bytes(facts)) for group, facts in _gathered(session, bare))
+    return found
 
 
 def _gathered(session: Session, rows: Sequence[Any]) -> Iterator[tuple[int, Facts]]:

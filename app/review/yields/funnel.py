@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-import numpy as np
-
-from app.geometry.arrays import BoolArray, IntArray
-from app.review.yields.store import Snapshot, YieldStore
+from app.geometry.arrays import IntArray
+from app.review.yields.figures import JAC_STEPS
+from app.review.yields.pool import each
+from app.review.yields.store import Block, Snapshot, YieldStore
+from app.review.yields.tally import DISTANCES, FINDINGS, Tally, sum_of
 from app.soccer.policy import BOXES, CALIBRATION, PITCH, THRESHOLDS, Policy
 from app.soccer.solution import GAMMAS_PERCENT, GATES
-from app.solving.verdict import Verdict, judge
 
 UNSOLVED = "unsolved"
 """Step of the funnel before the gates: groups that nobody has solved yet."""
@@ -22,10 +23,6 @@ ANSWERED = tuple(
     threshold for threshold in THRESHOLDS if threshold.subject not in WITHOUT_EFFECT | {CALIBRATION}
 )
 """Thresholds that the table answers for: gates and the findings about the ball."""
-JAC_STEPS = tuple((np.arange(101) / 100).tolist())
-"""Where the curves are counted: JaC from 0 to 1."""
-DISTANCES = (0.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
-"""Where the bins of distance begin, metres; the last one has no end."""
 
 
 @dataclass(frozen=True)
@@ -109,8 +106,12 @@ def get_yield(
     policy = _changed(snapshot.policy, values or {})
     unanswered = needs_solving(snapshot.policy, policy)
     same = all(item.value(policy) == item.value(snapshot.policy) for item in ANSWERED)
-    verdict = snapshot.present if same else judge(snapshot.table.facts, policy, snapshot.spread)
-    return _answer(snapshot, policy, verdict, unanswered)
+
+    def tally(block: Block) -> Tally:
+        return block.tally if same else block.tally_under(policy)
+
+    total = sum_of(each(tally, snapshot.blocks))
+    return _answer(snapshot, policy, total, unanswered)
 
 
 def needs_solving(present: Policy, asked: Policy) -> tuple[str, ...]:
@@ -128,29 +129,32 @@ def _changed(policy: Policy, values: Mapping[str, Any]) -> Policy:
     return replace(policy, **{**values, "calibration": calibration})
 
 
-def _answer(
-    snapshot: Snapshot, policy: Policy, verdict: Verdict, unanswered: tuple[str, ...]
-) -> Yield:
-    passes, before = verdict.passes, snapshot.present.passes
+def _answer(snapshot: Snapshot, policy: Policy, total: Tally, unanswered: tuple[str, ...]) -> Yield:
     return Yield(
         policy=policy,
-        groups=snapshot.table.groups + snapshot.unsolved,
-        passing=int(passes.sum()),
+        groups=snapshot.solved + snapshot.unsolved,
+        passing=total.passing,
         unsolved=snapshot.unsolved,
-        funnel=_funnel(snapshot, verdict.first, policy),
-        given_not_measured=snapshot.unmeasured,
-        curves=_curves(snapshot),
-        splits=_splits(snapshot, passes),
-        distances=_distances(snapshot, verdict),
-        findings=_findings(snapshot, policy, verdict),
-        leakage=tuple(Leak(match, splits) for match, splits in snapshot.leaks),
-        gained=int((passes & ~before).sum()),
-        lost=int((before & ~passes).sum()),
+        funnel=_funnel(snapshot, total.dropped, policy),
+        given_not_measured=total.unmeasured,
+        curves=tuple(
+            Curve(gamma, tuple(counts.tolist()))
+            for gamma, counts in zip(GAMMAS_PERCENT, total.curves, strict=True)
+        ),
+        splits=_splits(snapshot, total),
+        distances=_distances(snapshot, total),
+        findings=tuple(
+            Part(kind, groups, passing)
+            for kind, (groups, passing) in zip(FINDINGS, total.findings.tolist(), strict=True)
+        ),
+        leakage=_leaks(snapshot.places),
+        gained=total.gained,
+        lost=total.lost,
         needs_solving=unanswered,
     )
 
 
-def _funnel(snapshot: Snapshot, first: IntArray, policy: Policy) -> tuple[Step, ...]:
+def _funnel(snapshot: Snapshot, dropped: IntArray, policy: Policy) -> tuple[Step, ...]:
     """Gates that the policy asks for, in order, after the groups that are not solved."""
     inactive = {
         "agreement": policy.min_agreement is None,
@@ -158,8 +162,7 @@ def _funnel(snapshot: Snapshot, first: IntArray, policy: Policy) -> tuple[Step, 
         "sigma": policy.max_sigma_m is None,
         "chi_square": policy.min_p_value is None,
     }
-    dropped = np.bincount(first, minlength=len(GATES) + 1)
-    left, steps = snapshot.table.groups, []
+    left, steps = snapshot.solved, []
     if snapshot.unsolved:
         steps.append(Step(UNSOLVED, left, snapshot.unsolved))
     for place, gate in enumerate(GATES):
@@ -169,49 +172,31 @@ def _funnel(snapshot: Snapshot, first: IntArray, policy: Policy) -> tuple[Step, 
     return tuple(steps)
 
 
-def _curves(snapshot: Snapshot) -> tuple[Curve, ...]:
-    """A group qualifies at every threshold strictly below the JaC of its second best view."""
+def _splits(snapshot: Snapshot, total: Tally) -> tuple[Part, ...]:
+    everyone: Counter[str] = Counter()
+    for (_, split), groups in snapshot.places.items():
+        everyone[split] += groups
     return tuple(
-        Curve(gamma, tuple((len(jac) - np.searchsorted(jac, JAC_STEPS, "right")).tolist()))
-        for gamma, jac in zip(GAMMAS_PERCENT, snapshot.qualifying, strict=True)
+        Part(split, groups, total.splits[split]) for split, groups in sorted(everyone.items())
     )
 
 
-def _splits(snapshot: Snapshot, passes: BoolArray) -> tuple[Part, ...]:
-    heads = snapshot.heads
-    everyone = np.bincount(heads.split, minlength=len(heads.splits))
-    inside = heads.split[: snapshot.table.groups]
-    passing = np.bincount(inside[passes], minlength=len(heads.splits))
-    return tuple(
-        Part(name, int(groups), int(count))
-        for name, groups, count in zip(heads.splits, everyone, passing, strict=True)
-    )
-
-
-def _distances(snapshot: Snapshot, verdict: Verdict) -> tuple[Part, ...]:
+def _distances(snapshot: Snapshot, total: Tally) -> tuple[Part, ...]:
     """By distance of the ball; groups that have none under the policy stand apart, last."""
-    place = np.digitize(verdict.distance, DISTANCES) - 1
-    place[np.isnan(verdict.distance)] = len(DISTANCES)
-    groups = np.bincount(place, minlength=len(DISTANCES) + 1)
+    groups, passing = total.distances.tolist()
     groups[-1] += snapshot.unsolved
-    passing = np.bincount(place[verdict.passes], minlength=len(DISTANCES) + 1)
     ends: list[float | None] = [*DISTANCES[1:], None, None]
     return tuple(
-        Part("", int(groups[bin_]), int(passing[bin_]), low, ends[bin_])
+        Part("", groups[bin_], passing[bin_], low, ends[bin_])
         for bin_, low in enumerate([*DISTANCES, None])
     )
 
 
-def _findings(snapshot: Snapshot, policy: Policy, verdict: Verdict) -> tuple[Part, ...]:
-    """Findings about the ball that follow from thresholds, though they are no gates."""
-    x, y, z = verdict.point.T
-    half = snapshot.heads.pitch[: snapshot.table.groups].T / 2
-    outside = np.maximum(np.abs(x) - half[0], np.abs(y) - half[1])
-    implausible = (
-        (z > policy.below_grass_m) | (-z > policy.max_height_m) | (outside > policy.outside_pitch_m)
-    )
-    low = verdict.parallax < policy.low_parallax_degrees
-    return tuple(
-        Part(kind, int(found.sum()), int((found & verdict.passes).sum()))
-        for kind, found in (("implausible_ball", implausible), ("low_parallax", low))
-    )
+def _leaks(places: Counter[tuple[str, str]]) -> tuple[Leak, ...]:
+    """Matches in several splits, by name."""
+    found: dict[str, list[tuple[str, int]]] = {}
+    for (match, split), groups in places.items():
+        if split:
+            found.setdefault(match, []).append((split, groups))
+    several = (match for match, splits in found.items() if len(splits) > 1)
+    return tuple(Leak(match, tuple(sorted(found[match]))) for match in sorted(several))

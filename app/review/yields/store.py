@@ -1,50 +1,74 @@
-"""YieldStore: one table a dataset, built when first asked for and kept in step with the database."""
+"""YieldStore: the tables of datasets, kept in step with the database as groups change."""
 
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
+from pathlib import Path
 
-import numpy as np
+import structlog
 
-from app.errors import NotFoundError
-from app.geometry.arrays import FloatArray, IntArray
-from app.review.yields.cache import forget_table, keep_table, kept_table
-from app.review.yields.facts import Wanted, read_facts
-from app.review.yields.figures import is_unmeasured, qualifying_jac
+from app.errors import NotFoundError, OverloadedError, ReviewError
+from app.geometry.arrays import BoolArray
+from app.review.yields.cache import KeptBlock, forget_table, keep_judged, kept_judged
+from app.review.yields.gathered import Gathered
+from app.review.yields.judged import Judged
+from app.review.yields.pool import each
 from app.review.yields.table import EMPTY, YieldTable, join
+from app.review.yields.tally import Tally, tally_of
 from app.soccer.policy import Policy
-from app.soccer.solution import GAMMAS_PERCENT, SOLVER_VERSION
-from app.solving.spread import MeanSpread
-from app.solving.verdict import Verdict, judge
-from app.store.datasets import find_dataset, policy_of
-from app.store.log import newest_entry
+from app.soccer.solution import SOLVER_VERSION
+from app.store.datasets import dataset_names, find_dataset, policy_of
+from app.store.group_changes import count_changes, count_groups
 from app.store.session import Session, Store
-from app.store.solutions import newest_solution, present_solutions
 
 MAX_BYTES = 512 * 1024 * 1024
-"""What all tables together may hold; beyond it the one that was asked for longest ago goes."""
-WORTH_KEEPING = 500
-"""So many new groups are written to the cache; fewer are read again in a moment."""
+"""What all tables together may hold in memory; beyond it the one that was asked for longest ago
+goes. Files that are mapped do not count: the system takes their memory back when it needs it."""
+AT_ONCE = 20_000
+"""Groups that are read while somebody waits; of more, who asks is told how far they are."""
+PATIENCE_SECONDS = 5.0
+"""How long who asks waits for others who read at the moment."""
+FAR_BEHIND = 2000
+"""Changes from which on it is worth a look whether another process has followed them."""
+
+log = structlog.get_logger("touchline.yields")
 
 
 @dataclass(frozen=True)
-class Heads:
-    """Groups as they are now, in the order of the table where they are in it.
+class Block:
+    """A block of a table, and what the present policy makes of it."""
 
-    Attributes:
-        split: Index in ``splits`` of each group, shape (N,); ``match`` likewise.
-        pitch: Length and width, metres, shape (N, 2).
-    """
+    block: KeptBlock
+    judged: Judged
 
-    group_id: IntArray
-    split: IntArray
-    splits: tuple[str, ...]
-    match: IntArray
-    matches: tuple[str, ...]
-    pitch: FloatArray
+    @cached_property
+    def tally(self) -> Tally:
+        """What is counted of its groups under the present policy."""
+        verdict = self.judged.verdict
+        return tally_of(self.table, self.live, self.judged.policy, verdict, verdict)
+
+    def tally_under(self, policy: Policy) -> Tally:
+        """What is counted of them under another one."""
+        verdict = self.judged.under(policy)
+        return tally_of(self.table, self.live, policy, self.judged.verdict, verdict, self.tally)
+
+    @property
+    def table(self) -> YieldTable:
+        """Its groups, those among them that do not count any more."""
+        return self.block.table
+
+    @property
+    def live(self) -> BoolArray | slice:
+        """Chooses the rows of those that count."""
+        return slice(None) if self.block.live is None else self.block.live
+
+    @cached_property
+    def places(self) -> Counter[tuple[str, str]]:
+        """How many groups that count lie in each match and split."""
+        return self.table.count_places(self.block.live)
 
 
 @dataclass(frozen=True)
@@ -53,34 +77,54 @@ class Snapshot:
 
     Attributes:
         policy: The present one.
-        unsolved: Groups that the table does not hold yet.
-        unmeasured: Groups whose cameras are given and have no lines to measure JaC.
-        heads: Of the groups in the table, then of the others.
-        present: What the present policy makes of the table.
-        spread: Of the table.
-        qualifying: For each gamma: ``figures.qualifying_jac``, sorted.
-        leaks: Matches in several splits, with the number of groups in each.
+        blocks: The groups that are solved.
+        bare: The others.
     """
 
     policy: Policy
-    table: YieldTable
-    unsolved: int
-    unmeasured: int
-    heads: Heads
-    present: Verdict
-    spread: MeanSpread
-    qualifying: tuple[FloatArray, ...]
-    leaks: tuple[tuple[str, tuple[tuple[str, int], ...]], ...]
+    blocks: tuple[Block, ...]
+    bare: YieldTable
+
+    @cached_property
+    def solved(self) -> int:
+        """How many groups are solved."""
+        return sum(part.block.groups for part in self.blocks)
+
+    @property
+    def unsolved(self) -> int:
+        """How many are not."""
+        return self.bare.groups
+
+    @cached_property
+    def table(self) -> YieldTable:
+        """The groups that are solved, in one table."""
+        return join([EMPTY, *(part.block.only_live for part in self.blocks)])
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it holds, without what is mapped from files."""
+        loose = sum(part.table.nbytes for part in self.blocks if not part.block.name)
+        return loose + sum(part.judged.nbytes for part in self.blocks) + self.bare.nbytes
+
+    @cached_property
+    def places(self) -> Counter[tuple[str, str]]:
+        """How many groups lie in each match and split, solved or not."""
+        total = self.bare.count_places()
+        for part in self.blocks:
+            total.update(part.places)
+        return total
 
 
 @dataclass
 class _Kept:
-    """A dataset's snapshot, and the mark of the state that it was made from."""
+    """A dataset's groups, and the snapshot that was made of them last."""
 
     lock: threading.Lock = field(default_factory=threading.Lock)
-    mark: tuple[int, int, str] | None = None
-    calibration: str | None = None
+    gathered: Gathered | None = None
+    version: int | None = None
     snapshot: Snapshot | None = None
+    read: tuple[int, int] = (0, 0)
+    """How many groups are read, and how many are left: for who asks meanwhile."""
 
 
 class YieldStore:
@@ -92,89 +136,144 @@ class YieldStore:
         self._kept: OrderedDict[int, _Kept] = OrderedDict()
 
     def snapshot(self, dataset_id: int) -> Snapshot:
-        """The table of a dataset as it is now.
+        """The table of a dataset as it is now; what has changed since the last look is read.
 
-        The first time it is read from all solutions (seconds for ten thousand groups), then
-        only what has changed since; a copy in the cache outlives the process.
+        Raises:
+            NotFoundError: There is no such dataset.
+            OverloadedError: So many groups have changed that a thread reads them first.
+        """
+        kept = self._of(dataset_id)
+        if not kept.lock.acquire(timeout=PATIENCE_SECONDS):
+            raise _not_yet(kept)
+        try:
+            snapshot = self._tried(dataset_id, kept, AT_ONCE)
+        finally:
+            kept.lock.release()
+        if snapshot is None:
+            error = _not_yet(kept)
+            work = threading.Thread(target=self._caught_up, args=(dataset_id,), daemon=True)
+            work.start()
+            raise error
+        self._forget()
+        return snapshot
+
+    def keep_up(self, dataset_id: int) -> None:
+        """Bring a table in step, however much has changed, before somebody asks.
 
         Raises:
             NotFoundError: There is no such dataset.
         """
+        kept = self._of(dataset_id)
+        with kept.lock:
+            self._tried(dataset_id, kept, None)
+        self._forget()
+
+    def keep_large_up(self) -> None:
+        """Bring those tables in step that would let somebody wait."""
+        with self._store.read() as session:
+            names = dataset_names(session)
+            large = [number for number in names if count_groups(session, number) > AT_ONCE]
+        for dataset_id in large:
+            self._caught_up(dataset_id)
+
+    def _caught_up(self, dataset_id: int) -> None:
+        try:
+            self.keep_up(dataset_id)
+        except ReviewError as error:
+            log.warning("a yield table stays behind", error=error.message)
+        except Exception:
+            log.exception("a yield table stays behind")
+
+    def _of(self, dataset_id: int) -> _Kept:
         with self._lock:
             kept = self._kept.setdefault(dataset_id, _Kept())
             self._kept.move_to_end(dataset_id)
-        with kept.lock:
-            try:
-                snapshot = self._refreshed(dataset_id, kept)
-            except NotFoundError:
-                self._drop(dataset_id)
-                raise
-        self._forget()
-        return snapshot
+        return kept
 
-    def _refreshed(self, dataset_id: int, kept: _Kept) -> Snapshot:
-        with self._store.read() as session:
-            policy = read_policy(session, dataset_id)
-            mark = _mark(session, policy)
-            if kept.snapshot is not None and kept.mark == mark:
-                return kept.snapshot
-            rows: Rows = {group: rest for group, *rest in present_solutions(session, dataset_id)}
-        calibration = f"{policy.calibration_hash} {SOLVER_VERSION}"
-        place = self._store.settings.cache / "yields" / f"{dataset_id}.npz"
-        if kept.snapshot is None:
-            old = kept_table(place, calibration)
-        else:
-            old = kept.snapshot.table if kept.calibration == calibration else EMPTY
-        table = self._table(old, rows)
-        if table.groups - old.groups >= WORTH_KEEPING:
-            keep_table(place, calibration, table)
-        heads, spread = _heads(rows, table), MeanSpread(table.facts)
-        kept.snapshot = Snapshot(
-            policy=policy,
-            table=table,
-            unsolved=len(rows) - table.groups,
-            unmeasured=int(is_unmeasured(table.facts).sum()),
-            heads=heads,
-            present=judge(table.facts, policy, spread),
-            spread=spread,
-            qualifying=tuple(
-                np.sort(qualifying_jac(table.facts, gamma)) for gamma in GAMMAS_PERCENT
-            ),
-            leaks=_leaks(heads),
-        )
-        kept.mark, kept.calibration = mark, calibration
+    def _folder(self, dataset_id: int) -> Path:
+        return self._store.settings.yields / str(dataset_id)
+
+    def _tried(self, dataset_id: int, kept: _Kept, most: int | None) -> Snapshot | None:
+        try:
+            return self._refreshed(dataset_id, kept, most)
+        except NotFoundError:
+            with self._lock:
+                self._kept.pop(dataset_id, None)
+            forget_table(self._folder(dataset_id))
+            raise
+
+    def _refreshed(self, dataset_id: int, kept: _Kept, most: int | None) -> Snapshot | None:
+        """The snapshot as of now; None where more groups than ``most`` would have to be read."""
+        while True:
+            with self._store.read() as session:
+                policy = read_policy(session, dataset_id)
+                gathered = self._gathered(session, dataset_id, kept, policy)
+                left = gathered.left(session)
+                kept.read = gathered.groups, left
+                if most is not None and left > most:
+                    return None
+                if gathered.step(session):
+                    continue
+                if not gathered.is_whole(session):
+                    # Groups went without a mark, as when the log is replayed.
+                    folder, calibration = gathered.folder, gathered.calibration
+                    kept.gathered = Gathered.begin(session, folder, dataset_id, calibration)
+                    kept.snapshot = None
+                    continue
+            break
+        old = kept.snapshot
+        if old is None or kept.version != gathered.version or old.policy != policy:
+            kept.snapshot = self._judged(gathered, policy, old)
+            kept.version = gathered.version
         return kept.snapshot
 
-    def _table(self, old: YieldTable, rows: Rows) -> YieldTable:
-        """The old table without what has changed, and with what is new."""
-        same = [rows.get(group) for group in old.group_id.tolist()]
-        kept = np.array(
-            [
-                row is not None and row[0] == inputs
-                for row, inputs in zip(same, old.inputs.tolist(), strict=True)
-            ],
-            bool,
+    def _gathered(self, session: Session, dataset_id: int, kept: _Kept, policy: Policy) -> Gathered:
+        """The groups as they were looked at last, here or by another process."""
+        calibration, folder = (
+            f"{policy.calibration_hash} {SOLVER_VERSION}",
+            self._folder(dataset_id),
         )
-        there = set(old.group_id[kept].tolist())
-        wanted = [
-            Wanted(group, row[0], row[1])
-            for group, row in rows.items()
-            if row[1] is not None and group not in there
-        ]
-        if not wanted and kept.all():
-            return old
-        return join([old.only(kept), read_facts(self._store, wanted)])
+        known = kept.gathered
+        if known is not None and known.calibration != calibration:
+            known = None
+        if known is None or count_changes(session, dataset_id, known.mark) > FAR_BEHIND:
+            found = Gathered.load(session, folder, dataset_id, calibration)
+            if found is not None and (known is None or found.mark > known.mark):
+                known = found
+        if known is None:
+            known = Gathered.begin(session, folder, dataset_id, calibration)
+        if known is not kept.gathered:
+            kept.gathered, kept.snapshot = known, None
+        return known
 
-    def _drop(self, dataset_id: int) -> None:
-        """Forget a dataset that is gone; its id is never given again."""
-        with self._lock:
-            self._kept.pop(dataset_id, None)
-        forget_table(self._store.settings.cache / "yields" / f"{dataset_id}.npz")
+    def _judged(self, gathered: Gathered, policy: Policy, old: Snapshot | None) -> Snapshot:
+        """The snapshot of groups under a policy; what was judged before is so no more."""
+        before = {id(part.table): part for part in old.blocks} if old is not None else {}
+
+        def judged_block(block: KeptBlock) -> Block:
+            known = before.get(id(block.table))
+            if known is not None and known.judged.policy.hash == policy.hash:
+                return known if known.block is block else Block(block, known.judged)
+            if known is None:
+                judged = kept_judged(gathered.folder, block, policy)
+                if judged is not None:
+                    return Block(block, judged)
+            table = block.table
+            if known is not None:
+                judged = known.judged.moved(policy)
+            else:
+                judged = Judged.by(table.facts, table.jac, policy)
+            if block.name:
+                judged.complete()
+                keep_judged(gathered.folder, block, judged)
+            return Block(block, judged)
+
+        return Snapshot(policy, tuple(each(judged_block, gathered.blocks)), gathered.bare)
 
     def _forget(self) -> None:
         with self._lock:
             sizes = {
-                key: kept.snapshot.table.nbytes
+                key: kept.snapshot.nbytes
                 for key, kept in self._kept.items()
                 if kept.snapshot is not None
             }
@@ -182,10 +281,6 @@ class YieldStore:
                 if sum(sizes.values()) <= MAX_BYTES:
                     return
                 del self._kept[key], sizes[key]
-
-
-Rows = dict[int, list[Any]]
-"""By group: hash of its inputs, id of its solution or None, split, match, size of its pitch."""
 
 
 def read_policy(session: Session, dataset_id: int) -> Policy:
@@ -196,38 +291,9 @@ def read_policy(session: Session, dataset_id: int) -> Policy:
     return policy_of(row.policy)
 
 
-def _mark(session: Session, policy: Policy) -> tuple[int, int, str]:
-    """Differs whenever the log, the solutions or the policy do."""
-    return newest_entry(session), newest_solution(session), policy.hash
-
-
-def _heads(rows: Rows, table: YieldTable) -> Heads:
-    inside = set(table.group_id.tolist())
-    order = [*table.group_id.tolist(), *(group for group in rows if group not in inside)]
-    splits, split = _coded([rows[group][2] for group in order])
-    matches, match = _coded([rows[group][3] for group in order])
-    return Heads(
-        group_id=np.array(order, np.int64),
-        split=split,
-        splits=splits,
-        match=match,
-        matches=matches,
-        pitch=np.array([rows[group][4:6] for group in order], float).reshape(-1, 2),
+def _not_yet(kept: _Kept) -> OverloadedError:
+    done, left = kept.read
+    return OverloadedError(
+        f"the yield is being counted: {done:,} groups are read, about {left:,} are left",
+        hint="Ask again in a few seconds.",
     )
-
-
-def _leaks(heads: Heads) -> tuple[tuple[str, tuple[tuple[str, int], ...]], ...]:
-    pairs, counts = np.unique(
-        np.column_stack([heads.match, heads.split]), axis=0, return_counts=True
-    )
-    found: dict[str, list[tuple[str, int]]] = {}
-    for (match, split), count in zip(pairs.tolist(), counts.tolist(), strict=True):
-        if heads.splits[split]:
-            found.setdefault(heads.matches[match], []).append((heads.splits[split], count))
-    return tuple((match, tuple(splits)) for match, splits in found.items() if len(splits) > 1)
-
-
-def _coded(names: list[str]) -> tuple[tuple[str, ...], IntArray]:
-    different = sorted(set(names))
-    places = {name: place for place, name in enumerate(different)}
-    return tuple(different), np.array([places[name] for name in names], np.int64)

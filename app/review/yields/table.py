@@ -1,19 +1,30 @@
-"""YieldTable: the facts of every group of a dataset.
+"""YieldTable: the facts of groups of a dataset, and what else is counted of them.
 
 Nothing in it depends on a threshold: one table answers for every policy that calibrates alike.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from app.geometry.arrays import BoolArray, IntArray
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.review.yields.figures import is_unmeasured, qualifying_steps
+from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.facts import COLUMNS, NOTHING, Facts
 from app.solving.facts import join as join_facts
+from app.solving.verdict import view_jac
+
+HEADS = ("group_id", "inputs", "split", "match", "pitch")
+"""Arrays with a row for each group, solved or not."""
+FIGURES = ("jac", "steps", "unmeasured")
+"""Arrays that follow from the facts, whatever the policy."""
 
 
 @dataclass(frozen=True)
@@ -23,11 +34,18 @@ class YieldTable:
     Attributes:
         group_id: Id of each group, shape (G,).
         inputs: Hash of what was said of each group, shape (G,).
-        facts: What the gates read of them.
+        split: Index in ``splits`` of each group, shape (G,); ``match`` likewise.
+        pitch: Length and width, metres, shape (G, 2).
+        facts: What the gates read of them; of no group where they are not solved.
     """
 
     group_id: IntArray
-    inputs: npt.NDArray[np.str_]
+    inputs: npt.NDArray[np.bytes_]
+    split: IntArray
+    splits: tuple[str, ...]
+    match: IntArray
+    matches: tuple[str, ...]
+    pitch: FloatArray
     facts: Facts
 
     @property
@@ -37,22 +55,96 @@ class YieldTable:
 
     @property
     def nbytes(self) -> int:
-        """Memory of all arrays."""
+        """Bytes of all arrays, in memory or mapped."""
         columns = sum(getattr(self.facts, name).nbytes for name in COLUMNS)
-        return int(columns + self.group_id.nbytes + self.inputs.nbytes)
+        return int(columns + sum(getattr(self, name).nbytes for name in HEADS))
+
+    @cached_property
+    def jac(self) -> FloatArray:
+        """``view_jac`` at each of ``GAMMAS_PERCENT``, shape (3, V)."""
+        return np.stack([view_jac(self.facts, gamma) for gamma in GAMMAS_PERCENT])
+
+    @cached_property
+    def steps(self) -> npt.NDArray[np.uint8]:
+        """``qualifying_steps`` at each of ``GAMMAS_PERCENT``, shape (3, G)."""
+        return np.stack([qualifying_steps(self.facts, jac) for jac in self.jac])
+
+    @cached_property
+    def unmeasured(self) -> BoolArray:
+        """Groups whose cameras are given and have no lines to measure JaC, shape (G,)."""
+        return is_unmeasured(self.facts)
 
     def only(self, kept: BoolArray) -> YieldTable:
         """The table of some of the groups, in the same order."""
-        return YieldTable(self.group_id[kept], self.inputs[kept], self.facts.only(kept))
+        facts = self.facts.only(kept) if self.facts.groups else self.facts
+        heads = {name: getattr(self, name)[kept] for name in HEADS}
+        return YieldTable(**heads, splits=self.splits, matches=self.matches, facts=facts)
+
+    def count_places(self, kept: BoolArray | None = None) -> Counter[tuple[str, str]]:
+        """How many of the groups lie in each match and split."""
+        chosen = slice(None) if kept is None else kept
+        code = self.match[chosen] * max(len(self.splits), 1) + self.split[chosen]
+        counts = np.bincount(code)
+        places = np.flatnonzero(counts)
+        match, split = np.divmod(places, max(len(self.splits), 1))
+        return Counter(
+            {
+                (self.matches[a], self.splits[b]): count
+                for a, b, count in zip(
+                    match.tolist(), split.tolist(), counts[places].tolist(), strict=True
+                )
+            }
+        )
 
 
-EMPTY = YieldTable(np.empty(0, np.int64), np.empty(0, "U1"), NOTHING)
+def table_of(rows: Sequence[Any], facts: Facts) -> YieldTable:
+    """The table of rows as ``groups_from`` returns them, with their facts or none."""
+    splits, split = _coded([row.split for row in rows])
+    matches, match = _coded([row.match for row in rows])
+    return YieldTable(
+        group_id=np.array([row.group_id for row in rows], np.int64),
+        inputs=np.array([row.inputs_hash for row in rows], "S"),
+        split=split,
+        splits=splits,
+        match=match,
+        matches=matches,
+        pitch=np.array([(row.pitch_length, row.pitch_width) for row in rows], float).reshape(-1, 2),
+        facts=facts,
+    )
 
 
 def join(tables: Sequence[YieldTable]) -> YieldTable:
     """The groups of several tables, one after the other."""
+    splits, split = _joined([(table.splits, table.split) for table in tables])
+    matches, match = _joined([(table.matches, table.match) for table in tables])
     return YieldTable(
-        np.concatenate([table.group_id for table in tables]),
-        np.concatenate([table.inputs for table in tables]),
-        join_facts([table.facts for table in tables]),
+        group_id=np.concatenate([table.group_id for table in tables]),
+        inputs=np.concatenate([table.inputs for table in tables]),
+        split=split,
+        splits=splits,
+        match=match,
+        matches=matches,
+        pitch=np.concatenate([table.pitch for table in tables]),
+        facts=join_facts([table.facts for table in tables]),
     )
+
+
+def _coded(names: list[str]) -> tuple[tuple[str, ...], IntArray]:
+    different = sorted(set(names))
+    places = {name: place for place, name in enumerate(different)}
+    return tuple(different), np.array([places[name] for name in names], np.int64)
+
+
+def _joined(
+    parts: Sequence[tuple[tuple[str, ...], IntArray]],
+) -> tuple[tuple[str, ...], IntArray]:
+    different = sorted({name for names, _ in parts for name in names})
+    places = {name: place for place, name in enumerate(different)}
+    codes = [
+        np.array([places[name] for name in names], np.int64)[code] if len(code) else code
+        for names, code in parts
+    ]
+    return tuple(different), np.concatenate(codes)
+
+
+EMPTY = table_of([], NOTHING)

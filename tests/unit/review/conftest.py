@@ -5,16 +5,13 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import pysqlite3.dbapi2 as sqlite
 import pytest
 from sqlalchemy import select
 
-from app.config import Settings
 from app.geometry.camera import Camera
 from app.review.datasets.dataset import get_dataset
 from app.review.editing.recompute import solve_dataset
@@ -30,6 +27,7 @@ from app.store.models import DatasetModel
 from app.store.session import Store
 from tests.balls import seen
 from tests.cameras import SIZE, looking
+from tests.databases import Databases
 
 MATCH = "north_league/2030-2031/2030-08-17 - 18-00 Alder Town 3 - 1 Birch Rovers"
 
@@ -114,68 +112,51 @@ def make_static() -> MakeGroup:
 
 
 @pytest.fixture(scope="session")
-def only_store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
+def only_store(databases: Databases, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
     """One store for all tests: what it has compiled once serves them all."""
-    store = Store.open(Settings(home=tmp_path_factory.mktemp("home")))
+    store = Store.open(databases.settings(tmp_path_factory.mktemp("review") / "home"))
     yield store
     store.close()
 
 
 @pytest.fixture(scope="session")
-def empty(only_store: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def empty(only_store: Store, databases: Databases) -> Any:
     """The database as it was before any test."""
-    copy = tmp_path_factory.mktemp("empty") / "touchline.db"
-    _copy(only_store.settings.home / "touchline.db", copy)
-    return copy
+    return databases.keep(only_store)
 
 
 @pytest.fixture
-def store(only_store: Store, empty: Path) -> Store:
-    """An empty database: a real file, put back before each test."""
-    _copy(empty, only_store.settings.home / "touchline.db")
+def store(only_store: Store, databases: Databases, empty: Any) -> Store:
+    """An empty database: a real one, put back before each test."""
+    databases.put_back(only_store, empty)
     # What an earlier test saw is not true of this database.
     only_store._damage = None
     return only_store
 
 
 @pytest.fixture
-def there(empty: Path, tmp_path: Path) -> Iterator[Store]:
+def there(databases: Databases, tmp_path: Path) -> Iterator[Store]:
     """Another installation, empty."""
-    home = tmp_path / "there"
-    home.mkdir()
-    _copy(empty, home / "touchline.db")
-    other = Store.open(Settings(home=home))
+    other = Store.open(databases.settings(tmp_path / "there"))
     yield other
     other.close()
-
-
-def _copy(source: Path, target: Path) -> None:
-    # What the home knows of the database that was there before is not true of this one.
-    target.with_name("home.json").unlink(missing_ok=True)
-    with closing(sqlite.connect(str(source))) as one, closing(sqlite.connect(str(target))) as two:
-        one.backup(two)
 
 
 Once = Callable[[object, Callable[[], Any]], Any]
 
 
 @pytest.fixture(scope="session")
-def filled_before(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Any]]:
-    """Databases that tests have filled, each with what its filling returned."""
+def filled_before(only_store: Store) -> dict[str, tuple[Any, Any]]:
+    """What tests have filled the database with, each with what its filling returned."""
     return {}
 
 
 @pytest.fixture
-def once(
-    store: Store,
-    filled_before: dict[str, tuple[Path, Any]],
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Once:
+def once(store: Store, databases: Databases, filled_before: dict[str, tuple[Any, Any]]) -> Once:
     """Fills the empty database: ``once(name, fill)``; from the second time on it is copied.
 
     The name is anything that tells one content from all others.
     """
-    database = store.settings.home / "touchline.db"
 
     def run(name: object, make: Callable[[], Any]) -> Any:
         if not _is_empty(store):
@@ -183,11 +164,9 @@ def once(
         key = hashlib.sha256(pickle.dumps(name)).hexdigest()
         if key not in filled_before:
             result = make()
-            kept = tmp_path_factory.mktemp("filled") / "touchline.db"
-            _copy(database, kept)
-            filled_before[key] = (kept, result)
+            filled_before[key] = (databases.keep(store), result)
         else:
-            _copy(filled_before[key][0], database)
+            databases.put_back(store, filled_before[key][0])
         return filled_before[key][1]
 
     return run

@@ -11,20 +11,28 @@ from app.review.datasets.dataset import get_dataset, list_datasets
 from app.review.datasets.delete import delete_dataset, read_contents
 from app.review.editing.edit import SetBall
 from app.review.editing.ledger import read_ledger
+from app.review.editing.past import history
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import rebuild, replay
-from app.review.editing.submit import history, load, submit
+from app.review.editing.submit import load, submit
 from app.review.importing.ingest import ingest
 from app.review.importing.spare import SpareFrame, ingest_spare
+from app.review.people.access_tokens import AccessTokens
+from app.review.people.logins import Login, Logins, read_roles
+from app.review.people.members import give_role
+from app.review.people.people import invite
+from app.review.people.roles import DatasetRoles, Role, Scope
 from app.review.queue.listing import list_groups
 from app.review.queue.saved_views import save_view
 from app.review.verdicts.bulk import give_verdicts
 from app.review.yields.store import YieldStore
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
+from app.soccer.policy import PAPER
 from app.store.log import verify_chain
 from app.store.models import CalibrationModel, LogModel
 from app.store.session import Store
+from app.store.soundness import count_lost_references
 from app.store.tables import Base
 
 
@@ -87,7 +95,7 @@ class TestDeleteDataset:
         assert list_groups(two, 2, limit=500) == before
         assert load(two, before.items[0].id).solution is not None
         with two.read() as session:
-            assert not list(session.execute(text("PRAGMA foreign_key_check")))
+            assert count_lost_references(session) == 0
             for table in Base.metadata.sorted_tables:
                 if "dataset_id" in table.c and table.name not in ("log", "job"):
                     owners = set(session.scalars(select(table.c.dataset_id)))
@@ -156,6 +164,21 @@ class TestDeleteDataset:
         assert get_dataset(two, "demo").solved == 3
         delete_dataset(two, "demo", confirm="demo", actor="eve")
         assert rows(two, "groups") == 2
+
+    def test_one_that_begins_afresh_keeps_who_may_what_in_it(self, two: Store) -> None:
+        person, _ = invite(two, "zoe", Role.VIEWER, actor="eve")
+        give_role(two, "demo", person.id, Role.NONE, actor="eve")
+        seen = Logins(two)._clock()
+        zoe = Login(1, person.id, "zoe", DatasetRoles(Role.VIEWER), seen)
+        AccessTokens(two).make(zoe, "demo alone", [Scope.READ], dataset_id=1)
+        delete_dataset(two, "demo", confirm="demo", actor="eve", afresh=PAPER)
+        made = get_dataset(two, "demo")
+        assert (made.id, made.groups) == (3, 0)
+        with two.read() as session:
+            assert read_roles(session, person.id, Role.VIEWER).single == {3: Role.NONE}
+            assert replay(session) == read_ledger(session)
+            assert count_lost_references(session) == 0
+        assert [one.dataset for one in AccessTokens(two).of_person(person.id)] == ["demo"]
 
     def test_verdicts_can_be_deleted_only_with_their_dataset(self, two: Store) -> None:
         delete_dataset(two, "other", confirm="other", actor="eve")

@@ -12,7 +12,7 @@ from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_writer import write_line_files
 from app.errors import DatasetFormatError
-from app.review.datasets.batch import calibrate_files
+from app.review.datasets.calibrate_files import calibrate_files
 from app.review.datasets.pictures import estimate_picture_of_files, picture_for, read_picture
 from app.soccer.picture import PictureGeometry
 from tests.cameras import SIZE, looking

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections import namedtuple
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -14,9 +15,14 @@ from app.config import Settings
 from app.review.editing import checkup
 from app.review.editing.check import Check
 from app.review.editing.checkup import examine_home, examine_surroundings
+from app.review.people.people import invite
+from app.review.people.roles import Role
 from app.store.home import make_home
+from app.store.identities import put_identity
 from app.store.session import Store
 from app.store.uploads import UploadWriter, keep_upload
+from tests.databases import said_for_sqlite
+from tests.provider import CLIENT, SECRET, providing, tell
 
 
 @pytest.fixture
@@ -30,11 +36,42 @@ def faults(settings: Settings) -> dict[str, Check]:
     return {check.name: check for check in examine_home(settings) if not check.ok}
 
 
+SIGN_ON = {"sso_client_id": CLIENT, "sso_client_secret": SECRET}
+
+
+class TestSignOn:
+    def test_a_provider_that_answers_is_no_fault_and_another_is(self, tmp_path: Path) -> None:
+        with providing() as provider:
+            said = {**SIGN_ON, "sso_issuer": provider.address}
+            make_home(settings := Settings(home=tmp_path / "home", **said))
+            assert "single sign-on" not in faults(settings)
+            found = {one.name: one for one in examine_home(settings)}["single sign-on"]
+            assert found.sentence == f"{provider.address} answers, with 1 keys"
+            other = {**provider.described(), "issuer": "https://other.example"}
+            there = "/.well-known/openid-configuration"
+            provider.instead[there] = lambda handler: tell(handler, other)
+            assert "not what this server was told" in faults(settings)["single sign-on"].sentence
+        assert "does not answer" in faults(settings)["single sign-on"].sentence
+        half = Settings(home=tmp_path / "home", sso_issuer=provider.address)
+        assert "lacks TOUCHLINE_SSO_CLIENT_ID" in faults(half)["single sign-on"].sentence
+
+    def test_an_admin_has_to_be_linked_where_there_is_no_other_way(self, tmp_path: Path) -> None:
+        said = {**SIGN_ON, "sso_issuer": "https://club.example", "sso_only": True}
+        with closing(Store.open(Settings(home=tmp_path / "home", team=True, **said))) as store:
+            person, _ = invite(store, "anna", Role.ADMIN, actor="local")
+            assert not around(store)["admins"].ok
+            mine = {"person_id": person.id, "issuer": "https://club.example", "subject": "s"}
+            with store.write() as session:
+                put_identity(session, {**mine, "shown": "anna", "created": "2026-11-01"})
+            assert around(store)["admins"].ok
+
+
 def around(store: Store) -> dict[str, Check]:
     return {check.name: check for check in examine_surroundings(store)}
 
 
 class TestExamineHome:
+    @pytest.mark.file_of_sqlite("a home without a database yet: a server has one before")
     def test_a_new_home_has_no_fault(self, settings: Settings) -> None:
         assert faults(settings) == {}
 
@@ -48,6 +85,7 @@ class TestExamineHome:
         gone = settings.model_copy(update={"import_folders": [Path("/nowhere/at/all")]})
         assert "/nowhere/at/all" in faults(gone)["settings"].sentence
 
+    @pytest.mark.file_of_sqlite("permissions of the file")
     def test_a_home_that_others_can_read_is_named(self, settings: Settings) -> None:
         settings.database_file.touch(mode=0o644)
         assert faults(settings) == {}
@@ -82,7 +120,7 @@ class TestExamineSurroundings:
 
     def test_a_clock_behind_the_log_is_named(self, store: Store, fill, make_group) -> None:
         fill(make_group(7))
-        with store.write() as session:
+        with store.write() as session, said_for_sqlite(session):
             session.execute(text("DROP TRIGGER log_refuses_update"))
             session.execute(text("UPDATE log SET at = '2999-01-01T00:00:00+00:00'"))
         found = around(store)["clock"]

@@ -11,6 +11,7 @@ from app.review.editing.replay import rebuild
 from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict
 from app.store.session import Store
+from tests.databases import said_for_sqlite
 
 
 @pytest.fixture
@@ -26,7 +27,7 @@ def faults(store: Store) -> dict[str, Check]:
 
 def change(store: Store, *statements: str) -> None:
     """Behind the service's back."""
-    with store.write() as session:
+    with store.write() as session, said_for_sqlite(session):
         session.execute(text("PRAGMA defer_foreign_keys = ON"))
         for statement in statements:
             session.execute(text(statement))
@@ -42,7 +43,7 @@ class TestExamine:
     def test_a_table_that_was_changed_is_named_and_mended_by_rebuilding(
         self, store: Store, ids
     ) -> None:
-        change(store, f"UPDATE view SET included = 0 WHERE group_id = {ids[1]}")
+        change(store, f"UPDATE view SET included = NOT included WHERE group_id = {ids[1]}")
         found = faults(store)
         assert found.keys() == {"groups"}
         assert found["groups"].sentence == f"1 not as the log says: {ids[1]}"

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.datasets.archive import DEFAULT_LIMITS
+from app.datasets.file_tree import DEFAULT_LIMITS
 from app.datasets.report import Report
 from app.errors import InputError
 from app.review.editing.codec import edit_from_json

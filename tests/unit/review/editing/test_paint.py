@@ -18,9 +18,10 @@ from app.review.editing import paint as editing
 from app.review.editing.edit import SetBall, SetLines
 from app.review.editing.ledger import read_ledger
 from app.review.editing.paint import get_paint, read_paint, take_back_paint
+from app.review.editing.past import history
 from app.review.editing.recompute import solve_dataset, stale_groups
 from app.review.editing.replay import rebuild, replay
-from app.review.editing.submit import history, load, submit, undo
+from app.review.editing.submit import load, submit, undo
 from app.review.importing.carry import carried_group
 from app.review.importing.ingest import ingest
 from app.review.policies.policy import change_policy
@@ -31,7 +32,7 @@ from app.review.yields.funnel import get_yield
 from app.review.yields.store import YieldStore
 from app.sample.render import render
 from app.sample.scene import Scene
-from app.soccer.annotation import BallAnnotation
+from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Media
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT
@@ -254,6 +255,58 @@ class TestReadPaint:
         draw(painted, 1)
         undo(painted, 1, if_match=load(painted, 1).etag, actor="ann")
         assert calibrations(painted) == before
+
+    def test_where_other_people_hide_paint_now_it_is_read_again(self, painted, pictures, looked):
+        first, other = groups(pictures)
+        key = first.views[0].key
+        boxes = first.views[0].extras.boxes
+        assert len(boxes) > 1
+        changed = first.with_view(
+            replace(first.views[0], extras=replace(first.views[0].extras, boxes=boxes[1:]))
+        )
+        before = load(painted, 1)
+        ingest(painted, "demo", [changed, other], source="files", actor="ann")
+        assert state(painted).old == 1
+        solve_dataset(painted, "demo")
+        after = load(painted, 1)
+        assert [view.calibration.source for view in after.solution.views] == ["lines", "paint"]
+        (finding,) = (item for item in after.solution.findings if item.kind == NO_PAINT)
+        assert (finding.view, finding.fix.action) == (key, "read_paint")
+        assert "boxes of its people" in finding.sentence
+        read_paint(painted, "demo", actor="ann")
+        solve_dataset(painted, "demo")
+        again = load(painted, 1)
+        assert (looked, state(painted).old) == ([key], 0)
+        assert [view.calibration.source for view in again.solution.views] == ["paint", "paint"]
+        assert again.group.paint[key].people not in ("", before.group.paint[key].people)
+        with painted.read() as session:
+            assert replay(session) == read_ledger(session)
+
+    def test_what_was_read_while_an_import_brought_other_people_is_old(
+        self, painted, pictures, looked
+    ):
+        first, other = groups(pictures)
+        reading = load(painted, 1).group.paint
+        bare = replace(first, views=tuple(replace(view, extras=Extras()) for view in first.views))
+        ingest(painted, "demo", [bare, other], source="files", actor="ann")
+        # What a process was at while that happened is given afterwards.
+        with painted.write() as session:
+            editing._give(session, 1, {1: reading}, "ann", {"run": "late"})
+        solve_dataset(painted, "demo")
+        assert state(painted).old == 2
+        assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
+        assert kinds(painted) == ["no_paint"] * 2
+        read_paint(painted, "demo", actor="ann")
+        solve_dataset(painted, "demo")
+        assert (len(looked), state(painted).old) == (2, 0)
+        assert [item.source for item in calibrations(painted)] == ["paint", "paint"]
+        # What is had back was read beside those people, too.
+        for _ in range(2):
+            take_back_paint(painted, "demo", actor="ann")
+            solve_dataset(painted, "demo")
+            assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
+        with painted.read() as session:
+            assert replay(session) == read_ledger(session)
 
     def test_a_picture_that_changed_is_read_again(self, painted, pictures, tmp_path, looked):
         changed = groups(pictures)[0]

@@ -9,6 +9,7 @@ from sqlalchemy import Engine, event
 from app.errors import InputError, NotFoundError, StaleRevisionError
 from app.review.editing.edit import SetLines
 from app.review.editing.ledger import read_ledger
+from app.review.editing.past import history
 from app.review.editing.pitches import (
     change_pitches,
     estimate_pitches,
@@ -20,7 +21,7 @@ from app.review.editing.pitches import (
 )
 from app.review.editing.recompute import solve_dataset, stale_groups
 from app.review.editing.replay import rebuild, replay
-from app.review.editing.submit import history, load, submit, undo
+from app.review.editing.submit import load, submit, undo
 from app.review.importing.ingest import ingest
 from app.review.queue.findings import finding_values
 from app.soccer.annotation import make_lines
@@ -101,7 +102,7 @@ class TestEstimatePitches:
     def test_what_is_known_is_not_computed_again(self, solved, monkeypatch):
         from app.review.editing import pitches
 
-        def refuse(*_):
+        def refuse(*_, **__):
             raise AssertionError("estimated once more")
 
         monkeypatch.setattr(pitches, "estimate_pitch", refuse)
@@ -130,6 +131,56 @@ class TestEstimatePitches:
         assert found[RIGHT].estimate.length == pytest.approx(105.0, abs=0.3)
         # Of pictures that nobody knows enough about nothing is said.
         assert "needs 5" in found[SMALL].problem
+
+
+class TestGroupsWithoutMatch:
+    def test_another_size_is_proposed_and_accepted_for_all_of_them(self, store):
+        nameless = [replace(group, match="") for group in season()[:6]]
+        ingest(store, "demo", nameless, source="files", actor="ann")
+        (item,) = estimate_pitches(store, "demo").proposals
+        assert item.proposed.length == pytest.approx(103.0, abs=0.3)
+        assert item.proposed.width == pytest.approx(66.0, abs=0.3)
+        assert "for the groups without a match under Statistics" in item.sentence
+        accept(store, match="", pitch=TRUE)
+        assert {load(store, number).group.pitch for number in range(1, 7)} == {TRUE}
+        assert read_pitches(store, "demo").proposals == ()
+
+    def test_a_size_holds_for_those_that_it_was_said_of(self, store):
+        first, second, third = (replace(group, match="") for group in season()[:3])
+        ingest(store, "demo", [first, second], source="files", actor="ann")
+        accept(store, match="", pitch=TRUE)
+        (item,) = read_pitches(store, "demo").items
+        assert item.previous == Pitch()
+        changed = replace(first, label="the source says more of it now")
+        ingest(store, "demo", [changed, second, third], source="files", actor="ann")
+        assert [load(store, n).group.pitch for n in (1, 2, 3)] == [TRUE, TRUE, Pitch()]
+        assert load(store, 1).group.label == changed.label
+        # One more came since: the size before was not that of all.
+        assert read_pitches(store, "demo").items[0].previous is None
+        with store.write() as session:
+            give_pitch(session, 1, [3], Pitch(101.0, 65.0), "ann")
+        ingest(store, "demo", [first], source="files", actor="ann")
+        assert [load(store, n).group.pitch.length for n in (1, 2, 3)] == [103.0, 103.0, 101.0]
+        assert read_pitches(store, "demo").items[0].previous is None
+        assert_replays(store)
+
+    def test_of_several_pitches_nothing_is_proposed_and_that_is_said(self, store):
+        nameless = [replace(group, match="") for group in season()]
+        ingest(store, "demo", nameless, source="files", actor="ann")
+        (item,) = estimate_pitches(store, "demo").items
+        assert (item.estimate, item.proposed) == (None, None)
+        assert "pitches of several sizes" in item.problem
+
+    def test_without_lines_they_are_not_told_of(self, store):
+        bare = [
+            replace(
+                group, match="", views=(replace(view, station=replace(view.station, lines={})),)
+            )
+            for group in season()[:2]
+            for view in group.views
+        ]
+        ingest(store, "demo", bare, source="files", actor="ann")
+        assert estimate_pitches(store, "demo").items == ()
 
 
 class TestChangePitches:

@@ -18,6 +18,7 @@ from app.review.datasets.proposal_reading import MISSING
 from app.review.editing import proposals as editing
 from app.review.editing.edit import SetLines
 from app.review.editing.ledger import read_ledger
+from app.review.editing.past import history
 from app.review.editing.proposals import (
     ProposalRun,
     forget_proposals,
@@ -27,7 +28,7 @@ from app.review.editing.proposals import (
 )
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import replay
-from app.review.editing.submit import history, load, submit, undo
+from app.review.editing.submit import load, submit, undo
 from app.review.importing.carry import carried_group
 from app.review.importing.ingest import ingest
 from app.review.queue.listing import list_groups
@@ -142,6 +143,24 @@ class TestProposeViews:
         ((camera,),) = asked
         assert np.linalg.norm(camera.position - CAMERA.position) < 1.0
 
+    def test_cameras_that_say_nothing_of_a_stand_or_lens_are_not_handed_on(
+        self, store, groups, asked
+    ):
+        names = iter(lines_of(CAMERA))
+        mixed = {next(names): points for points in reversed(lines_of(CAMERA).values())}
+        wide = replace(CAMERA, focal_length=(CAMERA.focal_length[0] * 1.1, CAMERA.focal_length[1]))
+        cropped = replace(CAMERA, principal_point=(500.0, 359.5))
+        odd = [
+            Group("3", (view("3", None, given=wide),), match="m"),
+            Group("4", (view("4", None, given=cropped),), match="m"),
+            Group("5", (view("5", None, lines=mixed),), match="m"),
+        ]
+        ingest(store, "demo", [*groups, *odd], source="files", actor="ann")
+        solve_dataset(store, "demo")
+        propose_views(store, "demo")
+        ((camera,),) = asked
+        assert np.linalg.norm(camera.position - CAMERA.position) < 1.0
+
     def test_once_more_compares_pictures_and_looks_at_none(self, filled, asked):
         propose_views(filled, "demo")
         assert propose_views(filled, "demo") == ProposalRun(views=1, left=1)
@@ -162,6 +181,15 @@ class TestProposeViews:
             patch.setattr(proposal_reading, "EXTRACTOR_VERSION", "0")
             propose_views(filled, "demo")
         assert propose_views(filled, "demo") == ProposalRun(views=1, proposed=1)
+
+    def test_where_nothing_was_found_a_later_search_looks_again(
+        self, filled, asked, monkeypatch, tmp_path: Path
+    ):
+        draw(tmp_path / "b.png", empty=True)
+        propose_views(filled, "demo")
+        assert propose_views(filled, "demo") == ProposalRun(views=1, left=1)
+        monkeypatch.setattr(editing, "SEARCH_VERSION", editing.SEARCH_VERSION + 1)
+        assert propose_views(filled, "demo") == ProposalRun(views=1, nothing=1)
 
     def test_where_nothing_was_found_more_of_the_match_is_worth_another_look(
         self, store, groups, asked, tmp_path: Path
@@ -267,6 +295,91 @@ class TestAccepting:
         assert found(filled, "proposal:any") == []
         undo(filled, 2, if_match=load(filled, 2).etag, actor="bob")
         assert found(filled, "proposal:any") == [2]
+
+
+class TestDrawnLines:
+    """Views with lines that determine no camera."""
+
+    @pytest.fixture
+    def poor(self, store: Store, groups, tmp_path: Path) -> Store:
+        """One line in the first view, and enough of them in the second."""
+        few = {"Side line right": lines_of(CAMERA)["Side line right"]}
+        first = view("p.png", draw(tmp_path / "p.png"), lines=few)
+        second = view("q.png", draw(tmp_path / "q.png"), lines=lines_of(CAMERA))
+        bare = view("r.png", None, lines=few)
+        ingest(store, "demo", [Group("3", (first, second, bare), match="m")], source="f", actor="a")
+        return store
+
+    def test_are_looked_at_once_they_are_solved(self, poor, asked):
+        assert propose_views(poor, "demo") == ProposalRun()
+        solve_dataset(poor, "demo")
+        assert counts(poor) == (1, 0, 0, 0, 0, 0)
+        assert propose_views(poor, "demo") == ProposalRun(views=1, proposed=1)
+        assert counts(poor) == (1, 1, 1, 0, 0, 0)
+        assert found(poor, "proposal:proposed") == [1]
+        assert propose_views(poor, "demo") == ProposalRun(views=1, left=1)
+
+    def test_a_camera_that_is_a_guess_is_none(self, store, asked, tmp_path: Path):
+        names = iter(lines_of(CAMERA))
+        mixed = {next(names): points for points in reversed(lines_of(CAMERA).values())}
+        wrong = view("w.png", draw(tmp_path / "w.png"), lines=mixed)
+        ingest(store, "demo", [Group("1", (wrong,), match="m")], source="f", actor="a")
+        solve_dataset(store, "demo")
+        calibration = load(store, 1).solution.views[0].calibration
+        assert calibration.camera is not None and calibration.unobservable
+        assert propose_views(store, "demo") == ProposalRun(views=1, unsure=1)
+        ((_, is_open, item),) = get_group_proposals(store, 1)
+        assert is_open and "Side line right” is drawn" in item.sentence
+
+    def test_stay_and_the_others_join_them_in_one_edit(self, poor, asked):
+        solve_dataset(poor, "demo")
+        propose_views(poor, "demo")
+        before = load(poor, 1)
+        assert before.solution.views[0].calibration.camera is None
+        accept(poor, 1)
+        after = load(poor, 1)
+        station = after.group.views[0].station
+        assert (
+            station.lines["Side line right"]
+            == before.group.views[0].station.lines["Side line right"]
+        )
+        assert set(station.proposed) == {*lines_of(CAMERA)} - {"Side line right"}
+        assert after.solution.views[0].calibration.camera is not None
+        assert counts(poor) == (0, 0, 0, 0, 0, 1)
+        assert not get_group_proposals(poor, 1)[0][1]
+        back = undo(poor, 1, if_match=after.etag, actor="bob")
+        assert back.group == before.group
+        assert get_group_proposals(poor, 1)[0][1]
+
+    def test_that_are_others_now_are_looked_at_again(self, poor, asked):
+        solve_dataset(poor, "demo")
+        propose_views(poor, "demo")
+        at = load(poor, 1)
+        more = SetLines("p.png", {"Big rect. right main": lines_of(CAMERA)["Big rect. right main"]})
+        submit(poor, 1, more, if_match=at.etag, actor="bob")
+        assert not get_group_proposals(poor, 1)[0][1]
+        assert counts(poor) == (1, 0, 0, 0, 0, 0)
+        assert propose_views(poor, "demo") == ProposalRun(views=1, proposed=1)
+        assert counts(poor) == (1, 1, 1, 0, 0, 0)
+        ((_, is_open, item),) = get_group_proposals(poor, 1)
+        assert is_open and "Big rect. right main" not in item.lines
+        # Without any line the one beside them does not count.
+        none = SetLines("p.png", dict.fromkeys(load(poor, 1).group.views[0].station.lines))
+        submit(poor, 1, none, if_match=load(poor, 1).etag, actor="bob")
+        assert not get_group_proposals(poor, 1)[0][1]
+        assert counts(poor) == (1, 0, 0, 0, 0, 0)
+
+    def test_of_a_static_camera_are_looked_at_once(self, store, asked, tmp_path: Path):
+        media, few = (
+            draw(tmp_path / "s.png"),
+            {"Side line right": lines_of(CAMERA)["Side line right"]},
+        )
+        shared = [
+            Group(str(n), (view("cam1", media, shared=True, lines=few),), match="m") for n in (1, 2)
+        ]
+        ingest(store, "demo", shared, source="files", actor="ann")
+        solve_dataset(store, "demo")
+        assert propose_views(store, "demo") == ProposalRun(views=1, proposed=1)
 
 
 class TestQuery:

@@ -7,6 +7,7 @@ from sqlalchemy import text
 
 from app.errors import StorageError
 from app.geometry.camera import Camera
+from app.review.editing.ball_noise import give_factors
 from app.review.editing.edit import IncludeView, SetBall, SetLines, SetStationLines
 from app.review.editing.ledger import read_ledger
 from app.review.editing.replay import rebuild, replay
@@ -20,7 +21,9 @@ from app.review.verdicts.verdict import set_verdict
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.policy import STRICT
+from app.store.noise import Factor
 from app.store.session import Store
+from tests.databases import said_for_sqlite
 
 
 @pytest.fixture
@@ -46,6 +49,12 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
         )
         lines = {"Middle line": None}
     undo_station(store, station.id, if_match=station.etag, actor="ann")
+    with store.write() as session:
+        give_factors(session, 1, (Factor("cam2", None, 2.0), Factor("cam2", "ann", 3.0)), "ann")
+    state = load(store, ids[2])
+    submit(
+        store, ids[2], SetBall(state.group.views[-1].key, ball), if_match=state.etag, actor="ann"
+    )
     _import_changed(store, make_group, make_static)
     ingest_cameras(
         store, "demo", {"8_1": opposite, "cam2": opposite}, source="cameras", actor="ann"
@@ -91,12 +100,12 @@ class TestReplay:
 
     def test_a_table_that_was_changed_behind_the_log_is_seen(self, busy: Store) -> None:
         with busy.write() as session:
-            session.execute(text("UPDATE view SET included = 0 WHERE key = '8.png'"))
+            session.execute(text("UPDATE view SET included = NOT included WHERE key = '8.png'"))
         with busy.read() as session:
             assert replay(session) != read_ledger(session)
 
     def test_a_log_that_was_tampered_with_is_refused(self, busy: Store) -> None:
-        with busy.write() as session:
+        with busy.write() as session, said_for_sqlite(session):
             session.execute(text("DROP TRIGGER log_refuses_update"))
             session.execute(text("UPDATE log SET actor = 'eve' WHERE id = 3"))
         with busy.read() as session, pytest.raises(StorageError, match="row 3 of the log"):

@@ -19,9 +19,10 @@ from app.errors import (
 from app.review.editing import state as state_module
 from app.review.editing import submit as submit_module
 from app.review.editing.edit import IncludeView, SetBall, SetBalls, SetLines, SetPicture
+from app.review.editing.past import history
 from app.review.editing.solve_encoded import solve_encoded
 from app.review.editing.state import GroupState
-from app.review.editing.submit import history, load, preview, redo, solved, submit, undo
+from app.review.editing.submit import load, preview, redo, solved, submit, undo
 from app.review.policies.policy import change_policy
 from app.review.queue.listing import list_groups
 from app.soccer.annotation import BallAnnotation
@@ -32,6 +33,7 @@ from app.soccer.policy import STRICT
 from app.solving.solve import solve
 from app.store import solutions
 from app.store.session import Store
+from tests.databases import said_for_sqlite
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))
@@ -80,9 +82,9 @@ class TestSubmit:
     def test_edit_revision_solution_and_log_are_one_transaction(self, store, state, step) -> None:
         """Whichever of its writes fails, the others have not happened."""
         before = {name: count(store, name) for name in ("log", "solution", "calibration")}
-        with store.write() as session:
+        with store.write() as session, said_for_sqlite(session):
             session.execute(
-                text(f"CREATE TRIGGER full BEFORE {step} BEGIN SELECT RAISE(ABORT, 'full'); END")
+                text(f"CREATE TRIGGER spoils BEFORE {step} BEGIN SELECT RAISE(ABORT, 'full'); END")
             )
         with pytest.raises(StorageError, match="could not carry out"):
             change(store, state, SetBall("7.png", BALL))
@@ -205,6 +207,8 @@ class TestUndo:
             SetBall("7.png", BALL),
             SetLines("7_1.png", {"Middle line": None}),
             IncludeView("7_1.png", False),
+            # More steps, there and back, than are read of a history at first.
+            *(IncludeView("7_1.png", included) for included in (True, False, True)),
         ]
         states = [state]
         for edit in edits:

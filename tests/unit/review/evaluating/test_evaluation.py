@@ -285,7 +285,7 @@ class TestCompare:
 class TestRemoveEvaluation:
     def test_takes_its_frames_along(self, store, exact) -> None:
         run = run_evaluation(store, "demo", EvaluationRequest(predictions=exact.id), actor="ann")
-        remove_evaluation(store, run.id)
+        remove_evaluation(store, run.id, actor="local")
         with pytest.raises(NotFoundError):
             get_evaluation(store, run.id)
         with store.read() as session:

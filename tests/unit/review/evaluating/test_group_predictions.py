@@ -90,7 +90,7 @@ class TestAcceptedBall:
     def test_outlives_its_set_but_not_the_score(self, store, ids, add) -> None:
         found = add("yolo", ("7.png", 10, 0.75))
         accept_first(store, ids[0], "bob")
-        delete_predictions(store, found.id)
+        delete_predictions(store, found.id, actor="local")
         (ball,) = group_predictions(store, ids[0]).accepted
         assert (ball.name, ball.score, ball.actor) == ("yolo", None, "bob")
 

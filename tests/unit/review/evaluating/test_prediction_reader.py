@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from app.config import Settings
-from app.datasets.archive import Limits
+from app.datasets.file_tree import Limits
 from app.errors import DatasetFormatError, OverloadedError, TooLargeError
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.review.evaluating import prediction_reader

@@ -118,12 +118,12 @@ class TestDeletePredictions:
         found = add_predictions(
             store, "demo", "a", results(tmp_path / "a.json", "7.png"), actor="a"
         )
-        delete_predictions(store, found.id)
+        delete_predictions(store, found.id, actor="local")
         assert view_predictions(store, state.view_ids["7.png"]) == []
         with pytest.raises(NotFoundError):
             get_predictions(store, found.id)
         with pytest.raises(NotFoundError):
-            delete_predictions(store, found.id)
+            delete_predictions(store, found.id, actor="local")
 
     def test_a_view_that_goes_takes_its_predictions_along(self, store, state, tmp_path) -> None:
         add_predictions(

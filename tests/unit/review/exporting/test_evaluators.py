@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from app.review.datasets.batch import score_files
+from app.review.datasets.score_files import score_files
 from app.review.exporting.export import export
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize

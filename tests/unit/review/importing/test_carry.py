@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from app.datasets.archive import DEFAULT_LIMITS
+from app.datasets.file_tree import DEFAULT_LIMITS
 from app.datasets.report import Report
 from app.errors import InputError
 from app.review.datasets.dataset import get_dataset
@@ -20,11 +20,12 @@ from app.review.editing.edit import (
     SetStationLines,
 )
 from app.review.editing.ledger import read_ledger
+from app.review.editing.past import history
 from app.review.editing.pitches import change_pitches, read_pitches
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import replay
 from app.review.editing.stations import load_station, submit_station, undo_station
-from app.review.editing.submit import history, load, submit, undo
+from app.review.editing.submit import load, submit, undo
 from app.review.exporting.export import export
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.carry import GROUPS, STATIONS

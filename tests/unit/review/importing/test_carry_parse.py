@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from app.datasets.archive import open_tree
 from app.datasets.report import Report
+from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError, InputError
 from app.review.importing.carry_parse import FORMAT, FORMAT_VERSION, HEAD, _station, read_head
 from app.soccer.frames import ImageSize

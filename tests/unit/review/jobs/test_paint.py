@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import replace
 
 import pytest
 
+from app.errors import StorageError
 from app.review.editing import paint as editing
 from app.review.editing.paint import get_paint
 from app.review.importing.ingest import ingest
 from app.review.jobs import paint as paint_job
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.paint import request_paint, resume_reading, take_paint_back
+from app.review.jobs.paint import PAINT, take_paint_back
 from app.review.policies.policy import change_policy
 from app.soccer.group import Group, Media
 from app.soccer.policy import TOUCHLINE
+from app.store.jobs import NewJob, insert_job
 from app.store.log import read_log
 from app.store.session import Store
 from tests.unit.review.editing.test_positions import match
+from tests.unit.review.jobs.steps import Held, stopped_at_its_first_step
 from tests.waiting import SECONDS
 
 
@@ -43,7 +45,7 @@ def asked(store: Store) -> Store:
 
 def test_it_counts_solves_and_is_taken_back(asked: Store) -> None:
     jobs = Jobs(asked)
-    done = jobs.wait(request_paint(jobs, asked, "demo", None, actor="ann").id, SECONDS)
+    done = jobs.wait(PAINT.request(jobs, asked, "demo", None, actor="ann").id, SECONDS)
     assert (done.state, done.result["views"], done.result["no_frame"]) == ("done", 12, 12)
     assert (done.result["read"], done.result["without_picture"]) == (12, 0)
     assert done.sentence == "6 of 6 groups looked at"
@@ -54,26 +56,73 @@ def test_it_counts_solves_and_is_taken_back(asked: Store) -> None:
     jobs.close()
 
 
-def test_a_server_that_stops_leaves_it_to_the_next_one(asked: Store, monkeypatch) -> None:
-    started, whole = threading.Event(), paint_job.read_paint
+def test_a_reading_that_is_taken_back_while_it_runs_gives_nothing_more(
+    asked: Store, monkeypatch
+) -> None:
     monkeypatch.setattr(editing, "_A_CHILD", 1)
+    jobs, looked = Jobs(asked), Held(editing._readings, calls=2)
+    monkeypatch.setattr(editing, "_readings", looked)
+    job = PAINT.request(jobs, asked, "demo", None, actor="ann")
+    looked.wait()
+    assert get_paint(asked, "demo").items[0].read > 0
+    take_paint_back(jobs, asked, "demo", actor="ann")
+    looked.go_on.set()
+    assert jobs.wait(job.id, SECONDS).state == "cancelled"
+    assert get_paint(asked, "demo").items[0].read == 0
+    jobs.close()
 
-    def stopping(*arguments, progress, **options):
-        def told(done, total):
-            started.set()
-            while True:
-                progress(done, total)
 
-        return whole(*arguments, progress=told, **options)
+def test_one_that_is_stopped_before_it_gave_anything_takes_no_earlier_one_along(
+    asked: Store, monkeypatch
+) -> None:
+    jobs = Jobs(asked)
+    first = PAINT.request(jobs, asked, "demo", None, actor="ann")
+    assert jobs.wait(first.id, SECONDS).state == "done"
+    looked = Held(editing._readings, calls=1)
+    monkeypatch.setattr(editing, "_readings", looked)
+    job = PAINT.request(jobs, asked, "demo", None, actor="ann")
+    looked.wait()
+    take_paint_back(jobs, asked, "demo", actor="ann")
+    looked.go_on.set()
+    assert jobs.wait(job.id, SECONDS).state == "cancelled"
+    assert get_paint(asked, "demo").items[0].read == 12
+    jobs.close()
 
+
+def test_one_that_runs_goes_on_where_the_take_back_is_not_kept(asked: Store, monkeypatch) -> None:
+    def full(_job):
+        raise StorageError("the disk is full")
+
+    jobs, looked = Jobs(asked), Held(editing._readings, calls=1)
+    monkeypatch.setattr(editing, "_readings", looked)
+    job = PAINT.request(jobs, asked, "demo", None, actor="ann")
+    looked.wait()
+    with pytest.raises(StorageError):
+        take_paint_back(jobs, asked, "demo", actor="ann", keep=full)
+    looked.go_on.set()
+    assert jobs.wait(job.id, SECONDS).state == "done"
+    assert get_paint(asked, "demo").items[0].read == 12
+    jobs.close()
+
+
+def test_a_record_that_nobody_works_on_keeps_nothing_from_being_taken_back(asked: Store) -> None:
+    jobs = Jobs(asked)
+    job = PAINT.request(jobs, asked, "demo", None, actor="ann")
+    assert jobs.wait(job.id, SECONDS).state == "done"
+    with asked.write() as session:
+        insert_job(session, NewJob("paint", "Read", "ann", 1, {"match": None, "run": "lost"}))
+    take_paint_back(jobs, asked, "demo", actor="ann")
+    assert get_paint(asked, "demo").items[0].read == 0
+    jobs.close()
+
+
+def test_a_server_that_stops_leaves_it_to_the_next_one(asked: Store, monkeypatch) -> None:
+    monkeypatch.setattr(editing, "_A_CHILD", 1)
     first = Jobs(asked)
-    with monkeypatch.context() as patch:
-        patch.setattr(paint_job, "read_paint", stopping)
-        job = request_paint(first, asked, "demo", None, actor="ann")
-        assert started.wait(SECONDS)
-        first.close()
+    with stopped_at_its_first_step(paint_job, "read_paint", first):
+        job = PAINT.request(first, asked, "demo", None, actor="ann")
     second = Jobs(asked)
-    resume_reading(second, asked)
+    PAINT.resume(second, asked)
     second.start()
     assert second.wait(job.id, SECONDS).state == "done"
     second.close()

@@ -8,12 +8,14 @@ from dataclasses import replace
 import pytest
 
 from app.review.editing import positions as editing
+from app.review.editing.positions import get_positions
 from app.review.importing.ingest import ingest
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.positions import request_positions
+from app.review.jobs.positions import POSITIONS, take_positions_back
 from app.review.policies.policy import change_policy
 from app.store.session import Store
 from tests.unit.review.editing.test_positions import SHARING, match
+from tests.unit.review.jobs.steps import Held
 from tests.waiting import SECONDS
 
 
@@ -34,7 +36,7 @@ def test_matches_are_worked_on_in_processes_of_their_own(two: Store) -> None:
         return pools[-1]
 
     jobs = Jobs(two, pool=pool)
-    job = request_positions(jobs, two, "demo", None, actor="ann")
+    job = POSITIONS.request(jobs, two, "demo", None, actor="ann")
     assert jobs.wait(job.id, SECONDS).state == "done"
     assert len(pools) == 1
     jobs.close()
@@ -52,7 +54,24 @@ def test_what_was_written_before_it_failed_is_solved(
 
     monkeypatch.setattr(editing, "_estimate", estimate)
     jobs = Jobs(two)
-    job = request_positions(jobs, two, "demo", None, actor="ann")
+    job = POSITIONS.request(jobs, two, "demo", None, actor="ann")
     assert jobs.wait(job.id, SECONDS).state == "failed"
     assert [item.kind for item in jobs.find()] == ["solve", "positions"]
+    jobs.close()
+
+
+@pytest.mark.parametrize(
+    ("match", "shared"), [("0", [None, None]), ("1", [True, None])], ids=["given", "next"]
+)
+def test_a_share_that_is_taken_back_while_it_runs_gives_nothing_more(
+    two: Store, monkeypatch: pytest.MonkeyPatch, match: str, shared: list[bool | None]
+) -> None:
+    jobs, estimated = Jobs(two), Held(editing._estimate, calls=2)
+    monkeypatch.setattr(editing, "_estimate", estimated)
+    job = POSITIONS.request(jobs, two, "demo", None, actor="ann")
+    estimated.wait()
+    take_positions_back(jobs, two, "demo", match, actor="ann")
+    estimated.go_on.set()
+    assert jobs.wait(job.id, SECONDS).state == "cancelled"
+    assert [item.current for item in get_positions(two, "demo").items] == shared
     jobs.close()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
 
 import pytest
@@ -13,11 +12,12 @@ from app.review.editing.proposals import get_proposals
 from app.review.importing.ingest import ingest
 from app.review.jobs import proposals as proposals_job
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.proposals import request_proposals, resume_proposals
+from app.review.jobs.proposals import PROPOSALS, stop_and_forget
 from app.soccer.group import Group, Media, Station, View
 from app.store.session import Store
 from tests.cameras import SIZE
 from tests.unit.review.editing.test_paint import Here
+from tests.unit.review.jobs.steps import Held, stopped_at_its_first_step
 from tests.waiting import SECONDS
 
 VIEWS = 5
@@ -37,36 +37,49 @@ def gone(store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store
 
 def test_it_counts_and_solves_nothing(gone: Store) -> None:
     jobs = Jobs(gone)
-    done = jobs.wait(request_proposals(jobs, gone, "demo", None, actor="ann").id, SECONDS)
+    done = jobs.wait(PROPOSALS.request(jobs, gone, "demo", None, actor="ann").id, SECONDS)
     assert (done.state, done.sentence) == ("done", f"{VIEWS} of {VIEWS} views looked at")
     assert (done.result["views"], done.result["missing"], done.result["left"]) == (5, 5, 0)
     assert jobs.find(kinds=["solve"]) == []
     with pytest.raises(NotFoundError):
-        request_proposals(jobs, gone, "demo", "final", actor="ann")
+        PROPOSALS.request(jobs, gone, "demo", "final", actor="ann")
+    jobs.close()
+
+
+def test_asking_counts_nothing(gone: Store, monkeypatch) -> None:
+    def refuse(*_arguments):
+        raise AssertionError("every match was counted")
+
+    monkeypatch.setattr(editing, "match_proposals", refuse)
+    jobs = Jobs(gone)
+    job = PROPOSALS.request(jobs, gone, "demo", "", actor="ann")
+    assert jobs.wait(job.id, SECONDS).result["views"] == VIEWS
+    jobs.close()
+
+
+def test_what_a_search_finds_after_all_is_forgotten_is_not_kept(gone: Store, monkeypatch) -> None:
+    monkeypatch.setattr(editing, "_A_CHILD", 2)
+    jobs, looked = Jobs(gone), Held(editing._answers, calls=2)
+    monkeypatch.setattr(editing, "_answers", looked)
+    job = PROPOSALS.request(jobs, gone, "demo", None, actor="ann")
+    waiting = PROPOSALS.request(jobs, gone, "demo", None, actor="ann")
+    looked.wait()
+    kept = get_proposals(gone, "demo").count("looked")
+    assert 0 < stop_and_forget(jobs, gone, "demo") == kept < VIEWS
+    looked.go_on.set()
+    assert jobs.wait(job.id, SECONDS).state == jobs.get(waiting.id).state == "cancelled"
+    assert get_proposals(gone, "demo").count("looked") == 0
     jobs.close()
 
 
 def test_a_server_that_stops_leaves_it_to_the_next_one(gone: Store, monkeypatch) -> None:
-    started, whole = threading.Event(), proposals_job.propose_views
     monkeypatch.setattr(editing, "_A_CHILD", 1)
-
-    def stopping(*arguments, progress, **options):
-        def told(done, total):
-            started.set()
-            while True:
-                progress(done, total)
-
-        return whole(*arguments, progress=told, children=1, **options)
-
     first = Jobs(gone)
-    with monkeypatch.context() as patch:
-        patch.setattr(proposals_job, "propose_views", stopping)
-        job = request_proposals(first, gone, "demo", None, actor="ann")
-        assert started.wait(SECONDS)
-        first.close()
+    with stopped_at_its_first_step(proposals_job, "propose_views", first, children=1):
+        job = PROPOSALS.request(first, gone, "demo", None, actor="ann")
     assert get_proposals(gone, "demo").count("looked") == 1
     second = Jobs(gone)
-    resume_proposals(second, gone)
+    PROPOSALS.resume(second, gone)
     second.start()
     assert second.wait(job.id, SECONDS).state == "done"
     second.close()

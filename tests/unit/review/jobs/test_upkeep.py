@@ -188,7 +188,7 @@ class TestUpkeep:
         # Instead of a look that takes minutes: its number would be taken for a fault.
         count = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 2000000)"
         slow = text(f"{count} SELECT CAST(count(*) AS TEXT) FROM n")
-        monkeypatch.setattr("app.store.soundness.text", lambda _: slow)
+        monkeypatch.setattr("app.store.dialect.sqlite.text", lambda _: slow)
         there.require_whole(lambda: False)
         with pytest.raises(DamagedError):
             there.require_whole()

@@ -19,6 +19,7 @@ from app.soccer.policy import STRICT
 from app.store.clock import now
 from app.store.models import GroupModel, QueueModel
 from app.store.session import Store
+from tests.waiting import SECONDS
 
 
 def test_groups_that_wait_are_counted_and_the_oldest_is_timed(
@@ -74,6 +75,6 @@ def test_jobs_are_counted_by_kind_and_state(store: Store, fill, make_group) -> N
     assert read_home(store).jobs == {}
     jobs = Jobs(store)
     job = request_solve(jobs, store, get_dataset(store, "demo").id, actor="ann")
-    jobs.wait(job.id, 30)
+    jobs.wait(job.id, SECONDS)
     jobs.close()
     assert read_home(store).jobs == {("solve", "done"): 1}

@@ -23,7 +23,7 @@ from app.review.people import links, passwords
 from app.review.people.logins import IDLE, LASTS, Login, Logins
 from app.review.people.names import checked_name
 from app.review.people.people import change_person, find_person, invite, list_people, renew_link
-from app.review.people.roles import Action, Role, may, require
+from app.review.people.roles import Action, DatasetRoles, Role, may, require
 from app.store.log import read_log
 from app.store.people import update_person
 from app.store.session import Store
@@ -184,6 +184,13 @@ class TestLogins:
             logins.log_in("nobody", SECRET)
         assert len(asked) == 1
 
+    def test_who_asks_and_what_they_may_is_one_statement(self, home, logins, counted) -> None:
+        join(home, "anna", Role.LEAD)
+        token = logins.log_in("anna", SECRET)
+        with counted(home) as cost:
+            assert found(logins, token).role is Role.LEAD
+        assert (cost.statements, cost.reads, cost.writes) == (1, 0, 0)
+
     def test_it_ends_when_nobody_uses_it(self, home, logins, clock) -> None:
         join(home, "anna")
         token = logins.log_in("anna", SECRET)
@@ -300,3 +307,30 @@ class TestChangePerson:
         invite(home, "bob", Role.VIEWER, actor="anna")
         told = [(one.name, one.joined, one.invited, one.created_by) for one in list_people(home)]
         assert told == [("anna", True, False, "local"), ("bob", False, True, "anna")]
+
+
+class TestDatasetRoles:
+    """Store ids 1 and 2; somebody who is reviewer everywhere but in the first."""
+
+    def test_a_single_role_takes_the_place_of_the_one_everywhere(self) -> None:
+        for single in (Role.NONE, Role.VIEWER, Role.LEAD):
+            roles = DatasetRoles(Role.REVIEWER, {1: single})
+            assert [roles.role_in(key) for key in (1, 2)] == [single, Role.REVIEWER]
+        assert DatasetRoles(Role.ADMIN, {1: Role.NONE}).role_in(1) is Role.ADMIN
+
+    def test_rights_in_one_dataset_alone_are_none_elsewhere(self) -> None:
+        one = DatasetRoles(Role.ADMIN).only(1)
+        assert (one.role_in(1), one.role_in(2), one.is_admin) == (Role.ADMIN, Role.NONE, False)
+
+    @pytest.mark.parametrize(
+        ("everywhere", "single", "seen"),
+        [
+            (Role.VIEWER, {1: Role.NONE}, [False, True]),
+            (Role.NONE, {1: Role.VIEWER}, [True, False]),
+            (Role.NONE, {}, [False, False]),
+        ],
+    )
+    def test_what_somebody_sees(self, everywhere: Role, single: dict, seen: list[bool]) -> None:
+        sight = DatasetRoles(everywhere, single).sight("anna")
+        assert [sight.sees(key) for key in (1, 2)] == seen
+        assert [sight.sees(None, name) for name in ("anna", "bob")] == [True, False]

@@ -2,38 +2,92 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app.errors import DegenerateGeometryError, InputError, NotFoundError
+from app.review.editing.codec import edit_to_json
+from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset, stale_groups
+from app.review.editing.state import GroupState, read_states
 from app.review.importing.ingest import ensure_dataset, ingest
 from app.review.policies import noise
-from app.review.policies.noise import apply_noise, read_noise
-from app.soccer.annotation import BallAnnotation
+from app.review.policies.noise import apply_noise, read_noise, take_noise_back
+from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
 from app.solving.ball_noise import Miss
+from app.solving.resect import REFERENCE_DIAGONAL
 from app.solving.spread import CLICK_DIAGONAL
+from app.store.log import Entry, append
 from app.store.session import Store
+from app.store.solutions import present_solutions
 from tests.cameras import SIZE
 from tests.unit.review.conftest import BEHIND, MAIN, OPPOSITE, drawn
 
 UNIT = SIZE.diagonal / CLICK_DIAGONAL
 NOISY = 3.0
+LINE_NOISY = 0.4
+"""Of a point on a line, pixels at 960 x 540: less than what is assumed of an image alone."""
 
 
-def blurred(key: str, rng: np.random.Generator, *, given: bool) -> Group:
-    """A ball somewhere, clicked with noise in three views of known cameras."""
+def blurred(key: str, rng: np.random.Generator, *, given: bool, noisy: str = "") -> Group:
+    """A ball somewhere, clicked with noise in three views of known cameras, one of them noisier."""
     place = np.array([[rng.uniform(0, 10), rng.uniform(-5, 5), -1.0]])
     views = []
     for name, camera in (("a", MAIN), ("b", BEHIND), ("c", OPPOSITE)):
-        x, y = camera.project(place)[0] + rng.normal(0, NOISY * UNIT, 2)
+        x, y = camera.project(place)[0] + rng.normal(
+            0, NOISY * UNIT * (4 if name == noisy else 1), 2
+        )
         lines = {} if given else drawn(camera)
         known = camera if given else None
         station = Station(name, SIZE, shared=True, lines=lines, given=known)
         views.append(View(name, station, (BallAnnotation(point=ImagePoint(x, y)),)))
     return Group(key, tuple(views))
+
+
+def own_lines(view: View, name: str, rng: np.random.Generator) -> View:
+    """The view with a station of its own, its lines clicked anew."""
+    camera = {"a": MAIN, "b": BEHIND, "c": OPPOSITE}[view.key]
+    unit = SIZE.diagonal / REFERENCE_DIAGONAL
+    lines = {
+        marking: (np.array(points) + rng.normal(0, LINE_NOISY * unit, (len(points), 2))).tolist()
+        for marking, points in drawn(camera).items()
+    }
+    return replace(view, station=Station(name, SIZE, lines=make_lines(lines)))
+
+
+def placings(states: Sequence[GroupState]) -> Iterator[Entry]:
+    """Ann placed every ball; then Bea those of every other group once more, and Cleo the others."""
+    for state in states:
+        for view in state.group.views:
+            body = {"edit": edit_to_json(SetBall(view.key, view.balls[0]))}
+            for actor in ("ann", "bea" if state.id % 2 else "cleo"):
+                yield Entry("edit", actor, "2026-01-01T00:00:00Z", body, 1, state.id)
+
+
+def read_states_of(store: Store) -> list[GroupState]:
+    """Every group of the first dataset."""
+    with store.read() as session:
+        return read_states(session, [row[0] for row in present_solutions(session, 1)])
+
+
+def _spreads(store: Store) -> np.ndarray:
+    """Sigma of each camera's position, metres."""
+    states = read_states_of(store)
+    found = [
+        view.calibration for state in states if state.solution for view in state.solution.views
+    ]
+    return np.array([item.position_sigma_m for item in found])
+
+
+def _mean_sigma(store: Store) -> float:
+    """Of the balls, metres."""
+    balls = [state.solution.ball for state in read_states_of(store) if state.solution]
+    return float(np.mean([ball.sigma_m for ball in balls if ball is not None]))
 
 
 def make(store: Store, *, given: bool) -> None:
@@ -53,6 +107,58 @@ class TestReadNoise:
         assert "too small" in found.notices[0]
         assert (found.groups, found.solved) == (25, 25)
         assert found.lines is not None and found.lines.views == 3
+
+    def test_a_camera_and_a_person_with_noisier_balls_are_named(self, store: Store) -> None:
+        rng = np.random.default_rng(5)
+        groups = [blurred(str(n), rng, given=False, noisy="b") for n in range(40)]
+        ingest(store, "demo", groups, source="test", actor="ann")
+        solve_dataset(store, "demo")
+        with store.write() as session:
+            append(session, [*placings(read_states_of(store))])
+        found = read_noise(store, "demo")
+        worst, *rest = found.stations
+        assert worst.source == "b" and not any(one.differs for one in rest if one.ratio > 1)
+        assert worst.low < 4 * NOISY < worst.high and worst.differs
+        assert {one.source for one in found.people} == {"bea", "cleo"}
+        assert not any(one.differs for one in found.people)
+        # Sigma of the balls of camera b follows once it is accepted, and nothing is new then.
+        assert found.is_new and found.used == ()
+        sigma = _mean_sigma(store)
+        apply_noise(store, found, actor="ben")
+        carried = {view.noise for state in read_states_of(store) for view in state.group.views}
+        assert carried <= {item.ratio for item in found.factors} and max(carried) > 1.5
+        solve_dataset(store, "demo")
+        again = read_noise(store, "demo")
+        assert not again.is_new and again.used == found.factors
+        assert _mean_sigma(store) > sigma
+        assert take_noise_back(store, "demo", actor="ben") == 40
+        assert {view.noise for state in read_states_of(store) for view in state.group.views} == {1}
+
+    def test_lines_of_many_images_know_their_noise_together(self, store: Store) -> None:
+        """A policy that leaves it to each image is told, and agrees once it has taken it over."""
+        rng = np.random.default_rng(1)
+        groups = [
+            Group(str(n), tuple(own_lines(view, f"{n}{view.key}", rng) for view in group.views))
+            for n in range(8)
+            for group in [blurred(str(n), rng, given=False)]
+        ]
+        ingest(store, "demo", groups, source="test", actor="ann")
+        solve_dataset(store, "demo")
+        found = read_noise(store, "demo")
+        assert found.line_estimate is not None and found.line_estimate.views == 24
+        advice = {item.name: item for item in found.advice}
+        sigma, share = advice["calibration.line_sigma_px"], advice["calibration.line_share"]
+        assert (sigma.present, sigma.agrees, share.present) == (None, False, None)
+        assert sigma.low < LINE_NOISY < sigma.high and share.low <= 0.1
+        assert "weighed image by image" in " ".join(found.notices)
+        before = _spreads(store)
+        state = apply_noise(store, found, actor="ben")
+        assert state.policy.calibration.line_sigma_px == sigma.estimate
+        assert len(stale_groups(store, state.dataset_id)) == 8
+        solve_dataset(store, "demo")
+        assert (_spreads(store) < before).mean() > 0.8
+        again = read_noise(store, "demo")
+        assert all(item.agrees for item in again.advice if "line" in item.name)
 
     def test_of_given_cameras_it_is_theirs(self, store: Store) -> None:
         make(store, given=True)

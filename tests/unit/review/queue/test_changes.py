@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.review.datasets.dataset import get_dataset
+from app.review.datasets.delete import delete_dataset
 from app.review.editing.edit import IncludeView, SetStationCalibration
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.stations import load_station, submit_station
@@ -93,6 +94,15 @@ class TestReadChanges:
             (name, "everything") for name in ("one", "two", "three")
         }
         assert {item.id for item in told} == {newest(store)}
+
+    def test_that_a_dataset_is_gone_is_told_once(self, store: Store, fill, make_group) -> None:
+        fill(make_group(7))
+        before = newest(store)
+        change_policy(store, "demo", STRICT, if_match=None, actor="eve")
+        delete_dataset(store, "demo", confirm="demo", actor="eve")
+        assert [(item.dataset, item.group_id, item.id) for item in since(store, before)] == [
+            (None, None, newest(store))
+        ]
 
 
 class TestReadSolved:

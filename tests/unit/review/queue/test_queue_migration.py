@@ -18,8 +18,11 @@ from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict
 from app.store.engine import make_engine
 from app.store.migrate import KNOWN_REVISIONS, migrate, schema_revision
+from app.store.models import QUEUE_NUMBERS
 from app.store.queue import refresh_queue
 from app.store.session import Store
+
+pytestmark = pytest.mark.file_of_sqlite("homes of released versions, which had a file")
 
 PLACES = ("distance_m", "box_px", "x_m", "y_m")
 
@@ -27,13 +30,43 @@ PLACES = ("distance_m", "box_px", "x_m", "y_m")
 def as_before(store: Store) -> None:
     """Take back what migration 0005 does, and what came after it."""
     with store.write() as session:
-        for table in ("login", "one_time_link", "person"):
+        for trigger in ("group_new", "group_change", "group_solved"):
+            session.execute(text(f"DROP TRIGGER {trigger}_is_marked"))
+        session.execute(text("DROP TABLE group_change"))
+        for table in ("begun", "attempt"):
+            session.execute(text(f"DROP TABLE {table}"))
+        session.execute(text("ALTER TABLE job DROP COLUMN ending"))
+        session.execute(text("DROP INDEX queue_scanned"))
+        for table in ("agreement_limits", "agreement"):
+            session.execute(text(f"DROP TABLE {table}"))
+        for table in ("guideline_picture", "guideline", "gold", "take", "copy_dataset"):
+            session.execute(text(f"DROP TABLE {table}"))
+        for table in ("lease", "batch_group", "batch_person", "batch"):
+            session.execute(text(f"DROP TABLE {table}"))
+        for table in ("bell", "comment_mention", "comment", "thread"):
+            session.execute(text(f"DROP TABLE {table}"))
+        for name in QUEUE_NUMBERS:
+            session.execute(text(f"DROP INDEX queue_{name}"))
+        for table in ("webhook_delivery", "webhook"):
+            session.execute(text(f"DROP TABLE {table}"))
+        for table in (
+            "identity",
+            "passkey",
+            "access_token",
+            "recovery_code",
+            "second_factor",
+            "team_setting",
+        ):
+            session.execute(text(f"DROP TABLE {table}"))
+        for table in ("actor_alias", "dataset_role", "login", "one_time_link", "person"):
             session.execute(text(f"DROP TABLE {table}"))
         session.execute(text("DROP TABLE proposal"))
         session.execute(text("ALTER TABLE station DROP COLUMN proposed"))
         session.execute(text("ALTER TABLE queue DROP COLUMN agreement"))
         session.execute(text("DROP TABLE paint_evidence"))
         session.execute(text("ALTER TABLE groups DROP COLUMN paint"))
+        session.execute(text("ALTER TABLE dataset DROP COLUMN noise"))
+        session.execute(text("ALTER TABLE view DROP COLUMN noise"))
         session.execute(text("ALTER TABLE station DROP COLUMN picture"))
         session.execute(text("ALTER TABLE groups DROP COLUMN positions"))
         session.execute(text("DROP TABLE pitch_estimate"))

@@ -24,6 +24,7 @@ from app.soccer.split import Split
 from app.store.models import LogModel, SolutionModel
 from app.store.version_models import FrozenModel, VersionGroupModel, VersionModel
 from app.store.versions import read_rows
+from tests.databases import said_for_sqlite
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 
@@ -40,6 +41,14 @@ def frozen(store, name="v1", **options):
 def rows_of(store, version):
     with store.read() as session:
         return list(read_rows(session, version.id))
+
+
+def without_markings(solution):
+    """What a version needs of a solution."""
+    views = tuple(
+        replace(view, calibration=replace(view.calibration, markings=())) for view in solution.views
+    )
+    return replace(solution, views=views)
 
 
 @pytest.fixture
@@ -159,7 +168,7 @@ class TestFreeze:
             (row, _) = read_rows(session, version.id, members=True)
             (item,) = thaw(session, version, [row])
         assert item.group == before.group
-        assert item.solution == before.solution
+        assert item.solution == without_markings(before.solution)
 
     def test_a_shared_camera_is_frozen_once(self, store, fill, make_static) -> None:
         fill(*(make_static(frame) for frame in (10, 11, 12)))
@@ -261,18 +270,20 @@ class TestTriggers:
     )
     def test_the_database_refuses_to_change_a_version(self, store, judged, statement) -> None:
         frozen(store)
-        with store.write() as session, pytest.raises(Exception, match="never changed"):
-            session.execute(text(statement))
+        with store.write() as session, said_for_sqlite(session):
+            with pytest.raises(Exception, match="never changed"):
+                session.execute(text(statement))
+            session.rollback()
 
     def test_frozen_content_is_not_replaced(self, store, judged) -> None:
         frozen(store)
-        with store.write() as session:
+        with store.write() as session, said_for_sqlite(session):
             session.execute(text("INSERT OR REPLACE INTO frozen SELECT 1, key, x'00' FROM frozen"))
             assert not session.scalar(text("SELECT count(*) FROM frozen WHERE body = x'00'"))
 
     def test_versions_go_with_their_dataset_alone(self, store, judged) -> None:
         frozen(store)
-        with store.write() as session:
+        with store.write() as session, said_for_sqlite(session):
             session.execute(text("PRAGMA defer_foreign_keys = ON"))
             session.execute(text("DELETE FROM dataset"))
             for model in (VersionModel, VersionGroupModel, FrozenModel):

@@ -17,6 +17,7 @@ from app.review.versions.verify import verify
 from app.soccer.solution import Solution
 from app.solving.solve import NO_CALIBRATIONS, solve
 from app.store.frozen import body_of, text_of
+from tests.databases import said_for_sqlite
 
 
 def one_bit_off(group, policy, calibrations: Mapping = NO_CALIBRATIONS) -> Solution:
@@ -44,7 +45,7 @@ def tamper(store, prefix: str, change) -> None:
     """Change frozen content behind the service's back."""
     table = "calibration" if prefix == "calibration:" else "frozen"
     where = "" if table == "calibration" else "WHERE key LIKE :prefix"
-    with store.write() as session:
+    with store.write() as session, said_for_sqlite(session):
         session.execute(text(f"DROP TRIGGER {table}_refuses_update"))
         statement = text(f"SELECT key, body FROM {table} {where} ORDER BY key LIMIT 1")
         row = session.execute(statement, {"prefix": f"{prefix}%"} if where else {}).one()
@@ -95,14 +96,14 @@ class TestVerify:
         assert prefix == "calibration:" or "digest" in {item.place for item in report.differences}
 
     def test_rows_that_were_changed_do_not_give_the_hash(self, store, version) -> None:
-        with store.write() as session:
+        with store.write() as session, said_for_sqlite(session):
             session.execute(text("DROP TRIGGER version_group_refuses_update"))
             session.execute(text("UPDATE version_group SET split = 'test' WHERE position = 0"))
         places = {item.place for item in verify(store, version.id).differences}
         assert places == {"hash", "split"}
 
     def test_missing_content_is_named(self, store, version) -> None:
-        with store.write() as session:
+        with store.write() as session, said_for_sqlite(session):
             session.execute(text("DROP TRIGGER frozen_refuses_delete"))
             session.execute(text("DELETE FROM frozen WHERE key LIKE 'solution:%'"))
         report = verify(store, version.id)

@@ -1,23 +1,26 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import pytest
-from sqlalchemy import select, text, update
+from sqlalchemy import text, update
 
-from app.review.editing.edit import SetBall
-from app.review.editing.submit import load, submit
-from app.review.yields.facts import Wanted, read_facts
+from app.review.editing.submit import load
+from app.review.yields.facts import read_tables
+from app.review.yields.table import YieldTable
 from app.solving.facts import COLUMNS, group_facts, join
+from app.store.group_changes import groups_from
 from app.store.models import SolutionModel
 from app.store.session import Store
 
 
-def wanted(store: Store) -> list[Wanted]:
-    """Every solution there is, the oldest first."""
-    columns = (SolutionModel.group_id, SolutionModel.inputs_hash, SolutionModel.id)
+def read(store: Store) -> tuple[YieldTable, YieldTable]:
+    """The tables of every group, as it stands."""
     with store.read() as session:
-        rows = session.execute(select(*columns).order_by(SolutionModel.id))
-        return [Wanted(*row) for row in rows]
+        rows: Sequence[Any] = groups_from(session, 1, 0, 100)
+        return read_tables(session, rows)
 
 
 def forget_facts(store: Store) -> None:
@@ -36,8 +39,8 @@ def solved(request, store, fill, make_group, make_static) -> list[int]:
     return groups
 
 
-class TestReadFacts:
-    def test_read_facts_are_those_that_solving_judges(self, store, solved) -> None:
+class TestReadTables:
+    def test_facts_are_those_that_solving_judges(self, store, solved) -> None:
         states = [load(store, group) for group in solved]
         expected = join(
             [
@@ -45,24 +48,15 @@ class TestReadFacts:
                 for state in states
             ]
         )
-        table = read_facts(store, wanted(store))
-        assert table.group_id.tolist() == solved
+        table, bare = read(store)
+        assert (table.group_id.tolist(), bare.groups) == (solved, 0)
         for name in COLUMNS:
             found = getattr(table.facts, name)
             assert np.array_equal(found, getattr(expected, name), equal_nan=True), name
 
-    def test_a_solution_that_is_gone_is_left_out(self, store, solved) -> None:
-        first, *_ = wanted(store)
-        table = read_facts(store, [first, Wanted(solved[1], "inputs", 999)])
-        assert table.group_id.tolist() == [solved[0]]
-
-    def test_facts_that_were_not_kept_are_made_only_for_the_group_as_it_is(
-        self, store, fill, make_group
-    ) -> None:
-        (group,) = fill(make_group(7))
-        edit = SetBall("7.png", None)
-        submit(store, group, edit, if_match=load(store, group).etag, actor="ann")
-        before, after = wanted(store)
-        forget_facts(store)
-        assert read_facts(store, [before]).groups == 0
-        assert read_facts(store, [after]).group_id.tolist() == [group]
+    def test_groups_that_are_not_solved_stand_apart(self, store, solved, fill, make_group) -> None:
+        new = fill(make_group(9, split="test"), solved=False)[-1:]
+        table, bare = read(store)
+        assert (table.group_id.tolist(), bare.group_id.tolist()) == (solved, new)
+        assert sum(bare.count_places().values()) == 1
+        assert {split for _, split in bare.count_places()} == {"test"}

@@ -356,7 +356,7 @@ class TestYieldStore:
         change_policy(store, "demo", replace(STRICT, max_sigma_m=1e-6), if_match=None, actor="ann")
         found = get_yield(yields, 1)
         assert (found.unsolved, found.passing) == (0, 0)
-        assert yields.snapshot(1).table is before.table
+        assert yields.snapshot(1).blocks[0].table is before.blocks[0].table
         other = replace(PAPER, calibration=CalibrationPolicy(robust_scale_px=3.0))
         change_policy(store, "demo", other, if_match=None, actor="ann")
         assert get_yield(yields, 1).unsolved == 2
@@ -373,7 +373,7 @@ class TestYieldStore:
         solve_dataset(store, "other")
         yields = YieldStore(store)
         first = yields.snapshot(get_dataset(store, "demo").id)
-        monkeypatch.setattr("app.review.yields.store.MAX_BYTES", first.table.nbytes)
+        monkeypatch.setattr("app.review.yields.store.MAX_BYTES", first.nbytes)
         yields.snapshot(get_dataset(store, "other").id)
         assert yields.snapshot(1) is not first
         assert np.array_equal(

@@ -7,7 +7,9 @@ import pytest
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_writer import write_line_files
 from app.errors import DatasetFormatError, InputError
-from app.review.datasets.batch import calibrate_files, estimate_pitch_of_files, score_files
+from app.review.datasets.calibrate_files import calibrate_files
+from app.review.datasets.pitch_files import estimate_pitch_of_files
+from app.review.datasets.score_files import score_files
 from app.soccer.annotation import make_lines
 from app.soccer.pitch import Pitch
 from tests.cameras import SIZE, looking

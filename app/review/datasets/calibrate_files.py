@@ -1,33 +1,27 @@
-"""Batch: line files to camera files and their score, without a database."""
+"""Line files to camera files, without a database."""
 
 from __future__ import annotations
 
 import time
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import asdict, dataclass, replace
 from itertools import chain
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from app.datasets.cameras_reader import read_cameras
-from app.datasets.cameras_writer import camera_text
-from app.datasets.json_text import read_json
-from app.datasets.plain_file import read_plain
+from app.datasets.cameras_writer import camera_name, camera_text
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import read_line_files
 from app.durable import replace_file
-from app.errors import DatasetFormatError, InputError
+from app.errors import InputError
 from app.finite import json_text
-from app.geometry.camera import Camera
 from app.progress import Progress
 from app.review.datasets.matches import Share, read_matches, shares_of
 from app.review.datasets.pictures import as_taken, picture_for
-from app.soccer.annotation import Lines, make_lines
 from app.soccer.finding import Finding
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
@@ -37,9 +31,8 @@ from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
 from app.solving.calibration_findings import calibration_findings
 from app.solving.leave_one_out import leave_one_out
-from app.solving.match_position import Place, Places, place_of, share_position
-from app.solving.pitch_size import PitchFrame, estimate_pitch
-from app.solving.score import score, score_frame
+from app.solving.match_model import Place
+from app.solving.match_position import Places, place_of, share_position
 from app.solving.warm import warm_up
 
 CHUNK = 16
@@ -104,7 +97,7 @@ def calibrate_files(
     report = Report()
     files = list(read_line_files(source, size, report))
     if not files:
-        raise _nothing(source, report, "line files")
+        raise report.refusal(f"{source} holds no line files")
     geometry: PictureGeometry | None = None
     told: dict[str, Any] | None = None
     if picture is not None or guess_picture:
@@ -172,82 +165,6 @@ def share_chunk(
         _share_file(file, frame, share.others, size, policy, with_leave_one_out)
         for file, frame, share in zip(files, frames, shares, strict=True)
     ]
-
-
-def score_files(
-    lines: Path,
-    cameras: Path,
-    *,
-    size: ImageSize,
-    without: Path | None = None,
-    progress: Progress | None = None,
-) -> dict[str, Any]:
-    """Measure camera files against line files.
-
-    Args:
-        lines: Folder or zip of line files.
-        cameras: Folder or zip of ``camera_<stem>.json``.
-        size: Size of the annotated images where no folder of an export says it.
-        without: ``findings.json``; markings that it calls mislabelled are left out.
-        progress: Called with frames done.
-
-    Raises:
-        InputError: There is no line file, or no camera at all.
-    """
-    report, camera_report = Report(), Report()
-    found = _by_frame(read_cameras(cameras, camera_report))
-    if not found:
-        raise _nothing(cameras, camera_report, "camera files")
-    dropped = _wrong_labels(without) if without is not None else set()
-    pitch = Pitch()
-    scores = []
-    for file in read_line_files(lines, size, report, by_folder=True):
-        kept = _without(file.lines, {marking for stem, marking in dropped if stem == file.stem})
-        camera = found.get(file.stem)
-        scores.append(None if camera is None else score_frame(camera, kept, pitch, file.size))
-        if progress is not None:
-            progress(len(scores))
-    if not scores:
-        raise _nothing(lines, report, "line files")
-    # A line file that cannot be read is a frame without a camera.
-    scores.extend([None] * (report.read - len(scores)))
-    total = score(scores)
-    return {
-        "frames": total.frames,
-        "calibrated": total.calibrated,
-        "completeness": total.completeness,
-        "jac_0.5": total.jac[0],
-        "jac_1": total.jac[1],
-        "jac_2": total.jac[2],
-        "share": total.share,
-        "fs5": total.challenge,
-        "error_median_px": total.error_median_px,
-        "error_p95_px": total.error_p95_px,
-        **_times(cameras),
-        "problems": [item.message for item in (*report.problems, *camera_report.problems)],
-    }
-
-
-def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
-    """Length and width of the pitch that the line files of one match show; null: not shown.
-
-    Raises:
-        InputError: There is no line file.
-        DegenerateGeometryError: Too few show enough markings.
-    """
-    report = Report()
-    frames = [PitchFrame(file.lines, size) for file in read_line_files(source, size, report)]
-    if not frames:
-        raise _nothing(source, report, "line files")
-    found = estimate_pitch(frames, CalibrationPolicy())
-    return {
-        "length_m": found.length,
-        "width_m": found.width,
-        "length_sigma_m": found.length_sigma_m,
-        "width_sigma_m": found.width_sigma_m,
-        "frames": found.frames,
-        "problems": [problem.message for problem in report.problems],
-    }
 
 
 def _calibrate_file(
@@ -334,7 +251,7 @@ def _summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> d
 def _write(
     out: Path, frames: list[CalibratedFrame], summary: dict[str, Any], with_leave_one_out: bool
 ) -> None:
-    texts = {_camera_file(frame.stem): frame.camera for frame in frames if frame.camera}
+    texts = {camera_name(frame.stem): frame.camera for frame in frames if frame.camera}
     findings = [
         {"frame": frame.stem, **asdict(finding)} for frame in frames for finding in frame.findings
     ]
@@ -365,48 +282,6 @@ def _own_files(out: Path) -> set[str]:
         return set()
     names = {str(path.relative_to(out)) for path in out.rglob("camera_*.json")}
     return names | ({"leave_one_out.json"} if (out / "leave_one_out.json").is_file() else set())
-
-
-def _camera_file(stem: str) -> str:
-    """Where a frame's camera goes: frames of the same name stay in their folders."""
-    place = PurePosixPath(stem)
-    return str(place.with_name(f"camera_{place.name}.json"))
-
-
-def _by_frame(cameras: Mapping[str, Camera]) -> dict[str, Camera]:
-    """Cameras by key, and by the bare name of the frame where only one has it."""
-    names = Counter(key.rsplit("/", 1)[-1] for key in cameras)
-    bare = {key.rsplit("/", 1)[-1]: camera for key, camera in cameras.items()}
-    return {**{name: bare[name] for name in bare if names[name] == 1}, **cameras}
-
-
-def _wrong_labels(findings: Path) -> set[tuple[str, str]]:
-    """Frame and marking of each finding ``wrong_label``."""
-    value = read_json(read_plain(findings), str(findings))
-    if not isinstance(value, list):
-        raise DatasetFormatError(str(findings), None, None, "is not a list of findings")
-    rows = [item for item in value if isinstance(item, dict) and item.get("kind") == "wrong_label"]
-    return {(str(item.get("frame")), str(item.get("marking"))) for item in rows}
-
-
-def _without(lines: Lines, markings: set[str]) -> Lines:
-    return make_lines({name: points for name, points in lines.items() if name not in markings})
-
-
-def _times(cameras: Path) -> dict[str, Any]:
-    """Milliseconds a frame from the ``calibrate.json`` beside the cameras, or null."""
-    beside = cameras / "calibrate.json"
-    value = read_json(beside.read_bytes(), str(beside)) if beside.is_file() else {}
-    times = {"ms_median": None, "ms_p95": None}
-    if isinstance(value, dict):
-        times |= {name: value.get(name) for name in times}
-    return {name: time if isinstance(time, int | float) else None for name, time in times.items()}
-
-
-def _nothing(source: Path, report: Report, what: str) -> InputError:
-    if report.problems:
-        return report.problems[0]
-    return InputError(f"{source} holds no {what}")
 
 
 def _text(value: Any) -> str:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from app.config import Settings
-from app.datasets.archive import resolve_inside
 from app.datasets.cameras_reader import read_cameras
-from app.datasets.cameras_writer import camera_text
+from app.datasets.cameras_writer import camera_name, camera_text
 from app.datasets.report import Report
+from app.datasets.safe_path import resolve_inside
 from app.durable import replace_file
 from app.errors import GeometryError, InputError
 from app.finite import json_text
@@ -91,8 +91,7 @@ def _propose_one(
         except (GeometryError, np.linalg.LinAlgError) as error:
             found = Proposal("nothing", f"the picture cannot be solved ({error})")
     milliseconds = 1000 * (time.perf_counter() - began)
-    place = Path(frame)
-    file = resolve_inside(out, str(place.with_name(f"camera_{place.name}.json")))
+    file = resolve_inside(out, camera_name(frame))
     if found.outcome == "proposed" and found.camera is not None and picture.image is not None:
         camera = found.camera
         if size is not None:

@@ -1,0 +1,98 @@
+"""Compare: several annotations of the same frames beside each other, and what they differ in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from app.errors import InputError
+from app.evaluation.agreement_limits import Disagreement, Limits, disagreements
+from app.evaluation.annotation_distance import GroupDistance, compare_annotations
+from app.review.editing.state import GroupState
+from app.review.editing.submit import load_solved
+from app.store.session import Store
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two of several annotations, by their places in the list, from 0.
+
+    Attributes:
+        distance: How far they lie apart.
+        disagreements: What goes beyond the limits, the worst first.
+    """
+
+    a: int
+    b: int
+    distance: GroupDistance
+    disagreements: tuple[Disagreement, ...]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Annotations of the same frames.
+
+    Attributes:
+        states: The groups, solved.
+        pairs: Every two of them, those that disagree most first.
+        limits: How far they may lie apart.
+        worst_views: Keys of the views, the one with most to look at first.
+    """
+
+    states: tuple[GroupState, ...]
+    pairs: tuple[Pair, ...]
+    limits: Limits
+    worst_views: tuple[str, ...]
+
+
+def compare_groups(store: Store, group_ids: Sequence[int], limits: Limits) -> Comparison:
+    """Groups of the same frames beside each other; saves nothing.
+
+    Raises:
+        NotFoundError: There is no such group.
+        InputError: They have no view in common.
+    """
+    return compare_states([load_solved(store, number) for number in group_ids], limits)
+
+
+def compare_states(states: Sequence[GroupState], limits: Limits) -> Comparison:
+    """The same of groups that are read already.
+
+    Raises:
+        InputError: Two of them have no view in common.
+    """
+    pairs = []
+    for a, b in combinations(range(len(states)), 2):
+        first, second = states[a], states[b]
+        distance = compare_annotations(first.group, second.group, first.solution, second.solution)
+        if not distance.views:
+            raise InputError(
+                f"{first.key} and {second.key} have no view in common",
+                hint="Compare two annotations of the same frames.",
+                pointer="/with",
+            )
+        verdicts = (_judged(first), _judged(second))
+        pairs.append(Pair(a, b, distance, disagreements(distance, verdicts, limits)))
+    pairs.sort(key=lambda pair: (-_weight(pair.disagreements), -len(pair.disagreements)))
+    return Comparison(tuple(states), tuple(pairs), limits, _worst_views(states, pairs))
+
+
+def _judged(state: GroupState) -> str | None:
+    said = state.verdict.state
+    return None if said == "unreviewed" else said
+
+
+def _weight(found: Sequence[Disagreement]) -> float:
+    return max((item.weight for item in found), default=0.0)
+
+
+def _worst_views(states: Sequence[GroupState], pairs: Sequence[Pair]) -> tuple[str, ...]:
+    """Views by the weight of what is said of them, then by the largest distance in them."""
+    order: dict[str, tuple[float, float]] = {view.key: (0, 0) for view in states[0].group.views}
+    for pair in pairs:
+        for view in pair.distance.views:
+            said = [item for item in pair.disagreements if item.view == view.view]
+            weight, apart = order.get(view.view, (0.0, 0.0))
+            order[view.view] = (max(weight, _weight(said)), max(apart, view.largest_px))
+    return tuple(sorted(order, key=lambda key: [-value for value in order[key]]))

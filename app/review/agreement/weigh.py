@@ -1,0 +1,262 @@
+"""Weigh: compare the annotations of a group once enough are handed in, and settle what agrees."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import structlog
+
+from app.errors import ReviewError, StorageError
+from app.evaluation.annotation_distance import GroupDistance
+from app.review.agreement.compare import Comparison, compare_states
+from app.review.agreement.limits import KIND, read_limits
+from app.review.editing.follow_paint import PaintFollower
+from app.review.editing.state import GroupState
+from app.review.editing.submit import solved
+from app.review.takes.adopt import adopt_take, give_verdict_of
+from app.review.takes.take import Take, find_take_of
+from app.soccer.actors import SCRIPT
+from app.store.agreement import (
+    AGREED,
+    DECIDED,
+    OPEN,
+    agreements_on,
+    decide_agreement,
+    never_compared,
+    put_agreement,
+    settle_rest,
+    verdicts_asked,
+)
+from app.store.answers import Keep, keep_nothing
+from app.store.clock import now
+from app.store.codecs import pack
+from app.store.log import Entry, append
+from app.store.outbox import DISPUTED, announce, stamp
+from app.store.session import Session, Store
+from app.store.settling import settle_in_batch
+from app.store.takes import INDEPENDENT, takes_of_group
+from app.store.value_codec import to_json
+
+log = structlog.get_logger("touchline.agreement")
+
+ASKED = 2
+"""Annotations that are compared where no batch says how many."""
+BY_ITSELF = f"{SCRIPT}agreement"
+"""Who takes over what agrees."""
+
+
+@dataclass(frozen=True)
+class PairOfTakes:
+    """Two takes of a group, by their ids and people, and how far they lie apart."""
+
+    a: int
+    b: int
+    people: tuple[str, str]
+    verdicts: tuple[str | None, str | None]
+    distance: GroupDistance
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """All that is kept of a comparison."""
+
+    pairs: tuple[PairOfTakes, ...]
+
+
+def after_hand_in(store: Store, copy_id: int, paint: PaintFollower | None = None) -> str | None:
+    """Weigh the group whose copy was just handed in; None where there is nothing to weigh yet.
+
+    Returns:
+        ``agreed``: the first annotation was taken over; ``open``: somebody has to decide.
+    """
+    take = find_take_of(store, copy_id)
+    if take is None or take.kind != INDEPENDENT or take.handed_in is None:
+        return None
+    return weigh(store, take.group_id, take.batch_id, paint)
+
+
+def weigh(
+    store: Store, group_id: int, batch_id: int | None, paint: PaintFollower | None = None
+) -> str | None:
+    """Compare what was handed in of a group; where it agrees, the first annotation is taken over.
+
+    Each pair is compared, and all of them have to agree. ``paint`` reads the paint of edited lines
+    again, as for every edit. May be called again at any time: what was compared already stays.
+    """
+    takes = ready_takes(store, group_id, batch_id)
+    with store.read() as session:
+        asked = ASKED if batch_id is None else verdicts_asked(session, batch_id) or ASKED
+        known = _known(session, group_id, batch_id)
+    if len(takes) < max(ASKED, asked) or (known and known.state != OPEN):
+        return None
+    original = solved(store, group_id)
+    with store.read() as session:
+        limits = read_limits(session, original.dataset_id)
+    found = compare_states([solved(store, take.copy_id) for take in takes], limits)
+    values = _values(original, takes, found)
+    if not any(pair.disagreements for pair in found.pairs):
+        try:
+            settle(
+                store,
+                group_id,
+                batch_id,
+                takes,
+                takes[0],
+                outcome="take",
+                actor=BY_ITSELF,
+                paint=paint,
+                found=values,
+            )
+            return AGREED
+        except StorageError:
+            raise
+        except ReviewError:
+            # Somebody changed the original at the same moment: that person or another one decides.
+            pass
+    return OPEN if _keep(store, takes, values) else None
+
+
+def weigh_left(store: Store, paint: PaintFollower | None = None) -> int:
+    """Compare what was handed in before a server was stopped, and was not compared any more.
+
+    Returns:
+        How many groups.
+    """
+    with store.read() as session:
+        left = never_compared(session)
+    compared = 0
+    for group_id, batch_id in left:
+        try:
+            compared += weigh(store, group_id, batch_id, paint) is not None
+        except ReviewError as error:
+            log.error("annotations could not be compared", group=group_id, error=str(error))
+    return compared
+
+
+def ready_takes(store: Store, group_id: int, batch_id: int | None) -> list[Take]:
+    """What was handed in of a group in a batch (None: in none), and not decided about, in order."""
+    with store.read() as session:
+        rows = takes_of_group(session, group_id)
+    takes = [Take(**row._mapping) for row in rows]
+    found = [
+        take
+        for take in takes
+        if (take.batch_id, take.kind, take.settled) == (batch_id, INDEPENDENT, None)
+        and take.handed_in is not None
+    ]
+    return sorted(found, key=lambda take: (take.handed_in or "", take.id))
+
+
+def settle(
+    store: Store,
+    group_id: int,
+    batch_id: int | None,
+    takes: Sequence[Take],
+    taken: Take,
+    *,
+    outcome: str,
+    actor: str,
+    paint: PaintFollower | None = None,
+    judge: bool = False,
+    found: Mapping[str, Any] | None = None,
+    keep: Keep[GroupState] = keep_nothing,
+) -> GroupState:
+    """Take one annotation over, and be done with all of them, in one transaction.
+
+    Args:
+        judge: ``actor`` judges the group as the annotation's person did.
+        found: What the comparison came to, where it is not kept yet.
+        keep: Keeps the answer in the transaction.
+
+    Raises:
+        ConflictError: Somebody was faster.
+    """
+    at = now()
+    itself = actor == BY_ITSELF
+    values = {"outcome": outcome, "take_id": taken.id, "decided": at, "decided_by": actor}
+    body = {
+        "did": "agreed" if itself else "decided",
+        "outcome": outcome,
+        "take": taken.id,
+        "person": taken.person,
+        "of": sorted(take.person for take in takes),
+    }
+    values["state"] = AGREED if itself else DECIDED
+
+    def done(session: Session) -> None:
+        if found is not None:
+            put_agreement(session, found)
+        dataset = decide_agreement(session, group_id, batch_id or 0, values)
+        settle_rest(session, [take.id for take in takes], at)
+        if batch_id is not None:
+            settle_in_batch(session, batch_id, group_id, actor=actor, at=at)
+        append(session, [Entry(KIND, actor, at, body, dataset, group_id)])
+        if judge:
+            note = f"as {taken.person} judged it"
+            give_verdict_of(session, taken, actor=actor, note=note)
+
+    return adopt_take(store, taken.id, actor=actor, paint=paint, also=done, keep=keep)
+
+
+def _known(session: Session, group_id: int, batch_id: int | None) -> Any | None:
+    """What a group came to in a batch, where its annotations were compared already."""
+    rows = agreements_on(session, group_id)
+    return next((row for row in rows if row.batch_id == (batch_id or 0)), None)
+
+
+def _keep(store: Store, takes: Sequence[Take], values: Mapping[str, Any]) -> bool:
+    """Let a group wait for a decision; False where somebody went on or decided meanwhile."""
+    group_id, batch_id = values["group_id"], takes[0].batch_id
+    with store.write() as session:
+        now_there = [Take(**row._mapping) for row in takes_of_group(session, group_id)]
+        known = _known(session, group_id, batch_id)
+        if any(take not in now_there for take in takes) or (known and known.state != OPEN):
+            return False
+        put_agreement(session, values)
+        if known is None or known.takes != values["takes"]:
+            _announce(session, takes, values)
+    return True
+
+
+def _announce(session: Session, takes: Sequence[Take], values: Mapping[str, Any]) -> None:
+    at, group_id = values["found"], values["group_id"]
+    said = {name: values[name] for name in ("worst", "disagreements")}
+    announce(
+        session,
+        values["dataset_id"],
+        DISPUTED,
+        f"group{group_id}_disputed{stamp(at)}",
+        actor=BY_ITSELF,
+        at=at,
+        batch_id=takes[0].batch_id,
+        also={"group": group_id, "people": [take.person for take in takes], **said},
+    )
+
+
+def _values(original: GroupState, takes: Sequence[Take], found: Comparison) -> dict[str, Any]:
+    """What is kept of a comparison, as a row that waits for a decision."""
+    pairs = tuple(
+        PairOfTakes(
+            takes[pair.a].id,
+            takes[pair.b].id,
+            (takes[pair.a].person, takes[pair.b].person),
+            (takes[pair.a].verdict, takes[pair.b].verdict),
+            pair.distance,
+        )
+        for pair in found.pairs
+    )
+    said = [item for pair in found.pairs for item in pair.disagreements]
+    return {
+        "group_id": original.id,
+        "batch_id": takes[0].batch_id or 0,
+        "dataset_id": original.dataset_id,
+        "state": OPEN,
+        "takes": " ".join(str(take.id) for take in takes),
+        "pairs": pack(to_json(Weighed(pairs))),
+        "worst": max((item.weight for item in said), default=0.0),
+        "disagreements": len(said),
+        "found": now(),
+        **dict.fromkeys(("outcome", "take_id", "decided", "decided_by")),
+    }

@@ -1,0 +1,117 @@
+"""Ball noise: how noisy the balls of a camera or person are, given to the views that show them.
+
+What balls of one camera or person are off is estimated from a whole dataset (``policies/noise``). Once it is
+accepted, each view carries how noisy its ball is beside the dataset's; ``solve`` reads it like
+anything that is said of a view. Whoever places a ball later brings the noise that is accepted for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from app.review.editing.codec import edit_to_json
+from app.review.editing.edit import Edit, SetBall, SetBalls, SetNoise, Several, need_view
+from app.review.editing.undo import GROUP_KINDS
+from app.soccer.group import Group, View
+from app.store.clock import now
+from app.store.datasets import group_ids
+from app.store.group_revisions import next_revision, save_revision
+from app.store.groups import read_groups
+from app.store.log import Entry, append, read_entries_of
+from app.store.noise import (
+    NOISE,
+    Factors,
+    factor_of,
+    factors_to_json,
+    read_factors,
+    write_factors,
+)
+from app.store.queue import refresh_queue
+from app.store.session import Session
+
+_BATCH = 100
+
+
+def read_placed(session: Session, groups: Sequence[int]) -> dict[int, dict[str, str]]:
+    """Who placed the ball of each view last, by id of the group and key of the view.
+
+    A ball that somebody accepted from predictions is not placed by them.
+    """
+    placed: dict[int, dict[str, str]] = {}
+    for entry in read_entries_of(session, groups, GROUP_KINDS):
+        edit = entry.body.get("edit") or {}
+        if edit.get("edit") == "set_balls" and entry.group_id is not None:
+            of_group = placed.setdefault(entry.group_id, {})
+            of_group.pop(edit["view"], None)
+            if not any(ball.get("predicted_by") for ball in edit["balls"]):
+                of_group[edit["view"]] = entry.actor
+    return placed
+
+
+def give_factors(session: Session, dataset_id: int, factors: Factors, actor: str) -> int:
+    """Give the balls of a dataset the noise of their cameras and people; how many groups change.
+
+    They are stale until they are solved again. No factors: all balls are as noisy as the dataset's.
+    """
+    before, at, changed = read_factors(session, dataset_id), now(), 0
+    write_factors(session, dataset_id, factors)
+    body = {"factors": factors_to_json(factors), "before": factors_to_json(before)}
+    append(session, [Entry(NOISE, actor, at, body, dataset_id)])
+    ids = group_ids(session, dataset_id)
+    for start in range(0, len(ids), _BATCH):
+        changed += _give(session, dataset_id, ids[start : start + _BATCH], factors, actor, at)
+    return changed
+
+
+def with_noise(factors: Factors, group: Group, edit: Edit, actor: str) -> Edit:
+    """The edit with the noise of who makes it, where it places a ball."""
+    if isinstance(edit, Several):
+        own = (with_noise(factors, group, one, actor) for one in edit.edits)
+        return Several(tuple(own))
+    if not isinstance(edit, SetBall | SetBalls):
+        return edit
+    balls = edit.balls if isinstance(edit, SetBalls) else (edit.ball,)
+    if any(ball is None or ball.predicted_by for ball in balls):
+        return edit
+    view = need_view(group, edit.view)
+    return replace(edit, noise=factor_of(factors, _camera(view), actor)) if factors else edit
+
+
+def keeping_noise(group: Group, edit: Edit) -> Edit:
+    """The edit with the noise that its view has: nobody is known to make it yet."""
+    if not isinstance(edit, SetBall | SetBalls):
+        return edit
+    return replace(edit, noise=need_view(group, edit.view).noise)
+
+
+def _give(
+    session: Session, dataset_id: int, ids: Sequence[int], factors: Factors, actor: str, at: str
+) -> int:
+    placed = read_placed(session, ids)
+    entries, changed = [], []
+    for stored in read_groups(session, ids).values():
+        edit = SetNoise(_noise(stored.group, placed.get(stored.id, {}), factors))
+        group = edit.apply(stored.group)
+        if group == stored.group:
+            continue
+        save_revision(session, stored, next_revision(stored, group, at))
+        done = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(stored.group))}
+        entries.append(Entry(NOISE, actor, at, done, dataset_id, stored.id))
+        changed.append(stored.id)
+    append(session, entries)
+    refresh_queue(session, changed)
+    return len(changed)
+
+
+def _noise(group: Group, placed: Mapping[str, str], factors: Factors) -> dict[str, float]:
+    return {
+        view.key: factor_of(factors, _camera(view), placed.get(view.key))
+        for view in group.views
+        if view.ball is not None and not view.ball.predicted_by
+    }
+
+
+def _camera(view: View) -> str | None:
+    """Key of a view's static camera."""
+    return view.station.key if view.station.shared else None

@@ -1,0 +1,158 @@
+"""Whereabouts: which dataset it is that an address names something of, and whose that is.
+
+One plain function for each kind of thing. What it does not find, the routes do not find either:
+they are asked for something else then (``api/security/about.py``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from app.errors import NotFoundError
+from app.review.people.roles import DatasetRoles, Role, Sight
+from app.soccer.actors import is_of
+from app.store.belonging import dataset_of, owner_of_job, versions_like
+from app.store.datasets import find_dataset
+from app.store.session import Session, Store
+from app.store.uploads import get_upload
+
+MIN_HASH = 8
+"""So many digits of a hash name a version."""
+MAX_ID = 2**63 - 1
+
+
+class Kind(StrEnum):
+    """What an address can name."""
+
+    DATASET = "dataset"
+    NEW_DATASET = "new dataset"
+    """A dataset that is made where there is none of that name."""
+    GROUP = "group"
+    VIEW = "view"
+    STATION = "station"
+    VERSION = "version"
+    EXPORT = "export"
+    JOB = "job"
+    PREDICTIONS = "predictions"
+    EVALUATION = "evaluation"
+    SAVED_VIEW = "saved view"
+    BATCH = "batch"
+    """Verdicts that were given at once."""
+    WORK = "work"
+    """Groups that were given out."""
+    UPLOAD = "upload"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where something belongs.
+
+    Attributes:
+        dataset: Id of its dataset; None while it has none.
+        owners: Whose it is while it has none: the actors who made it.
+        called: The id to ask for instead of a name that several have; None: as it was named.
+    """
+
+    dataset: int | None
+    owners: frozenset[str] = frozenset()
+    called: str | None = None
+
+
+def role_at(place: Place, roles: DatasetRoles, name: str) -> Role:
+    """What somebody is where something belongs; ``none``: they do not see it.
+
+    Args:
+        place: Where.
+        roles: Their rights.
+        name: Under which what they make is theirs (``Login.owner``).
+    """
+    if roles.is_admin:
+        return Role.ADMIN
+    if place.dataset is not None:
+        return roles.role_in(place.dataset)
+    mine = any(is_of(owner, name) for owner in place.owners)
+    return roles.highest if mine else Role.NONE
+
+
+@dataclass(frozen=True)
+class Named:
+    """What a request names, by its id or by whatever else names a thing of that kind."""
+
+    kind: Kind
+    by: str | int
+
+
+def find_place(store: Store, named: Named, sight: Sight) -> Place | None:
+    """Where something is that an address names; None where there is nothing of that name.
+
+    Args:
+        store: The database.
+        named: What, and how it is named.
+        sight: Which datasets take part where a name alone does not say which of them is meant.
+    """
+    if named.kind is Kind.UPLOAD:
+        return _upload(store, named.by)
+    with store.read() as session:
+        find = _FIND.get(named.kind)
+        if find is not None:
+            return find(session, named.by, sight)
+        if not isinstance(named.by, int):
+            return None
+        dataset = dataset_of(session, named.kind.value, named.by)
+    return None if dataset is None else Place(dataset)
+
+
+def _dataset(session: Session, named: str | int, _sight: Sight) -> Place | None:
+    row = find_dataset(session, named)
+    return None if row is None else Place(int(row.id))
+
+
+def _job(session: Session, named: str | int, _sight: Sight) -> Place | None:
+    number = _number(named)
+    row = None if number is None else owner_of_job(session, number)
+    return None if row is None else Place(row.dataset_id, frozenset({row.actor}))
+
+
+def _version(session: Session, named: str | int, sight: Sight) -> Place | None:
+    """By id, name or hash, among the datasets that somebody sees."""
+    rows = versions_like(session, str(named))
+    every = _fitting(rows, str(named))
+    seen = _fitting([row for row in rows if sight.sees(row.dataset_id)], str(named))
+    if len(seen) == 1:
+        return Place(seen[0].dataset_id, called=str(seen[0].id))
+    # Several: the route says so, and which datasets they are of.
+    return Place(seen[0].dataset_id) if seen and len(seen) == len(every) else None
+
+
+def _fitting(rows: Sequence[Any], text: str) -> list[Any]:
+    fitting = [row for row in rows if text == str(row.id)]
+    fitting = fitting or [row for row in rows if text == row.name]
+    if not fitting and len(text) >= MIN_HASH:
+        fitting = [row for row in rows if row.hash.startswith(text)]
+    return fitting
+
+
+def _upload(store: Store, named: str | int) -> Place | None:
+    try:
+        found = get_upload(store.settings, str(named))
+    except NotFoundError:
+        return None
+    return Place(None, frozenset(found.by))
+
+
+def _number(named: str | int) -> int | None:
+    if isinstance(named, int):
+        return named
+    return int(named) if named.isascii() and named.isdigit() and len(named) < 19 else None
+
+
+_FIND: Mapping[Kind, Callable[[Session, Any, Sight], Place | None]] = {
+    Kind.DATASET: _dataset,
+    Kind.NEW_DATASET: _dataset,
+    Kind.JOB: _job,
+    Kind.EXPORT: _job,
+    Kind.VERSION: _version,
+}

@@ -1,0 +1,309 @@
+"""Takes: one person's own annotation of a group, made on a copy of it that nobody else sees.
+
+See docs/decisions/0028-independent-annotations.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from app.errors import ConflictError, ForbiddenError, NotFoundError
+from app.review.datasets.dataset import need_dataset
+from app.review.editing.submit import solved
+from app.review.takes.copying import CopyOrder, copy_group, start_of
+from app.review.takes.handed_back import HandedBack, read_handed_back
+from app.soccer.actors import person_of
+from app.store.agreement import forget_open
+from app.store.clock import now
+from app.store.groups import StoredGroup, read_groups
+from app.store.session import Session, Store
+from app.store.takes import (
+    GOLD,
+    INDEPENDENT,
+    count_takes,
+    find_take,
+    insert_take,
+    names_of,
+    take_of_copy,
+    takes_in,
+    takes_of_group,
+    update_take,
+)
+
+
+@dataclass(frozen=True)
+class Take:
+    """A person's own annotation of a group.
+
+    Attributes:
+        group_id: The original.
+        copy_id: The group that is the copy; it is opened and edited like any other.
+        kind: ``independent``, or ``gold`` where the original's truth is known: for leads alone.
+        place: Which one of this person in this batch it is, from 1.
+        verdict: What they judged; None: nothing.
+        settled: When something was decided about it; None: not yet.
+    """
+
+    id: int
+    batch_id: int | None
+    group_id: int
+    copy_id: int
+    person: str
+    kind: str
+    place: int
+    begun: str
+    handed_in: str | None
+    verdict: str | None
+    settled: str | None
+
+
+@dataclass(frozen=True)
+class TakeView:
+    """A take as everybody may see it who sees its copy; that it is a gold one it does not say.
+
+    Attributes:
+        group: The copy.
+        dataset: Of what it is a copy.
+        of: The original; None where its person is not told.
+        title: What people call the group.
+        handed_back: Why its person has it back; None: they have not, or handed it in again.
+    """
+
+    id: int
+    batch: int | None
+    group: int
+    dataset: int
+    of: int | None
+    title: str
+    person: str
+    place: int
+    begun: str
+    handed_in: str | None
+    verdict: str | None
+    settled: str | None
+    handed_back: HandedBack | None = None
+
+
+def begin_take(
+    store: Store,
+    group_id: int,
+    *,
+    person: str,
+    batch_id: int | None = None,
+    kind: str = INDEPENDENT,
+    since: str | None = None,
+    blind: bool = True,
+    nameless: bool = False,
+) -> Take:
+    """Let a person begin their own annotation of a group; the one that they have already, if so.
+
+    Args:
+        store: The database.
+        group_id: The original.
+        person: Whose it is; also of a token, the person's.
+        batch_id: For which batch; None: for none.
+        kind: ``independent`` or ``gold``.
+        since: When the batch began: edits of the original from then on are not seen.
+        blind: Begin with the group as it was then, else as the last take of it left it.
+        nameless: The copy does not say which group it is of.
+
+    Raises:
+        NotFoundError: There is no such group.
+        ConflictError: It is a copy itself.
+    """
+    with store.write() as session:
+        take = begin(
+            session,
+            group_id,
+            person=person_of(person),
+            batch_id=batch_id,
+            kind=kind,
+            since=since,
+            blind=blind,
+            nameless=nameless,
+        )
+    solved(store, take.copy_id)
+    return take
+
+
+def begin(
+    session: Session,
+    group_id: int,
+    *,
+    person: str,
+    batch_id: int | None,
+    kind: str,
+    since: str | None,
+    blind: bool,
+    nameless: bool,
+) -> Take:
+    """``begin_take`` within a write session; the copy is solved by the caller."""
+    stored = need_group(session, group_id)
+    others = [one for one in takes_of_group(session, group_id) if one.batch_id == batch_id]
+    for one in others:
+        if one.person == person:
+            return _take(one)
+    if take_of_copy(session, group_id) is not None:
+        raise ConflictError(
+            "this is an own annotation already", hint="Begin from the group that it is of."
+        )
+    place = count_takes(session, batch_id, person) + 1
+    ready = [one.copy_id for one in others if one.handed_in is not None]
+    start = stored.group
+    if kind == GOLD:
+        start = start_of(session, stored)
+    elif blind and since is not None:
+        start = start_of(session, stored, since=since)
+    elif not blind and ready:
+        start = need_group(session, ready[-1]).group
+    order = CopyOrder(stored, batch_id, person, f"{batch_id or 0}-{place}" if nameless else None)
+    copy_id = copy_group(session, order, start)
+    take_id = insert_take(
+        session,
+        batch_id=batch_id,
+        group_id=group_id,
+        copy_id=copy_id,
+        person=person,
+        kind=kind,
+        place=place,
+    )
+    return read_take(session, take_id)
+
+
+def hand_in(store: Store, take_id: int, *, actor: str) -> Take:
+    """Say that one's own annotation is done; from then on it stays as it is.
+
+    Raises:
+        NotFoundError: There is no such take.
+        ForbiddenError: It is somebody else's.
+    """
+    with store.write() as session:
+        take = read_take(session, take_id)
+        if person_of(actor) != take.person:
+            raise ForbiddenError(f"{take.person} hands this in, nobody else")
+        if take.handed_in is None:
+            update_take(session, take_id, handed_in=now())
+        return read_take(session, take_id)
+
+
+def reopen(store: Store, take_id: int) -> Take:
+    """Let the person of a take go on with it.
+
+    Raises:
+        NotFoundError: There is no such take.
+        ConflictError: It was decided about it.
+    """
+    with store.write() as session:
+        reopen_take(session, read_take(session, take_id))
+        return read_take(session, take_id)
+
+
+def reopen_take(session: Session, take: Take) -> None:
+    """``reopen`` within a write session; what was compared with it waits for no decision any more."""
+    if take.settled is not None:
+        raise ConflictError("it was decided about this annotation")
+    update_take(session, take.id, handed_in=None)
+    forget_open(session, take.group_id, take.batch_id or 0)
+
+
+def get_take(store: Store, take_id: int) -> Take:
+    """A take; raises NotFoundError where there is none."""
+    with store.read() as session:
+        return read_take(session, take_id)
+
+
+def get_take_of(store: Store, copy_id: int) -> Take:
+    """The take whose copy a group is.
+
+    Raises:
+        NotFoundError: It is an ordinary group.
+    """
+    take = find_take_of(store, copy_id)
+    if take is not None:
+        return take
+    with store.read() as session:
+        there = bool(read_groups(session, [copy_id]))
+    if not there:
+        raise NotFoundError(f"there is no group {copy_id}")
+    raise NotFoundError(f"group {copy_id} is nobody's own annotation")
+
+
+def find_take_of(store: Store, copy_id: int) -> Take | None:
+    """The take whose copy a group is; None for an ordinary group."""
+    with store.glance() as session:
+        row = take_of_copy(session, copy_id)
+    return None if row is None else _take(row)
+
+
+def list_takes(
+    store: Store, dataset: str | int, sees_all: Callable[[int], bool], *, person: str
+) -> list[TakeView]:
+    """The takes of a dataset's groups as they are shown, oldest first.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        sees_all: Whether everybody's are shown, by the dataset's id.
+        person: Whose else.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        dataset_id = need_dataset(session, dataset)
+        whose = None if sees_all(dataset_id) else person_of(person)
+        found = [_take(row) for row in takes_in(session, dataset_id, whose)]
+        return _shown(session, found)
+
+
+def shown(store: Store, take: Take) -> TakeView:
+    """A take as it is shown."""
+    with store.read() as session:
+        return _shown(session, [take])[0]
+
+
+def _shown(session: Session, takes: Sequence[Take]) -> list[TakeView]:
+    heads = {row.id: row for row in names_of(session, [one.copy_id for one in takes])}
+    waiting = [one.copy_id for one in takes if one.handed_in is None and one.settled is None]
+    back = read_handed_back(session, waiting)
+    return [
+        TakeView(
+            id=one.id,
+            batch=one.batch_id,
+            group=one.copy_id,
+            dataset=heads[one.copy_id].of_id,
+            # A copy that says not what it is of has another key.
+            of=one.group_id if heads[one.copy_id].same else None,
+            title=heads[one.copy_id].label or heads[one.copy_id].key,
+            person=one.person,
+            place=one.place,
+            begun=one.begun,
+            handed_in=one.handed_in,
+            verdict=one.verdict,
+            settled=one.settled,
+            handed_back=back.get(one.copy_id),
+        )
+        for one in takes
+    ]
+
+
+def read_take(session: Session, take_id: int) -> Take:
+    """``get_take`` within a session."""
+    row = find_take(session, take_id)
+    if row is None:
+        raise NotFoundError(f"there is no annotation {take_id}")
+    return _take(row)
+
+
+def need_group(session: Session, group_id: int) -> StoredGroup:
+    """A group whole; raises NotFoundError where there is none."""
+    stored = read_groups(session, [group_id]).get(group_id)
+    if stored is None:
+        raise NotFoundError(f"there is no group {group_id}")
+    return stored
+
+
+def _take(row: Any) -> Take:
+    return Take(**row._mapping)

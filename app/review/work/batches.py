@@ -1,0 +1,418 @@
+"""Batches: groups of a dataset that a lead gives to people, and what becomes of them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field
+from datetime import date
+from enum import StrEnum
+from typing import Any
+
+from app.errors import ConflictError, InputError, NotFoundError
+from app.review.datasets.dataset import dataset_id
+from app.review.people.bell import RingKind, tell
+from app.review.people.members import list_members
+from app.review.people.roles import Action, may
+from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
+from app.soccer.actors import person_of
+from app.store.answers import Keep, keep_nothing
+from app.store.clock import now
+from app.store.datasets import dataset_name
+from app.store.listing import Listing
+from app.store.log import Entry, append
+from app.store.outbox import GIVEN_OUT, HANDED_ON, announce_batch
+from app.store.session import Session, Store
+from app.store.work import (
+    CLOSED,
+    OPEN,
+    batch_of,
+    batches_of,
+    count_work,
+    delete_batch,
+    groups_given,
+    groups_of,
+    insert_batch,
+    insert_groups,
+    leases_of,
+    people_of,
+    set_people,
+    update_batch,
+)
+
+MOST_GROUPS = 10_000
+"""Of one batch."""
+MOST_BATCHES = 500
+"""Of one dataset: a list that people read."""
+MOST_VERDICTS = 5
+"""So many independent verdicts can a batch ask for."""
+MAX_NAME = 80
+WORK = "work"
+"""Kind of the log's entries about batches; they change no group."""
+
+
+class Part(StrEnum):
+    """What somebody does in a batch."""
+
+    ANNOTATOR = "annotator"
+    REVIEWER = "reviewer"
+
+
+_NEEDS = {Part.ANNOTATOR: Action.ANNOTATE, Part.REVIEWER: Action.REVIEW}
+
+
+@dataclass(frozen=True)
+class NewBatch:
+    """What a lead asks for; people go by their names.
+
+    Attributes:
+        query: Which groups, as in the queue; with the order in which they are given out.
+        size: So many of them, the first ones; None: all.
+        skip_given: Leave out groups that wait in another open batch.
+        verdicts, blind, gold_every: As ``BatchModel`` has them.
+    """
+
+    name: str
+    query: str = ""
+    size: int | None = None
+    annotators: Sequence[str] = ()
+    reviewers: Sequence[str] = ()
+    due: date | None = None
+    skip_given: bool = True
+    verdicts: int = 1
+    blind: bool = True
+    gold_every: int | None = None
+
+
+@dataclass(frozen=True)
+class Here:
+    """Somebody who has a group open, and since when."""
+
+    group: int
+    person: str
+    since: str
+    seen: str
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A batch as it is now.
+
+    Attributes:
+        annotators, reviewers: Names; nobody: every reviewer of the dataset may review, and nobody
+            is asked to annotate.
+        groups, handed_in, settled: How many there are, wait for a verdict, and are done.
+        last: When one of them was handed in or done last.
+        here: Who has which group open.
+    """
+
+    id: int
+    dataset_id: int
+    dataset: str
+    name: str
+    query: str
+    sort: str
+    verdicts: int
+    blind: bool
+    gold_every: int | None
+    due: str | None
+    state: str
+    created: str
+    created_by: str
+    annotators: list[str] = field(default_factory=list)
+    reviewers: list[str] = field(default_factory=list)
+    groups: int = 0
+    handed_in: int = 0
+    settled: int = 0
+    last: str | None = None
+    here: list[Here] = field(default_factory=list)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is still work to be had from it."""
+        return self.state == OPEN
+
+    @property
+    def waiting(self) -> int:
+        """Groups that nobody has handed in or judged."""
+        return self.groups - self.handed_in - self.settled
+
+
+@dataclass(frozen=True)
+class BatchGroup:
+    """A group of a batch; ``here`` are the names of those who have it open."""
+
+    group: int
+    number: int
+    place: int
+    handed_in: str | None
+    handed_in_by: str | None
+    settled: str | None
+    here: list[str]
+
+
+def list_batches(store: Store, dataset: str | int) -> list[Batch]:
+    """The batches of a dataset: open ones and those that are due first come first."""
+    with store.read() as session:
+        return read_batches(session, [dataset_id(store, dataset)])
+
+
+def get_batch(store: Store, batch_id: int) -> Batch:
+    """A batch; raises NotFoundError when there is none."""
+    with store.read() as session:
+        return read_batch(session, batch_id)
+
+
+def dataset_of_batch(store: Store, batch_id: int) -> int:
+    """Id of the dataset of a batch; raises NotFoundError when there is no such batch."""
+    with store.glance() as session:
+        row = batch_of(session, batch_id)
+    if row is None:
+        raise NotFoundError(f"there is no batch {batch_id}")
+    return int(row.dataset_id)
+
+
+def list_batch_groups(store: Store, batch_id: int) -> list[BatchGroup]:
+    """The groups of a batch in the order in which they are given out."""
+    with store.read() as session:
+        batch = read_batch(session, batch_id)
+        here: dict[int, list[str]] = defaultdict(list)
+        for one in batch.here:
+            here[one.group].append(one.person)
+        return [
+            BatchGroup(
+                row.group_id, row.number, row.place, row.handed_in, row.handed_in_by,
+                row.settled, here[row.group_id],
+            )
+            for row in groups_of(session, batch_id)
+        ]  # fmt: skip
+
+
+def make_batch(
+    store: Store,
+    dataset: str | int,
+    new: NewBatch,
+    *,
+    actor: str,
+    keep: Keep[Batch] = keep_nothing,
+) -> Batch:
+    """Give out what a query finds now; what comes to match later is not part of it.
+
+    ``keep`` keeps the answer in its transaction.
+
+    Raises:
+        InputError: The query cannot be understood or finds nothing, or somebody named may not.
+        ConflictError: The dataset has as many batches as it may.
+    """
+    query = parse_query(new.query, longest=MAX_LISTED_LENGTH)
+    _check(new)
+    number = dataset_id(store, dataset)
+    people = {
+        Part.ANNOTATOR: _ids(store, number, Part.ANNOTATOR, new.annotators),
+        Part.REVIEWER: _ids(store, number, Part.REVIEWER, new.reviewers),
+    }
+    with store.write() as session:
+        if len(batches_of(session, [number])) >= MOST_BATCHES:
+            raise ConflictError(
+                f"a dataset has at most {MOST_BATCHES} batches", hint="Delete one that is closed."
+            )
+        found = Listing(session, number, query.conditions).ids(query.order)
+        given = groups_given(session, number) if new.skip_given else set()
+        ids = [one for one in found if one not in given][: new.size or MOST_GROUPS]
+        if not ids:
+            raise _nothing(found)
+        values = {
+            "dataset_id": number,
+            "name": new.name.strip(),
+            "query": new.query.strip(),
+            "sort": f"{query.sort}-desc" if query.descending else query.sort,
+            "verdicts": new.verdicts,
+            "blind": new.blind,
+            "gold_every": new.gold_every,
+            "due": None if new.due is None else new.due.isoformat(),
+            "state": OPEN,
+            "created": now(),
+            "created_by": actor,
+        }
+        made = insert_batch(session, values)
+        insert_groups(session, made, ids)
+        for part, chosen in people.items():
+            set_people(session, made, part, chosen)
+        batch = read_batch(session, made)
+        _note(session, batch, "made", actor)
+        _tell(session, batch, (*batch.annotators, *batch.reviewers), actor)
+        announce_batch(session, made, GIVEN_OUT, actor=actor, at=batch.created)
+        keep(batch)(session)
+        return batch
+
+
+def change_batch(
+    store: Store,
+    batch_id: int,
+    *,
+    actor: str,
+    name: str | None = None,
+    due: date | None = None,
+    never_due: bool = False,
+    annotators: Sequence[str] | None = None,
+    reviewers: Sequence[str] | None = None,
+    state: str | None = None,
+    gold_every: int | None = None,
+    no_gold: bool = False,
+) -> Batch:
+    """Give a batch on to others, close or open it, or name it otherwise; None leaves as it is.
+
+    ``gold_every`` counts from the next group on that somebody begins, ``no_gold``: none is one.
+
+    Raises:
+        NotFoundError: There is none.
+        InputError: Somebody named may not do that part.
+    """
+    before = get_batch(store, batch_id)
+    values: dict[str, Any] = {}
+    if name is not None:
+        values["name"] = _checked_name(name)
+    if due is not None or never_due:
+        values["due"] = None if due is None else due.isoformat()
+    if state is not None:
+        values["state"] = state
+    if gold_every is not None or no_gold:
+        values["gold_every"] = gold_every
+    named = {Part.ANNOTATOR: annotators, Part.REVIEWER: reviewers}
+    people = {
+        part: _ids(store, before.dataset_id, part, names)
+        for part, names in named.items()
+        if names is not None
+    }
+    with store.write() as session:
+        read_batch(session, batch_id)
+        if values:
+            update_batch(session, batch_id, values)
+        for part, chosen in people.items():
+            set_people(session, batch_id, part, chosen)
+        batch = read_batch(session, batch_id)
+        _note(session, batch, "closed" if state == CLOSED else "changed", actor)
+        known = (*before.annotators, *before.reviewers)
+        new = [name for name in (*batch.annotators, *batch.reviewers) if name not in known]
+        _tell(session, batch, new, actor)
+        if known != (*batch.annotators, *batch.reviewers):
+            announce_batch(session, batch_id, HANDED_ON, actor=actor, at=now())
+        return batch
+
+
+def remove_batch(store: Store, batch_id: int, *, actor: str) -> Batch:
+    """Delete a batch; verdicts and edits of its groups stay. Returns what it was."""
+    with store.write() as session:
+        batch = read_batch(session, batch_id)
+        delete_batch(session, batch_id)
+        _note(session, batch, "deleted", actor)
+        return batch
+
+
+def read_batch(session: Session, batch_id: int) -> Batch:
+    """A batch within a session; raises NotFoundError when there is none."""
+    row = batch_of(session, batch_id)
+    if row is None:
+        raise NotFoundError(f"there is no batch {batch_id}")
+    return _batches(session, [row])[0]
+
+
+def read_batches(session: Session, dataset_ids: Collection[int]) -> list[Batch]:
+    """The batches of datasets within a session."""
+    return _batches(session, batches_of(session, dataset_ids))
+
+
+def _batches(session: Session, rows: Sequence[Any]) -> list[Batch]:
+    ids = [row.id for row in rows]
+    counts = count_work(session, ids)
+    names: dict[tuple[int, str], list[str]] = defaultdict(list)
+    for row in people_of(session, ids):
+        names[row.batch_id, row.part].append(row.name)
+    here: dict[int, list[Here]] = defaultdict(list)
+    for row in leases_of(session, ids, now()):
+        here[row.batch_id].append(Here(row.group_id, row.person, row.taken, row.seen))
+    found = []
+    for row in rows:
+        count = counts.get(row.id)
+        found.append(
+            Batch(
+                **row._mapping,
+                dataset=dataset_name(session, row.dataset_id),
+                annotators=names[row.id, Part.ANNOTATOR],
+                reviewers=names[row.id, Part.REVIEWER],
+                # A dataset that begins again leaves a batch without groups.
+                groups=count.groups if count else 0,
+                handed_in=count.handed_in if count else 0,
+                settled=count.settled if count else 0,
+                last=count.last if count else None,
+                here=here[row.id],
+            )
+        )
+    return found
+
+
+def _ids(store: Store, dataset: int, part: Part, names: Iterable[str]) -> list[int]:
+    """Ids of people who may do a part in a dataset."""
+    wanted = {name.strip().lower() for name in names}
+    if not wanted:
+        return []
+    able = {one.name: one.id for one in list_members(store, dataset) if may(one.role, _NEEDS[part])}
+    missing = sorted(wanted - set(able))
+    if missing:
+        raise InputError(
+            f"{missing[0]} cannot be {part} here",
+            hint=f"Give them the role {part} in this dataset first.",
+            pointer=f"/{part}s",
+        )
+    return [able[name] for name in sorted(wanted)]
+
+
+def _check(new: NewBatch) -> None:
+    _checked_name(new.name)
+    if not 1 <= new.verdicts <= MOST_VERDICTS:
+        raise InputError(
+            f"a batch asks for 1 to {MOST_VERDICTS} verdicts on each group", pointer="/verdicts"
+        )
+
+
+def _checked_name(name: str) -> str:
+    name = name.strip()
+    if not name or len(name) > MAX_NAME or not name.isprintable():
+        raise InputError(f"a batch has a name of 1 to {MAX_NAME} letters", pointer="/name")
+    return name
+
+
+def _nothing(found: Sequence[int]) -> InputError:
+    if not found:
+        return InputError("no group matches that query", pointer="/query")
+    return InputError(
+        "every group that matches is in an open batch already",
+        hint="Take them all the same, or ask for other groups.",
+        pointer="/query",
+    )
+
+
+def _tell(session: Session, batch: Batch, people: Iterable[str], actor: str) -> None:
+    """Tell people that work was given to them."""
+    by = person_of(actor)
+    due = "" if batch.due is None else f", due {batch.due}"
+    said = f"{by} gave you work: {batch.name}, {batch.groups} groups of {batch.dataset}{due}"
+    for name in dict.fromkeys(people):
+        tell(
+            session, name, RingKind.ASSIGNED, said,
+            actor=actor, address="/work", dataset_id=batch.dataset_id,
+        )  # fmt: skip
+
+
+def _note(session: Session, batch: Batch, did: str, actor: str) -> None:
+    """Write what became of a batch into the log."""
+    body = {
+        "batch": batch.id,
+        "dataset": batch.dataset_id,
+        "did": did,
+        "name": batch.name,
+        "groups": batch.groups,
+        "annotators": batch.annotators,
+        "reviewers": batch.reviewers,
+    }
+    append(session, [Entry(WORK, actor, now(), body)])

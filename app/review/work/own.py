@@ -1,0 +1,95 @@
+"""Own annotations in a batch: where several people annotate each group, or some groups are gold,
+everybody works on copies that nobody else sees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from app.errors import ConflictError
+from app.review.takes.adopt import adopt_take
+from app.review.takes.mixing import Terms, begin_next
+from app.review.takes.take import Take, hand_in, read_take, reopen
+from app.review.work.batches import Batch, Part
+from app.soccer.actors import person_of
+from app.store.session import Session, Store
+from app.store.takes import INDEPENDENT, count_left, take_of_copy, takes_of_batch
+from app.store.work import groups_of
+
+
+def takes_part(batch: Batch, parts: Collection[Part]) -> bool:
+    """Whether somebody with these parts makes annotations of their own in a batch."""
+    if batch.verdicts == 1 and batch.gold_every is None:
+        return False
+    return Part.ANNOTATOR in parts or (Part.REVIEWER in parts and not batch.annotators)
+
+
+def next_own(store: Store, batch: Batch, person: str) -> Take | None:
+    """The own annotation that somebody shall work on now; None: there is nothing left for them.
+
+    Where one annotation a group is asked for, what they have handed in is taken over first.
+    """
+    take_over_handed_in(store, batch, person)
+    with store.read() as session:
+        # What was handed in before gold groups were mixed in waits for its reviewer.
+        waiting = [
+            row
+            for row in groups_of(session, batch.id)
+            if row.settled is None and row.handed_in is None
+        ]
+        groups = [row.group_id for row in waiting]
+    terms = Terms(
+        batch.id,
+        batch.dataset_id,
+        groups,
+        batch.verdicts,
+        batch.blind,
+        batch.created,
+        batch.gold_every,
+    )
+    return begin_next(store, terms, person=person)
+
+
+def own_left(session: Session, batch: Batch, person: str) -> int:
+    """Of how many groups somebody may still make an annotation of their own, begun ones included."""
+    name = person_of(person)
+    return count_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
+
+
+def take_over_handed_in(store: Store, batch: Batch, person: str) -> None:
+    """Take over what somebody handed in, where nobody else annotates the same groups."""
+    if batch.verdicts > 1:
+        return
+    with store.read() as session:
+        ready = [
+            row.id
+            for row in takes_of_batch(session, batch.id, batch.dataset_id)
+            if row.person == person_of(person)
+            and (row.kind, row.settled) == (INDEPENDENT, None)
+            and row.handed_in is not None
+        ]
+    for take_id in ready:
+        adopt_take(store, take_id, actor=person)
+
+
+def own_of(session: Session, batch: Batch, group: int, person: str) -> Take | None:
+    """The own annotation of a person in a batch whose copy a group is; None: it is none."""
+    row = take_of_copy(session, group)
+    if row is None or (row.batch_id, row.person) != (batch.id, person_of(person)):
+        return None
+    return read_take(session, row.id)
+
+
+def hand_in_own(store: Store, batch: Batch, take: Take, *, actor: str, done: bool) -> None:
+    """Hand an own annotation in, or go on with it while nothing was decided about it.
+
+    Raises:
+        ConflictError: It was taken over, or decided about.
+    """
+    if done:
+        hand_in(store, take.id, actor=actor)
+        take_over_handed_in(store, batch, take.person)
+    elif take.verdict is not None:
+        raise ConflictError("you have judged this group", hint="Take your verdict back.")
+    else:
+        reopen(store, take.id)

@@ -1,0 +1,169 @@
+"""Judged: what one policy makes of many groups, from which others are tried quickly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from threading import Lock
+
+import numpy as np
+
+from app.geometry.arrays import BoolArray, FloatArray
+from app.soccer.policy import Policy
+from app.soccer.solution import GAMMAS_PERCENT
+from app.solving.chi_square import residuals_of, untestable
+from app.solving.facts import Facts
+from app.solving.spread import MeanSpread, longest_sigma
+from app.solving.verdict import (
+    Verdict,
+    compare_again,
+    failures,
+    judge,
+    view_jac,
+    views_of,
+)
+
+_NUMBERS = ("baseline", "point", "parallax", "distance")
+
+
+@dataclass
+class Judged:
+    """Groups under a policy; what is not asked for yet is computed when it first is.
+
+    Attributes:
+        facts: The groups.
+        jac: ``view_jac`` at each of ``GAMMAS_PERCENT``, shape (3, V).
+        policy: By which they are judged.
+        verdict: What it makes of them.
+        sigma: Standard deviation along the longest axis, metres, NaN without a ball, shape (G,).
+        p_value: Of the residuals, infinite where it cannot be tested, shape (G,).
+        spread: Kept from the first time that another noise is tried.
+    """
+
+    facts: Facts
+    jac: FloatArray
+    policy: Policy
+    verdict: Verdict
+    sigma: FloatArray | None = None
+    p_value: FloatArray | None = None
+    spread: MeanSpread | None = None
+    lock: Lock = field(default_factory=Lock, repr=False)
+
+    @staticmethod
+    def by(facts: Facts, jac: FloatArray, policy: Policy) -> Judged:
+        """Judge groups."""
+        spread = MeanSpread(facts)
+        verdict = judge(facts, policy, spread, _jac(facts, jac, policy))
+        found = Judged(facts, jac, policy, verdict)
+        if policy.max_sigma_m is not None:
+            found.sigma = _sigma(facts, policy, verdict, spread)
+        return found
+
+    def complete(self) -> None:
+        """Compute what somebody may ask for, so that nobody waits for it."""
+        with self.lock:
+            if self.sigma is None:
+                self.sigma = _sigma(self.facts, self.policy, self.verdict, MeanSpread(self.facts))
+            if self.p_value is None:
+                self.p_value = _p_value(self.facts, self.policy, self.verdict)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of what is kept, roughly."""
+        verdict = self.verdict
+        arrays = (verdict.failed, *(getattr(verdict, name) for name in _NUMBERS))
+        rows = verdict.view_failed.nbytes + verdict.pair_failed.nbytes + self.jac.nbytes
+        spread = 0 if self.spread is None else self.spread.nbytes
+        return int(rows + spread + sum(array.nbytes for array in arrays))
+
+    def under(self, policy: Policy) -> Verdict:
+        """What another policy makes of the groups."""
+        if _asks_more(policy) and noise_of(policy) != noise_of(self.policy):
+            jac = _jac(self.facts, self.jac, policy)
+            return judge(self.facts, policy, self._spread(), jac)
+        return self._under(policy)[0]
+
+    def moved(self, policy: Policy) -> Judged:
+        """The groups judged by another policy from now on."""
+        if noise_of(policy) != noise_of(self.policy):
+            return Judged.by(self.facts, self.jac, policy)
+        verdict, new, part = self._under(policy)
+        found = Judged(self.facts, self.jac, policy, verdict)
+        if self.sigma is not None and self.p_value is not None:
+            found.sigma, found.p_value = self.sigma.copy(), self.p_value.copy()
+            if part is not None:
+                part.complete()
+                found.sigma[new], found.p_value[new] = part.sigma, part.p_value
+        return found
+
+    def _under(self, policy: Policy) -> tuple[Verdict, BoolArray, Judged | None]:
+        """The verdict, which groups had to be judged anew, and those by themselves."""
+        facts, known = self.facts, self.verdict
+        jac = _jac(facts, self.jac, policy)
+        view_failed, pair_failed = failures(facts, jac, policy)
+        new = np.zeros(facts.groups, bool)
+        new[facts.view_group[np.flatnonzero(view_failed != known.view_failed)]] = True
+        new[facts.pair_group[np.flatnonzero(pair_failed != known.pair_failed)]] = True
+        failed = compare_again(known, policy, *self._measured(policy))
+        numbers = [getattr(known, name) for name in _NUMBERS]
+        part = None
+        if new.any():
+            some = facts.part(new)
+            found = judge(some, policy, MeanSpread(some), jac[new[facts.view_group]])
+            failed[:, new] = found.failed
+            numbers = [array.copy() for array in numbers]
+            for array, name in zip(numbers, _NUMBERS, strict=True):
+                array[new] = getattr(found, name)
+            part = Judged(some, self.jac, policy, found)
+        return Verdict(jac, view_failed, pair_failed, failed, *numbers), new, part
+
+    def _measured(self, policy: Policy) -> tuple[FloatArray | None, FloatArray | None]:
+        """Sigmas and p-values, where the policy asks for them."""
+        with self.lock:
+            if policy.max_sigma_m is not None and self.sigma is None:
+                spread = self.spread or MeanSpread(self.facts)
+                self.sigma = _sigma(self.facts, self.policy, self.verdict, spread)
+            if policy.min_p_value is not None and self.p_value is None:
+                self.p_value = _p_value(self.facts, self.policy, self.verdict)
+        return (
+            None if policy.max_sigma_m is None else self.sigma,
+            None if policy.min_p_value is None else self.p_value,
+        )
+
+    def _spread(self) -> MeanSpread:
+        with self.lock:
+            if self.spread is None:
+                self.spread = MeanSpread(self.facts)
+        return self.spread
+
+
+def noise_of(policy: Policy) -> tuple[float, float, float]:
+    """How exact clicks are taken to be."""
+    return policy.click_sigma_px, policy.box_sigma_share, policy.given_sigma_px
+
+
+def _asks_more(policy: Policy) -> bool:
+    """Whether it asks for what depends on the noise of clicks."""
+    return policy.max_sigma_m is not None or policy.min_p_value is not None
+
+
+def _jac(facts: Facts, jac: FloatArray, policy: Policy) -> FloatArray:
+    gamma = policy.jac_gamma_percent
+    if gamma in GAMMAS_PERCENT:
+        known: FloatArray = jac[GAMMAS_PERCENT.index(gamma)]
+        return known
+    return view_jac(facts, gamma)
+
+
+def _sigma(facts: Facts, policy: Policy, verdict: Verdict, spread: MeanSpread) -> FloatArray:
+    there = np.flatnonzero(~np.isnan(verdict.point[:, 0]))
+    spreads = spread.covariances(verdict.valid, there, verdict.point[there], policy)
+    sigma = np.full(facts.groups, np.nan)
+    sigma[there] = longest_sigma(spreads)
+    return sigma
+
+
+def _p_value(facts: Facts, policy: Policy, verdict: Verdict) -> FloatArray:
+    used = views_of(facts, verdict.valid)
+    p_value = residuals_of(facts, used, verdict.point, policy).p_value
+    p_value[untestable(facts, used, policy)] = np.inf
+    return p_value

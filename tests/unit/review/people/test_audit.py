@@ -1,0 +1,101 @@
+"""The audit: everything that was said and done, with who did it, for whom it is for."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.review.editing.replay import _STEPS
+from app.review.editing.submit import load
+from app.review.people.audit import KINDS, Family, every_entry, read_audit
+from app.review.people.deeds import record_deed
+from app.review.people.links import use
+from app.review.people.logins import Logins
+from app.review.people.members import give_role
+from app.review.people.people import invite
+from app.review.people.roles import EVERYTHING, DatasetRoles, Role
+from app.review.talk.comments import begin_thread
+from app.review.verdicts.verdict import set_verdict
+from app.store.audit import AuditQuery
+from app.store.session import Store
+
+ALL = AuditQuery()
+
+
+@pytest.fixture
+def said(store: Store, fill, make_group) -> int:
+    """A group of which anna and a token of hers have said something, and bob was let in."""
+    (group,) = fill(make_group())
+    bob, link = invite(store, "bob", Role.NONE, actor="anna")
+    use(store, link.token, "three plain words")
+    Logins(store).log_in("bob", "three plain words", address="192.0.2.7")
+    give_role(store, "demo", bob.id, Role.LEAD, actor="anna")
+    begin_thread(store, group, "Behind the post?", actor="anna (token lens)")
+    state = load(store, group)
+    set_verdict(store, group, "deferred", None, "unsure", if_match=state.etag, actor="anna")
+    return group
+
+
+def lines(store: Store, asked: AuditQuery = ALL, sight=EVERYTHING, search: str = "") -> list[str]:
+    found = read_audit(store, asked, sight, search=search).items
+    return [f"{one.actor}: {one.sentence}" for one in found]
+
+
+class TestAudit:
+    def test_everything_is_told_the_newest_first_with_who_did_it(
+        self, store: Store, said: int
+    ) -> None:
+        assert lines(store)[:6] == [
+            "anna: deferred: unsure",
+            "anna (token lens): commented: Behind the post?",
+            "anna: bob: role in dataset (lead)",
+            "bob: bob: logged in",
+            "bob: bob: password chosen",
+            "anna: bob: invited",
+        ]
+        login = read_audit(store, ALL, EVERYTHING, search="logged in").items[0]
+        assert (login.network, login.address) == ("192.0.2.7", "/people")
+        assert read_audit(store, ALL, EVERYTHING).items[1].address == f"/review/{said}?thread=1"
+
+    def test_it_is_filtered_by_person_kind_group_time_and_words(
+        self, store: Store, said: int
+    ) -> None:
+        assert len(lines(store, AuditQuery(person="anna"))) == 4
+        assert len(lines(store, AuditQuery(person="anna (token lens)"))) == 1
+        assert len(lines(store, AuditQuery(kinds=KINDS[Family.VERDICT]))) == 1
+        assert len(lines(store, AuditQuery(group_id=said))) == 3
+        at = read_audit(store, ALL, EVERYTHING).items[0].at
+        assert len(lines(store, AuditQuery(since=at))) == 1
+        assert len(lines(store, AuditQuery(until=at))) == len(lines(store)) - 1
+        assert lines(store, search="POST behind") == [
+            "anna (token lens): commented: Behind the post?"
+        ]
+
+    def test_a_lead_reads_of_their_datasets_alone_rights_there_too(
+        self, store: Store, said: int
+    ) -> None:
+        lead = DatasetRoles(Role.NONE, {1: Role.LEAD}).led()
+        assert lines(store, sight=lead)[2] == "anna: bob: role in dataset (lead)"
+        assert not any("logged in" in line for line in lines(store, sight=lead))
+        for roles in (DatasetRoles(Role.REVIEWER), DatasetRoles(Role.LEAD, {1: Role.VIEWER})):
+            assert lines(store, sight=roles.led()) == []
+
+    def test_pages_follow_each_other_and_hold_each_entry_once(
+        self, store: Store, said: int
+    ) -> None:
+        every = [one.id for one in every_entry(store, ALL, EVERYTHING)]
+        for search in ("", "e"):
+            ids, before = [], None
+            while True:
+                page = read_audit(store, ALL, EVERYTHING, before=before, limit=2, search=search)
+                ids += [one.id for one in page.items]
+                if page.next is None:
+                    break
+                before = page.next
+            assert ids == every
+
+    def test_every_kind_that_the_log_knows_has_its_family(self) -> None:
+        assert {kind for kinds in KINDS.values() for kind in kinds} == set(_STEPS) | {"import"}
+
+    def test_what_has_no_words_of_its_own_names_its_person(self, store: Store, said: int) -> None:
+        record_deed(store, "bob", "webhook deleted", 1, url="https://hooks.example.org/")
+        assert lines(store)[0] == "bob: webhook deleted: https://hooks.example.org/"

@@ -1,0 +1,296 @@
+"""Batches and leases in a real database: nobody meets anybody by accident."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from app.errors import ConflictError, HeldGroupError, InputError, NotFoundError
+from app.review.agreement.weigh import after_hand_in
+from app.review.editing.replay import replay
+from app.review.editing.submit import load
+from app.review.people.audit import read_audit
+from app.review.people.people import invite
+from app.review.people.roles import EVERYTHING, Role
+from app.review.queue.listing import list_groups
+from app.review.verdicts.verdict import set_verdict
+from app.review.work.batches import (
+    NewBatch,
+    Part,
+    change_batch,
+    get_batch,
+    list_batch_groups,
+    list_batches,
+    make_batch,
+    remove_batch,
+)
+from app.review.work.leases import LASTS, Leases, Worker
+from app.review.work.progress import my_work, team_work
+from app.store.audit import AuditQuery
+from app.store.bells import read_rings
+from app.store.people import person_by_name
+
+ADA, BO, CY = (Worker(name) for name in ("ada", "bo", "cy"))
+NOTED = "looked at"
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.at = datetime.now(UTC)
+
+    def __call__(self) -> datetime:
+        return self.at
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def groups(store, fill, make_group) -> list[int]:
+    """Six groups of a dataset, and three people."""
+    ids = fill(*(make_group(number) for number in range(1, 7)), solved=False)
+    for name, role in (("ada", Role.ANNOTATOR), ("bo", Role.REVIEWER), ("cy", Role.REVIEWER)):
+        invite(store, name, role, actor="local")
+    return ids
+
+
+@pytest.fixture
+def dataset(groups, store) -> int:
+    return load(store, groups[0]).dataset_id
+
+
+@pytest.fixture
+def leases(store, clock) -> Leases:
+    return Leases(store, clock)
+
+
+def judge(store, group: int, actor: str, state: str = "rejected") -> None:
+    reason = "ball_hidden" if state == "rejected" else None
+    etag = load(store, group).etag
+    set_verdict(store, group, state, reason and "other", NOTED, if_match=etag, actor=actor)
+
+
+class TestBatch:
+    def test_holds_what_its_query_finds_in_its_order_and_leaves_out_what_is_given(
+        self, store, dataset, groups
+    ):
+        first = make_batch(store, dataset, NewBatch("a", "sort:number-desc", 2), actor="lead")
+        rest = make_batch(store, dataset, NewBatch("b"), actor="lead")
+        assert [one.group for one in list_batch_groups(store, first.id)] == groups[:-3:-1]
+        assert [one.group for one in list_batch_groups(store, rest.id)] == groups[:4]
+        with pytest.raises(InputError, match="open batch already"):
+            make_batch(store, dataset, NewBatch("c"), actor="lead")
+        again = make_batch(store, dataset, NewBatch("c", skip_given=False), actor="lead")
+        assert (again.groups, again.waiting) == (6, 6)
+
+    def test_is_made_with_the_answer_that_is_kept_of_it_or_not_at_all(self, store, dataset):
+        def keep(made):
+            raise OSError("the power went")
+
+        with pytest.raises(OSError, match="power"):
+            make_batch(store, dataset, NewBatch("a"), actor="lead", keep=keep)
+        assert list_batches(store, dataset) == []
+
+    def test_is_a_query_in_its_own_order(self, store, dataset, groups):
+        batch = make_batch(store, dataset, NewBatch("a", "sort:number-desc", 4), actor="lead")
+        page = list_groups(store, dataset, f"batch:{batch.id}", limit=3)
+        assert [row.id for row in page.items] == groups[:-4:-1]
+        rest = list_groups(store, dataset, f"batch:{batch.id}", limit=3, cursor=page.next)
+        assert [row.id for row in rest.items] == [groups[2]]
+        other = list_groups(store, dataset, f"batch:{batch.id} sort:number", limit=1)
+        assert other.items[0].id == groups[2]
+        assert list_groups(store, dataset, f"-batch:{batch.id}").total == 2
+
+    def test_is_given_to_those_alone_who_may(self, store, dataset):
+        with pytest.raises(InputError, match="ada cannot be reviewer") as refused:
+            make_batch(store, dataset, NewBatch("a", reviewers=["ada"]), actor="lead")
+        assert refused.value.pointer == "/reviewers"
+        batch = make_batch(store, dataset, NewBatch("a", annotators=["ada"]), actor="lead")
+        given = change_batch(store, batch.id, actor="lead", annotators=["bo"], state="closed")
+        assert (given.annotators, given.is_open) == (["bo"], False)
+        remove_batch(store, batch.id, actor="lead")
+        with pytest.raises(NotFoundError):
+            get_batch(store, batch.id)
+        with store.read() as session:
+            replay(session)
+
+
+class TestLeases:
+    def test_the_next_group_is_one_write_that_nobody_waits_for_the_disk_for(
+        self, store, dataset, leases, counted
+    ):
+        batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
+        with counted(store) as cost:
+            assert leases.next(batch, BO).group is not None
+        assert (cost.reads, cost.commits) == (0, 0)
+
+    def test_two_people_are_given_two_groups(self, store, dataset, groups, leases):
+        batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
+        assert leases.next(batch, BO).group == groups[0]
+        assert leases.next(batch, CY).group == groups[1]
+        assert leases.next(batch, BO).group == groups[0]
+        assert leases.next(batch, BO, after=groups[0]).group == groups[2]
+        few = make_batch(store, dataset, NewBatch("b", size=1, skip_given=False), actor="lead").id
+        assert leases.next(few, BO, after=groups[0]).group is None
+
+    def test_no_group_is_given_to_two_of_many_who_ask_at_once(self, store, dataset, groups):
+        batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
+        people = [Worker(f"person{number}") for number in range(8)]
+        with ThreadPoolExecutor(8) as pool:
+            given = list(pool.map(lambda one: Leases(store).next(batch, one).group, people))
+        assert sorted(one for one in given if one) == sorted(groups)
+        assert given.count(None) == 2
+
+    def test_one_that_is_not_kept_runs_out(self, store, dataset, groups, leases, clock):
+        batch = make_batch(store, dataset, NewBatch("a", size=1), actor="lead").id
+        leases.next(batch, BO)
+        clock.at += LASTS * 0.9
+        leases.take(batch, groups[0], BO)
+        clock.at += LASTS * 0.9
+        assert leases.next(batch, CY).group is None
+        clock.at += LASTS * 0.2
+        assert leases.next(batch, CY).group == groups[0]
+
+    def test_one_is_given_back_and_taken_over(self, store, dataset, groups, leases):
+        batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
+        leases.next(batch, BO)
+        with pytest.raises(HeldGroupError, match="bo has this group open") as held:
+            leases.take(batch, groups[0], CY)
+        assert [one.person for one in held.value.here] == ["bo"]
+        over = leases.take(batch, groups[0], CY, take_over=True)
+        assert [one.person for one in over.here] == ["cy"]
+        with pytest.raises(ConflictError, match="cy has this group open"):
+            leases.take(batch, groups[0], BO)
+        assert leases.give_back(batch, groups[0], CY).here == ()
+        assert leases.next(batch, BO).group == groups[0]
+
+    def test_a_verdict_ends_it_and_the_work_and_taking_it_back_brings_both(
+        self, store, dataset, groups, leases
+    ):
+        batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
+        leases.next(batch, BO)
+        judge(store, groups[0], "bo")
+        assert get_batch(store, batch).settled == 1
+        assert get_batch(store, batch).here == []
+        assert leases.next(batch, CY).group == groups[1]
+        judge(store, groups[0], "bo", "unreviewed")
+        assert get_batch(store, batch).settled == 0
+        judge(store, groups[0], "bo", "deferred")
+        assert leases.next(batch, BO, after=groups[1]).group == groups[2]
+
+    def test_an_annotator_hands_in_and_a_reviewer_gets_it(self, store, dataset, groups, leases):
+        new = NewBatch("a", annotators=["ada"], reviewers=["bo"])
+        batch = make_batch(store, dataset, new, actor="lead").id
+        assert leases.next(batch, BO).group is None
+        lease = leases.next(batch, ADA)
+        assert (lease.group, lease.part) == (groups[0], Part.ANNOTATOR)
+        assert leases.hand_in(batch, groups[0], ADA, actor="ada").batch.handed_in == 1
+        assert leases.next(batch, ADA, after=groups[0]).group == groups[1]
+        review = leases.next(batch, BO)
+        assert (review.group, review.part) == (groups[0], Part.REVIEWER)
+        with pytest.raises(ConflictError):
+            leases.hand_in(batch, groups[1], BO, actor="bo")
+        with pytest.raises(ConflictError, match="given to others"):
+            leases.next(batch, CY)
+        with pytest.raises(NotFoundError):
+            leases.take(batch, 99, BO)
+        leases.hand_in(batch, groups[0], ADA, actor="ada", done=False)
+        assert get_batch(store, batch).handed_in == 0
+
+    def test_what_is_handed_back_waits_for_its_annotator_first_and_says_why(
+        self, store, dataset, groups, leases
+    ):
+        invite(store, "dan", Role.ANNOTATOR, actor="local")
+        dan = Worker("dan")
+        new = NewBatch("a", annotators=["ada", "dan"], reviewers=["bo"])
+        batch = make_batch(store, dataset, new, actor="lead").id
+        with pytest.raises(ConflictError, match="nobody has handed"):
+            leases.hand_back(batch, groups[3], BO, actor="bo")
+        leases.hand_in(batch, groups[3], ADA, actor="ada")
+        assert leases.next(batch, BO).group == groups[3]
+        back = leases.hand_back(batch, groups[3], BO, "the far goal  line", actor="bo")
+        assert (back.batch.handed_in, back.here) == (0, ())
+        (mine,) = my_work(store, lambda _: ADA)
+        said = [(one.group, one.by, one.reason) for one in mine.handed_back]
+        assert said == [(groups[3], "bo", "the far goal line")]
+        assert my_work(store, lambda _: dan)[0].handed_back == []
+        with store.read() as session:
+            person = person_by_name(session, "ada")
+            rings = read_rings(session, person.id, EVERYTHING, "", 9)
+        assert rings[0].sentence.endswith("back to you: the far goal line")
+        told = read_audit(store, AuditQuery(), EVERYTHING).items[0]
+        assert told.sentence == "handed back to ada: the far goal line"
+        assert leases.next(batch, dan).group == groups[0]
+        assert leases.next(batch, dan, after=groups[2]).group == groups[4]
+        lease = leases.next(batch, ADA)
+        assert lease.group == groups[3] and lease.handed_back is not None
+        lease = leases.hand_in(batch, groups[3], ADA, actor="ada")
+        assert lease.batch.handed_in == 1 and my_work(store, lambda _: ADA)[0].handed_back == []
+        with store.read() as session:
+            assert groups[3] in replay(session).groups
+
+    def test_nothing_is_given_out_of_a_closed_one(self, store, dataset, leases):
+        batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
+        change_batch(store, batch, actor="lead", state="closed")
+        with pytest.raises(ConflictError, match="closed"):
+            leases.next(batch, BO)
+
+
+class TestProgress:
+    def test_work_is_of_those_to_whom_it_is_given(self, store, dataset, groups, leases):
+        new = NewBatch("a", size=3, annotators=["ada"], reviewers=["bo"])
+        batch = make_batch(store, dataset, new, actor="lead").id
+        leases.hand_in(batch, groups[0], ADA, actor="ada")
+        left = {
+            one.name: [(item.parts, item.left) for item in my_work(store, lambda _, one=one: one)]
+            for one in (ADA, BO, CY)
+        }
+        assert left == {"ada": [([Part.ANNOTATOR], 2)], "bo": [([Part.REVIEWER], 1)], "cy": []}
+
+    def test_pace_comes_of_what_was_done_and_pauses_are_none_of_it(
+        self, store, dataset, groups, clock
+    ):
+        new = NewBatch("a", annotators=["ada"])
+        batch = make_batch(store, dataset, new, actor="lead").id
+        for minutes, group in ((1, groups[0]), (4, groups[1]), (90, groups[2]), (96, groups[3])):
+            at = clock.at + timedelta(minutes=minutes)
+            Leases(store, lambda at=at: at).hand_in(batch, group, ADA, actor="ada")
+        (team,) = team_work(store, dataset, at=clock.at + timedelta(hours=2))
+        (pace,) = team.people
+        assert (pace.name, pace.handed_in, pace.minutes) == ("ada", 4, pytest.approx(9))
+        assert pace.groups_an_hour == pytest.approx(60 * 4 / 9)
+        assert team.stalled is None
+        (later,) = team_work(store, dataset, at=clock.at + timedelta(hours=27))
+        assert later.stalled is not None
+        change_batch(store, batch, actor="lead", state="closed")
+        (closed,) = team_work(store, dataset, at=clock.at + timedelta(hours=27))
+        assert closed.stalled is None
+
+    def test_own_annotations_count_on_the_copies_and_not_again_where_they_are_taken_over(
+        self, store, dataset, groups, clock, monkeypatch
+    ):
+        new = NewBatch("a", size=2, annotators=["ada", "bo"], reviewers=["cy"], verdicts=2)
+        batch = make_batch(store, dataset, new, actor="lead").id
+        copies = {}
+        for minutes, who in ((1, ADA), (5, ADA), (20, BO)):
+            copies[minutes] = Leases(store).next(batch, who).group
+            at = (clock.at + timedelta(minutes=minutes)).isoformat(timespec="microseconds")
+            monkeypatch.setattr("app.review.verdicts.verdict.now", lambda at=at: at)
+            judge(store, copies[minutes], who.name)
+        (team,) = team_work(store, dataset, at=clock.at + timedelta(hours=2))
+        paces = {one.name: (one.handed_in, one.judged, one.groups) for one in team.people}
+        assert paces == {"ada": (2, 2, 2), "bo": (1, 1, 1)}
+        assert team.people[0].minutes_a_group == pytest.approx(2)
+        # Ada's comes into the group under her name, an hour later: she did not work then.
+        monkeypatch.setattr(
+            "app.review.takes.adopt.now", lambda: (clock.at + timedelta(minutes=9)).isoformat()
+        )
+        assert after_hand_in(store, copies[20]) == "agreed"
+        (team,) = team_work(store, dataset, at=clock.at + timedelta(hours=2))
+        assert (team.people[0].groups, team.people[0].minutes) == (2, pytest.approx(4))
+        (later,) = team_work(store, dataset, at=clock.at + timedelta(hours=25))
+        assert later.stalled is not None
