@@ -8,13 +8,17 @@ Progress and complaints go to stderr. Heavy modules are imported inside the comm
 
 from __future__ import annotations
 
+import gc
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from app.commands import (
     backup,
+    batches,
+    cluster,
     datasets,
     doctor,
     evaluation,
@@ -37,11 +41,15 @@ from app.commands import (
     versions,
 )
 from app.commands.options import act_as
+from app.commands.server import work_at
 from app.commands.terminal import complain, spell_out
 from app.errors import ReviewError
 
 READER_GONE = 141
 """Exit code of a command whose reader has gone, as shells have it."""
+YOUNG = 50_000
+"""New objects before the collector looks at them: what libraries bring is there to stay, and to walk
+through it again and again is a sixth of a start."""
 
 app = typer.Typer(
     name="touchline",
@@ -68,10 +76,12 @@ PARTS = (
     predictions,
     doctor,
     backup,
+    cluster,
 )
 for part in PARTS:
     app.add_typer(part.commands)
 app.add_typer(datasets.commands, name="datasets")
+app.add_typer(batches.commands, name="batch")
 app.add_typer(policy.commands, name="policy")
 app.add_typer(users.commands, name="users")
 
@@ -86,12 +96,28 @@ def _tell_version(asked: bool) -> None:
 
 @app.callback()
 def options(
+    context: typer.Context,
     actor: Annotated[
         str | None,
         typer.Option(
             envvar="TOUCHLINE_ACTOR",
             metavar="NAME",
             help="What this script calls itself; history and verdicts name it as script:NAME.",
+        ),
+    ] = None,
+    server: Annotated[
+        str | None,
+        typer.Option(
+            envvar="TOUCHLINE_SERVER",
+            metavar="URL",
+            help="Work against this server instead of a home on this machine, where a command can.",
+        ),
+    ] = None,
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            envvar="TOUCHLINE_TOKEN_FILE",
+            help="File with a token of a team's server, that you alone can read.",
         ),
     ] = None,
     version: Annotated[
@@ -103,11 +129,17 @@ def options(
 ) -> None:
     """Turn multi-view soccer frames into a trusted 3D ball dataset."""
     act_as(actor)
+    work_at(server, token_file, context.invoked_subcommand)
+    if server is not None and token_file is not None and actor is not None:
+        raise typer.BadParameter(
+            "the log names the person of the token; leave it out", param_hint="--actor"
+        )
 
 
 def main() -> None:
     """Entry point: what a caller can cause is one sentence on stderr and exit code 1."""
     spell_out()
+    gc.set_threshold(YOUNG)
     try:
         app()
     except SystemExit as end:
@@ -128,3 +160,7 @@ def main() -> None:
             "Point NUMBA_CACHE_DIR at a folder that this user alone can write.",
         )
         sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -6,9 +6,18 @@ import json
 import os
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
+from urllib.parse import unquote, urlsplit
 
-from pydantic import Field, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SecretStr,
+    StringConstraints,
+    field_validator,
+    model_validator,
+)
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 
@@ -41,6 +50,66 @@ def memory_bytes(
     return min(found)
 
 
+class StoreSettings(BaseModel):
+    """One object store (S3 or what speaks like it), as the operator describes it.
+
+    Attributes:
+        url: ``s3://bucket`` or ``s3://bucket/prefix``; nothing beside it is ever asked for.
+        endpoint: Where it is, such as https://minio.example.org:9000; None: at Amazon.
+        region: Its region.
+        key: Access key, with ``secret`` and, for keys that expire, ``token``.
+        key_file: A file in place of these, in the form of ~/.aws/credentials, for its owner alone
+            (0600); read again when it changes.
+        profile: Section of that file.
+        anonymous: It is public, and asked without keys.
+        exports: Exports may be written to it.
+        delivery: How browsers get an export that lies there: ``proxied`` through this server, or
+            ``signed``: sent to an address of the store that is good for a minute.
+        seconds: Longest time that one request to it may take.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    url: Annotated[
+        str, StringConstraints(pattern=r"^s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[^?#]*)?$")
+    ]
+    endpoint: str | None = None
+    region: str = "us-east-1"
+    key: SecretStr | None = None
+    secret: SecretStr | None = None
+    token: SecretStr | None = None
+    key_file: Path | None = None
+    profile: str = "default"
+    anonymous: bool = False
+    exports: bool = False
+    delivery: Literal["proxied", "signed"] = "proxied"
+    seconds: float = Field(default=10.0, gt=0, le=600)
+
+    @model_validator(mode="after")
+    def _one_way_in(self) -> StoreSettings:
+        given = (self.key is not None and self.secret is not None, self.key_file is not None)
+        if sum((*given, self.anonymous)) != 1:
+            raise ValueError(
+                "needs key and secret, or key_file, or anonymous, and only one of them"
+            )
+        if self.endpoint is not None and not _URL.fullmatch(self.endpoint.lower()):
+            raise ValueError("endpoint must be an address such as https://minio.example.org:9000")
+        return self
+
+    @property
+    def bucket(self) -> str:
+        """Name of the bucket."""
+        return self.url.removeprefix("s3://").partition("/")[0]
+
+    @property
+    def prefix(self) -> str:
+        """What the key of every object begins with; empty, or without slashes at its ends."""
+        return self.url.removeprefix("s3://").partition("/")[2].strip("/")
+
+
+StoreName = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,62}$")]
+
+_FILE = "touchline.db"
 _URL = re.compile(r"https?://(?:[a-z0-9.-]+|\[[0-9a-f:]+\])(?::\d{1,5})?/?")
 
 
@@ -51,8 +120,8 @@ class Settings(BaseSettings):
 
     home: Path = Field(default_factory=_user_data_folder)
     """The folder that holds the database, the media cache and the exports."""
-    database_url: str | None = None
-    """Another database than the SQLite file in ``home``."""
+    database_url: str | None = Field(default=None, repr=False)
+    """Another database than the SQLite file in ``home``: ``postgresql://USER:PASSWORD@HOST/NAME``."""
     host: str = "127.0.0.1"
     """Address the server listens on."""
     port: int = 8000
@@ -66,8 +135,52 @@ class Settings(BaseSettings):
     stands in front."""
     proxies: list[str] = ["127.0.0.1", "::1"]
     """Addresses of proxies that are believed whom they forward (X-Forwarded-For), once ``url`` is set."""
+    webhooks: list[str] = []
+    """Addresses such as https://hooks.example.org/touchline: webhooks may be sent to them and to what
+    lies below them, and nowhere else."""
+    stalled_hours: float = Field(default=24.0, gt=0, le=8760)
+    """A batch that is not done and in which nobody did anything for so long has stalled; one whose due
+    day is over, in any case."""
+    sso_issuer: str | None = None
+    """Address of the OpenID Connect provider by which people log in (single sign-on), as it calls itself:
+    https://accounts.example.org."""
+    sso_client_id: str | None = None
+    """Under which name the provider knows this server."""
+    sso_client_secret: SecretStr | None = None
+    """The secret that the provider has given it."""
+    sso_client_secret_file: Path | None = None
+    """Or a file with that secret, which its owner alone may read (``chmod 600``)."""
+    sso_label: str = Field("single sign-on", min_length=1, max_length=40)
+    """What people call the provider: the button says *Log in with* this."""
+    sso_hosts: list[str] = []
+    """Beginnings of addresses, such as https://oauth2.googleapis.com, that the provider has beside its own;
+    nothing is asked of any other."""
+    sso_scope: str = "openid email profile"
+    """What the provider is asked to tell of people."""
+    sso_name_claim: str = "preferred_username"
+    """Which claim is the name of somebody new."""
+    sso_domains: list[str] = []
+    """Who may come in: whose verified e-mail address is of one of these domains; empty: of any, or none."""
+    sso_group_claim: str | None = None
+    """Which claim lists somebody's groups."""
+    sso_groups: list[str] = []
+    """Who may come in: whoever is in one of these groups; empty: everybody."""
+    sso_new_role: str | None = None
+    """Which role somebody gets whom nobody here knows, such as ``viewer``; empty: they do not come in."""
+    sso_only: bool = False
+    """Nobody logs in by password or passkey."""
+    sso_second_factor: list[str] = []
+    """Values of the claims ``amr`` and ``acr`` by which the provider says that it has asked for a second
+    factor: with one of them ours is not asked for; empty: it always is."""
     workers: int = Field(default_factory=lambda: os.cpu_count() or 1)
     """Processes that solve in batches."""
+    web_workers: int = Field(default=1, ge=1, le=64)
+    """Processes that answer requests, on PostgreSQL alone."""
+    cluster: str | None = None
+    """Address of a scheduler, such as tls://solve.example.org:8786, whose workers solve in batches in
+    place of processes of this machine."""
+    cluster_keys: Path | None = None
+    """Folder with ca.pem, cert.pem and key.pem, by which scheduler, workers and servers know each other."""
     image_workers: int = Field(default_factory=lambda: min(os.cpu_count() or 1, 4), ge=1)
     """Processes that make pictures of frames."""
     max_upload_bytes: int = 2 * 1024**3
@@ -83,6 +196,11 @@ class Settings(BaseSettings):
     """After so many days a derived image is made anew."""
     import_folders: Annotated[list[Path], NoDecode] = []
     """Folders below which imports over REST may read, separated by ``:`` (or a JSON list)."""
+    stores: dict[StoreName, StoreSettings] = {}
+    """Object stores by the name that people use for them (``s3://NAME/...``), as JSON: ``url`` with
+    ``key`` and ``secret``, ``key_file`` or ``anonymous``; ``endpoint``, ``exports`` and more: [operations.md](operations.md)."""
+    store_cache_bytes: int = Field(default=4 * 1024**3, ge=2**26)
+    """Room for frames of object stores that are kept on this disk; those not asked for longest go."""
     max_file_bytes: int = 256 * 1024 * 1024
     """Largest single data file (JSON, XML, CSV) that an importer reads."""
     import_memory: int = Field(default_factory=lambda: min(4 * 1024**3, memory_bytes() // 2))
@@ -122,12 +240,27 @@ class Settings(BaseSettings):
     @property
     def database(self) -> str:
         """URL of the database."""
-        return self.database_url or f"sqlite+pysqlite:///{self.home / 'touchline.db'}"
+        return self.database_url or f"sqlite+pysqlite:///{self.home / _FILE}"
 
     @property
     def database_file(self) -> Path:
-        """The file of the database."""
+        """The file of the database; of one on a server, where in the home its file would lie."""
+        if not self.database.startswith("sqlite"):
+            return self.home / _FILE
         return Path(self.database.partition("///")[2].partition("?")[0])
+
+    @property
+    def database_name(self) -> str:
+        """What the database is called in a sentence: its file, or its name on its server."""
+        if self.database.startswith("sqlite"):
+            return self.database_file.name
+        name = urlsplit(self.database).path.strip("/")
+        return f"the database {unquote(name)}" if name else "the database"
+
+    @property
+    def yields(self) -> Path:
+        """The folder of the tables that yields are counted from, a part of the cache."""
+        return self.cache / "yields"
 
     @property
     def cache(self) -> Path:

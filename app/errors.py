@@ -12,12 +12,14 @@
       ConflictError
         StaleRevisionError  (current)
         SharedStationError  (station)
+        HeldGroupError      (here)
       GeometryError
         DegenerateGeometryError
       StorageError          the disk or the database refuses
         BusyError           another process writes for longer than one waits
         DamagedError        the database is not what was written
       OverloadedError       more work waits than is taken
+      ClusterError          the other machines that solve cannot
       AccessError           who asks may not
         NotLoggedInError    nobody has said who asks
         ForbiddenError      their role does not let them
@@ -31,6 +33,7 @@ exit code.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Self
 
 
@@ -155,6 +158,19 @@ class SharedStationError(ConflictError):
         self.station = station
 
 
+class HeldGroupError(ConflictError):
+    """Somebody else has a group of a batch open.
+
+    Args:
+        message: Names them.
+        here: Everybody who has it open, with ``person`` and ``since``.
+    """
+
+    def __init__(self, message: str, here: Sequence[Any]):
+        super().__init__(message, hint="Take it over, or go on with the next one.")
+        self.here = here
+
+
 class GeometryError(ReviewError):
     """Geometry that has no answer; recorded on the solution, not a crash."""
 
@@ -181,6 +197,10 @@ class DamagedError(StorageError):
 
 class OverloadedError(ReviewError):
     """The server has as much work as it takes; later it takes more."""
+
+
+class ClusterError(ReviewError):
+    """The processes that solve on other machines are not there, or are not of this version."""
 
 
 class AccessError(ReviewError):

@@ -15,6 +15,7 @@ import struct
 import tempfile
 import zipfile
 from pathlib import Path
+from typing import Protocol
 
 MAX_UNPACKED = 4 * 1024**3
 """Bytes of a compressed zip that are unpacked to reach its members."""
@@ -33,6 +34,49 @@ _ENTRY_BYTES = 46
 _FLAGS, _FLAGS_AT = struct.Struct("<H"), 8
 
 
+class Reads(Protocol):
+    """Bytes of something, from any place in it."""
+
+    def pread(self, count: int, at: int) -> bytes:
+        """So many bytes from there, fewer at the end."""
+
+    def close(self) -> None:
+        """Nobody reads it any more."""
+
+
+class Elsewhere(Protocol):
+    """A file that lies on no disk here."""
+
+    def reads(self) -> Reads:
+        """Begin to read it."""
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+
+
+class _Handle:
+    """A file of this machine."""
+
+    def __init__(self, handle: int):
+        self._handle = handle
+
+    def pread(self, count: int, at: int) -> bytes:
+        return os.pread(self._handle, count, at)
+
+    def close(self) -> None:
+        os.close(self._handle)
+
+
+def open_zip_elsewhere(place: Elsewhere) -> zipfile.ZipFile:
+    """``open_zip`` of a file that lies on no disk here; reads its list of members.
+
+    Raises:
+        zipfile.BadZipFile, ValueError: It is no zip file.
+    """
+    return _open_window(_Window(place.reads(), 0, place.size))
+
+
 def open_zip(path: Path) -> zipfile.ZipFile:
     """Open a zip file; a member whose name is not the text that it is said to be is ``UNREADABLE``.
 
@@ -46,7 +90,7 @@ def open_zip(path: Path) -> zipfile.ZipFile:
         return zipfile.ZipFile(path)
     except UnicodeDecodeError:
         handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-        return _with_any_names(_Window(handle, 0, os.fstat(handle).st_size))
+        return _with_any_names(_Window(_Handle(handle), 0, os.fstat(handle).st_size))
 
 
 def _open_window(window: _Window) -> zipfile.ZipFile:
@@ -94,15 +138,16 @@ def nested_name(archive: zipfile.ZipFile, name: str) -> tuple[str, str] | None:
 
 
 def open_nested(
-    archive: zipfile.ZipFile, path: Path, member: zipfile.ZipInfo, limit: int = MAX_UNPACKED
+    archive: zipfile.ZipFile,
+    path: Path | Elsewhere,
+    member: zipfile.ZipInfo,
 ) -> zipfile.ZipFile:
     """Open a zip that is a member of another.
 
     Args:
         archive: The outer zip, open.
         path: Its file.
-        member: The inner zip.
-        limit: Bytes to unpack at most, where it is compressed; real ones are counted.
+        member: The inner zip; where it is compressed, the bytes that it unpacks to are counted.
 
     Raises:
         zipfile.BadZipFile: It is damaged, encrypted, no zip, or larger than the limit.
@@ -112,21 +157,27 @@ def open_nested(
         raise zipfile.BadZipFile("is encrypted")
     if member.compress_type == zipfile.ZIP_STORED:
         return _open_window(_stored(path, member))
+    if not isinstance(path, Path):
+        # To reach a member of it, all of it would have to be fetched.
+        raise zipfile.BadZipFile("is a zip compressed inside another; put it there by itself")
     with tempfile.TemporaryFile() as file:
         total = 0
         with archive.open(member) as packed:
             while chunk := packed.read(_CHUNK):
                 total += len(chunk)
-                if total > limit:
-                    raise zipfile.BadZipFile(f"unpacks to more than {limit:,} bytes")
+                if total > MAX_UNPACKED:
+                    raise zipfile.BadZipFile(f"unpacks to more than {MAX_UNPACKED:,} bytes")
                 file.write(chunk)
         file.flush()
-        return _open_window(_Window(os.dup(file.fileno()), 0, total))
+        return _open_window(_Window(_Handle(os.dup(file.fileno())), 0, total))
 
 
-def _stored(path: Path, member: zipfile.ZipInfo) -> _Window:
-    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    window = _Window(handle, member.header_offset, _HEADER.size)
+def _stored(path: Path | Elsewhere, member: zipfile.ZipInfo) -> _Window:
+    if isinstance(path, Path):
+        reads: Reads = _Handle(os.open(path, os.O_RDONLY | os.O_CLOEXEC))
+    else:
+        reads = path.reads()
+    window = _Window(reads, member.header_offset, _HEADER.size)
     header = window.read(_HEADER.size)
     if len(header) < _HEADER.size or not header.startswith(_SIGNATURE):
         raise zipfile.BadZipFile("has no header where the zip file's list of members says")
@@ -138,13 +189,13 @@ def _stored(path: Path, member: zipfile.ZipInfo) -> _Window:
 class _Window(io.RawIOBase):
     """A part of a file as a file; reading it moves nobody else's place in it.
 
-    It closes its handle when nobody holds it any more: a member may be under way while its
+    It closes what it reads when nobody holds it any more: a member may be under way while its
     archive is closed.
     """
 
-    def __init__(self, handle: int, start: int, size: int):
+    def __init__(self, reads: Reads, start: int, size: int):
         super().__init__()
-        self._handle, self._start, self._size, self._at = handle, start, size, 0
+        self._reads, self._start, self._size, self._at = reads, start, size, 0
         self.lenient = False
         """Whether it is read for the list of a zip's members, whose names may be no text."""
 
@@ -176,7 +227,7 @@ class _Window(io.RawIOBase):
     def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
         """Fill a buffer as far as the part goes."""
         count = max(min(len(buffer), self._size - self._at), 0)
-        data = os.pread(self._handle, count, self._start + self._at)
+        data = self._reads.pread(count, self._start + self._at)
         if self.lenient and data.startswith(_LISTED):
             data = _without_false_marks(data)
         buffer[: len(data)] = data
@@ -186,5 +237,5 @@ class _Window(io.RawIOBase):
     def close(self) -> None:
         """Release the handle."""
         if not self.closed:
-            os.close(self._handle)
+            self._reads.close()
         super().close()

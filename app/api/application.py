@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, nullcontext
 from pathlib import Path
 
 from anyio.to_thread import current_default_thread_limiter
@@ -17,19 +17,27 @@ from app.api.openapi import describe
 from app.api.pages import install_pages
 from app.api.request_log import RequestLog
 from app.api.routers import (
+    agreement,
+    audit,
+    bell,
     bulk,
     datasets,
     evaluations,
     events,
     exports,
     findings,
+    gold,
     groups,
+    guidelines,
     health,
     imports,
     insight,
     jobs,
+    members,
     noise,
     paint,
+    passkeys,
+    pictures,
     pitch,
     pitches,
     policies,
@@ -40,15 +48,22 @@ from app.api.routers import (
     query_fields,
     rig,
     saved_views,
+    second_factors,
     sessions,
+    sign_on,
     stations,
     statistics,
+    takes,
+    threads,
     timeline,
+    tokens,
     uploads,
     users,
     versions,
     view_paint,
     views,
+    webhooks,
+    work,
     yields,
 )
 from app.api.security.access import Access, require_decided
@@ -68,7 +83,10 @@ from app.soccer.actors import LOCAL_USER
 PREFIX = "/api/v1"
 ROUTERS = (
     datasets,
+    gold,
     groups,
+    guidelines,
+    threads,
     view_paint,
     views,
     stations,
@@ -79,6 +97,7 @@ ROUTERS = (
     exports,
     pitch,
     pitches,
+    pictures,
     paint,
     proposals,
     positions,
@@ -96,13 +115,24 @@ ROUTERS = (
     saved_views,
     query_fields,
     statistics,
+    takes,
     practice,
     sessions,
+    sign_on,
+    passkeys,
+    second_factors,
+    tokens,
     users,
+    members,
+    bell,
+    audit,
+    webhooks,
+    work,
+    agreement,
 )
 
 
-def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None = None) -> FastAPI:
+def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullcontext) -> FastAPI:
     """The whole service over one home.
 
     The database must exist in the present schema (``touchline migrate``); it is opened here, so
@@ -111,7 +141,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool | None =
     Args:
         settings: Where things live and how much is allowed.
         static: Folder of the browser application.
-        pool: Makes the processes that large jobs solve in; None: they share this one.
+        pool: Makes the processes that large jobs solve in; without any they share this one.
 
     Raises:
         StorageError: The database cannot be used.
@@ -154,7 +184,7 @@ def _add_middleware(app: FastAPI, settings: Settings, site: Site, team: Team | N
     app.add_middleware(Idempotency, actor=LOCAL_USER)
     if team is not None:
         # Inside of what makes HEAD a GET, outside of whatever could answer.
-        app.add_middleware(Access, logins=team.logins, cookie=team.cookie)
+        app.add_middleware(Access, team=team, store=app.state.services.store)
     app.add_middleware(OneRange)
     app.add_middleware(HeadAsGet)
     app.add_middleware(

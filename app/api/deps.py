@@ -7,17 +7,20 @@ costs more than all that it does here.
 from __future__ import annotations
 
 import re
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from threading import Event, Thread
 from typing import Annotated
 
+import structlog
 from fastapi import Depends, Header, Path, Query, Request
 
 from app.api.errors import PreconditionRequiredError
 from app.api.events import Events
-from app.api.security.access import login_of
+from app.api.security.access import login_of, sight_of
 from app.config import Settings
 from app.errors import BusyError, InputError
+from app.review.agreement.weigh import weigh_left
 from app.review.editing.follow_paint import PaintFollower
 from app.review.evaluating.prediction_reader import PredictionReader
 from app.review.exporting.folder import ExportFolder
@@ -25,18 +28,26 @@ from app.review.jobs.evaluations import resume_evaluations
 from app.review.jobs.exports import resume_exports
 from app.review.jobs.imports import resume_imports
 from app.review.jobs.jobs import Jobs, Pool
-from app.review.jobs.paint import resume_reading
-from app.review.jobs.proposals import resume_proposals
+from app.review.jobs.paint import PAINT
+from app.review.jobs.pictures import PICTURES
+from app.review.jobs.proposals import PROPOSALS
+from app.review.jobs.rig import make_rigs
+from app.review.jobs.shared_jobs import SharedJobs
 from app.review.jobs.solve import resume_solving, solve_leftovers
 from app.review.jobs.upkeep import Upkeep
 from app.review.jobs.versions import resume_versions
+from app.review.people.roles import Sight
 from app.review.policies.noise_store import NoiseStore
 from app.review.practice.practice import resume_practice
+from app.review.webhooks.sender import WebhookSender
+from app.review.yields.statistics import StatisticsStore
 from app.review.yields.store import YieldStore
 from app.soccer.actors import LOCAL_USER, script_name
 from app.solving.warm import warm_up
 from app.store.frames import Frames
 from app.store.session import Store
+
+log = structlog.get_logger("touchline.api")
 
 ACTOR_HEADER = "X-Actor"
 LEFTOVERS_AGAIN_S = 2.0
@@ -60,8 +71,10 @@ class Services:
     jobs: Jobs
     events: Events
     yields: YieldStore
+    statistics: StatisticsStore
     noises: NoiseStore
     upkeep: Upkeep
+    webhooks: WebhookSender
     stopping: Event = field(default_factory=Event)
 
     @property
@@ -70,10 +83,10 @@ class Services:
         return PaintFollower(self.frames)
 
     @staticmethod
-    def open(settings: Settings, pool: Pool | None = None) -> Services:
+    def open(settings: Settings, pool: Pool = nullcontext) -> Services:
         """Open everything over one home; ``pool`` is for jobs that are worth processes."""
         store = Store.open(settings)
-        jobs = Jobs(store, pool=pool)
+        jobs = SharedJobs(store, pool=pool) if store.sharing.is_shared else Jobs(store, pool=pool)
         exports = ExportFolder(settings.exports)
         return Services(
             settings,
@@ -84,26 +97,49 @@ class Services:
             jobs,
             Events(store, jobs),
             YieldStore(store),
+            StatisticsStore(store),
             NoiseStore(store),
             Upkeep(store, jobs),
+            WebhookSender(store, leads=jobs.leads),
         )
 
     def start(self) -> None:
         """Load the solver's kernels, and take up the work that an earlier run left undone."""
         Thread(target=warm_up, daemon=True).start()
+        Thread(target=self._keep_large_up, name="yield", daemon=True).start()
         self.frames.warm()
         resume_solving(self.jobs, self.store)
-        resume_reading(self.jobs, self.store)
-        resume_proposals(self.jobs, self.store)
+        for kind in (PAINT, PROPOSALS, PICTURES):
+            kind.resume(self.jobs, self.store)
         resume_exports(self.jobs, self.store, self.exports, self.frames)
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
         resume_evaluations(self.jobs, self.store)
         resume_practice(self.jobs, self.store, self.settings)
+        make_rigs(self.jobs, self.store)
+        self.jobs.on_lead(self._lead)
         self.jobs.start()
+        self.store.follow()
+        self.upkeep.start()
+        self.webhooks.start()
+
+    def _lead(self) -> None:
+        """Begin what one process does for all."""
         if not self._solved_leftovers():
             Thread(target=self._solve_leftovers_later, daemon=True).start()
-        self.upkeep.start()
+        Thread(target=self._weigh_left, name="agreement", daemon=True).start()
+        self.webhooks.wake()
+
+    def _weigh_left(self) -> None:
+        """Compare annotations that an earlier run was stopped before."""
+        try:
+            weigh_left(self.store, self.paint)
+        except Exception:
+            log.exception("annotations could not be compared")
+
+    def _keep_large_up(self) -> None:
+        self.statistics.keep_large_up()
+        self.yields.keep_large_up()
 
     def _solved_leftovers(self) -> bool:
         """Whether what an earlier run left is taken up; not while another process keeps writing."""
@@ -120,6 +156,7 @@ class Services:
     def close(self) -> None:
         """Let the running work end, and close processes and database."""
         self.events.close()
+        self.webhooks.close()
         self.upkeep.stop()
         self.jobs.close()
         self.upkeep.close()
@@ -151,7 +188,7 @@ async def get_actor(
         ),
     ] = None,
 ) -> str:
-    """Who acts: the person who is logged in; on a server without accounts its single user, or a script
+    """Who acts: the person who is logged in, or whose token it is; on a server without accounts its single user, or a script
     by its name.
 
     Raises:
@@ -165,8 +202,13 @@ async def get_actor(
                 hint="Leave it out: the log names the person who is logged in.",
                 pointer=f"/{ACTOR_HEADER}",
             )
-        return login.name
+        return login.actor
     return LOCAL_USER if said is None else script_name(said, pointer=f"/{ACTOR_HEADER}")
+
+
+async def get_sight(request: Request) -> Sight:
+    """What whoever asks sees."""
+    return sight_of(request.scope)
 
 
 async def require_if_match(
@@ -202,6 +244,7 @@ async def require_if_match(
 AppServices = Annotated[Services, Depends(get_services)]
 AppStore = Annotated[Store, Depends(get_store)]
 Actor = Annotated[str, Depends(get_actor)]
+Sees = Annotated[Sight, Depends(get_sight)]
 IfMatch = Annotated[str, Depends(require_if_match)]
 Id = Annotated[int, Path(ge=1, le=MAX_ID)]
 DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]

@@ -12,13 +12,16 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
 from app.api.problem import SCHEME, TITLES, make_problem, problem_response
+from app.api.schemas.event import PresenceDocument
 from app.api.schemas.problem import FieldProblem
 from app.api.unknown_names import UNKNOWN, sentence_about
 from app.errors import (
+    ClusterError,
     ConflictError,
     DamagedError,
     ForbiddenError,
     GeometryError,
+    HeldGroupError,
     ImageError,
     InputError,
     NotFoundError,
@@ -48,6 +51,7 @@ STATUSES: tuple[tuple[type[ReviewError], int], ...] = (
     (GeometryError, 422),
     (StorageError, 507),
     (OverloadedError, 503),
+    (ClusterError, 503),
     (TooManyTriesError, 429),
 )
 """The first branch that fits decides."""
@@ -84,9 +88,10 @@ def status_of(error: ReviewError) -> int:
 def _is_full(error: StorageError) -> bool:
     """Whether the disk is full, rather than the database busy or damaged."""
     cause = error.__cause__
-    name = str(getattr(getattr(cause, "orig", None), "sqlite_errorname", ""))
+    said = getattr(cause, "orig", None)
+    name = str(getattr(said, "sqlite_errorname", "") or getattr(said, "sqlstate", ""))
     full = getattr(cause, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
-    return name.startswith("SQLITE_FULL") or full
+    return name.startswith(("SQLITE_FULL", "53100")) or full
 
 
 def install_handlers(app: FastAPI) -> None:
@@ -105,6 +110,7 @@ async def _review_error(request: Request, error: Exception) -> Response:
         hint=error.hint,
         pointer=error.pointer,
         station=error.station if isinstance(error, SharedStationError) else None,
+        here=_presences(error) if isinstance(error, HeldGroupError) else None,
     )
     headers = {"Retry-After": RETRY_SECONDS} if status in (503, 507) else {}
     if isinstance(error, TooManyTriesError):
@@ -120,6 +126,10 @@ async def _review_error(request: Request, error: Exception) -> Response:
         cause = str(error.__cause__ or "").partition("\n")[0]
         log.error("request refused", instance=problem.instance, error=str(error), cause=cause)
     return problem_response(problem, headers, current)
+
+
+def _presences(error: HeldGroupError) -> list[PresenceDocument]:
+    return [PresenceDocument.model_validate(one) for one in error.here]
 
 
 async def _validation_error(request: Request, error: Exception) -> Response:

@@ -17,11 +17,13 @@ from dataclasses import dataclass, replace
 import structlog
 from fastapi.sse import ServerSentEvent
 
-from app.api.schemas.event import DatasetEvent, GroupEvent
+from app.api.schemas.event import DatasetEvent, GroupEvent, PresenceDocument, WorkEvent
 from app.api.schemas.job import JobDocument
 from app.errors import OverloadedError, StorageError
 from app.review.jobs.jobs import Jobs
+from app.review.people.roles import EVERYTHING, Sight
 from app.review.queue.changes import Change, read_news, read_position
+from app.review.work.leases import Lease
 from app.store.jobs import OPEN, Job
 from app.store.session import Store
 
@@ -30,11 +32,13 @@ log = structlog.get_logger("touchline.events")
 PAUSE = 0.05
 """Seconds between two looks at the log while commits follow each other."""
 POLL = 2.0
-"""Seconds until the log is looked at for what other processes have committed."""
+"""Seconds until the log is looked at for what other processes have committed and not told."""
 MAX_FEEDS = 100
 """Listeners at a time; a browser has one a window."""
 MAX_WAITING = 1000
 """Events that a listener may be behind."""
+_WORK = "work"
+"""How what processes tell each other of a lease begins."""
 RETRY_MS = 1000
 """How long a browser waits before it comes back."""
 
@@ -55,21 +59,33 @@ class Feed:
     Args:
         dataset_id: Tell of this dataset alone; None: of all.
         position: Id of the log entry up to which it knows everything.
+        sight: What its reader sees.
+        began: Id of the newest log entry when it began to listen.
 
     Attributes:
         lost: It did not keep up and was let go.
     """
 
-    def __init__(self, dataset_id: int | None, position: int):
+    def __init__(self, dataset_id: int | None, position: int, sight: Sight, began: int):
         self.dataset_id, self.position = dataset_id, position
+        self._sight, self._began = sight, began
         self.lost = False
         self._events: deque[ServerSentEvent] = deque()
         self._loop = asyncio.get_running_loop()
         self._ready, self._ended = asyncio.Event(), False
 
-    def wants(self, dataset_id: int | None) -> bool:
-        """Whether what happens in a dataset (None: in none) is told here."""
-        return self.dataset_id is None or dataset_id in (None, self.dataset_id)
+    def wants(self, dataset_id: int | None, actor: str | None = None) -> bool:
+        """Whether what happens in a dataset (None: in none, by somebody) is told here."""
+        meant = self.dataset_id is None or dataset_id in (None, self.dataset_id)
+        return meant and self._sight.sees(dataset_id, actor)
+
+    def is_told(self, change: Change) -> bool:
+        """Whether a change is told here.
+
+        Who saw a dataset that was gone before this one listened, nobody knows any more.
+        """
+        gone = change.dataset is None and (change.id or 0) <= self._began
+        return self.wants(change.dataset_id) and (not gone or self._sight == EVERYTHING)
 
     def offer(self, events: list[ServerSentEvent]) -> None:
         """Tell of something; from any thread."""
@@ -118,6 +134,7 @@ class Events:
         self._counts = Counts()
         jobs.listen(self._tell_job)
         store.listen(self._wake.set)
+        store.sharing.hear(self._hear_lease)
 
     def position(self) -> int:
         """Id of the newest entry of the log."""
@@ -129,13 +146,23 @@ class Events:
         with self._lock:
             return replace(self._counts, open=len(self._feeds))
 
-    def subscribe(self, dataset_id: int | None, position: int, *, resumed: bool = False) -> Feed:
+    def subscribe(
+        self,
+        dataset_id: int | None,
+        position: int,
+        *,
+        resumed: bool = False,
+        sight: Sight = EVERYTHING,
+        began: int | None = None,
+    ) -> Feed:
         """Begin to listen, or go on where an earlier stream ended; on the event loop.
+
+        ``began`` is the newest entry of the log by now, where that is not the position.
 
         Raises:
             OverloadedError: Too many listen, or the server stops.
         """
-        feed = Feed(dataset_id, position)
+        feed = Feed(dataset_id, position, sight, position if began is None else began)
         with self._lock:
             if len(self._feeds) >= MAX_FEEDS or self._closing.is_set():
                 raise OverloadedError("too many windows listen for events")
@@ -154,9 +181,9 @@ class Events:
             self._feeds.discard(feed)
             self._counts.lost += feed.lost
 
-    def open_jobs(self, dataset_id: int | None) -> list[ServerSentEvent]:
+    def open_jobs(self, dataset_id: int | None, sight: Sight) -> list[ServerSentEvent]:
         """Jobs that are under way, for whoever begins to listen."""
-        jobs = self._jobs.find(dataset_id=dataset_id, states=OPEN)
+        jobs = self._jobs.find(dataset_id=dataset_id, states=OPEN, sight=sight)
         return [_job_event(job) for job in reversed(jobs)]
 
     def close(self) -> None:
@@ -198,11 +225,34 @@ class Events:
         for feed in feeds:
             wanted = [*news.changes.get(feed.position, []), *news.solved]
             feed.position = max(feed.position, news.entry)
-            feed.offer([_change_event(item) for item in wanted if feed.wants(item.dataset_id)])
+            feed.offer([_change_event(item) for item in wanted if feed.is_told(item)])
+
+    def tell_lease(self, lease: Lease) -> None:
+        """Tell who has a group of a batch open."""
+        if lease.group is None:
+            return
+        here = [PresenceDocument.model_validate(one) for one in lease.here]
+        told = WorkEvent(
+            batch=lease.batch.id, group=lease.group, dataset=lease.batch.dataset, here=here
+        )
+        self._tell_work(lease.batch.dataset_id, told)
+        self._store.say(f"{_WORK} {lease.batch.dataset_id} {told.model_dump_json()}")
+
+    def _hear_lease(self, word: str) -> None:
+        """Tell of a lease that another process has given."""
+        kind, _, rest = word.partition(" ")
+        if kind == _WORK:
+            dataset_id, _, told = rest.partition(" ")
+            self._tell_work(int(dataset_id), WorkEvent.model_validate_json(told))
+
+    def _tell_work(self, dataset_id: int, told: WorkEvent) -> None:
+        for feed in self._listening():
+            if feed.wants(dataset_id):
+                feed.offer([ServerSentEvent(event="work", data=told)])
 
     def _tell_job(self, job: Job) -> None:
         for feed in self._listening():
-            if feed.wants(job.dataset_id):
+            if feed.wants(job.dataset_id, job.actor):
                 feed.offer([_job_event(job)])
 
 

@@ -10,9 +10,10 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import re
+import time
 
 import structlog
-from anyio import CapacityLimiter
+from anyio import CancelScope, CapacityLimiter
 from anyio.to_thread import run_sync
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -25,7 +26,7 @@ from app.api.security.access import actor_of
 from app.api.security.bodies import BYTES, VALUE
 from app.api.security.origin import SAFE_METHODS
 from app.errors import OverloadedError, ReviewError, StorageError
-from app.review.answers.answers import find_first, keep_first
+from app.review.answers.answers import claim, end_claim, find_first, keep_first
 from app.store.answers import Answer
 from app.store.codecs import canonical
 from app.store.session import Store
@@ -40,7 +41,11 @@ MAX_ANSWER_BYTES = 8 * 1024 * 1024
 """Larger answers are not kept; no route that changes something gives one."""
 PATIENCE = 60.0
 """Seconds that a repetition waits for the first one to be answered."""
-UNKEPT = re.compile(r"/api/v\d+/(?:session|sessions|links|users)(?:/|$)")
+AGAIN_SECONDS = 0.02
+"""Between two looks whether another process has answered."""
+UNKEPT = re.compile(
+    r"/api/v\d+/(?:session|sessions|links|tokens|users|datasets/[^/]+/webhooks)(?:/|$)"
+)
 """Answers that hold a secret are shown once, and kept nowhere."""
 THREADS = 4
 """So many answers are looked up at a time, and as many are kept."""
@@ -82,15 +87,42 @@ class Idempotency:
             while (first := self._under_way.get(whose)) is not None:
                 await asyncio.wait_for(first.wait(), PATIENCE)
         except TimeoutError:
-            error = OverloadedError("the first request of this key is still being answered")
-            await _refuse(error, scope, receive, send)
+            await _refuse(_still(), scope, receive, send)
             return
         done = self._under_way[whose] = asyncio.Event()
         try:
-            await self._answer(*whose, _Request(scope, receive), send)
+            await self._alone(*whose, _Request(scope, receive), send)
         finally:
             del self._under_way[whose]
             done.set()
+
+    async def _alone(self, actor: str, key: str, request: _Request, send: Send) -> None:
+        """Answer while no other process does, where there may be some."""
+        if not request.store.sharing.is_shared:
+            await self._answer(actor, key, request, send)
+            return
+        try:
+            claimed = await self._claim(request.store, key, actor)
+        except StorageError as error:
+            await _refuse(error, request.scope, request.receive, send)
+            return
+        if not claimed:
+            await _refuse(_still(), request.scope, request.receive, send)
+            return
+        try:
+            await self._answer(actor, key, request, send)
+        finally:
+            with CancelScope(shield=True):
+                await run_sync(end_claim, request.store, key, actor, limiter=self._keeping)
+
+    async def _claim(self, store: Store, key: str, actor: str) -> bool:
+        """Whether it could be had before patience was at its end."""
+        until = time.monotonic() + PATIENCE
+        while not await run_sync(claim, store, key, actor, limiter=self._finding):
+            if time.monotonic() > until:
+                return False
+            await asyncio.sleep(AGAIN_SECONDS)
+        return True
 
     async def _answer(self, actor: str, key: str, request: _Request, send: Send) -> None:
         try:
@@ -120,6 +152,10 @@ class Idempotency:
             except StorageError as error:
                 # It is sent already; a repetition is answered with the state as it is then.
                 log.warning("an answer could not be kept", error=str(error))
+
+
+def _still() -> OverloadedError:
+    return OverloadedError("the first request of this key is still being answered")
 
 
 async def _refuse(error: ReviewError, scope: Scope, receive: Receive, send: Send) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from fastapi import Response
 
-from app.api.problem import Responses
+from app.api.problem import Responses, responses
 from app.api.reply import document
 from app.api.schemas.job import JobDocument
 from app.store.jobs import Job
@@ -27,8 +29,11 @@ def job_answer(job: Job) -> Response:
     return document(JobDocument.model_validate(job), 202, job_address(job))
 
 
-def accepted(job: Job, response: Response) -> JobDocument:
-    """The document of a job that was started, its address in the header."""
-    response.status_code = 202
-    response.headers.update(job_address(job))
-    return JobDocument.model_validate(job)
+def by_job(*statuses: int) -> dict[str, Any]:
+    """What a route says of itself that answers 202 with a job.
+
+    Args:
+        statuses: Of its refusals.
+    """
+    answers = {**responses(*statuses), **ACCEPTED}
+    return {"status_code": 202, "response_model": JobDocument, "responses": answers}

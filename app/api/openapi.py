@@ -21,7 +21,9 @@ Everything that the browser does goes through these addresses.
 * **Names.** A script says its name in `X-Actor` and is remembered as `script:NAME`; nobody checks it.
 * **Who asks.** A server that one person runs alone asks nobody. On a server of a team everything but
   `/healthz`, `/readyz` and logging in needs a session: `POST /api/v1/session` sets its cookie, and a
-  change must carry an `Origin` of this server. 401: there is none; 403: the role does not suffice.
+  change must carry an `Origin` of this server. Scripts send a token of `POST /api/v1/tokens` as
+  `Authorization: Bearer tl_...`, and neither cookie nor `Origin`. 401: there is none that is valid;
+  403: the role does not suffice, or the token lacks a scope.
 * **Problems.** Every answer that is not a success is `application/problem+json` (RFC 9457).
 * **Pages.** Lists take `limit` and `cursor`; `next` is the cursor of the next page, `total` says
   how many match.
@@ -37,7 +39,12 @@ TAGS = {
     "insight": "What would mend a group, and which points move its ball most.",
     "verdicts": "Many groups judged at once.",
     "queue": "Saved queries, and who has reviewed how much.",
+    "work": "Batches of groups that leads give out, and who has which group open.",
+    "takes": "Own annotations that nobody else sees, groups whose truth is known, guidelines.",
     "yield": "What a policy lets through, and what another one would.",
+    "agreement": "How far people agree who annotated the same frames.",
+    "comments": "What people say to each other about groups, and what they are told.",
+    "webhooks": "Addresses that are told what happens in a dataset, each message signed.",
     "imports": "Files and folders that become datasets.",
     "predictions": "What detectors say, beside what people said.",
     "evaluations": "Detectors measured on what was accepted.",
@@ -49,6 +56,7 @@ TAGS = {
     "events": "What changes, as it changes.",
     "pitch": "Names and shapes of the 26 markings.",
     "sessions": "On a server of a team: who is logged in, and where.",
+    "tokens": "On a server of a team: with what scripts ask, in the name of a person.",
     "users": "On a server of a team: who has an account, and which role.",
     "health": "For whoever runs the service.",
 }

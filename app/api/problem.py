@@ -8,6 +8,7 @@ from typing import Any
 
 from starlette.responses import Response
 
+from app.api.schemas.event import PresenceDocument
 from app.api.schemas.problem import MEDIA_TYPE, FieldProblem, Problem
 
 TITLES: Mapping[int, tuple[str, str]] = {
@@ -37,11 +38,6 @@ Responses = dict[int | str, dict[str, Any]]
 """Answers of a route, by status, as the framework takes them."""
 
 
-def new_instance() -> str:
-    """Id of one occurrence of a problem."""
-    return uuid.uuid4().urn
-
-
 def make_problem(
     status: int,
     detail: str,
@@ -50,9 +46,9 @@ def make_problem(
     pointer: str | None = None,
     errors: list[FieldProblem] | None = None,
     station: int | None = None,
-    instance: str | None = None,
+    here: list[PresenceDocument] | None = None,
 ) -> Problem:
-    """A problem of that status, its kind and title filled in."""
+    """A problem of that status, its kind, title and instance filled in."""
     kind, title = TITLES.get(status, ("http", "The request failed"))
     return Problem(
         type=f"urn:touchline:problem:{kind}",
@@ -61,9 +57,10 @@ def make_problem(
         detail=detail,
         hint=hint,
         pointer=pointer,
-        instance=instance or new_instance(),
+        instance=uuid.uuid4().urn,
         errors=errors,
         station=station,
+        here=here,
     )
 
 
@@ -75,7 +72,7 @@ def problem_response(
     ``current`` is its member of that name as JSON text: the event loop does not write a whole
     group once more.
     """
-    optional = {"errors", "station", "current"}
+    optional = {"errors", "station", "here", "current"}
     absent = {name for name in optional if getattr(problem, name) is None}
     body = problem.model_dump_json(exclude=absent)
     if current is not None:

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from starlette.responses import Response
 
 from app.review.answers.answers import keep_with_work
-from app.store.answers import Answer, Kept, Progress, keep_nothing
+from app.store.answers import Answer, Kept, SavedProgress, keep_nothing
 
 T = TypeVar("T")
 
@@ -34,9 +34,9 @@ class Asked:
         self.kept = True
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> SavedProgress:
         """Where work of several transactions says how far it is."""
-        return Progress(self.key, self.actor, self.digest)
+        return SavedProgress(self.key, self.actor, self.digest)
 
 
 class Reply(Generic[T]):
@@ -59,7 +59,7 @@ class Reply(Generic[T]):
         self._of: T | None = None
 
     @property
-    def progress(self) -> Progress | None:
+    def progress(self) -> SavedProgress | None:
         """Where the work says how far it is; None for a request without a key."""
         return None if self._asked is None else self._asked.progress
 

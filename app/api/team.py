@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from ipaddress import ip_address
 from typing import Annotated, Any
 from urllib.parse import urlsplit
 
 from fastapi import Depends, Request
 
-from app.api.security.access import cookie_of
+from app.api.security.cookie import cookie_of
 from app.api.security.tries import Tries
 from app.config import Settings
-from app.errors import ConflictError
-from app.review.people.logins import LASTS, Login, Logins
+from app.errors import ConflictError, NotLoggedInError
+from app.review.people.access_tokens import AccessTokens
+from app.review.people.challenges import LASTS as CHALLENGE_LASTS
+from app.review.people.logins import LASTS, Login, Logins, Way
+from app.review.people.passkeys import Passkeys, Site
+from app.review.people.second_factor import SecondFactors
+from app.review.people.sign_on import LASTS as BEGUN_LASTS
+from app.review.people.sign_on import SignOn
+from app.review.people.sign_on_rules import read_rules
 from app.store.session import Store
 
 NAME = "touchline_session"
+ASKER = "touchline_passkey"
+"""The cookie that says which browser was asked to sign with a passkey."""
+BEGUN = "touchline_sign_on"
+"""The cookie that says which browser was sent to the provider of single sign-on."""
+LANDING = "/login"
+"""The page to which the provider sends people back."""
 
 
 @dataclass(frozen=True)
@@ -23,21 +37,46 @@ class Team:
     """The way in.
 
     Attributes:
+        logins: Sessions of people in browsers.
+        tokens: Tokens of their scripts.
+        factors: Their second factors.
+        passkeys: With which they need no password.
+        sign_on: The provider by which they come in; None: there is none.
         url: The address that people open; None: the one that they came by.
         proxies: Who is believed whom they forward.
+        tries: Counts who tries too often.
     """
 
     logins: Logins
+    tokens: AccessTokens
+    factors: SecondFactors
+    passkeys: Passkeys
+    sign_on: SignOn | None
     url: str | None
     proxies: frozenset[str]
-    tries: Tries = field(default_factory=Tries)
+    tries: Tries
 
     @staticmethod
     def of(settings: Settings, store: Store) -> Team | None:
-        """Of a server of a team; None for one that somebody runs alone."""
+        """Of a server of a team; None for one that somebody runs alone.
+
+        Raises:
+            InputError: The settings of single sign-on are there by half.
+        """
+        rules = read_rules(settings)
         if not settings.team:
             return None
-        return Team(Logins(store), settings.url, frozenset(settings.proxies))
+        logins = Logins(store, only=Way.SIGN_ON if rules and rules.only else None)
+        return Team(
+            logins,
+            AccessTokens(store),
+            SecondFactors(store),
+            Passkeys(store, logins),
+            SignOn(store, logins, rules) if rules else None,
+            settings.url,
+            frozenset(settings.proxies),
+            Tries(store),
+        )
 
     @property
     def secure(self) -> bool:
@@ -48,12 +87,69 @@ class Team:
     def cookie(self) -> str:
         """Name of the cookie. With the prefix browsers refuse one that was set by another name, or
         without TLS."""
-        return f"__Host-{NAME}" if self.secure else NAME
+        return self._cookie_name(NAME)
 
     def cookie_values(self, token: str | None) -> dict[str, Any]:
         """How the cookie of a token is set; None: how it is taken back."""
-        values = {"key": self.cookie, "value": token or "", "path": "/", "httponly": True}
-        age = int(LASTS.total_seconds()) if token else 0
+        return self._values(NAME, token or "", int(LASTS.total_seconds()) if token else 0)
+
+    def asker(self, request: Request) -> str:
+        """What a browser alone knows that was asked to sign with a passkey; empty: it was not."""
+        return cookie_of(request.scope, self._cookie_name(ASKER)) or ""
+
+    def asker_values(self, asker: str) -> dict[str, Any]:
+        """How it is told that."""
+        return self._values(ASKER, asker, int(CHALLENGE_LASTS.total_seconds()))
+
+    def begun(self, request: Request) -> str:
+        """What a browser alone knows that was sent to the provider; empty: it was not."""
+        return cookie_of(request.scope, self._cookie_name(BEGUN)) or ""
+
+    def begun_values(self, asker: str | None) -> dict[str, Any]:
+        """How it is told that; None: how it is taken back."""
+        return self._values(BEGUN, asker or "", int(BEGUN_LASTS.total_seconds()) if asker else 0)
+
+    def landing(self, request: Request) -> str:
+        """The address to which the provider sends people back."""
+        return self.base(request) + LANDING
+
+    def require_sign_on(self) -> SignOn:
+        """The provider by which people come in; raises ConflictError where there is none."""
+        if self.sign_on is None:
+            raise ConflictError(
+                "there is no single sign-on here", hint="The operator sets it up: docs/teams.md."
+            )
+        return self.sign_on
+
+    def require_passwords(self) -> None:
+        """Raise ConflictError where people come by single sign-on alone."""
+        if self.sign_on is not None and self.sign_on.rules.only:
+            label = self.sign_on.rules.label
+            raise ConflictError(
+                f"people log in by {label} alone here", hint=f"Log in with {label}."
+            )
+
+    def site(self, request: Request) -> Site:
+        """For whom passkeys are: the address that people open, as the operator said, or this machine.
+
+        Raises:
+            ConflictError: Browsers make no passkeys for it.
+        """
+        said = urlsplit(self.base(request))
+        name = said.hostname or ""
+        if name == "localhost" or (said.scheme == "https" and not _is_number(name)):
+            port = f":{said.port}" if said.port not in (None, 80, 443) else ""
+            return Site(name, f"{said.scheme}://{name}{port}")
+        raise ConflictError(
+            "browsers know no passkeys for this address",
+            hint="They need https and a name (touchline serve --team --url), or localhost.",
+        )
+
+    def _cookie_name(self, name: str) -> str:
+        return f"__Host-{name}" if self.secure else name
+
+    def _values(self, name: str, value: str, age: int) -> dict[str, Any]:
+        values = {"key": self._cookie_name(name), "value": value, "path": "/", "httponly": True}
         return {**values, "samesite": "strict", "secure": self.secure, "max_age": age}
 
     def token(self, request: Request) -> str | None:
@@ -64,6 +160,19 @@ class Team:
         """Who that is, on a route that anybody may ask."""
         token = self.token(request)
         return self.logins.find(token) if token else None
+
+    def login_with(self, token: str, request: Request) -> Login:
+        """Who asks with a token.
+
+        Raises:
+            NotLoggedInError: It is not valid.
+            TooManyTriesError: Nor were too many before, from the same address.
+        """
+        try:
+            return self.tokens.find(token)
+        except NotLoggedInError:
+            self.tries.count_token(self.address(request))
+            raise
 
     def base(self, request: Request) -> str:
         """The beginning of addresses that are shown to people."""
@@ -76,6 +185,15 @@ class Team:
         if self.url is None or peer not in self.proxies or not forwarded:
             return peer
         return forwarded[-1].rpartition(",")[2].strip()[:60] or peer
+
+
+def _is_number(name: str) -> bool:
+    """Whether that is an address of numbers, which no passkey is for."""
+    try:
+        ip_address(name)
+    except ValueError:
+        return False
+    return True
 
 
 def allowed_hosts(settings: Settings) -> list[str]:

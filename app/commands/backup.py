@@ -1,14 +1,17 @@
-"""Commands that copy a home and bring it back: backup and restore."""
+"""Commands that copy a home and bring it back: backup, restore and transfer."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from app.commands.options import Json, read_settings
 from app.commands.terminal import print_json, say
+
+if TYPE_CHECKING:
+    from app.config import Settings
 
 commands = typer.Typer()
 
@@ -43,6 +46,49 @@ def backup(
         say(
             f"  {manifest.frames_elsewhere:,} files with frames are not in it; they stay as they are"
         )
+
+
+@commands.command()
+def transfer(
+    source: Annotated[
+        str, typer.Argument(metavar="FROM", help="A home folder, or postgresql://HOST/DATABASE.")
+    ],
+    target: Annotated[
+        str, typer.Argument(metavar="TO", help="The same: a new folder, or an empty database.")
+    ],
+    json_: Json = False,
+) -> None:
+    """Copy a whole database between SQLite and PostgreSQL, and compare every row and the log.
+
+    No server may run. A transfer that was stopped goes on when it is given again. Files of the home
+    (uploads, exports) stay where they are. Keep passwords out of both: use PGPASSWORD or ~/.pgpass.
+    """
+    from app.store.transfer import transfer as run_transfer
+
+    settings = read_settings()
+    told: set[str] = set()
+
+    def tell(table: str, _rows: int) -> None:
+        if table not in told and not json_:
+            say(f"  {table}")
+        told.add(table)
+
+    begin = _database(source, settings)
+    end = _database(target, begin if "://" in target else settings)
+    done = run_transfer(begin, end, tell)
+    if json_:
+        print_json(vars(done))
+        return
+    say(f"{_contents(done.entries, done.rows)} are equal in both; {done.copied:,} rows were copied")
+    for name, digest in done.versions.items():
+        say(f"  version {name} {digest[:12]}")
+
+
+def _database(place: str, settings: Settings) -> Settings:
+    """Settings of the database that an argument names."""
+    if "://" in place:
+        return settings.model_copy(update={"database_url": place})
+    return settings.model_copy(update={"home": Path(place).absolute(), "database_url": None})
 
 
 @commands.command()

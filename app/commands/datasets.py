@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from app.commands.opened import opened_store
 from app.commands.options import Json, acting
+from app.commands.server import Server, connected, given_server
 from app.commands.terminal import print_json, print_values, say
 
 commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
@@ -16,15 +17,8 @@ commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
 @commands.command("list")
 def list_(json_: Json = False) -> None:
     """List every dataset with its progress."""
-    from app.review.datasets.dataset import list_datasets
-
-    with opened_store() as store:
-        datasets = list_datasets(store)
-    names = ("id", "name", "groups", "solved", "accepted", "rejected", "deferred", "unreviewed")
-    values = [
-        {**{name: getattr(item, name) for name in names}, "policy": item.policy.name}
-        for item in datasets
-    ]
+    server = given_server()
+    values = _values() if server is None else _values_at(server)
     if json_:
         print_json(values)
         return
@@ -33,6 +27,25 @@ def list_(json_: Json = False) -> None:
             f"{value['name']:30} {value['groups']:7} groups {value['solved']:7} solved "
             f"{value['accepted']:7} accepted   {value['policy']}"
         )
+
+
+def _values() -> list[dict[str, Any]]:
+    from app.review.datasets.dataset import list_datasets
+
+    with opened_store() as store:
+        datasets = list_datasets(store)
+    names = ("id", "name", "groups", "solved", "accepted", "rejected", "deferred", "unreviewed")
+    return [
+        {**{name: getattr(item, name) for name in names}, "policy": item.policy.name}
+        for item in datasets
+    ]
+
+
+def _values_at(server: Server) -> list[dict[str, Any]]:
+    from app.commands.remote import dataset_values
+
+    with connected(server) as client:
+        return dataset_values(client)
 
 
 @commands.command()

@@ -51,10 +51,11 @@ def _examine(settings: Settings) -> list[Check]:
     from app.review.editing.check import Check
     from app.review.editing.checkup import examine_home, examine_surroundings
     from app.review.editing.doctor import examine
+    from app.review.yields.soundness import examine_yields
     from app.store.home import make_home
 
     make_home(settings)
-    checks = examine_home(settings)
+    checks = [*examine_home(settings), examine_yields(settings)]
     try:
         with opened_store(settings) as store:
             return [*checks, *examine_surroundings(store), *examine(store)]

@@ -11,11 +11,13 @@ import typer
 from app.commands.opened import opened_store
 from app.commands.options import Dataset, Json, acting, parse_size
 from app.commands.predictions import print_set
+from app.commands.server import Server, connected, given_server
 from app.commands.terminal import print_json, say, show_progress
 from app.soccer.frames import ImageSize
 
 if TYPE_CHECKING:
     from app.evaluation.table import Cell, Table
+    from app.review.evaluating.prediction_source import PredictionSource
     from app.store.evaluations import StoredEvaluation
     from app.store.predictions import PredictionSet
 
@@ -186,6 +188,18 @@ def evaluate(
     request = EvaluationRequest(
         name=name, groups=groups.value, split=split, boxes=boxes.value, min_score=min_score
     )
+    server = given_server()
+    if server is not None:
+        asked = {
+            "name": name,
+            "groups": groups.value,
+            "split": split,
+            "boxes": boxes.value,
+            "min_score": min_score,
+            "version": version,
+        }
+        _evaluate_at(server, dataset, asked, found, drawn, out, json_)
+        return
     with opened_store() as store, show_progress("Evaluating") as progress:
         done = evaluate_sources(
             store, dataset, request, predictions=found, careful=drawn,
@@ -200,6 +214,35 @@ def evaluate(
     for item in done.sets:
         print_set(item)
     _print_evaluation(done.evaluation)
+
+
+def _evaluate_at(
+    server: Server,
+    dataset: str,
+    asked: dict[str, Any],
+    predictions: PredictionSource,
+    careful: PredictionSource,
+    out: Path | None,
+    json_: bool,
+) -> None:
+    from types import SimpleNamespace
+
+    from app.commands import remote
+
+    with connected(server) as client, show_progress("Evaluating") as progress:
+        values, sets = remote.evaluate(
+            client, dataset, asked, predictions=predictions, careful=careful, progress=progress
+        )
+        if out is not None:
+            remote.write_evaluation(client, values, out)
+    found: list[Any] = [SimpleNamespace(**item) for item in sets]
+    if json_:
+        print_json({**values, "sets": [_set_values(item) for item in found]})
+        return
+    for item in found:
+        print_set(item)
+    shown: Any = SimpleNamespace(**values)
+    _print_evaluation(shown)
 
 
 def _print_evaluation(found: StoredEvaluation) -> None:

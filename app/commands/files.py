@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -15,12 +15,17 @@ from app.commands.options import (
     acting,
     parse_cameras,
     parse_frame_offset,
+    parse_place,
     parse_size,
     read_settings,
 )
 from app.commands.policy import read_policy_option
+from app.commands.server import connected, given_server
 from app.commands.terminal import complain, print_export, print_import, show_progress
+from app.config import Settings
 from app.datasets.format_names import ExportFormat, ImportFormat
+from app.object_store.address import is_address
+from app.object_store.path import StoredPath, find_path, target_path
 from app.soccer.frames import ImageSize
 
 commands = typer.Typer()
@@ -59,7 +64,12 @@ class Images(StrEnum):
 @commands.command("import")
 def import_(
     format_: Annotated[ImportFormat, typer.Argument(metavar="FORMAT")],
-    path: Annotated[Path, typer.Argument(exists=True, help="A folder or a file.")],
+    path: Annotated[
+        str,
+        typer.Argument(
+            parser=parse_place, metavar="PATH", help="A folder, a file or s3://NAME/..."
+        ),
+    ],
     dataset: Dataset,
     lines: Annotated[
         Path | None, typer.Option(exists=True, help="ISSIA: line files of the static cameras.")
@@ -84,6 +94,12 @@ def import_(
             help="Judges the dataset where this import makes it.",
         ),
     ] = "paper",
+    frames: Annotated[
+        str | None,
+        typer.Option(
+            parser=parse_place, metavar="LIST", help="JSON list of where frames lie in stores."
+        ),
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would happen, and keep nothing.")
     ] = False,
@@ -94,19 +110,41 @@ def import_(
     FORMAT is soccernet-v3, soccernet-v3d, issia, issia-3d, sn-calibration, cameras, gamestate,
     coco, parquet or touchline; docs/formats.md says what each of them holds.
     """
+    server = given_server()
+    if server is not None:
+        from app.commands import remote
+
+        options: dict[str, Any] = {
+            "calibration": calibration.value,
+            "frame_offset": parse_frame_offset(frame_offset),
+            "flipped": sorted(parse_cameras(flip)),
+            "size": None if size is None else [size.width, size.height],
+        }
+        with connected(server) as client, show_progress("Importing") as progress:
+            values, nothing = remote.import_values(
+                client, dataset, format_, path if is_address(path) else Path(path), options,
+                lines=lines, frames=frames, policy=policy, dry_run=dry_run, progress=progress,
+            )  # fmt: skip
+        print_import(values, json_)
+        if nothing is not None:
+            complain(*nothing)
+            raise typer.Exit(1)
+        return
     from app.review.importing.sources import Source, import_source
 
+    settings = read_settings()
+    root = _root(settings, path)
     source = Source(
         format_,
-        path.resolve(),
+        root,
         size=size,
         lines=None if lines is None else lines.resolve(),
         calibration=calibration.value,
         frame_offset=parse_frame_offset(frame_offset),
         flipped=parse_cameras(flip),
+        frames=None if frames is None else _root(settings, frames),
     )
     chosen = read_policy_option(policy)
-    settings = read_settings()
     with opened_store(settings) as store, show_progress("Importing") as progress:
         imported = import_source(
             store, dataset, source, settings, progress,
@@ -118,9 +156,15 @@ def import_(
         raise typer.Exit(1)
 
 
+def _root(settings: Settings, text: str) -> Path | StoredPath:
+    return find_path(settings, text) if is_address(text) else Path(text).resolve()
+
+
 @commands.command()
 def export(
-    out: Annotated[Path, typer.Argument(help="A folder, or a zip by its ending.")],
+    out: Annotated[
+        str, typer.Argument(help="A folder, or a zip by its ending; s3://NAME/... in a store.")
+    ],
     dataset: Dataset,
     format_: Annotated[ExportFormat, typer.Option("--format", help="Which format to write.")],
     everything: Annotated[
@@ -137,6 +181,26 @@ def export(
     json_: Json = False,
 ) -> None:
     """Write accepted groups, all of them, or a frozen version, with a manifest."""
+    server = given_server()
+    if server is not None:
+        from app.commands import remote
+
+        if images is Images.LINK:
+            raise typer.BadParameter("a server copies frames, or leaves them out")
+        request = {
+            "dataset": dataset,
+            "format": format_,
+            "all": everything,
+            "boxes": boxes.value,
+            "images": images.value,
+            "views": views.value,
+            "version": version,
+        }
+        with connected(server) as client, show_progress("Exporting") as progress:
+            target = out if is_address(out) else Path(out)
+            values = remote.export_values(client, target, request, progress)
+        print_export(values, json_)
+        return
     from app.review.exporting.export import export as run_export
     from app.review.exporting.export import require_possible
 
@@ -155,7 +219,7 @@ def export(
             store,
             dataset,
             format_,
-            out,
+            target_path(store.settings, out) if is_address(out) else Path(out),
             everything=everything,
             boxes=boxes.value,
             images=images.value,

@@ -57,7 +57,7 @@ def calibrate(
     json_: Json = False,
 ) -> None:
     """Calibrate line files (folder or zip) to camera files; needs no dataset."""
-    from app.review.datasets.batch import calibrate_files
+    from app.review.datasets.calibrate_files import calibrate_files
 
     named, shape = _file(matches, "--matches"), _file(picture, "--picture")
     pool = process_pool(workers or read_settings().workers)
@@ -104,7 +104,7 @@ def score(
     json_: Json = False,
 ) -> None:
     """Measure camera files against line files: JaC, completeness, errors."""
-    from app.review.datasets.batch import score_files
+    from app.review.datasets.score_files import score_files
 
     with show_progress("Scoring") as progress:
         result = score_files(lines, cameras, size=size, without=without, progress=progress)

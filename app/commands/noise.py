@@ -15,42 +15,65 @@ if TYPE_CHECKING:
     from app.review.policies.noise import Noise
 
 commands = typer.Typer()
+_FACTORS = "factors", "used"
 
 
 @commands.command()
 def noise(
     dataset: Dataset,
     apply: Annotated[
-        bool, typer.Option("--apply", help="Put the estimates into the policy.")
+        bool, typer.Option("--apply", help="Judge by them: the policy, and balls unlike others.")
+    ] = False,
+    alike: Annotated[
+        bool,
+        typer.Option("--alike", help="Take balls of all cameras and people to be alike again."),
     ] = False,
     json_: Json = False,
 ) -> None:
     """Estimate how noisy a dataset's balls and lines are, from what its views disagree about."""
-    from app.review.policies.noise import apply_noise, read_noise
+    from app.review.policies.noise import apply_noise, read_noise, take_noise_back
 
+    if apply and alike:
+        raise typer.BadParameter("--apply and --alike contradict each other")
     with opened_store() as store:
+        if alike:
+            take_noise_back(store, dataset, actor=acting())
         found = read_noise(store, dataset)
         policy = apply_noise(store, found, actor=acting()).policy if apply else None
     if json_:
         applied = None if policy is None else {"name": policy.name, "hash": policy.hash}
         advice = [{**asdict(item), "agrees": item.agrees} for item in found.advice]
-        values = {"advice": advice, "values": found.values, "applied": applied}
+        factors = {name: [one._asdict() for one in getattr(found, name)] for name in _FACTORS}
+        values = {"advice": advice, "values": found.values, "applied": applied, **factors}
         print_json({**asdict(found), **values})
         return
     _say(found)
     if policy is not None:
-        say("The policy holds the estimates now; `touchline solve` computes what that changes.")
-    elif found.values:
-        changes = ", ".join(f"{name} to {value:g}" for name, value in found.values.items())
-        say(f"Run it again with --apply to put the estimates into the policy: {changes}.")
+        say("The dataset is judged by the estimates; `touchline solve` computes what that changes.")
+    elif alike:
+        say("All balls are taken to be alike; `touchline solve` computes what that changes.")
+    elif found.values or found.is_new:
+        changes = [f"{name} to {value:g}" for name, value in found.values.items()]
+        changes += ["balls of cameras and people their own sigma"] if found.is_new else []
+        say(f"Run it again with --apply to judge by the estimates: {', '.join(changes)}.")
 
 
 def _say(found: Noise) -> None:
     for item in found.advice:
+        present = "leaves it to each image"
+        if item.present is not None:
+            present = f"says {item.present:g}{item.short_unit}"
         say(
             f"{item.label}: {item.estimate:g}{item.short_unit} ({item.low:g} to {item.high:g}); "
-            f"the policy says {item.present:g}{item.short_unit}"
+            f"the policy {present}"
         )
+    for word, sources in (("of camera", found.stations), ("placed by", found.people)):
+        for one in sources:
+            note = ", unlike the dataset's" if one.differs else ""
+            say(
+                f"Sigma of a ball {word} {one.source}: {one.sigma_px:.2f} px "
+                f"({one.low:.2f} to {one.high:.2f}){note}"
+            )
     if found.lines is not None:
         lines = found.lines
         say(

@@ -7,6 +7,7 @@ from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
 
 from app.commands.options import read_settings
+from app.commands.server import require_home
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 @contextmanager
 def opened_store(settings: Settings | None = None) -> Iterator[Store]:
     """The database of a home; by default the one that the environment names."""
+    require_home()
     from app.store.session import Store
 
     with closing(Store.open(settings or read_settings())) as store:
@@ -25,13 +27,31 @@ def opened_store(settings: Settings | None = None) -> Iterator[Store]:
 
 
 @contextmanager
-def executor_of(workers: int) -> Iterator[Executor | None]:
-    """Where a dataset is solved; None: in this process."""
-    if workers == 1:
+def executor_of(settings: Settings, workers: int | None = None) -> Iterator[Executor | None]:
+    """Where a dataset is solved: on a cluster where one is named; None: in this process."""
+    count = workers or settings.workers
+    if settings.cluster is not None:
+        with cluster_of(settings) as cluster:
+            yield cluster
+    elif count == 1:
         yield None
-        return
-    with process_pool(workers) as pool:
-        yield pool
+    else:
+        with process_pool(count) as pool:
+            yield pool
+
+
+@contextmanager
+def cluster_of(settings: Settings) -> Iterator[Executor]:
+    """The workers of the scheduler that the settings name.
+
+    Raises:
+        InputError: The address cannot be one.
+        ClusterError: Nobody is there, or somebody of another version.
+    """
+    from app.review.datasets.cluster import Cluster, read_place
+
+    with Cluster(read_place(settings.cluster or "", settings.cluster_keys)) as cluster:
+        yield cluster
 
 
 @contextmanager

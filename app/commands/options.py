@@ -44,6 +44,15 @@ def parse_frame_offset(text: str) -> int | dict[int, int]:
     return dict(found)
 
 
+def parse_place(text: str) -> str:
+    """A folder or file that is there, or an address in an object store."""
+    from pathlib import Path
+
+    if not text.startswith("s3://") and not Path(text).exists():
+        raise typer.BadParameter(f"Path '{text}' does not exist.")
+    return text
+
+
 def acting() -> str:
     """Who acts in this command: the local user, or the script that `--actor` names."""
     return _ACTING.get()
@@ -76,6 +85,15 @@ Size = Annotated[
 ]
 Workers = Annotated[
     int | None, typer.Option("--workers", min=1, help="Processes; default: all cores.")
+]
+
+Cluster = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="ADDRESS",
+        help="Scheduler whose workers solve, such as tls://HOST:8786. [env: TOUCHLINE_CLUSTER]",
+    ),
 ]
 
 
@@ -112,8 +130,15 @@ def read_settings(**given: object) -> Settings:
 
 
 def require_safe(settings: Settings) -> None:
-    """Refuse to serve where strangers could come in, or passwords would be read on their way."""
-    from app.api.server import is_local
+    """Refuse to serve where strangers could come in, or passwords would be read on their way.
+
+    Raises:
+        InputError: The settings of single sign-on are there by half.
+    """
+    from app.hosts import is_local
+    from app.review.people.sign_on_rules import read_rules
+
+    read_rules(settings)
 
     secure = (settings.url or "").startswith("https://")
     if not is_local(settings.host) and not settings.team:

@@ -77,7 +77,7 @@ def _of_dataset(
     settings = read_settings()
     with (
         opened_store(settings) as store,
-        executor_of(workers or settings.workers) as executor,
+        executor_of(settings, workers) as executor,
         show_progress("Estimating") as progress,
     ):
         found = estimate_pictures(store, dataset, executor, progress)
@@ -101,14 +101,8 @@ def _of_dataset(
 
 def _sentence(state: PictureState) -> str:
     if state.estimate is None:
-        return state.problem or ""
-    found, sigma = state.estimate.picture, state.estimate.picture.sigma
-    shown = (
-        f"pixels {100 * (found.aspect - 1):+.1f} % wide (sigma {100 * sigma[0]:.1f}), axis "
-        f"{found.shift[0]:+.3f} right and {found.shift[1]:+.3f} down, in half diagonals "
-        f"(sigma {sigma[1]:.3f} and {sigma[2]:.3f})"
-    )
-    return f"{shown}; {'use it with --accept' if state.proposed else 'nothing to change'}"
+        return state.sentence
+    return f"{state.sentence}; {'use it with --accept' if state.proposed else 'nothing to change'}"
 
 
 def _values(state: PictureState) -> dict[str, Any]:

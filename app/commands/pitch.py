@@ -55,7 +55,7 @@ def pitch(
     if source is not None and Path(source).exists():
         if accept or match or set_:
             raise typer.BadParameter("--accept, --match and --set are for datasets")
-        from app.review.datasets.batch import estimate_pitch_of_files
+        from app.review.datasets.pitch_files import estimate_pitch_of_files
 
         print_values(estimate_pitch_of_files(Path(source), size=size), json_)
         return
@@ -73,7 +73,7 @@ def _of_dataset(
     settings = read_settings()
     with (
         opened_store(settings) as store,
-        executor_of(workers or settings.workers) as executor,
+        executor_of(settings, workers) as executor,
         show_progress("Estimating") as progress,
     ):
         found = estimate_pitches(store, dataset, executor, progress)
@@ -94,7 +94,9 @@ def _size(state: PitchState, text: str) -> Any:
     if text != "previous":
         return parse_pitch(text)
     if state.previous is None:
-        raise InputError(f"the pitch of {state.match} has not been changed")
+        raise InputError(
+            f"the pitch of {state.match or 'groups without a match'} has not been changed"
+        )
     return state.previous
 
 
@@ -109,7 +111,8 @@ def _print(found: DatasetPitches, match: str | None, json_: bool) -> None:
         shown = f"length {_number(values, 'length')}, width {_number(values, 'width')}"
         proposed = item.proposed
         advice = "" if proposed is None else f"; use {proposed.length:g} x {proposed.width:g} m"
-        say(f"{item.match}: {size}; lines show {item.problem or shown}{advice}")
+        name = item.match or "groups without a match"
+        say(f"{name}: {size}; lines show {item.problem or shown}{advice}")
 
 
 def _number(values: dict[str, Any], name: str) -> str:

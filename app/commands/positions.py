@@ -46,7 +46,7 @@ def positions(
             found = take_back_positions(store, dataset, match or "", actor=acting())
         elif share:
             with (
-                executor_of(workers or settings.workers) as executor,
+                executor_of(settings, workers) as executor,
                 show_progress("Estimating") as progress,
             ):
                 chosen = None if match is None else [match]

@@ -55,7 +55,7 @@ def propose(
 
     OUT gets camera_<stem>.json of the proposed ones, and propose.json with the outcome of each
     (proposed, unsure, nothing). Sides are by convention: the camera stands where y > 0.
-    With --dataset the views without lines and camera are looked at, and what is found is kept
+    With --dataset the views without a camera are looked at, and what is found is kept
     as predictions: nothing counts before a person accepts one.
     """
     if dataset is not None:
@@ -75,7 +75,7 @@ def propose(
 def _propose_for_views(
     dataset: str, match: str | None, show: bool, undo: bool, workers: int | None, json_: bool
 ) -> None:
-    from app.review.editing.proposals import forget_proposals, propose_views, require_matches
+    from app.review.editing.proposals import forget_proposals, get_proposals, propose_views
 
     matches = None if match is None else [match]
     with opened_store() as store:
@@ -85,10 +85,7 @@ def _propose_for_views(
             print_values({"forgotten": forget_proposals(store, dataset)}, json_)
             return
         if show:
-            found = require_matches(store, dataset, matches)
-            items = [
-                asdict(item) for item in found.items if matches is None or item.match in matches
-            ]
+            items = [asdict(item) for item in get_proposals(store, dataset, matches).items]
             if json_:
                 print_json(items)
                 return
@@ -108,7 +105,7 @@ def _propose_for_views(
 def _propose_for_files(
     images: list[Path], out: Path, size: str, known: Sequence[Path], json_: bool
 ) -> None:
-    from app.review.datasets.propose import counts_of, propose_files
+    from app.review.datasets.propose_files import counts_of, propose_files
 
     wanted = None if size == "native" else parse_size(size)
     with show_progress("Proposing") as progress:

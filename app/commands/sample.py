@@ -123,6 +123,5 @@ def _fill(settings: Settings, dataset: str, folder: Path, workers: int | None) -
     with opened_store(settings) as store:
         with show_progress("Importing") as progress:
             import_source(store, dataset, source, settings, progress)
-        count = workers or settings.workers
-        with executor_of(count) as executor, show_progress("Solving") as progress:
+        with executor_of(settings, workers) as executor, show_progress("Solving") as progress:
             solve_dataset(store, dataset, executor, progress)

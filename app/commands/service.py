@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.opened import opened_store, process_pool
-from app.commands.options import acting, read_settings, require_safe
+from app.commands.opened import cluster_of, opened_store, process_pool
+from app.commands.options import Cluster, acting, read_settings, require_safe
 from app.commands.sample import ensure_sample
 from app.commands.terminal import log_to_stderr, say
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+    from socket import socket
+
     from app.config import Settings
     from app.store.session import Store
 
@@ -37,34 +42,88 @@ def serve(
         str | None,
         typer.Option(help="The address that people open, where a proxy stands in front."),
     ] = None,
+    cluster: Cluster = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=64,
+            help="Processes that answer requests, on PostgreSQL. Default: one.",
+        ),
+    ] = None,
     with_sample: Annotated[
         bool, typer.Option("--sample", help="Make the dataset sample first, where it is missing.")
     ] = False,
 ) -> None:
     """Serve the browser application and the REST interface."""
-    settings = read_settings(host=host, port=port, team=team, url=url)
+    settings = read_settings(
+        host=host, port=port, team=team, url=url, cluster=cluster, web_workers=workers
+    )
     require_safe(settings)
+    _require_one_process(settings)
     log_to_stderr()
     from app.api.application import create_app
     from app.api.server import listen, run
+    from app.api.web_processes import serve_with
+    from app.review.jobs.vitals import file_sizes
+    from app.store.dialect.dialect import dialect_of
     from app.store.locks import server_lock
 
-    with server_lock(settings):
+    with server_lock(settings, shared=not dialect_of(settings).is_file):
         _prepare(settings)
         if not settings.team and team is None:
             _require_no_team(settings)
         if with_sample:
             ensure_sample(settings)
         with listen(settings.host, settings.port) as (socket, address):
-            # One processor is left for the requests.
-            workers = max(1, settings.workers - 1)
-            application = create_app(settings, pool=lambda: process_pool(workers))
-            if settings.database_file.stat().st_size <= QUICK_BYTES:
+            if settings.web_workers > 1:
+                _say_address(settings, address)
+                serve_with(settings.web_workers, _serve_part, settings, socket)
+                return
+            application = create_app(settings, pool=_pool_of(settings))
+            if file_sizes(settings).get("database", 0) <= QUICK_BYTES:
                 application.state.services.store.require_whole()
             say(f"Touchline is at {address}")
             if settings.team:
                 _say_first_link(application.state.services.store, settings.url or address)
             run(application, socket)
+
+
+def _require_one_process(settings: Settings) -> None:
+    """Refuse several processes where the database is a file of one."""
+    from app.errors import InputError
+    from app.store.dialect.dialect import dialect_of
+
+    if settings.web_workers > 1 and dialect_of(settings).is_file:
+        raise InputError(
+            "several processes can serve a database on PostgreSQL alone, and this one is a file",
+            hint="Leave out --workers (TOUCHLINE_WEB_WORKERS), or set TOUCHLINE_DATABASE_URL:"
+            " docs/operations.md.",
+        )
+
+
+def _serve_part(settings: Settings, socket: socket) -> None:
+    """Serve in one process of several."""
+    from app.api.application import create_app
+    from app.api.server import run
+
+    log_to_stderr()
+    run(create_app(settings, pool=_pool_of(settings)), socket)
+
+
+def _say_address(settings: Settings, address: str) -> None:
+    say(f"Touchline is at {address}")
+    if settings.team:
+        with opened_store(settings) as store:
+            _say_first_link(store, settings.url or address)
+
+
+def _pool_of(settings: Settings) -> Callable[[], AbstractContextManager[Executor]]:
+    """Where large jobs of the server are solved."""
+    if settings.cluster is not None:
+        return lambda: cluster_of(settings)
+    # One processor is left for the requests.
+    return lambda: process_pool(max(1, settings.workers - 1))
 
 
 def _require_no_team(settings: Settings) -> None:

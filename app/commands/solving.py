@@ -7,8 +7,9 @@ from typing import Annotated
 import typer
 
 from app.commands.opened import executor_of, opened_store
-from app.commands.options import Dataset, Json, Workers, acting, read_settings
+from app.commands.options import Cluster, Dataset, Json, Workers, acting, read_settings
 from app.commands.policy import read_policy_option
+from app.commands.server import connected, given_server
 from app.commands.terminal import (
     complain,
     held_interrupts,
@@ -35,18 +36,21 @@ def solve(
         ),
     ] = None,
     workers: Workers = None,
+    cluster: Cluster = None,
     json_: Json = False,
 ) -> None:
     """Compute what is missing or out of date; Ctrl+C keeps what is done, and the next run goes on."""
+    from app.review.datasets.dataset import get_dataset
     from app.review.editing.pitches import estimate_pitches
     from app.review.editing.recompute import solve_dataset
     from app.review.policies.policy import change_policy
+    from app.review.yields.store import AT_ONCE, YieldStore
 
     chosen = None if policy is None else read_policy_option(policy)
-    settings = read_settings()
+    settings = read_settings(cluster=cluster)
     with (
         opened_store(settings) as store,
-        executor_of(workers or settings.workers) as executor,
+        executor_of(settings, workers) as executor,
         show_progress("Solving") as progress,
     ):
         if chosen is not None:
@@ -58,16 +62,26 @@ def solve(
                 complain(f"stopped; {report.solved} groups are kept, {left} are left to do")
                 raise typer.Exit(INTERRUPTED)
         estimate_pitches(store, dataset, executor)
+        if report.solved > AT_ONCE:
+            # So that the first look at the yield finds it counted.
+            YieldStore(store).keep_up(get_dataset(store, dataset).id)
     print_values(vars(report), json_)
 
 
 @commands.command()
 def findings(dataset: Dataset, json_: Json = False) -> None:
     """List what a person should look at."""
-    from app.review.queue.findings import finding_values
+    server = given_server()
+    if server is not None:
+        from app.commands import remote
 
-    with opened_store() as store:
-        values = list(finding_values(store, dataset))
+        with connected(server) as client:
+            values = list(remote.finding_values(client, dataset))
+    else:
+        from app.review.queue.findings import finding_values
+
+        with opened_store() as store:
+            values = list(finding_values(store, dataset))
     if json_:
         print_json(values)
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -11,6 +12,7 @@ from app.commands.options import Json, acting, read_settings
 from app.commands.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
+    from app.review.people.access_tokens import AccessToken
     from app.review.people.links import Link
     from app.review.people.people import Person
     from app.review.people.roles import Role
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 commands = typer.Typer(help="Who may log in to the server of a team.", no_args_is_help=True)
 
 Name = Annotated[str, typer.Argument(help="Name of the person.")]
+Dataset = Annotated[str, typer.Argument(help="Name or id of the dataset.")]
 
 
 def _role(said: str) -> Role:
@@ -34,7 +37,7 @@ def _role(said: str) -> Role:
 def add(
     name: Name,
     role: Annotated[
-        str, typer.Option(help="viewer, annotator, reviewer, lead or admin.")
+        str, typer.Option(help="none, viewer, annotator, reviewer, lead or admin.")
     ] = "reviewer",
     json_: Json = False,
 ) -> None:
@@ -58,7 +61,10 @@ def list_(json_: Json = False) -> None:
         print_json(found)
         return
     for value in found:
-        say(f"{value['name']:40} {value['role']:10} {value['state']:12} {value['seen'] or ''}")
+        single = ", ".join(f"{one}: {role}" for one, role in value.get("datasets", {}).items())
+        seen = value["seen"] or ""
+        more = ", ".join(part for part in (value.get("sign_on"), single) if part)
+        say(f"{value['name']:40} {value['role']:10} {value['state']:12} {seen:33} {more}".rstrip())
 
 
 @commands.command()
@@ -76,21 +82,143 @@ def enable(name: Name, json_: Json = False) -> None:
 @commands.command()
 def role(
     name: Name,
-    role: Annotated[str, typer.Argument(help="viewer, annotator, reviewer, lead or admin.")],
+    role: Annotated[str, typer.Argument(help="none, viewer, annotator, reviewer, lead or admin.")],
     json_: Json = False,
 ) -> None:
-    """Give somebody another role."""
+    """Give somebody another role, in every dataset in which they have none of their own."""
     _change(name, json_, role=_role(role))
 
 
 @commands.command()
-def reset(name: Name, json_: Json = False) -> None:
-    """Print a link with which somebody chooses another password; it logs them out when it is used."""
-    from app.review.people.people import find_person, renew_link
+def grant(
+    name: Name,
+    dataset: Dataset,
+    role: Annotated[
+        str, typer.Argument(help="none (sees nothing of it), viewer, annotator, reviewer or lead.")
+    ],
+    json_: Json = False,
+) -> None:
+    """Give somebody a role in one dataset, in place of what they are in all of them."""
+    _give(name, dataset, _role(role), json_)
+
+
+@commands.command()
+def take(name: Name, dataset: Dataset, json_: Json = False) -> None:
+    """Take somebody's role in one dataset: what they are in all of them counts there again."""
+    _give(name, dataset, None, json_)
+
+
+@commands.command()
+def adopt(name: Name, json_: Json = False) -> None:
+    """Show what was done before there were accounts as somebody's; once. The log keeps its names."""
+    from app.review.people.adopt import adopt as give
+    from app.review.people.people import find_person
 
     with opened_store() as store:
-        person, link = renew_link(store, find_person(store, name).id, actor=acting())
+        found = give(store, find_person(store, name).id, actor=acting())
+    print_values({"name": found, "shown as theirs": "what was done until now as local"}, json_)
+
+
+@commands.command()
+def reset(
+    name: Name,
+    second_factor: Annotated[
+        bool, typer.Option("--second-factor", help="Take away their second factor, too.")
+    ] = False,
+    json_: Json = False,
+) -> None:
+    """Print a link with which somebody chooses another password; it logs them out when it is used."""
+    from app.review.people.people import find_person, renew_link
+    from app.review.people.second_factor import SecondFactors
+
+    with opened_store() as store:
+        found = find_person(store, name)
+        if second_factor:
+            SecondFactors(store).clear(found.id, actor=acting())
+        person, link = renew_link(store, found.id, actor=acting())
     _print_link(person, link, json_)
+
+
+@commands.command()
+def unlink(name: Name, json_: Json = False) -> None:
+    """Take away the account of the provider by which somebody comes in, and end those sessions."""
+    from app.review.people.identities import unlink_person
+    from app.review.people.people import find_person
+
+    with opened_store() as store:
+        found = find_person(store, name)
+        unlink_person(store, found.id, actor=acting())
+        person = find_person(store, name)
+    print_values(_values(person), json_)
+
+
+def _give(name: str, dataset: str, role: Role | None, json_: bool) -> None:
+    from app.review.people.members import give_role
+    from app.review.people.people import find_person
+
+    with opened_store() as store:
+        found = find_person(store, name)
+        one = give_role(store, dataset, found.id, role, actor=acting())
+    print_values({"name": one.name, "dataset": dataset, "role": str(one.role)}, json_)
+
+
+class Switch(StrEnum):
+    """Whether something counts."""
+
+    ON = "on"
+    OFF = "off"
+
+
+@commands.command("require-second-factor")
+def require_second_factor(
+    switch: Annotated[Switch, typer.Argument(metavar="on|off")], json_: Json = False
+) -> None:
+    """Let everybody need a second factor: whoever has none makes one before anything else."""
+    from app.review.people.second_factor import SecondFactors
+
+    with opened_store() as store:
+        SecondFactors(store).require(switch is Switch.ON, actor=acting())
+    print_values({"second_factor_required": switch is Switch.ON}, json_)
+
+
+@commands.command()
+def tokens(
+    name: Annotated[
+        str | None, typer.Argument(help="Of this person; default: everybody's.")
+    ] = None,
+    end: Annotated[int | None, typer.Option(metavar="ID", help="End the token of this id.")] = None,
+    json_: Json = False,
+) -> None:
+    """List the tokens with which scripts ask, or end one; they are made in the browser."""
+    from app.errors import NotFoundError
+    from app.review.people.access_tokens import AccessTokens
+    from app.review.people.people import find_person
+
+    with opened_store() as store:
+        asked = AccessTokens(store)
+        found = asked.of_person(None if name is None else find_person(store, name).id)
+        if end is not None:
+            one = next((token for token in found if token.id == end), None)
+            if one is None:
+                raise NotFoundError(
+                    f"there is no token {end}", hint="touchline users tokens lists them."
+                )
+            asked.end(one.id, find_person(store, one.person).id, actor=acting())
+            found = [one]
+    _print_tokens(found, json_, ended=end is not None)
+
+
+def _print_tokens(found: list[AccessToken], json_: bool, *, ended: bool) -> None:
+    state = ["expired" if one.expired else "ended" if ended else "good" for one in found]
+    if json_:
+        print_json([{**vars(one), "state": word} for one, word in zip(found, state, strict=True)])
+        return
+    for one, word in zip(found, state, strict=True):
+        where = one.dataset or "all datasets"
+        say(
+            f"{one.id:4} {one.person:20} {one.name:24} {one.start}...  {','.join(one.scopes):24} "
+            f"{where}, {word}, until {one.expires[:10]}, used {(one.used or 'never')[:10]}"
+        )
 
 
 def _change(name: str, json_: bool, **change: Any) -> None:
@@ -105,7 +233,10 @@ def _change(name: str, json_: bool, **change: Any) -> None:
 def _values(person: Person) -> dict[str, Any]:
     waits = "invited" if person.invited else "without link"
     state = "disabled" if person.disabled else "active" if person.joined else waits
-    return {"name": person.name, "role": str(person.role), "state": state, "seen": person.seen}
+    datasets = {one.dataset: str(one.role) for one in person.datasets}
+    values = {"name": person.name, "role": str(person.role), "state": state, "seen": person.seen}
+    linked = {"sign_on": person.sign_on} if person.sign_on else {}
+    return values | linked | ({"datasets": datasets} if datasets else {})
 
 
 def _print_link(person: Person, link: Link, json_: bool) -> None:

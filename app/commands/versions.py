@@ -10,6 +10,7 @@ import typer
 
 from app.commands.opened import executor_of, opened_store
 from app.commands.options import (
+    Cluster,
     Dataset,
     Json,
     Workers,
@@ -18,6 +19,7 @@ from app.commands.options import (
     read_settings,
     read_text,
 )
+from app.commands.server import connected, given_server
 from app.commands.terminal import (
     complain,
     print_json,
@@ -83,6 +85,27 @@ def freeze(
 ) -> None:
     """Freeze a dataset as it is now into a version that never changes."""
     cameras = tuple(f"cam{number}" for number in sorted(parse_cameras(test_cameras)))
+    server = given_server()
+    if server is not None:
+        from app.commands import remote
+        from app.review.versions.freeze import MAX_LICENCE
+
+        asked = {
+            "name": name or named,
+            "note": note,
+            "licence": licence if licence_file is None else read_text(licence_file, MAX_LICENCE),
+            "groups": groups.value,
+            "split": {
+                "kind": split.value,
+                "seed": seed,
+                "test_share": test_share,
+                "test_cameras": list(cameras),
+            },
+        }
+        with connected(server) as client, show_progress("Freezing") as progress:
+            found = remote.freeze_values(client, dataset, asked, progress, dry_run=dry_run)
+        print_values(found, json_)
+        return
     from app.review.versions.freeze import MAX_LICENCE, FreezeRequest, plan_freeze
     from app.review.versions.freeze import freeze as run_freeze
     from app.review.versions.version import next_name
@@ -103,17 +126,24 @@ def freeze(
 @commands.command()
 def versions(dataset: Dataset, json_: Json = False) -> None:
     """List the frozen versions of a dataset, newest first."""
-    from app.review.versions.version import list_versions
+    server = given_server()
+    if server is not None:
+        from app.commands import remote
 
-    with opened_store() as store:
-        found = list_versions(store, dataset)
+        with connected(server) as client:
+            found = remote.version_values(client, dataset)
+    else:
+        from app.review.versions.version import list_versions
+
+        with opened_store() as store:
+            found = [version_values(item) for item in list_versions(store, dataset)]
     print_rows(
         found,
         json_,
-        version_values,
+        dict,
         lambda item: (
-            f"{item.name:16} {item.hash[:16]}  {item.created[:19]}  "
-            f"{item.counts['groups']:6} groups  {item.note}"
+            f"{item['name']:16} {item['hash'][:16]}  {item['created'][:19]}  "
+            f"{item['counts']['groups']:6} groups  {item['note']}"
         ),
     )
 
@@ -145,16 +175,17 @@ def verify(
         str | None, typer.Argument(help="Name, id or hash of a version; default: the newest.")
     ] = None,
     workers: Workers = None,
+    cluster: Cluster = None,
     json_: Json = False,
 ) -> None:
     """Compute a version from scratch and compare it bit for bit; exit code 1 where it differs."""
     from app.review.versions.verify import verify_and_keep
     from app.review.versions.version import find_version, newest_version
 
-    settings = read_settings()
+    settings = read_settings(cluster=cluster)
     with (
         opened_store() as store,
-        executor_of(workers or settings.workers) as executor,
+        executor_of(settings, workers) as executor,
         show_progress("Verifying") as progress,
     ):
         if version is None:

@@ -7,16 +7,21 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 import structlog
 from sqlalchemy import event
+from typer.main import get_command
 
 from app.cli import main
+from app.store import migrate
 from app.store.session import Store
+from tests.databases import SQLITE, Databases, databases_of, opened_databases
 from tests.kept_child import USERS, KeptChild
+from tests.schemas import copied_schemas, make_schema
 
 # As the server logs. The default draws a traceback with all its variables, half a second each.
 structlog.configure(
@@ -27,6 +32,41 @@ structlog.configure(
         structlog.processors.KeyValueRenderer(key_order=["level", "event"]),
     ]
 )
+
+
+ON_BOTH = frozenset(
+    {
+        "review/editing/test_submit.py",
+        "review/verdicts/test_verdict.py",
+        "review/versions/test_freeze.py",
+        "store/test_answers.py",
+        "store/test_conditions.py",
+        "store/test_listing.py",
+        "store/test_log.py",
+        "store/test_orphans.py",
+        "store/test_spare.py",
+        "store/test_verdicts.py",
+    }
+)
+"""Files whose tests always run on SQLite and on PostgreSQL: what the engines do differently, and one
+way each of edits, verdicts, versions and answers through the store."""
+WHEN_ALL = ON_BOTH | {
+    "review/answers/test_answers.py",
+    "review/datasets/test_delete.py",
+    "review/importing/test_ingest.py",
+    "review/queue/test_listing.py",
+    "review/versions/test_verify.py",
+    "review/work/test_work.py",
+    "store/test_changes.py",
+    "store/test_datasets.py",
+    "store/test_heads.py",
+    "store/test_jobs.py",
+    "store/test_projection.py",
+    "store/test_removal.py",
+    "store/test_solutions.py",
+    "store/test_views.py",
+}
+"""Files that do with ``TOUCHLINE_TEST_DATABASES=all``."""
 
 
 @dataclass
@@ -46,6 +86,49 @@ def _children_are_kept() -> Iterator[None]:
         for module in USERS:
             patch.setattr(f"{module}.Child", KeptChild)
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _commands_are_built_once() -> Iterator[None]:
+    """Who runs a command gets the tree of all commands that an earlier test has built."""
+    build = cache(get_command)
+    with pytest.MonkeyPatch.context() as patch:
+        for user in ("typer.main.get_command", "typer.testing._get_command"):
+            patch.setattr(user, build)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _schemas_are_copied() -> Iterator[None]:
+    """An empty home is migrated once in a process."""
+    with copied_schemas():
+        yield
+
+
+@pytest.fixture
+def every_migration(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty home is migrated as the product does it: for tests of that."""
+    monkeypatch.setattr(migrate, "make_schema", make_schema)
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run tests of a database on both, where ``ON_BOTH`` names their file."""
+    if "databases" in metafunc.fixturenames:
+        file = Path(metafunc.module.__file__).relative_to(Path(__file__).parent)
+        own = getattr(metafunc.module, "DATABASES", None)
+        names = own or databases_of(file.as_posix(), ON_BOTH, WHEN_ALL)
+        if names != [SQLITE]:
+            metafunc.parametrize("databases", names, indirect=True, scope="session")
+
+
+@pytest.fixture(scope="session")
+def databases(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Databases]:
+    """The databases that tests run on."""
+    kind = getattr(request, "param", SQLITE)
+    with opened_databases(kind, tmp_path_factory.mktemp(kind)) as opened:
+        yield opened
 
 
 @pytest.fixture(autouse=True)
@@ -90,19 +173,27 @@ def counted() -> Callable[[Store], AbstractContextManager[Cost]]:
         cost, engine = Cost(), store._engine
 
         def execute(_connection: Any, _cursor: Any, statement: str, *_: Any) -> None:
-            cost.reads += statement == "BEGIN"
-            cost.writes += statement == "BEGIN IMMEDIATE"
-            cost.statements += not statement.startswith("BEGIN")
+            cost.statements += not statement.startswith(
+                ("BEGIN", "SELECT pg_advisory", "SELECT pg_notify")
+            )
+
+        def begin(connection: Any) -> None:
+            options = connection.get_execution_options()
+            write = bool(options.get("touchline_write"))
+            cost.writes += write
+            cost.reads += not (write or options.get("touchline_glance"))
 
         def commit(connection: Any) -> None:
             cost.commits += bool(connection.get_execution_options().get("touchline_write"))
 
         event.listen(engine, "before_cursor_execute", execute)
+        event.listen(engine, "begin", begin)
         event.listen(engine, "commit", commit)
         try:
             yield cost
         finally:
             event.remove(engine, "before_cursor_execute", execute)
+            event.remove(engine, "begin", begin)
             event.remove(engine, "commit", commit)
 
     return run

@@ -23,6 +23,7 @@ from app.errors import (
     StaleRevisionError,
     StorageError,
 )
+from tests.waiting import SECONDS
 
 MEBI = 2**20
 ENDLESS = re.compile(r"(a+)+$"), "a" * 60 + "b"
@@ -94,7 +95,7 @@ def is_alive(pid: int) -> bool:
 
 
 def wait_for_end(pid: int) -> bool:
-    until = time.monotonic() + 20
+    until = time.monotonic() + SECONDS
     while is_alive(pid) and time.monotonic() < until:
         time.sleep(0.01)
     return not is_alive(pid)

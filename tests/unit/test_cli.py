@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import re
 import resource
+import runpy
 import socket
 import subprocess
 import sys
@@ -15,7 +17,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from app.cli import app
+from app import cli
+from app.cli import YOUNG, app
 from app.datasets.manifest import software_version
 from app.datasets.sn_calibration_writer import lines_to_json
 from tests.scenes import make_scenes
@@ -42,6 +45,17 @@ def line_files(tmp_path: Path) -> Path:
     return folder
 
 
+class TestModule:
+    def test_it_is_the_program_too(
+        self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        monkeypatch.setattr(sys, "argv", ["touchline", "--version"])
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_path(str(cli.__file__), run_name="__main__")
+        assert ended.value.code in (0, None)
+        assert capsys.readouterr().out.startswith("touchline ")
+
+
 class TestHelp:
     def test_comes_within_a_second(self) -> None:
         # Processor time: a busy machine is no fault of ours.
@@ -62,7 +76,17 @@ class TestHelp:
             for path in words:
                 code, out, _ = run(*path, "-h")
                 assert code == 0, path
-                assert f"{path[-1]} [OPTIONS]" in out, path
+                # A long name is on a line of its own.
+                assert f"{path[-1]} [OPTIONS]" in " ".join(out.split()), path
+
+    def test_a_start_is_not_kept_up_by_looking_for_garbage(self, run: Run) -> None:
+        before = gc.get_threshold()
+        gc.set_threshold(700)
+        try:
+            assert run("--version")[0] == 0
+            assert gc.get_threshold()[0] == YOUNG
+        finally:
+            gc.set_threshold(*before)
 
     def test_the_version_is_that_of_manifests(self, run: Run) -> None:
         assert run("--version")[:2] == (0, f"touchline {software_version()}\n")
@@ -102,7 +126,7 @@ class TestCompiled:
         def refuse(*_arguments: object, **_options: object) -> None:
             raise RuntimeError("cannot cache function 'f': no locator available for file 'x.py'")
 
-        monkeypatch.setattr("app.review.datasets.batch.score_files", refuse)
+        monkeypatch.setattr("app.review.datasets.score_files.score_files", refuse)
         code, _, err = run("score", line_files, line_files)
         assert code == 1
         assert "NUMBA_CACHE_DIR" in err

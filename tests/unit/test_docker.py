@@ -28,10 +28,17 @@ class TestCompose:
         assert services["touchline"]["network_mode"] == "service:proxy"
         assert "TOUCHLINE_HOST" not in services["touchline"]["environment"]
 
-    def test_the_proxy_never_starts_without_a_password(self, services: dict[str, Any]) -> None:
+    def test_people_log_in_under_the_name_that_the_proxy_has_a_certificate_for(
+        self, services: dict[str, Any]
+    ) -> None:
+        given = services["touchline"]["environment"]
+        assert given["TOUCHLINE_TEAM"] == "true"
+        assert given["TOUCHLINE_URL"] == "https://${TOUCHLINE_NAME}"
+
+    def test_the_proxy_never_starts_without_its_name(self, services: dict[str, Any]) -> None:
         given = services["proxy"]["environment"]
         used = set(re.findall(r"\{\$(\w+)\}", (FOLDER / "Caddyfile").read_text("utf-8")))
-        assert used == given.keys()
+        assert used == given.keys() == {"TOUCHLINE_NAME"}
         assert all(text.startswith(f"${{{name}:?") for name, text in given.items())
 
     def test_both_may_write_to_their_volumes_alone(self, services: dict[str, Any]) -> None:

@@ -11,6 +11,7 @@ import pytest
 import tests.fuzz.__main__ as fuzz
 from tests.fuzz import readers
 from tests.fuzz.case import Case
+from tests.waiting import SECONDS
 
 LEAVES = """
 import sys, time
@@ -27,17 +28,21 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("then", "what"),
-    [("time.sleep(600)", fuzz.STUCK), ("time.sleep(0.4); sys.exit(3)", f"{fuzz.CRASHED} (3)")],
+    ("then", "what", "grace"),
+    [
+        # Time enough to begin, on a machine that does much else.
+        ("time.sleep(600)", fuzz.STUCK, 2.0),
+        ("time.sleep(0.4); sys.exit(3)", f"{fuzz.CRASHED} (3)", SECONDS),
+    ],
     ids=["sticks", "crashes"],
 )
 def test_a_process_that_does_not_come_back_leaves_its_case(
-    corpus: Path, then: str, what: str
+    corpus: Path, then: str, what: str, grace: float
 ) -> None:
     text = Case("text", {"a": b"b"}).text()
     program = (sys.executable, "-ISc", LEAVES.format(text=text, then=then))
     start = time.monotonic()
-    assert fuzz.supervise(0.3, [], 1, program, 0.5) == 1
+    assert fuzz.supervise(0.3, [], 1, program, grace) == 1
     assert time.monotonic() - start < 300
     assert [Case.of(path.read_text()).found for path in corpus.iterdir()] == [what]
 

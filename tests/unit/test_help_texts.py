@@ -23,22 +23,35 @@ from tests.docs.settings import SETTINGS_PAGE, settings_page
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
+    choice give hand handed back lease leases on people work
+    take takes gold guidelines mixing copying copies own errors parts guideline datasets
+    adjudicate compare differences distance limits other panel rater summary weigh workspace
+    comment comments talk threads mentions bells past deed deeds window before after
+    tall scroll stalls settling
+    cluster serving hosts
+    stored tree trees safe path refusal attempt cookie fit stack
+    compiler dialect postgresql sqlite statements transfer triggers
+    attempts lived processes shared sharing short web
+    addresses messages secrets sender
+    challenges enrol
+    proof provider identities sign
     access account accounts join link links login logins passwords people person roles team tokens
-    me rules tries users
+    bearer codes me remote rules tries users
+    about adopt aliases belonging instead needs rights sight whereabouts
     actor actors
-    candidate proposal propose scoring search straight
+    candidate drawn proposal propose scoring search straight
     3d accept action actions address adjust adjustments advice ahead anchor annotate answers app
     application archive archives arrays arrival ask axis backup bar bars batches best binned bodies
     bundle proposal
     body boxes bulk button buttons cache calibrate canvas caption card cards cell changes chart
     child chip choice chooser class cli client clock codec codecs colours comparison completion
-    conditions config confirm connections contact cross csv cursor curve damped delete deps details
+    conditions config confirm connections contact copy cross csv cursor curve damped delete deps details
     detect diagram dialog diff doctor document documents drags drawing durable editor empty encode
     encoded engine environment estimator etags evaluate event events exact examination export
     exports facets facts failures fan faults fields figure figures files finite first fixes fixture
-    folder folders follow form format formats frozen gestures glossary grass grid guess guide header
+    folder folders follow form format formats frozen gathered gestures glossary grass grid guess guide header
     headers heads health heat help histograms history hit home hooks idempotency identity if image images
-    import imports in info init insight items jaccard json key keys known konva last latest lazy
+    import imports in info init insight items jaccard json judged key keys known konva last latest lazy
     least leftovers legend lens lesson lessons letter licence limits list listing live locks look loupe
     kernels profile trace
     main map markdown marks match matches matrix meant membership menu merge metrics migrate mini missing
@@ -50,7 +63,7 @@ PLAIN_WORDS = """
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows shared sheet singular site smallest solve
     solving soundness source sources sphere spill spread squares stage staging standpoints starts
-    state statistics steps storage store stream submit summary surface swap synloc tab table tables term
+    state statistics steps storage store stream submit summary surface swap synloc tab table tally tables term
     terminal text textures threshold ticks tools triangulate truth types undo undrawn unknown upload uploads
     v3 v3d video viewport viewports virtual wal walk warm what when whiskers words workspace write writer zip
 """

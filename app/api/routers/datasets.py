@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from app.api.deps import Actor, AppServices, AppStore, DatasetPath, QueryText
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees
 from app.api.problem import responses
 from app.api.schemas.dataset import (
     DatasetDeletion,
@@ -24,9 +24,9 @@ router = APIRouter(prefix="/datasets", tags=["datasets"])
 
 
 @router.get("", operation_id="listDatasets", responses=responses())
-def list_datasets(store: AppStore) -> DatasetList:
-    """Every dataset with its progress."""
-    return DatasetList(items=review.list_datasets(store))
+def list_datasets(store: AppStore, sight: Sees) -> DatasetList:
+    """Every dataset that one sees, with its progress."""
+    return DatasetList(items=review.list_datasets(store, sight))
 
 
 @router.get(
@@ -62,12 +62,12 @@ def delete_dataset(
     """
     contents = read_contents(services.store, dataset)
     if not dry_run:
-        exports = services.jobs.find(dataset_id=contents.id, kinds=["export"], limit=1000)
+        exports = services.jobs.every(dataset_id=contents.id, kind="export")
         if request.confirm == contents.name:
             services.jobs.cancel_all(contents.id)
         contents = deletion.delete_dataset(
             services.store, contents.id, confirm=request.confirm, actor=actor
         )
-        for job in exports:
-            services.exports.forget(str(job.id))
+        for export in exports:
+            services.exports.forget(str(export))
     return DeletedDocument(dry_run=dry_run, **vars(contents))

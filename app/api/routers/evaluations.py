@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from app.api.cursor import parse_cursor
 from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id
-from app.api.jobs import ACCEPTED, accepted
+from app.api.jobs import by_job, job_answer
 from app.api.problem import Responses, responses
 from app.api.schemas.evaluation import (
     ComparisonDocument,
@@ -21,7 +21,6 @@ from app.api.schemas.evaluation import (
     FrameList,
     TableDocument,
 )
-from app.api.schemas.job import JobDocument
 from app.errors import NotFoundError
 from app.evaluation.comparison import FIELDS
 from app.evaluation.figure import FIGURES
@@ -77,16 +76,14 @@ def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
 @router.post(
     "/datasets/{dataset}/evaluations",
     operation_id="startEvaluation",
-    status_code=202,
-    responses={**responses(404, 409, 413, 415), **ACCEPTED},
+    **by_job(404, 409, 413, 415),
 )
 def start_evaluation(
     dataset: DatasetPath,
     request: EvaluationBody,
     services: AppServices,
     actor: Actor,
-    response: Response,
-) -> JobDocument:
+) -> Response:
     """Evaluate predictions against a frozen version, or the dataset as it is now.
 
     The job's result names the evaluation.
@@ -95,7 +92,7 @@ def start_evaluation(
     version = None if named is None else version_called(store, str(named), dataset)
     wanted = request.value(version)
     job = request_evaluation(services.jobs, store, dataset, wanted, actor=actor)
-    return accepted(job, response)
+    return job_answer(job)
 
 
 @router.get(
@@ -115,9 +112,9 @@ def get_evaluation(evaluation: Id, store: AppStore) -> StoredEvaluation:
     status_code=204,
     responses=responses(404),
 )
-def delete_evaluation(evaluation: Id, store: AppStore) -> None:
+def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
     """Delete an evaluation; its predictions stay."""
-    review.remove_evaluation(store, evaluation)
+    review.remove_evaluation(store, evaluation, actor=actor)
 
 
 @router.get(

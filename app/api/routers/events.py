@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from app.api.deps import AppServices, Services, get_services
+from app.api.deps import AppServices, Sees, Services, get_services
 from app.api.events import Feed, hello
 from app.api.problem import Responses, responses
 from app.api.schemas.event import EVENTS
@@ -52,15 +52,23 @@ class Start:
         ] = None,
     ):
         self.dataset_id = None if dataset is None else dataset_id(services.store, dataset)
-        newest = services.events.position()
+        newest = self.newest = services.events.position()
         seen = last_event_id or ""
         self.resumed = seen.isascii() and seen.isdigit() and len(seen) < 19 and int(seen) <= newest
         self.position = int(seen) if self.resumed else newest
 
 
-async def begin(services: AppServices, start: Annotated[Start, Depends()]) -> AsyncIterator[Feed]:
+async def begin(
+    services: AppServices, sight: Sees, start: Annotated[Start, Depends()]
+) -> AsyncIterator[Feed]:
     """A feed for as long as the request lasts."""
-    feed = services.events.subscribe(start.dataset_id, start.position, resumed=start.resumed)
+    feed = services.events.subscribe(
+        start.dataset_id,
+        start.position,
+        resumed=start.resumed,
+        sight=sight,
+        began=start.newest,
+    )
     try:
         yield feed
     finally:
@@ -69,11 +77,12 @@ async def begin(services: AppServices, start: Annotated[Start, Depends()]) -> As
 
 def under_way(
     services: AppServices,
+    sight: Sees,
     start: Annotated[Start, Depends()],
     _feed: Annotated[Feed, Depends(begin)],
 ) -> list[ServerSentEvent]:
     """Jobs that are under way, read once the feed hears of what becomes of them."""
-    return services.events.open_jobs(start.dataset_id)
+    return services.events.open_jobs(start.dataset_id, sight)
 
 
 @router.get(
@@ -91,7 +100,7 @@ async def listen(
     """What changes, as it changes: by anybody, in a browser or on the command line.
 
     `group`: a group has another ETag. `dataset`: a dataset changed as a whole. `job`: a job began,
-    went on or ended. The stream begins with the jobs that are under way.
+    went on or ended. `work`: who has a group of a batch open. The stream begins with the jobs that are under way.
     """
     yield hello(start.position)
     for event in jobs:

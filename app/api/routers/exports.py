@@ -6,11 +6,11 @@ import asyncio
 import time
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Path, Response
+from fastapi import APIRouter, Depends, Path, Request, Response
 from starlette.responses import FileResponse
 
 from app.api.cursor import parse_cursor
-from app.api.deps import Actor, AppServices, Services
+from app.api.deps import Actor, AppServices, Sees, Services
 from app.api.jobs import ACCEPTED, job_address
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, Reply, document
@@ -22,9 +22,11 @@ from app.api.schemas.export import (
     ExportRequest,
 )
 from app.api.schemas.job import JobDocument
+from app.api.stored_file import stored_file
 from app.errors import ConflictError, NotFoundError
 from app.review.datasets.dataset import dataset_id
 from app.review.jobs.exports import KIND, request_export
+from app.review.people.deeds import record_deed
 from app.store.jobs import Job
 
 router = APIRouter(prefix="/exports", tags=["exports"])
@@ -72,6 +74,7 @@ def _export_answer(job: Job) -> Response:
 @router.get("", operation_id="listExports", responses=responses(404))
 def list_exports(
     services: AppServices,
+    sight: Sees,
     dataset: DatasetFilter = None,
     limit: Limit = 50,
     cursor: Cursor = None,
@@ -79,7 +82,11 @@ def list_exports(
     """Exports, the newest first, those under way and those that failed too."""
     found = None if dataset is None else dataset_id(services.store, dataset)
     jobs = services.jobs.find(
-        dataset_id=found, kinds=[KIND], before=parse_cursor(cursor), limit=limit + 1
+        dataset_id=found,
+        kinds=[KIND],
+        before=parse_cursor(cursor),
+        limit=limit + 1,
+        sight=sight,
     )
     more = str(jobs[limit - 1].id) if len(jobs) > limit else None
     items = [ExportDocument.of_job(job, services.exports.find(str(job.id))) for job in jobs[:limit]]
@@ -99,7 +106,7 @@ def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     response_class=Response,
     responses={**responses(404, 409), 204: {"description": "It is gone."}},
 )
-def delete_export(export: ExportId, services: AppServices) -> Response:
+def delete_export(export: ExportId, services: AppServices, actor: Actor) -> Response:
     """Delete the file of an export, or one that failed altogether; 409 while it is being written."""
     document = _document(services, export)
     if document.state in ("waiting", "running"):
@@ -109,13 +116,14 @@ def delete_export(export: ExportId, services: AppServices) -> Response:
     if document.state in ("failed", "cancelled"):
         services.jobs.forget(int(export))
     services.exports.forget(export)
+    record_deed(services.store, actor, "export deleted", None, export=export)
     return Response(status_code=204)
 
 
 async def written(export: ExportId, services: AppServices) -> str:
     """The id of an export, once that is no longer under way or patience is at its end."""
     end = time.monotonic() + PATIENCE
-    number = int(export) if export.isascii() and export.isdigit() else 0
+    number = int(export) if _is_id(export) else 0
     while services.jobs.is_open(number, KIND) and time.monotonic() < end:
         await asyncio.sleep(0.05)
     return export
@@ -125,14 +133,20 @@ async def written(export: ExportId, services: AppServices) -> str:
     "/{export}/content",
     operation_id="getExportContent",
     response_class=FileResponse,
-    responses={**responses(404, 409), **ZIP},
+    responses={**responses(404, 409, 503), **ZIP},
 )
-def get_content(export: Annotated[str, Depends(written)], services: AppServices) -> FileResponse:
+def get_content(
+    export: Annotated[str, Depends(written)], services: AppServices, request: Request
+) -> Response:
     """The zip itself; waits a while for one that is still being written.
 
-    409 when it is not ready by then, or its writing failed.
+    409 when it is not ready by then, or its writing failed. One that lies in an object store comes
+    through this server, or from an address of the store that is good for a minute.
     """
     document = _document(services, export)
+    entry = services.exports.find(export)
+    if entry is not None and entry.stored is not None:
+        return stored_file(services.settings, entry.stored, _file_name(document), request)
     path = services.exports.content(document.id)
     if document.state == "gone" or (document.state == "done" and not path.is_file()):
         raise NotFoundError("the file of this export is gone", hint="Make the export again.")
@@ -141,9 +155,13 @@ def get_content(export: Annotated[str, Depends(written)], services: AppServices)
     return FileResponse(
         path,
         media_type="application/zip",
-        filename=f"touchline-{document.request.format}-{document.id[:8]}.zip",
+        filename=_file_name(document),
         headers={"Cache-Control": "private, no-cache"},
     )
+
+
+def _file_name(document: ExportDocument) -> str:
+    return f"touchline-{document.request.format}-{document.id[:8]}.zip"
 
 
 def _document(services: Services, export: str) -> ExportDocument:
@@ -155,11 +173,16 @@ def _document(services: Services, export: str) -> ExportDocument:
     entry = services.exports.find(export)
     if entry is not None:
         return ExportDocument.of(entry)
-    if export.isascii() and export.isdigit() and len(export) < 19:
+    if _is_id(export):
         job = services.jobs.get(int(export))
         if job.kind == KIND:
             return ExportDocument.of_job(job, None)
     raise NotFoundError("there is no such export")
+
+
+def _is_id(export: str) -> bool:
+    """Whether it may be the id of a job; those of exports that were made before there were jobs are none."""
+    return export.isascii() and export.isdigit() and len(export) < 19
 
 
 def _not_ready(document: ExportDocument) -> ConflictError:

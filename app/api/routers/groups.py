@@ -26,6 +26,7 @@ from app.api.edits import preview_edits
 from app.api.problem import Responses, responses
 from app.api.reply import Asked, AskedUnder, Reply, document
 from app.api.schemas.group import GroupDocument
+from app.api.schemas.past import StepDocument
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
 from app.api.schemas.queue import (
     GroupIds,
@@ -37,10 +38,14 @@ from app.api.schemas.queue import (
 )
 from app.api.schemas.solution import SolutionDocument
 from app.api.schemas.verdict import VerdictEdit
+from app.api.security.access import login_of
 from app.errors import NotFoundError
+from app.review.agreement.weigh import after_hand_in
 from app.review.datasets.dataset import dataset_id
 from app.review.editing import submit
+from app.review.editing.past import history, read_step
 from app.review.editing.state import GroupState
+from app.review.people.roles import Action, may
 from app.review.queue import listing as queue
 from app.review.verdicts.verdict import set_verdict
 from app.store.session import Store
@@ -85,6 +90,7 @@ def change_group(
 @router.get("", operation_id="listGroups", responses=responses(404))
 def list_groups(
     store: AppStore,
+    request: Request,
     dataset: DatasetQuery,
     query: QueryText = "",
     limit: Annotated[int, Query(ge=1, le=MAX_LIMIT)] = 50,
@@ -114,9 +120,10 @@ def list_groups(
     except (OverflowError, UnicodeEncodeError) as error:
         # A forged cursor can hold what the database cannot.
         raise foreign_cursor() from error
-    return GroupPage(
-        items=[GroupRow.of(row) for row in page.items], next=page.next, total=page.total
-    )
+    login = login_of(request.scope)
+    judges = login is None or may(login.roles.role_in(found), Action.REVIEW)
+    items = [GroupRow.of(row, judges) for row in page.items]
+    return GroupPage(items=items, next=page.next, total=page.total)
 
 
 @router.get("/ids", operation_id="listGroupIds", responses=responses(404))
@@ -174,8 +181,14 @@ def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.N
 
 @router.get("/{group}/history", operation_id="getHistory", responses=responses(404))
 def get_history(group: Id, store: AppStore) -> History:
-    """Everything that was said about the group, oldest first."""
-    return History(items=[LogEntryDocument.of(entry) for entry in submit.history(store, group)])
+    """Everything that was said about the group and changed of its static cameras, oldest first."""
+    return History(items=[LogEntryDocument.of(entry) for entry in history(store, group)])
+
+
+@router.get("/{group}/history/{entry}", operation_id="getHistoryStep", responses=responses(404))
+def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
+    """What one entry of the history has changed: the views that differ, before and after."""
+    return StepDocument.of(read_step(store, group, entry))
 
 
 @router.post(
@@ -237,12 +250,15 @@ def _step(
 def put_verdict(
     group: Id,
     verdict: VerdictEdit,
-    store: AppStore,
+    services: AppServices,
     actor: Actor,
     if_match: IfMatch,
     asked: AskedUnder,
 ) -> Response:
     """Accept, reject with a reason, defer, or take a verdict back."""
     said = (verdict.state, verdict.reason, verdict.note)
-    change = partial(set_verdict, store, group, *said, if_match=if_match, actor=actor)
-    return change_group(asked, lambda: load_document(store, group), change)
+    change = partial(set_verdict, services.store, group, *said, if_match=if_match, actor=actor)
+    answer = change_group(asked, lambda: load_document(services.store, group), change)
+    # A verdict on one's own annotation of a group hands it in.
+    after_hand_in(services.store, group, services.paint)
+    return answer

@@ -7,10 +7,9 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.api.deps import Actor, AppServices, DryRun
-from app.api.jobs import ACCEPTED, accepted
+from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
 from app.api.schemas.imports import FolderDocument, ImportBody
-from app.api.schemas.job import JobDocument
 from app.review.importing.folders import FolderListing, list_folder
 from app.review.jobs.imports import request_import
 
@@ -35,16 +34,14 @@ def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
 @router.post(
     "",
     operation_id="startImport",
-    status_code=202,
-    responses={**responses(404, 413, 415, 503), **ACCEPTED},
+    **by_job(404, 413, 415, 503),
 )
 def start_import(
     request: ImportBody,
     services: AppServices,
     actor: Actor,
-    response: Response,
     dry_run: DryRun = False,
-) -> JobDocument:
+) -> Response:
     """Read files into a dataset, which is made when there is none of that name.
 
     The job's result is the report: read, imported, new, changed, unchanged, findings, and what
@@ -57,4 +54,4 @@ def start_import(
         request.value(dry_run=dry_run),
         actor=actor,
     )
-    return accepted(job, response)
+    return job_answer(job)

@@ -7,10 +7,11 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 
 from app.api.cursor import parse_cursor
-from app.api.deps import AppServices, Id
+from app.api.deps import Actor, AppServices, Id, Sees
 from app.api.problem import responses
 from app.api.schemas.job import JobDocument, JobKind, JobPage, JobState
 from app.review.datasets.dataset import dataset_id
+from app.review.people.deeds import record_deed
 from app.store.jobs import Job
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
@@ -25,6 +26,7 @@ DatasetFilter = Annotated[
 @router.get("", operation_id="listJobs", responses=responses(404))
 def list_jobs(
     services: AppServices,
+    sight: Sees,
     dataset: DatasetFilter = None,
     kind: Annotated[JobKind | None, Query()] = None,
     state: Annotated[JobState | None, Query()] = None,
@@ -39,6 +41,7 @@ def list_jobs(
         states=[state] if state else [],
         before=parse_cursor(cursor),
         limit=limit + 1,
+        sight=sight,
     )
     more = str(jobs[limit - 1].id) if len(jobs) > limit else None
     return JobPage(items=jobs[:limit], next=more)
@@ -53,6 +56,9 @@ def get_job(job: Id, services: AppServices) -> Job:
 @router.delete(
     "/{job}", operation_id="cancelJob", response_model=JobDocument, responses=responses(404, 409)
 )
-def cancel_job(job: Id, services: AppServices) -> Job:
+def cancel_job(job: Id, services: AppServices, actor: Actor) -> Job:
     """End a job: one that waits at once, one that runs at its next step; 409 when it is over."""
-    return services.jobs.cancel(job)
+    ended = services.jobs.cancel(job)
+    where = ended.dataset_id
+    record_deed(services.store, actor, "job cancelled", where, job=job, title=ended.title)
+    return ended

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 
-from app.api.deps import AppServices, DatasetPath
+from app.api.deps import Actor, AppServices, DatasetPath
+from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply
 from app.api.schemas.noise import NoiseDocument
+from app.review.jobs.noise import request_noise, request_noise_back
 from app.review.policies.noise import Noise
 
 router = APIRouter(prefix="/datasets/{dataset}/noise", tags=["policies"])
@@ -16,6 +19,42 @@ router = APIRouter(prefix="/datasets/{dataset}/noise", tags=["policies"])
 def get_noise(dataset: DatasetPath, services: AppServices) -> Noise:
     """Sigma of balls, given cameras and field lines with intervals, and what the policy says.
 
-    Changes nothing: to judge by the estimates, send `values` to the dataset's policy.
+    Changes nothing: to judge by the estimates, `POST` here, or send `values` alone to the dataset's
+    policy.
     """
     return services.noises.read(dataset)
+
+
+@router.post(
+    "",
+    operation_id="acceptNoise",
+    **by_job(404, 412),
+)
+def accept_noise(
+    dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
+) -> Response:
+    """Judge by the estimates: `values` go into the policy, `factors` to the balls; the job solves.
+
+    A ball that is placed later has the factor of its camera and of who places it.
+    """
+    reply = Reply(asked, job_answer)
+    found = services.noises.read(dataset)
+    job = request_noise(services.jobs, services.store, found, actor=actor, keep=reply.keep)
+    return reply.of(job)
+
+
+@router.delete(
+    "",
+    operation_id="takeNoiseBack",
+    **by_job(404),
+)
+def take_noise_back(
+    dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
+) -> Response:
+    """Take the balls of all cameras and people to be as noisy as the dataset's; the job solves.
+
+    The policy stays as it is.
+    """
+    reply = Reply(asked, job_answer)
+    job = request_noise_back(services.jobs, services.store, dataset, actor=actor, keep=reply.keep)
+    return reply.of(job)

@@ -5,13 +5,12 @@ from __future__ import annotations
 from fastapi import APIRouter, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath
-from app.api.jobs import ACCEPTED, job_answer
+from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply
-from app.api.schemas.job import JobDocument
 from app.api.schemas.paint import DatasetPaintDocument, DatasetPaintRequest
 from app.review.editing.paint import get_paint
-from app.review.jobs.paint import request_paint, take_paint_back
+from app.review.jobs.paint import PAINT, take_paint_back
 
 router = APIRouter(prefix="/datasets/{dataset}/paint", tags=["datasets"])
 
@@ -25,9 +24,7 @@ def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
 @router.post(
     "",
     operation_id="readDatasetPaint",
-    status_code=202,
-    response_model=JobDocument,
-    responses={**responses(404, 409, 413, 415), **ACCEPTED},
+    **by_job(404, 409, 413, 415),
 )
 def read_paint(
     dataset: DatasetPath,
@@ -42,7 +39,7 @@ def read_paint(
     reads any; this does. 409 while the policy does not use paint.
     """
     reply = Reply(asked, job_answer)
-    job = request_paint(
+    job = PAINT.request(
         services.jobs, services.store, dataset, request.match, actor=actor, keep=reply.keep
     )
     return reply.of(job)
@@ -51,16 +48,15 @@ def read_paint(
 @router.delete(
     "",
     operation_id="takeDatasetPaintBack",
-    status_code=202,
-    response_model=JobDocument,
-    responses={**responses(404, 409), **ACCEPTED},
+    **by_job(404, 409),
 )
 def take_back_paint(
     dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
 ) -> Response:
     """Give all groups what they had before paint was read last; the job solves them.
 
-    Once more takes back the reading before that one; 409 when there is none any more.
+    Once more takes back the reading before that one; 409 when there is none any more. A reading
+    that waits or runs is cancelled, and is the one that is taken back, as far as it came.
     """
     reply = Reply(asked, job_answer)
     job = take_paint_back(services.jobs, services.store, dataset, actor=actor, keep=reply.keep)

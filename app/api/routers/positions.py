@@ -7,13 +7,12 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath
-from app.api.jobs import ACCEPTED, job_answer
+from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply
-from app.api.schemas.job import JobDocument
 from app.api.schemas.positions import PositionsRequest, SharedPositionsDocument
 from app.review.editing.positions import get_positions
-from app.review.jobs.positions import request_positions, take_positions_back
+from app.review.jobs.positions import POSITIONS, take_positions_back
 
 router = APIRouter(prefix="/datasets/{dataset}/positions", tags=["datasets"])
 
@@ -27,9 +26,7 @@ def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocu
 @router.post(
     "",
     operation_id="sharePositions",
-    status_code=202,
-    response_model=JobDocument,
-    responses={**responses(404, 409, 413, 415), **ACCEPTED},
+    **by_job(404, 409, 413, 415),
 )
 def share_positions(
     dataset: DatasetPath,
@@ -44,7 +41,7 @@ def share_positions(
     policy does not use it.
     """
     reply = Reply(asked, job_answer)
-    job = request_positions(
+    job = POSITIONS.request(
         services.jobs, services.store, dataset, request.match, actor=actor, keep=reply.keep
     )
     return reply.of(job)
@@ -53,9 +50,7 @@ def share_positions(
 @router.delete(
     "",
     operation_id="takePositionsBack",
-    status_code=202,
-    response_model=JobDocument,
-    responses={**responses(404, 409), **ACCEPTED},
+    **by_job(404, 409),
 )
 def take_back_positions(
     dataset: DatasetPath,

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Response
 
-from app.api.deps import Actor, AppServices, Id
-from app.api.jobs import ACCEPTED, accepted
+from app.api.deps import Actor, AppServices, Id, Sees
+from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
-from app.api.schemas.job import JobDocument
 from app.api.schemas.practice import LessonDocument, PracticeBody, PracticeDocument
 from app.review.editing.submit import load
 from app.review.practice.practice import (
@@ -27,20 +26,17 @@ router = APIRouter(tags=["practice"])
     response_model=PracticeDocument,
     responses=responses(),
 )
-def get_practice(services: AppServices) -> Practice:
+def get_practice(services: AppServices, sight: Sees) -> Practice:
     """Every lesson and what has come of it; none until the practice is made."""
-    return read_practice(services.store, services.settings)
+    return read_practice(services.store, services.settings, sight)
 
 
 @router.post(
     "/practice",
     operation_id="startPractice",
-    status_code=202,
-    responses={**responses(409, 413, 415, 503), **ACCEPTED},
+    **by_job(409, 413, 415, 503),
 )
-def start_practice(
-    request: PracticeBody, services: AppServices, actor: Actor, response: Response
-) -> JobDocument:
+def start_practice(request: PracticeBody, services: AppServices, actor: Actor) -> Response:
     """Make the dataset `practice`; sent again it changes nothing, with `again` it begins afresh.
 
     The job's result has `dataset`, `groups` and `first`, the id of the first lesson's group.
@@ -48,7 +44,7 @@ def start_practice(
     job = request_practice(
         services.jobs, services.store, services.settings, again=request.again, actor=actor
     )
-    return accepted(job, response)
+    return job_answer(job)
 
 
 @router.get(

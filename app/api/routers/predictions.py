@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
-from app.api.jobs import ACCEPTED, accepted
+from app.api.jobs import ACCEPTED, job_answer
 from app.api.problem import responses
 from app.api.reply import AskedUnder
 from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document
@@ -101,7 +101,6 @@ def accept_predictions(
     request: AcceptBody,
     services: AppServices,
     actor: Actor,
-    response: Response,
     dry_run: DryRun = False,
 ) -> AcceptOutcome | Response:
     """Make annotations of predictions, as edits in the log that can be undone.
@@ -115,13 +114,7 @@ def accept_predictions(
     if request.views is not None:
         return AcceptOutcome.done(accept(store, request.dataset, value, actor=actor))
     job = request_accept(services.jobs, store, request.dataset, value, actor=actor)
-    document = accepted(job, response)
-    return Response(
-        document.model_dump_json(),
-        status_code=202,
-        media_type="application/json",
-        headers={"Location": response.headers["Location"]},
-    )
+    return job_answer(job)
 
 
 @router.get(
@@ -141,9 +134,9 @@ def get_predictions(predictions: Id, store: AppStore) -> PredictionSet:
     status_code=204,
     responses=responses(404),
 )
-def delete_predictions(predictions: Id, store: AppStore) -> None:
+def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
     """Throw a set away; evaluations of it stay, and so do balls that were accepted from it."""
-    review.delete_predictions(store, predictions)
+    review.delete_predictions(store, predictions, actor=actor)
 
 
 @router.get(

@@ -1,4 +1,4 @@
-"""Proposals for views without lines: looked for in a dataset, shown, taken back."""
+"""Proposals for views without a camera: looked for in a dataset, shown, taken back."""
 
 from __future__ import annotations
 
@@ -17,13 +17,8 @@ from app.api.schemas.proposals import (
     GroupProposals,
     ProposalPlanDocument,
 )
-from app.review.editing.proposals import (
-    forget_proposals,
-    get_group_proposals,
-    get_proposals,
-    require_matches,
-)
-from app.review.jobs.proposals import request_proposals
+from app.review.editing.proposals import get_group_proposals, get_proposals
+from app.review.jobs.proposals import PROPOSALS, stop_and_forget
 
 router = APIRouter(tags=["datasets"])
 
@@ -58,7 +53,7 @@ def propose_lines(
     asked: AskedUnder,
     dry_run: DryRun = False,
 ) -> Response:
-    """Look at the pictures of views that have neither lines nor a given camera.
+    """Look at the pictures of views without a camera, neither given nor from their lines.
 
     What is found is kept as predictions: nothing counts before a person saves the lines of one.
     Views that were looked at are left alone, unless their picture is another, or more is known of
@@ -66,11 +61,11 @@ def propose_lines(
     """
     if dry_run or request.dry_run:
         matches = None if request.match is None else [request.match]
-        found = require_matches(services.store, dataset, matches)
-        counts = {name: found.count(name, matches) for name in ("views", "looked")}
+        found = get_proposals(services.store, dataset, matches)
+        counts = {name: found.count(name) for name in ("views", "looked")}
         return document(ProposalPlanDocument(**counts))
     reply = Reply(asked, job_answer)
-    job = request_proposals(
+    job = PROPOSALS.request(
         services.jobs, services.store, dataset, request.match, actor=actor, keep=reply.keep
     )
     return reply.of(job)
@@ -82,10 +77,13 @@ def propose_lines(
     response_model=ForgottenProposalsDocument,
     responses=responses(404),
 )
-def forget(dataset: DatasetPath, store: AppStore, asked: AskedUnder) -> Response:
-    """Forget everything that was proposed for a dataset; lines that were accepted stay."""
+def forget(dataset: DatasetPath, services: AppServices, asked: AskedUnder) -> Response:
+    """Forget everything that was proposed for a dataset; lines that were accepted stay.
+
+    A search that waits or runs is cancelled, and nothing that it finds is kept afterwards.
+    """
     reply = Reply[int](asked, lambda gone: document(ForgottenProposalsDocument(forgotten=gone)))
-    return reply.of(forget_proposals(store, dataset, keep=reply.keep))
+    return reply.of(stop_and_forget(services.jobs, services.store, dataset, keep=reply.keep))
 
 
 @router.get(

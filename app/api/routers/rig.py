@@ -5,10 +5,9 @@ from __future__ import annotations
 from fastapi import APIRouter, Response
 
 from app.api.deps import Actor, AppServices, DatasetPath
-from app.api.jobs import ACCEPTED, job_answer
+from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
-from app.api.schemas.job import JobDocument
 from app.api.schemas.rig import RigRequest, RigTakenBack
 from app.review.jobs.rig import request_rig, take_rig_back
 
@@ -18,9 +17,7 @@ router = APIRouter(tags=["stations"])
 @router.post(
     "/datasets/{dataset}/rig",
     operation_id="adjustRig",
-    status_code=202,
-    response_model=JobDocument,
-    responses={**responses(404, 409, 413, 415), **ACCEPTED},
+    **by_job(404, 409, 413, 415),
 )
 def adjust_rig(
     dataset: DatasetPath,

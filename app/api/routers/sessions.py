@@ -18,14 +18,19 @@ from app.api.schemas.people import (
     OpenSessionList,
     PasswordEdit,
     SessionDocument,
+    SingleRoleDocument,
+    WaysIn,
 )
 from app.api.security.access import login_of
+from app.api.security.bearer import bearer_of
 from app.api.team import AppTeam, Team
 from app.errors import NotLoggedInError
 from app.review.people import links
 from app.review.people.logins import Login
-from app.review.people.roles import Action, Role, may
+from app.review.people.members import read_single_roles
+from app.review.people.roles import SCOPES, Action, Role, may
 from app.soccer.actors import LOCAL_USER
+from app.store.session import Store
 
 router = APIRouter(tags=["sessions"])
 log = structlog.get_logger("touchline.access")
@@ -46,34 +51,68 @@ async def get_login(request: Request) -> Login:
 Me = Annotated[Login, Depends(get_login)]
 
 
-def _session_of(name: str | None, role: Role | None, *, team: bool) -> SessionDocument:
-    allowed = [] if role is None else [action for action in Action if may(role, action)]
-    return SessionDocument(team=team, name=name, role=role, may=allowed)
+ALLOWS = {role: [action for action in Action if may(role, action)] for role in Role}
 
 
-@router.get("/session", operation_id="getSession", responses=responses())
-def get_session(request: Request) -> SessionDocument:
-    """Who asks; nobody, before they have logged in."""
+def session_of(login: Login | None, store: Store) -> SessionDocument:
+    """What a server of a team says of who asks."""
+    if login is None:
+        return SessionDocument(team=True, name=None, role=None, may=[])
+    allows = ALLOWS
+    if login.token is not None:
+        scopes = frozenset[Action]().union(*(SCOPES[scope] for scope in login.token.scopes))
+        allows = {role: [item for item in ALLOWS[role] if item in scopes] for role in Role}
+    return SessionDocument(
+        team=True,
+        name=login.name,
+        role=login.role,
+        enrol=login.must_enrol,
+        way=login.way,
+        may=allows[login.role],
+        datasets=[SingleRoleDocument(**vars(one)) for one in read_single_roles(store, login.roles)],
+        allows=allows,
+    )
+
+
+@router.get("/session", operation_id="getSession", responses=responses(401, 429))
+def get_session(request: Request, store: AppStore) -> SessionDocument:
+    """Who asks; nobody, before they have logged in. With a token: whose it is, and what it may."""
     team: Team | None = request.app.state.team
     if team is None:
-        return _session_of(LOCAL_USER, Role.ADMIN, team=False)
-    login = team.login(request)
-    if login is None:
-        return _session_of(None, None, team=True)
-    return _session_of(login.name, login.role, team=True)
+        every = ALLOWS[Role.ADMIN]
+        return SessionDocument(
+            team=False, name=LOCAL_USER, role=Role.ADMIN, may=every, allows=ALLOWS
+        )
+    bearer = bearer_of(request.scope)
+    login = team.login(request) if bearer is None else team.login_with(bearer, request)
+    found = session_of(login, store)
+    rules = team.sign_on and team.sign_on.rules
+    ways = WaysIn(password=not (rules and rules.only), sign_on=rules.label if rules else None)
+    return found.model_copy(update={"ways": ways})
 
 
 @router.post("/session", operation_id="createSession", responses=responses(401, 409, 413, 415, 429))
-def log_in(who: NewSession, request: Request, response: Response, team: AppTeam) -> SessionDocument:
+def log_in(
+    who: NewSession, request: Request, response: Response, store: AppStore, team: AppTeam
+) -> SessionDocument:
     """Log in; the answer sets the cookie of a new session.
 
-    A name that nobody has gets the same answer as a wrong password, and takes as long.
+    A name that nobody has gets the same answer as a wrong password, and takes as long. Whoever has a
+    second factor is asked for its code by a 401 whose pointer is `/code`: send all three then. 409
+    where people come by single sign-on alone.
     """
-    return _begin(team, request, response, who.name, who.password)
+    team.require_passwords()
+    return _begin(team, store, request, response, who.name, who.password, who.code)
 
 
 def _begin(
-    team: Team, request: Request, response: Response, name: str, password: str
+    team: Team,
+    store: Store,
+    request: Request,
+    response: Response,
+    name: str,
+    password: str,
+    code: str | None = None,
 ) -> SessionDocument:
     address = team.address(request)
     team.tries.count(address, name)
@@ -81,6 +120,8 @@ def _begin(
         token = team.logins.log_in(
             name,
             password,
+            code=code,
+            on_code=lambda: team.tries.count_code(name),
             browser=request.headers.get("user-agent", ""),
             address=address,
             before=team.token(request),
@@ -93,17 +134,19 @@ def _begin(
     login = team.logins.find(token)
     if login is None:
         raise NotLoggedInError("the account was disabled meanwhile")
-    return _session_of(login.name, login.role, team=True)
+    return session_of(login, store)
 
 
 @router.delete("/session", operation_id="deleteSession", responses=responses(409))
-def log_out(request: Request, response: Response, team: AppTeam) -> SessionDocument:
+def log_out(
+    request: Request, response: Response, store: AppStore, team: AppTeam
+) -> SessionDocument:
     """Log out: the session ends on the server, and the cookie goes."""
     login = team.login(request)
     if login is not None:
         team.logins.end(login, login.id)
     response.set_cookie(**team.cookie_values(None))
-    return _session_of(None, None, team=True)
+    return session_of(None, store)
 
 
 @router.put(
@@ -112,13 +155,19 @@ def log_out(request: Request, response: Response, team: AppTeam) -> SessionDocum
     responses=responses(401, 409, 413, 415, 429),
 )
 def change_password(
-    change: PasswordEdit, request: Request, response: Response, team: AppTeam, me: Me
+    change: PasswordEdit,
+    request: Request,
+    response: Response,
+    store: AppStore,
+    team: AppTeam,
+    me: Me,
 ) -> SessionDocument:
     """Give oneself another password; every session ends, and this browser gets a new one."""
+    team.require_passwords()
     team.tries.count(team.address(request), me.name)
     token = team.logins.change_password(me, change.old, change.new)
     response.set_cookie(**team.cookie_values(token))
-    return _session_of(me.name, me.role, team=True)
+    return session_of(me, store)
 
 
 @router.get("/sessions", operation_id="listSessions", responses=responses(401, 409))
@@ -157,11 +206,18 @@ def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTe
     return LinkMeaning(**vars(links.look(store, asked.token)))
 
 
-@router.post("/links/use", operation_id="useLink", responses=responses(404, 409, 413, 415, 429))
+@router.post(
+    "/links/use", operation_id="useLink", responses=responses(401, 404, 409, 413, 415, 429)
+)
 def use_link(
     chosen: LinkUse, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
-    """Set the password that a link is for, and log in with it; the link is good no more."""
+    """Set the password that a link is for, and log in with it; the link is good no more.
+
+    For whoever has a second factor the password is set, and the answer is the 401 whose pointer is
+    `/code`: log in with the new password and a code.
+    """
+    team.require_passwords()
     team.tries.count(team.address(request))
     name = links.use(store, chosen.token, chosen.password, chosen.name)
-    return _begin(team, request, response, name, chosen.password)
+    return _begin(team, store, request, response, name, chosen.password)

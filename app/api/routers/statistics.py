@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from app.api.deps import AppStore, DatasetPath, QueryText
+from app.api.deps import AppServices, DatasetPath, QueryText
 from app.api.problem import responses
 from app.api.schemas.statistics import StatisticsDocument
 from app.review.datasets.dataset import dataset_id
@@ -19,9 +19,14 @@ router = APIRouter(prefix="/datasets/{dataset}/statistics", tags=["datasets"])
     response_model=StatisticsDocument,
     responses=responses(404),
 )
-def get_statistics(dataset: DatasetPath, store: AppStore, query: QueryText = "") -> Statistics:
+def get_statistics(
+    dataset: DatasetPath, services: AppServices, query: QueryText = ""
+) -> Statistics:
     """Distances, parallax, uncertainty, sizes, heights and positions, per match and split.
 
     Every bar carries the query that opens the queue with the groups that it counts.
     """
-    return statistics(store, dataset_id(store, dataset), query)
+    found = dataset_id(services.store, dataset)
+    if query.strip():
+        return statistics(services.store, found, query)
+    return services.statistics.statistics(found)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from typing import Annotated, Any
 
 from anyio import CancelScope, to_thread
 from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.requests import ClientDisconnect
 
-from app.api.deps import AppServices, Services
+from app.api.deps import Actor, AppServices, Sees, Services
 from app.api.problem import responses
 from app.api.schemas.upload import UploadDocument, UploadList
 from app.datasets.guess_format import guess_format
@@ -56,18 +57,18 @@ BODY: dict[str, Any] = {
     },
 )
 async def upload_file(
-    request: Request, services: AppServices, name: FileName, response: Response
+    request: Request, services: AppServices, actor: Actor, name: FileName, response: Response
 ) -> UploadDocument:
     """Take a file, to import it or its predictions; the same file again is the same upload."""
     declared = request.headers.get("content-length", "")
     if declared.isascii() and declared.isdigit() and len(declared) < 19:
         require_size(services.settings, int(declared))
-    upload = await _receive(request, services, name)
+    upload = await _receive(request, services, name, actor)
     response.headers["Location"] = f"/api/v1/uploads/{upload.id}"
     return UploadDocument.of(upload)
 
 
-async def _receive(request: Request, services: Services, name: str) -> Upload:
+async def _receive(request: Request, services: Services, name: str, actor: str) -> Upload:
     """Write what comes, off the event loop; nothing stays of what does not come whole."""
     writer = await to_thread.run_sync(UploadWriter, services.settings, name)
     writing = asyncio.ensure_future(_write(request, writer))
@@ -77,7 +78,7 @@ async def _receive(request: Request, services: Services, name: str) -> Upload:
             if services.stopping.is_set():
                 raise OverloadedError("the server stops", hint="Send the file again in a while.")
         writing.result()
-        return await to_thread.run_sync(writer.finish, guess_format)
+        return await to_thread.run_sync(partial(writer.finish, guess_format, by=actor))
     except BaseException as error:
         with CancelScope(shield=True):
             writing.cancel()
@@ -99,11 +100,16 @@ async def _write(request: Request, writer: UploadWriter) -> None:
 
 
 @router.get("", operation_id="listUploads")
-def get_uploads(services: AppServices) -> UploadList:
-    """Every file that is still here."""
+def get_uploads(services: AppServices, sight: Sees) -> UploadList:
+    """Every file of one's own that is still here; an admin is shown everybody's."""
     settings = services.settings
+    mine = [
+        item
+        for item in list_uploads(settings)
+        if sight.sees(None) or any(sight.sees(None, name) for name in item.by)
+    ]
     return UploadList(
-        items=[UploadDocument.of(item) for item in list_uploads(settings)],
+        items=[UploadDocument.of(item) for item in mine],
         max_bytes=settings.max_upload_bytes,
         days=settings.upload_days,
     )
@@ -116,6 +122,9 @@ def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
 
 
 @router.delete("/{upload}", operation_id="deleteUpload", status_code=204, responses=responses(404))
-def delete_one(upload: UploadId, services: AppServices) -> None:
-    """Delete a file; 400 while a dataset reads its frames from it."""
-    delete_upload(services.settings, upload)
+def delete_one(upload: UploadId, services: AppServices, sight: Sees) -> None:
+    """Delete a file; 400 while a dataset reads its frames from it.
+
+    Where others have sent the same file, it stays with them; an admin deletes it for all.
+    """
+    delete_upload(services.settings, upload, partial(sight.sees, None))

@@ -7,9 +7,11 @@ from fastapi import APIRouter, Request
 from app.api.deps import AppStore, Id
 from app.api.problem import responses
 from app.api.routers.sessions import Me
+from app.api.schemas.access_token import AccessTokenList
 from app.api.schemas.people import NewUser, UserDocument, UserEdit, UserList, UserWithLink
 from app.api.team import AppTeam, Team
 from app.review.people import people
+from app.review.people.adopt import adopt, adopted_by
 from app.review.people.links import Link
 from app.review.people.people import Person
 
@@ -24,7 +26,7 @@ def _with_link(team: Team, request: Request, person: Person, link: Link) -> User
 @router.get("", operation_id="listUsers", responses=responses(401, 409))
 def list_users(store: AppStore, _team: AppTeam, _me: Me) -> UserList:
     """Everybody with an account, disabled ones too."""
-    return UserList(items=people.list_people(store))
+    return UserList(items=people.list_people(store), adopted_by=adopted_by(store))
 
 
 @router.post(
@@ -37,7 +39,7 @@ def invite_user(
     new: NewUser, request: Request, store: AppStore, team: AppTeam, me: Me
 ) -> UserWithLink:
     """Make an account; the link with which its person chooses a password is shown this once."""
-    person, link = people.invite(store, new.name, new.role, actor=me.name)
+    person, link = people.invite(store, new.name, new.role, actor=me.actor)
     return _with_link(team, request, person, link)
 
 
@@ -53,7 +55,7 @@ def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me:
     Nobody changes their own rights, and the last admin who can log in stays one.
     """
     return people.change_person(
-        store, user, actor=me.name, role=change.role, disabled=change.disabled
+        store, user, actor=me.actor, role=change.role, disabled=change.disabled
     )
 
 
@@ -63,6 +65,41 @@ def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me:
     responses=responses(401, 404, 409),
 )
 def renew_link(user: Id, request: Request, store: AppStore, team: AppTeam, me: Me) -> UserWithLink:
-    """A new link with which somebody sets their password; those before it are good no more."""
-    person, link = people.renew_link(store, user, actor=me.name)
+    """A new link with which somebody sets their password; those before it are good no more.
+
+    Nobody makes one for themselves, and no token makes any.
+    """
+    person, link = people.renew_link(store, user, actor=me.actor)
     return _with_link(team, request, person, link)
+
+
+@router.post(
+    "/{user}/adoption",
+    operation_id="adoptLocalWork",
+    responses=responses(401, 404, 409),
+)
+def adopt_work(user: Id, store: AppStore, _team: AppTeam, me: Me) -> UserList:
+    """Show what was done before there were accounts, under the name `local`, as somebody's; once.
+
+    The log is not changed: its entries keep their name, and this becomes an entry of its own.
+    """
+    adopt(store, user, actor=me.actor)
+    return UserList(items=people.list_people(store), adopted_by=adopted_by(store))
+
+
+@router.get("/{user}/tokens", operation_id="listTokensOfUser", responses=responses(401, 404, 409))
+def list_tokens(user: Id, store: AppStore, team: AppTeam, _me: Me) -> AccessTokenList:
+    """The tokens with which somebody's scripts ask."""
+    person = people.get_person(store, user)
+    return AccessTokenList(items=team.tokens.of_person(person.id))
+
+
+@router.delete(
+    "/{user}/tokens/{token}",
+    operation_id="endTokenOfUser",
+    status_code=204,
+    responses=responses(401, 404, 409),
+)
+def end_token(user: Id, token: Id, team: AppTeam, me: Me) -> None:
+    """End a token of somebody: whatever uses it is refused from now on."""
+    team.tokens.end(token, user, actor=me.actor)

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Path, Query, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun
-from app.api.jobs import ACCEPTED, job_answer
+from app.api.jobs import ACCEPTED, by_job, job_answer
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument
@@ -138,9 +138,7 @@ def get_diff(
 @router.post(
     "/versions/{version}/verify",
     operation_id="verifyVersion",
-    status_code=202,
-    response_model=JobDocument,
-    responses={**responses(404), **ACCEPTED},
+    **by_job(404),
 )
 def verify_version(
     version: VersionId, services: AppServices, actor: Actor, asked: AskedUnder

@@ -43,13 +43,17 @@ async def read_paint(
     "/{view}/propose",
     operation_id="proposeLines",
     response_model=ProposalDocument,
-    responses=responses(404, 413, 503),
+    responses=responses(404, 413, 415, 503),
 )
 async def propose_lines(
-    view: Id, services: AppServices, request: Request
+    view: Id, services: AppServices, request: Request, wanted: PaintRequest | None = None
 ) -> ProposalDocument | Response:
-    """Lines for a view that has none, from its frame alone; saves nothing."""
-    question = await to_thread.run_sync(proposal_question, services.store, view)
+    """Lines for a view without a camera, from its frame alone; saves nothing.
+
+    Where the view has lines, those that nobody drew are proposed beside them.
+    """
+    lines = {} if wanted is None else points_of(wanted.lines)
+    question = await to_thread.run_sync(proposal_question, services.store, view, lines)
     found = await _answer(request, services.frames, question, PaintQuestion.ask_proposal)
     return Response(status_code=CLIENT_GONE) if found is None else ProposalDocument.of(found)
 

@@ -250,6 +250,9 @@ async def _picture(
         found = await to_thread.run_sync(frames.cached, view.media, width, view.flipped)
         if found is not None:
             return found
+        fetching = await to_thread.run_sync(frames.ask_fetch, view.media)
+        if fetching is not None and not await while_wanted(request, fetching):
+            return None
         made: Picture | None = await while_wanted(
             request, frames.ask(view.media, width, view.flipped)
         )

@@ -17,8 +17,9 @@ router = APIRouter(prefix="/datasets/{dataset}/yield", tags=["yield"])
 def read_yield(dataset: DatasetPath, services: AppServices) -> Yield:
     """What the policy lets through: funnel, curves, splits, distances, leakage.
 
-    The first call after a start reads all solutions, which takes seconds for ten thousand
-    groups; from then on the answer follows every change within milliseconds.
+    What the answer is counted from is kept and follows every change. Where more than twenty
+    thousand groups have changed since somebody looked, they are read first: until then the answer
+    is 503, and says how far it is.
     """
     found = dataset_id(services.store, dataset)
     return get_yield(services.yields, found)

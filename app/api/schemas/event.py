@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 from pydantic import BaseModel, Field
 
+from app.api.schemas.document import Document
 from app.api.schemas.job import JobDocument
 
 
@@ -27,9 +30,26 @@ class DatasetEvent(BaseModel):
     actor: str | None
 
 
+class PresenceDocument(Document):
+    """Somebody who has a group of a batch open."""
+
+    person: str
+    since: datetime
+
+
+class WorkEvent(BaseModel):
+    """A group of a batch was opened, left, taken over or handed in."""
+
+    batch: int
+    group: int
+    dataset: str | None
+    here: list[PresenceDocument] = Field(description="Everybody who has the group open now.")
+
+
 EVENTS: dict[str, type[BaseModel]] = {
     "group": GroupEvent,
     "dataset": DatasetEvent,
     "job": JobDocument,
+    "work": WorkEvent,
 }
 """What the data of each kind of event is."""

@@ -41,6 +41,11 @@ class ExportRequest(BaseModel):
         description="coco and yolo: whether views that annotate a ball and are in no valid pair "
         "take part.",
     )
+    to: Annotated[str, Field(max_length=1000, pattern="^s3://")] | None = Field(
+        default=None,
+        description="Where in an object store the zip goes, `s3://NAME/folder/file.zip`, if the "
+        "operator allows it; without it the zip stays on the server.",
+    )
 
 
 class ExportJobDocument(JobDocument):

@@ -16,7 +16,7 @@ Side = Annotated[int, Field(ge=2, le=16_384)]
 
 
 class ImportPlace(BaseModel):
-    """Where files are: exactly one of an upload and a folder."""
+    """Where files are: exactly one of an upload and a folder, which may be `s3://NAME/...` in a store."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -55,6 +55,10 @@ class ImportOptions(BaseModel):
     lines: ImportPlace | None = Field(
         default=None, description="ISSIA: line files of the static cameras."
     )
+    frames: ImportPlace | None = Field(
+        default=None,
+        description="A JSON list of where frames lie in object stores, apart from the labels.",
+    )
 
 
 class ImportBody(BaseModel):
@@ -90,9 +94,9 @@ class ImportBody(BaseModel):
     def value(self, *, dry_run: bool = False) -> ImportRequest:
         """The import as the review floor takes it; options that were not given are left out."""
         options: dict[str, Any] = self.options.model_dump(
-            mode="json", exclude_defaults=True, exclude={"lines"}
+            mode="json", exclude_defaults=True, exclude={"lines", "frames"}
         )
-        lines = self.options.lines
+        lines, frames = self.options.lines, self.options.frames
         return ImportRequest(
             self.dataset,
             self.format,
@@ -101,6 +105,7 @@ class ImportBody(BaseModel):
             options,
             dry_run or self.dry_run,
             self.policy,
+            None if frames is None else frames.values(),
         )
 
 

@@ -23,6 +23,7 @@ JobKind = Literal[
     "positions",
     "paint",
     "proposals",
+    "pictures",
 ]
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 

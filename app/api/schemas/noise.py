@@ -27,6 +27,18 @@ class BallNoiseDocument(Document):
     )
 
 
+class SourceNoiseDocument(Document):
+    """Noise of the balls of a static camera or of a person, drawn towards the dataset's."""
+
+    source: str = Field(description="Key of the station, or name of the person.")
+    sigma_px: float = Field(description="Of a coordinate of a ball, pixels at 1920 x 1080.")
+    low: float = Field(description="End of the 95 % interval.")
+    high: float
+    ratio: float = Field(description="Of that to the dataset's.")
+    numbers: float = Field(description="Independent numbers that speak of it alone.")
+    differs: bool = Field(description="The interval leaves out the dataset's sigma.")
+
+
 class LineNoiseDocument(Document):
     """Noise of clicks on field lines: medians over images."""
 
@@ -37,17 +49,43 @@ class LineNoiseDocument(Document):
     views: int
 
 
+class IntervalDocument(Document):
+    """A number with the ends of its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+class LineEstimateDocument(Document):
+    """Noise of clicks on field lines, from all images together."""
+
+    sigma: IntervalDocument = Field(description="Of a point, pixels at 960 x 540.")
+    share: IntervalDocument = Field(
+        description="Of its variance, what the points of a marking have in common."
+    )
+    views: int = Field(description="Images that it rests on.")
+
+
 class AdviceDocument(Document):
     """A threshold of the policy and what the dataset says of it."""
 
     name: str
     label: str
     unit: str
-    present: float
+    present: float | None = Field(description="Null: the policy leaves it to each image.")
     estimate: float
     low: float
     high: float
     agrees: bool = Field(description="The interval holds the present value.")
+
+
+class FactorDocument(Document):
+    """How noisy balls of a camera that a person places are beside the dataset's."""
+
+    camera: str | None = Field(description="Key of a static camera; null: any other.")
+    person: str | None = Field(description="Who places the ball; null: anybody else.")
+    ratio: float = Field(description="Of both sigmas; one where they may be alike.")
 
 
 class NoiseDocument(Document):
@@ -56,7 +94,17 @@ class NoiseDocument(Document):
     groups: int = Field(description="Groups that were looked at.")
     solved: int = Field(description="Groups with a solution.")
     ball: BallNoiseDocument
+    stations: list[SourceNoiseDocument] = Field(
+        description="Static cameras of which enough is seen, the noisiest first."
+    )
+    people: list[SourceNoiseDocument] = Field(description="The same of who placed balls last.")
+    factors: list[FactorDocument] = Field(
+        description="Of cameras and people together; empty where all may be like the dataset."
+    )
+    used: list[FactorDocument] = Field(description="Those that sigma uses now.")
+    is_new: bool = Field(description="`factors` say something else than `used`.")
     lines: LineNoiseDocument | None
+    line_estimate: LineEstimateDocument | None = Field(description="Null where images are few.")
     advice: list[AdviceDocument]
     values: dict[str, float] = Field(
         description="To be sent to the policy; empty where it agrees already."

@@ -16,8 +16,8 @@ class MatchPaintDocument(Document):
     without_picture: int = Field(description="How many of them have no picture.")
     read: int = Field(description="How many of their pictures were read.")
     old: int | None = Field(
-        description="How many were read for other lines than their view has now, or by an older "
-        "version; null where too many were read to compare them."
+        description="How many were read for other lines than their view has now, beside other "
+        "boxes of people, or by an older version; null where too many were read to compare them."
     )
     painted: int = Field(
         description="How many of those place their camera, unless the lines changed since."

@@ -5,14 +5,16 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from pydantic.config import JsonDict
 
 from app.api.schemas.document import Document
+from app.review.people.logins import Way
 from app.review.people.roles import Action, Role
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Password = Annotated[str, Field(min_length=1, max_length=200)]
+Code = Annotated[str, Field(min_length=1, max_length=40)]
 Token = Annotated[str, Field(min_length=1, max_length=200)]
 EXAMPLE: JsonDict = {
     "password": "three plain words",
@@ -30,6 +32,64 @@ class NewSession(BaseModel):
 
     name: Name
     password: Password
+    code: Code | None = Field(
+        default=None,
+        description="Of the second factor, or a recovery code; asked for by 401 with the pointer "
+        "`/code` where somebody has one.",
+    )
+
+
+class PasswordOnly(BaseModel):
+    """One's own password, once more; whoever came by single sign-on just now needs none."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"password": EXAMPLE["password"]}]}
+    )
+
+    password: Password | None = None
+
+
+class CodeOnly(BaseModel):
+    """What the authenticator shows at this moment."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"code": "123456"}]})
+
+    code: Code
+
+
+class SecondFactorDocument(Document):
+    """Whether more is asked for than one's password."""
+
+    on: bool = Field(description="There is an authenticator, or a passkey.")
+    required: bool = Field(description="Everybody needs a second factor here.")
+    codes_left: int = Field(description="Recovery codes that were not used yet.")
+    authenticator: bool = Field(description="There is an authenticator, which shows codes.")
+
+
+class EnrolmentDocument(Document):
+    """What an authenticator has to know; shown this once."""
+
+    secret: str
+    uri: str
+    picture: str = Field(description="The address as a QR code: a PNG, as a `data:` address.")
+
+
+class RecoveryCodes(Document):
+    """Codes that take the place of the second factor, each once; shown this once."""
+
+    codes: list[str]
+
+
+class TeamSettings(BaseModel):
+    """What counts for everybody."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"require_second_factor": True}]}
+    )
+
+    require_second_factor: StrictBool = Field(
+        description="Who has no second factor makes one before anything else."
+    )
 
 
 class PasswordEdit(BaseModel):
@@ -70,13 +130,45 @@ class LinkMeaning(Document):
     joined: bool = Field(description="They have a password already; the link gives another one.")
 
 
+class SingleRoleDocument(Document):
+    """What somebody is in one dataset, in place of what they are in all of them."""
+
+    id: int = Field(description="Of the dataset.")
+    dataset: str = Field(description="Its name.")
+    role: Role
+
+
+class WaysIn(Document):
+    """How people log in here."""
+
+    password: bool = Field(description="By name and password, or by a passkey.")
+    sign_on: str | None = Field(
+        description="By the provider of single sign-on, which people call so; null: there is none."
+    )
+
+
 class SessionDocument(Document):
     """Who asks."""
 
     team: bool = Field(description="People log in; else one person runs the server alone.")
     name: str | None = Field(description="Null: nobody is logged in.")
-    role: Role | None
+    role: Role | None = Field(description="In every dataset that `datasets` does not name.")
+    enrol: bool = Field(
+        default=False, description="They must make a second factor before anything else."
+    )
+    way: Way | None = Field(
+        default=None, description="How this session began; null: there is none."
+    )
+    ways: WaysIn | None = Field(
+        default=None, description="How people log in; told to whoever asks who they are."
+    )
     may: list[Action] = Field(description="What the role lets them do.")
+    datasets: list[SingleRoleDocument] = Field(
+        default=[], description="Where they are something else."
+    )
+    allows: dict[Role, list[Action]] = Field(
+        default={}, description="What each role lets somebody do."
+    )
 
 
 class OpenSessionDocument(Document):
@@ -126,17 +218,30 @@ class UserDocument(Document):
     name: str
     role: Role
     disabled: bool
-    joined: bool = Field(description="They have chosen a password.")
+    joined: bool = Field(description="They have chosen a password, or come by single sign-on.")
     invited: bool = Field(description="A link waits for them with which they can.")
     created: datetime
     created_by: str
     seen: datetime | None = Field(description="When a session was used last; null: none is open.")
+    second_factor: bool = Field(description="More is asked for than their password.")
+    tokens: int = Field(description="How many tokens of scripts they have.")
+    sign_on: str | None = Field(
+        default=None,
+        description="What their account of the provider is known by; null: none is linked.",
+    )
+    datasets: list[SingleRoleDocument] = Field(
+        default=[], description="In which datasets they are something else than `role`."
+    )
 
 
 class UserList(Document):
     """Everybody, by name."""
 
     items: list[UserDocument]
+    adopted_by: str | None = Field(
+        default=None,
+        description="As whose that is shown which was done before there were accounts.",
+    )
 
 
 class UserWithLink(Document):
@@ -145,3 +250,31 @@ class UserWithLink(Document):
     user: UserDocument
     link: str
     expires: datetime
+
+
+class MemberEdit(BaseModel):
+    """What somebody shall be in a dataset."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"role": "reviewer"}, {"role": None}]}
+    )
+
+    role: Role | None = Field(
+        description="null: what they are everywhere counts here again; `admin` is of no dataset."
+    )
+
+
+class MemberDocument(Document):
+    """Somebody with an account, and what they are in a dataset."""
+
+    id: int
+    name: str
+    role: Role = Field(description="What they are here.")
+    everywhere: Role = Field(description="What they are where nothing else is said.")
+    single: Role | None = Field(description="What is said of this dataset; null: nothing.")
+
+
+class MemberList(Document):
+    """Everybody who can log in, by name; those of role `none` do not see the dataset."""
+
+    items: list[MemberDocument]

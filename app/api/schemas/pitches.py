@@ -24,7 +24,7 @@ class PitchEstimateDocument(Document):
 class MatchPitchDocument(Document):
     """The pitch of one match."""
 
-    match: str
+    match: str = Field(description="Empty: of the groups that have none, if they are of one pitch.")
     group: str = Field(description="Key of the first of its groups.")
     group_id: int
     groups: int
@@ -54,6 +54,6 @@ class PitchChange(BaseModel):
         json_schema_extra={"examples": [{"match": "a/b/c", "length": 103.0, "width": 66.0}]},
     )
 
-    match: str = Field(min_length=1, max_length=1000)
+    match: str = Field(max_length=1000, description="Empty: all groups that have none.")
     length: Annotated[float, Field(ge=LENGTH_RANGE[0], le=LENGTH_RANGE[1])]
     width: Annotated[float, Field(ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])]

@@ -6,6 +6,8 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
+from app.api.schemas.event import PresenceDocument
+
 MEDIA_TYPE = "application/problem+json"
 
 
@@ -35,6 +37,9 @@ class Problem(BaseModel):
     )
     station: int | None = Field(
         default=None, description="The station that owns the lines (409 on a static view)."
+    )
+    here: list[PresenceDocument] | None = Field(
+        default=None, description="Who has the group of a batch open (409 on its lease)."
     )
     current: dict[str, Any] | None = Field(
         default=None, description="The state as it is now, complete (412)."

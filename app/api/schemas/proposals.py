@@ -16,7 +16,7 @@ class MatchProposalsDocument(Document):
 
     match: str
     views: int = Field(
-        description="Views with a picture, without lines and without a given camera; a static "
+        description="Views with a picture and without a camera, given or of their lines; a static "
         "camera counts once."
     )
     looked: int = Field(description="How many of them were looked at.")
@@ -63,11 +63,17 @@ class GroupProposal(BaseModel):
 
     view: int
     key: str
-    open: bool = Field(description="Whether the view has neither lines nor a given camera yet.")
+    open: bool = Field(
+        description="Whether the view still has no given camera, and no lines or those beside "
+        "which this was proposed because they determined no camera."
+    )
     outcome: Literal["proposed", "unsure", "nothing"]
-    sentence: str = Field(description="Why nothing is proposed; empty where something is.")
+    sentence: str = Field(
+        description="Why nothing is proposed, or which drawn lines lie elsewhere; else empty."
+    )
     lines: LineDocuments = Field(
-        description="Points on the paint, pixels of the annotated size; none unless proposed."
+        description="Points on the paint of markings that nobody drew, pixels of the annotated "
+        "size; none unless proposed."
     )
     supported: float | None = Field(description="Share of the visible markings that has paint.")
     explained: float | None = Field(description="Share of line-like paint that has a marking.")

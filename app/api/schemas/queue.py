@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field
 
 from app.api.schemas.document import Document
 from app.api.schemas.group import State, image_address
 from app.api.schemas.solution import FailingGate, FindingDocument, FixDocument, OfferDocument
+from app.review.editing.past import STATION_EDITS
 from app.review.queue.findings import GroupFindings
 from app.review.queue.listing import GroupRow as QueueRow
 from app.soccer.finding import Finding
 from app.store.log import LogEntry
 
 THUMBNAIL_WIDTH = 208
-TOLD_KINDS = frozenset({"edit", "undo", "redo", "verdict", "pitch", "position", "paint"})
+TOLD_KINDS = frozenset(STATION_EDITS) | frozenset(
+    {"edit", "undo", "redo", "verdict", "pitch", "position", "noise", "paint", "comment"}
+    | {"take", "agreement", "work"}
+)
 
 
 def thumbnail_address(view_id: int | None) -> str | None:
@@ -70,13 +74,22 @@ class GroupRow(Document):
     reason: str | None
     override: str | None = Field(description="The gate that was overridden with a reason.")
     fixed: bool
+    comments: int = Field(description="Threads of comments that are open.")
+    takes: int | None = Field(
+        description="How many people handed in an annotation of their own; null: for reviewers alone."
+    )
+    came_to: Literal["agreed", "open", "decided"] | None = Field(
+        description="What these came to; `open`: they differ, and somebody has to decide."
+    )
     changed: datetime
     thumbnail: str | None
 
     @staticmethod
-    def of(row: QueueRow) -> GroupRow:
-        """The document of a row of the queue."""
+    def of(row: QueueRow, judges: bool = True) -> GroupRow:
+        """The document of a row of the queue; ``judges``: its reader may know what others made of it."""
         values: dict[str, Any] = {name: getattr(row, name) for name in _SAME}
+        if not judges:
+            values |= dict.fromkeys(("takes", "came_to"))
         failing = None
         if row.gate is not None:
             failing = FailingGate(
@@ -162,7 +175,8 @@ class LogEntryDocument(Document):
     actor: str
     kind: str
     body: dict[str, Any] | None = Field(
-        description="The edit, pitch, position or verdict as it was given; null for imports."
+        description="The edit, pitch, position or verdict as it was given, a comment without its "
+        "text; null for imports."
     )
 
     @staticmethod
@@ -170,7 +184,11 @@ class LogEntryDocument(Document):
         """The document of an entry."""
         told = entry.kind in TOLD_KINDS and isinstance(entry.body, dict)
         values = {name: getattr(entry, name) for name in ("id", "at", "actor", "kind")}
-        return LogEntryDocument.model_validate({**values, "body": entry.body if told else None})
+        body = {**entry.body} if told else None
+        if body is not None and entry.kind == "comment":
+            # Its writer may have deleted it since.
+            body.pop("text", None)
+        return LogEntryDocument.model_validate({**values, "body": body})
 
 
 class History(Document):

@@ -20,7 +20,7 @@ DIGITS = 3
 
 
 class PaintRequest(BaseModel):
-    """Lines that are not saved yet; without any the paint is sought near those that are."""
+    """Lines that are not saved yet; without any those count that are."""
 
     model_config = ConfigDict(
         extra="forbid",
@@ -71,12 +71,15 @@ class PaintDocument(Document):
 
 
 class ProposalDocument(Document):
-    """Lines for a view that has none, as its frame shows them; a prediction until saved."""
+    """Lines for a view without a camera, as its frame shows them; a prediction until saved."""
 
     outcome: Literal["proposed", "unsure", "nothing"]
-    sentence: str = Field(description="Why nothing is proposed; empty where something is.")
+    sentence: str = Field(
+        description="Why nothing is proposed, or which drawn lines lie elsewhere; else empty."
+    )
     lines: dict[str, list[Point]] = Field(
-        description="Points on the paint, pixels of the annotated size; none unless proposed."
+        description="Points on the paint, pixels of the annotated size; none unless proposed, and "
+        "none of markings that are drawn."
     )
     supported: float | None = Field(description="Share of the visible markings that has paint.")
     explained: float | None = Field(description="Share of line-like paint that has a marking.")

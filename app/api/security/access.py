@@ -9,22 +9,36 @@ from __future__ import annotations
 import asyncio
 import re
 from collections.abc import Mapping
-from http.cookies import CookieError, SimpleCookie
+from dataclasses import dataclass
 from typing import Any
 
 import structlog
 from anyio import CapacityLimiter
 from anyio.to_thread import run_sync
 from fastapi import Request
-from starlette.datastructures import Headers
+from starlette.responses import Response
 from starlette.routing import compile_path
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problem import SCHEME, make_problem, problem_response
+from app.api.security.about import Asked, Finding, datasets_of, is_known, require_allowed
+from app.api.security.bearer import SCHEME as BEARER
+from app.api.security.bearer import bearer_of
+from app.api.security.cookie import cookie_of
+from app.api.security.instead import Instead
 from app.api.security.rules import OPEN, RULES
-from app.errors import ForbiddenError, StorageError
+from app.api.team import Team
+from app.errors import (
+    AccessError,
+    ForbiddenError,
+    NotLoggedInError,
+    StorageError,
+    TooManyTriesError,
+)
+from app.review.people.access_tokens import AccessTokens
 from app.review.people.logins import Login, Logins
-from app.review.people.roles import Action, require
+from app.review.people.roles import EVERYTHING, Action, DatasetRoles, Sight, require_scope
+from app.store.session import Store
 
 log = structlog.get_logger("touchline.access")
 
@@ -33,10 +47,18 @@ LOGIN = "touchline.login"
 """Where a request's scope says who is logged in."""
 RULE = "touchline.rule"
 """Where it says which row of the table has let it through."""
-LOOK_SECONDS = 2.0
+LOOK_SECONDS = 1.0
 """Between two looks whether whoever reads an endless answer still may."""
 THREADS = 8
 """So many sessions are looked up at a time."""
+ENROLLING = (
+    "/session/second-factor",
+    "/session/second-factor/confirm",
+    "/session/passkeys",
+    "/session/passkeys/begin",
+    "/session/password",
+)
+"""What somebody may ask who needs a second factor and has none."""
 STREAMS = frozenset({"GET /api/v1/events"})
 
 
@@ -47,9 +69,15 @@ def login_of(scope: Mapping[str, Any]) -> Login | None:
 
 
 def actor_of(scope: Mapping[str, Any], otherwise: str) -> str:
-    """The name of who is logged in, or another where nobody has to be."""
+    """What the log calls who asks, or another name where nobody has to be logged in."""
     login = login_of(scope)
-    return otherwise if login is None else login.name
+    return otherwise if login is None else login.actor
+
+
+def sight_of(scope: Mapping[str, Any]) -> Sight:
+    """What whoever asks sees; everything on a server that somebody runs alone."""
+    login = login_of(scope)
+    return EVERYTHING if login is None else login.sight
 
 
 async def require_decided(request: Request) -> None:
@@ -67,120 +95,190 @@ async def require_decided(request: Request) -> None:
         raise ForbiddenError("nobody has decided who may do this")
 
 
+@dataclass(frozen=True)
+class Row:
+    """A row of the table that a request fits, with the parameters of its address."""
+
+    name: str
+    action: Action | None
+    path: Mapping[str, str]
+
+
 class _Rules:
-    """The table, ready to be asked."""
+    """The table, ready to be asked: rows by method, length, third word and last word."""
 
     def __init__(self) -> None:
-        plain = sorted(RULES, key=lambda name: ("elsewhere" in name, name.count("{")))
-        self._rows = []
-        for name in plain:
+        self._fixed: dict[str, Action | None] = {}
+        self._rows: dict[_Key, list[tuple[re.Pattern[str], str, Action | None]]] = {}
+        for name in sorted(RULES, key=lambda name: ("elsewhere" in name, name.count("{"))):
             method, template = name.split(" ", 1)
-            pattern = compile_path(template)[0]
-            self._rows.append((method, pattern, name, RULES[name]))
+            if "{" not in template:
+                self._fixed[name] = RULES[name]
+                continue
+            parts = template.split("/")
+            words = (_word(part) for part in (*parts[3:4], parts[-1]))
+            key: _Key = (method,) if ":" in template else (method, len(parts), *words)
+            found = compile_path(template)[0], name, RULES[name]
+            self._rows.setdefault(key, []).append(found)
 
-    def find(self, method: str, path: str) -> tuple[str, Action | None] | None:
-        """Row and action of a request; None where there is no row. Fixed addresses come first."""
-        for wanted, pattern, name, action in self._rows:
-            if wanted == method and pattern.match(path):
-                return name, action
+    def find(self, method: str, path: str) -> Row | None:
+        """Row of a request; None where there is none. Fixed addresses come first."""
+        name = f"{method} {path}"
+        if name in self._fixed:
+            return Row(name, self._fixed[name], {})
+        parts = path.split("/")
+        size: _Key = (method, len(parts), *parts[3:4])
+        keys: tuple[_Key, ...] = ((*size, parts[-1]), (*size, ""), (method,))
+        for key in keys:
+            for pattern, name, action in self._rows.get(key, ()):
+                if fits := pattern.match(path):
+                    return Row(name, action, fits.groupdict())
         return None
 
 
+_Key = tuple[str | int, ...]
+
+
+def _word(part: str) -> str:
+    return "" if "{" in part else part
+
+
+@dataclass(frozen=True)
+class _Let:
+    """Who asks, and where everything is that the request mentions, as far as they may know."""
+
+    login: Login
+    findings: list[Finding]
+
+
 class Access:
-    """Lets a request through whose session and role allow it: 401, 403, and 404 for what no row has.
+    """Lets a request through whose session or token, and role, allow it.
+
+    Others get 401, 403, and 404 for what no row has. A token counts before a cookie.
 
     Args:
         app: Answers those that may.
-        logins: Sessions.
-        cookie: Name of the cookie that holds a session's token.
+        team: Knows sessions and tokens.
+        store: Says which dataset something belongs to.
     """
 
-    def __init__(self, app: ASGIApp, logins: Logins, cookie: str):
-        self.app, self._logins, self._cookie = app, logins, cookie
+    def __init__(self, app: ASGIApp, team: Team, store: Store):
+        self.app, self._team, self._store = app, team, store
         self._rules = _Rules()
         self._threads = CapacityLimiter(THREADS)
-        self._touching: dict[int, asyncio.Task[None]] = {}
+        self._touching: dict[tuple[bool, int], asyncio.Task[None]] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
         row = self._rules.find(scope["method"], scope["path"])
-        if row is not None and row[1] is OPEN:
-            scope[RULE] = row[0]
+        if row is not None and row.action is OPEN:
+            scope[RULE] = row.name
             await self.app(scope, receive, send)
             return
-        token = cookie_of(scope, self._cookie)
+        asked = None if row is None else Asked.of(row.name, scope, row.path)
+        action = None if row is None else row.action
         try:
-            login = await self._find(token)
-        except StorageError as error:
-            problem = make_problem(503, error.message, hint=error.hint)
-            await problem_response(problem, {"Retry-After": "5"})(scope, receive, send)
+            let = await self._ask(scope, asked, action)
+        except (StorageError, AccessError) as error:
+            await _refuse(error, scope)(scope, receive, send)
             return
-        if login is None:
-            problem = make_problem(401, "nobody is logged in here", hint="Log in first.")
-            headers = {"WWW-Authenticate": SCHEME}
-            await problem_response(problem, headers)(scope, receive, send)
-            return
-        if row is None or row[1] is None:
+        if asked is None or action is None:
             problem = make_problem(404, "there is nothing at this address")
             await problem_response(problem)(scope, receive, send)
             return
-        await self._ask(row[0], row[1], login, token or "", scope, receive, send)
+        self._note_use(let.login)
+        instead = Instead(asked, let.findings)
+        if instead:
+            told = instead.scope(scope)
+            receive, send, scope = instead.receive(receive, told), instead.send(send), told
+        scope[RULE], scope[LOGIN] = asked.route, let.login
+        if asked.route in STREAMS:
+            await self._stream(asked, action, scope, receive, send)
+        else:
+            await self.app(scope, receive, send)
 
-    async def _ask(
+    async def _ask(self, scope: Scope, asked: Asked | None, action: Action | None) -> _Let:
+        """Who that is, and what they may know of what they ask.
+
+        Raises:
+            NotLoggedInError: Nobody.
+            TooManyTriesError: Nobody, with one of many tokens that are none.
+            ForbiddenError: They see it, and may not do that.
+        """
+        if bearer_of(scope) is None and not cookie_of(scope, self._team.cookie):
+            raise _nobody()
+        return await run_sync(self._look, scope, asked, action, limiter=self._threads)
+
+    def _look(self, scope: Scope, asked: Asked | None, action: Action | None) -> _Let:
+        login = self._login(scope)
+        if asked is None or action is None:
+            return _Let(login, [])
+        if login.token is not None:
+            require_scope(login.token.scopes, action)
+        if login.must_enrol and not asked.route.endswith(ENROLLING):
+            raise ForbiddenError(
+                "everybody needs a second factor here, and you have none yet",
+                hint="Make one under Account, before anything else.",
+            )
+        if action is not Action.ACCOUNT and not _is_decided(asked.route, action):
+            raise ForbiddenError("nobody has decided which datasets this is about")
+        findings = datasets_of(self._store, asked, login)
+        require_allowed(asked, findings, login, action)
+        return _Let(login, findings)
+
+    def _login(self, scope: Scope) -> Login:
+        bearer = bearer_of(scope)
+        if bearer is not None:
+            return self._team.login_with(bearer, Request(scope))
+        login = self._team.logins.find(cookie_of(scope, self._team.cookie) or "")
+        if login is None:
+            raise _nobody()
+        return login
+
+    def _note_use(self, login: Login) -> None:
+        """Write down that a session or token is used, seldom and while nobody waits for it."""
+        key = (login.token is not None, login.id)
+        if key in self._touching or not self._kind(login).is_stale(login):
+            return
+        task = asyncio.ensure_future(self._touch(login))
+        self._touching[key] = task
+        task.add_done_callback(lambda _task: self._touching.pop(key, None))
+
+    async def _touch(self, login: Login) -> None:
+        try:
+            await run_sync(self._kind(login).touch, login, limiter=self._threads)
+        except StorageError as error:
+            log.warning("the use of a session or token could not be noted", error=str(error))
+
+    def _kind(self, login: Login) -> Logins | AccessTokens:
+        return self._team.logins if login.token is None else self._team.tokens
+
+    async def _stream(
         self,
-        name: str,
+        asked: Asked,
         action: Action,
-        login: Login,
-        token: str,
         scope: Scope,
         receive: Receive,
         send: Send,
     ) -> None:
-        try:
-            require(login.role, action)
-        except ForbiddenError as error:
-            problem = make_problem(403, error.message, hint=error.hint)
-            await problem_response(problem)(scope, receive, send)
-            return
-        scope[RULE], scope[LOGIN] = name, login
-        self._note_use(login)
-        if name in STREAMS:
-            await self._stream(token, action, scope, receive, send)
-        else:
-            await self.app(scope, receive, send)
+        """An answer without an end; it ends when its reader is logged out, or has other rights.
 
-    async def _find(self, token: str | None) -> Login | None:
-        if not token:
-            return None
-        return await run_sync(self._logins.find, token, limiter=self._threads)
-
-    def _note_use(self, login: Login) -> None:
-        """Write down that a session is used, seldom and while nobody waits for it."""
-        if login.id in self._touching or not self._logins.is_stale(login):
-            return
-        task = asyncio.ensure_future(self._touch(login))
-        self._touching[login.id] = task
-        task.add_done_callback(lambda _task: self._touching.pop(login.id, None))
-
-    async def _touch(self, login: Login) -> None:
-        try:
-            await run_sync(self._logins.touch, login, limiter=self._threads)
-        except StorageError as error:
-            log.warning("the use of a session could not be noted", error=str(error))
-
-    async def _stream(
-        self, token: str, action: Action, scope: Scope, receive: Receive, send: Send
-    ) -> None:
-        """An answer without an end; it ends when its reader is logged out, or may no more."""
+        Whoever may read on comes back, and is told what they see from then on.
+        """
         ended = asyncio.Event()
+        roles = scope[LOGIN].roles
 
         async def look() -> None:
-            while not ended.is_set():
-                await asyncio.sleep(LOOK_SECONDS)
-                if not await self._still_may(token, action):
-                    ended.set()
+            # However the looking ends: nobody reads on whom nobody looks at.
+            try:
+                while not ended.is_set():
+                    await asyncio.sleep(LOOK_SECONDS)
+                    if not await self._still_may(scope, asked, action, roles):
+                        return
+            finally:
+                ended.set()
 
         async def heard() -> Message:
             waiting = [asyncio.ensure_future(receive()), asyncio.ensure_future(ended.wait())]
@@ -211,27 +309,36 @@ class Access:
         if begun and not over:
             await send({"type": "http.response.body", "body": b"", "more_body": False})
 
-    async def _still_may(self, token: str, action: Action) -> bool:
+    async def _still_may(
+        self, scope: Scope, asked: Asked, action: Action, roles: DatasetRoles
+    ) -> bool:
+        """Whether somebody may go on reading, with the rights that they had when they began."""
         try:
-            login = await self._find(token)
-            if login is not None:
-                require(login.role, action)
-        except ForbiddenError:
+            let = await self._ask(scope, asked, action)
+        except AccessError:
             return False
         except StorageError:
             # Nobody knows; what is told is read from the same database.
             return True
-        return login is not None
+        return let.login.roles == roles
 
 
-def cookie_of(scope: Scope, name: str) -> str | None:
-    """The value of one cookie; None where there is none, or two that could be meant."""
-    sent = Headers(scope=scope).getlist("cookie")
-    found = re.findall(rf"(?:^|;)\s*{re.escape(name)}=([^;]*)", ";".join(sent))
-    if len(found) != 1:
-        return None
-    try:
-        morsel = SimpleCookie(f"{name}={found[0]}").get(name)
-    except CookieError:
-        return None
-    return None if morsel is None else morsel.value
+def _is_decided(route: str, action: Action) -> bool:
+    """Whether somebody has decided which datasets a route is about; admins' routes are about none."""
+    return action is Action.ADMINISTER or is_known(route)
+
+
+def _nobody() -> NotLoggedInError:
+    return NotLoggedInError("nobody is logged in here", hint="Log in first.")
+
+
+def _refuse(error: StorageError | AccessError, scope: Scope) -> Response:
+    status, headers = 503, {"Retry-After": "5"}
+    if isinstance(error, TooManyTriesError):
+        status, headers = 429, {"Retry-After": str(error.seconds)}
+    elif isinstance(error, NotLoggedInError):
+        status = 401
+        headers = {"WWW-Authenticate": SCHEME if bearer_of(scope) is None else BEARER}
+    elif isinstance(error, AccessError):
+        status, headers = 403, {}
+    return problem_response(make_problem(status, error.message, hint=error.hint), headers)

@@ -40,13 +40,18 @@ CHANGES = Lane("changes", 8, 100)
 """One at a time is written; the others read, solve and encode meanwhile."""
 PREVIEWS = Lane("previews", 4, 100)
 """Questions that are answered by solving and change nothing."""
+STREAMS = Lane("streams", 4, 200)
+"""Those that begin: who listens takes nobody's place. All windows of a team come back at the same
+moment when a server starts again, and what each asks first would keep readers waiting."""
 IMAGES = Lane("images", 6, 200)
 UPLOADS = Lane("uploads", 8, 8)
 ZIPS = Lane("zips", 16, 100)
 """Those of exports, which a request may find still being written."""
 LOGINS = Lane("logins", 4, 50)
 """Passwords, whose hashes take some tenths of a second of a processor."""
-LANES = (READS, CHANGES, PREVIEWS, IMAGES, UPLOADS, ZIPS, LOGINS)
+SIGN_ONS = Lane("sign-ons", 4, 50)
+"""Single sign-on, whose provider may take its time, or never answer."""
+LANES = (READS, CHANGES, PREVIEWS, STREAMS, IMAGES, UPLOADS, ZIPS, LOGINS, SIGN_ONS)
 THREADS = sum(lane.width for lane in LANES) + 6
 """A thread for each request at work, and some for files of the browser application."""
 
@@ -54,15 +59,18 @@ _API = re.compile(r"/api/v\d+/")
 _STREAM = re.compile(r"/events$")
 _IMAGE = re.compile(r"/(?:image|figures/[^/]+|views/[^/]+/(?:neighbours|paint|propose))$")
 _ZIP = re.compile(r"/exports/[^/]+/content$")
-_SOLVING = re.compile(r"/(?:preview|influence|remedies|yield|noise)$")
+_SOLVING = re.compile(r"/(?:preview|comparison|influence|remedies|yield|noise)$")
 _LOGIN = re.compile(r"/(?:session|session/password|links/use)$")
+_SIGN_ON = re.compile(r"/session/(?:sign-on|sign-on/begin|identity/begin)$")
 _UPLOAD = re.compile(r"/uploads$")
 
 
 def lane_of(method: str, path: str) -> Lane | None:
     """The lane of a request; None where it needs no thread for long."""
-    if not _API.match(path) or _STREAM.search(path):
+    if not _API.match(path):
         return None
+    if _STREAM.search(path):
+        return STREAMS
     if _SOLVING.search(path):
         return PREVIEWS
     if _IMAGE.search(path):
@@ -71,6 +79,8 @@ def lane_of(method: str, path: str) -> Lane | None:
         return ZIPS if _ZIP.search(path) else READS
     if _LOGIN.search(path):
         return LOGINS
+    if _SIGN_ON.search(path):
+        return SIGN_ONS
     return UPLOADS if method == "POST" and _UPLOAD.search(path) else CHANGES
 
 

@@ -9,6 +9,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.api.problem import make_problem, problem_response
+from app.api.security.bearer import bearer_of
 
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _ORIGIN = re.compile(r"(https?)://([^/?#@\\\s]+)")
@@ -63,7 +64,8 @@ class SameOrigin:
     Args:
         app: Answers the others.
         url: The address that people open, where a proxy stands in front.
-        required: A change must say where it comes from, as browsers always do.
+        required: A change must say where it comes from, as browsers always do; one that brings a
+            token instead of a cookie need not.
     """
 
     def __init__(self, app: ASGIApp, url: str | None = None, *, required: bool = False):
@@ -85,7 +87,7 @@ class SameOrigin:
             return False
         host = headers.get("host", "")
         origins = headers.getlist("origin")
-        if self.required and not origins:
+        if self.required and not origins and bearer_of(scope) is None:
             return False
         return all(
             same_origin(origin, host, scheme) or origin.lower() == self.url for origin in origins

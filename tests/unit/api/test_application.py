@@ -14,6 +14,7 @@ from app.errors import StorageError
 from app.review.datasets.dataset import get_dataset
 from app.review.importing.ingest import ingest
 from app.store.session import Store
+from tests.waiting import SECONDS
 
 API = "/api/v1"
 
@@ -41,7 +42,7 @@ class TestCreateApp:
         app = create_app(settings, static=static_folder)
         with client_of(app) as client:
             assert client.get(f"{API}/groups/1").json()["solution"]["passes"] is True
-            deadline = time.monotonic() + 10
+            deadline = time.monotonic() + SECONDS
             while not get_dataset(store, "small").solved and time.monotonic() < deadline:
                 time.sleep(0.02)
             assert get_dataset(store, "small").solved == 1

@@ -56,9 +56,9 @@ def echo() -> Echo:
 
 @pytest.fixture
 def port(echo: Echo, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A server whose clients have little time and which takes few of them."""
-    monkeypatch.setattr(connections, "HEAD_SECONDS", 0.3)
-    monkeypatch.setattr(connections, "BODY_SECONDS", 0.3)
+    """A server which takes few clients, and gives them time."""
+    monkeypatch.setattr(connections, "HEAD_SECONDS", SECONDS)
+    monkeypatch.setattr(connections, "BODY_SECONDS", SECONDS)
     monkeypatch.setattr(connections, "connection_limit", lambda: LIMIT)
     config = uvicorn.Config(echo, http=Connection, ws="none", lifespan="off", log_level="error")
     server = uvicorn.Server(config)
@@ -113,23 +113,36 @@ def assert_problem(answer: bytes, status: int) -> None:
     assert json.loads(body)["status"] == status
 
 
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Clients that are late are cut off soon."""
+    monkeypatch.setattr(connections, "HEAD_SECONDS", 0.3)
+    monkeypatch.setattr(connections, "BODY_SECONDS", 0.3)
+
+
 class TestDeadlines:
-    def test_a_connection_that_sends_nothing_is_closed(self, port: int) -> None:
+    def test_a_connection_that_sends_nothing_is_closed(self, port: int, impatient: None) -> None:
         with connect(port) as client:
             assert_problem(rest(client), 408)
 
-    def test_half_a_head_is_not_waited_for(self, port: int) -> None:
+    def test_half_a_head_is_not_waited_for(self, port: int, impatient: None) -> None:
         with connect(port) as client:
             client.sendall(b"GET / HTTP/1.1\r\nHost: a\r\n")
             assert_problem(rest(client), 408)
 
-    def test_half_of_a_second_head_is_not_waited_for_either(self, port: int) -> None:
+    def test_half_of_a_second_head_is_not_waited_for_either(
+        self, port: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         with connect(port) as client:
             ask(client)
+            monkeypatch.setattr(connections, "HEAD_SECONDS", 0.3)
             client.sendall(b"GET / HT")
             assert_problem(rest(client), 408)
 
-    def test_a_body_that_stops_is_cut_off_and_its_reader_told(self, port: int, echo: Echo) -> None:
+    def test_a_body_that_stops_is_cut_off_and_its_reader_told(
+        self, port: int, echo: Echo, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(connections, "BODY_SECONDS", 0.3)
         with connect(port) as client:
             client.sendall(HEAD + b"x" * 100)
             assert_problem(rest(client), 408)

@@ -20,6 +20,7 @@ from app.errors import (
     ConflictError,
     DatasetFormatError,
     DegenerateGeometryError,
+    HeldGroupError,
     ImageError,
     InputError,
     NotFoundError,
@@ -32,6 +33,7 @@ from app.errors import (
     UnknownMarkingError,
     UnsafePathError,
 )
+from app.review.work.batches import Here
 
 
 class RefusalError(Exception):
@@ -46,6 +48,7 @@ def full_disk() -> StorageError:
     return error
 
 
+SINCE = "2026-11-22T09:00:00Z"
 STALE = StaleRevisionError("changed", base_etag='"a"', current_etag='"b"')
 CASES: list[tuple[ReviewError, int]] = [
     (InputError("x"), 400),
@@ -57,6 +60,7 @@ CASES: list[tuple[ReviewError, int]] = [
     (NotFoundError("x"), 404),
     (ConflictError("x"), 409),
     (SharedStationError("cam3", 7, "cam3"), 409),
+    (HeldGroupError("bo has this group open", [Here(7, "bo", SINCE, SINCE)]), 409),
     (STALE, 412),
     (StaleStateError(STALE, "{}"), 412),
     (PreconditionRequiredError("x"), 428),
@@ -103,6 +107,10 @@ class TestReviewErrors:
         index = next(i for i, (error, _) in enumerate(CASES) if type(error) is StaleStateError)
         answer = client.get(f"/raise/{index}")
         assert (answer.json()["current"], answer.headers["etag"]) == ({}, '"b"')
+
+    def test_a_group_that_somebody_has_open_says_who_and_since_when(self, client) -> None:
+        index = next(i for i, (e, _) in enumerate(CASES) if isinstance(e, HeldGroupError))
+        assert client.get(f"/raise/{index}").json()["here"] == [{"person": "bo", "since": SINCE}]
 
     def test_a_static_view_names_its_station(self, client) -> None:
         index = next(i for i, (e, _) in enumerate(CASES) if isinstance(e, SharedStationError))

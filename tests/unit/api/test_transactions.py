@@ -25,7 +25,7 @@ def transactions(source: str) -> list[int]:
         for call in opened
         if isinstance(call, ast.Call)
         and isinstance(call.func, ast.Attribute)
-        and call.func.attr in ("read", "write")
+        and call.func.attr in ("read", "glance", "write")
     ]
 
 

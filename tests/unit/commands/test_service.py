@@ -88,6 +88,16 @@ class TestServe:
         assert home.stat().st_mode & 0o777 == 0o700
         assert (home / "touchline.db").stat().st_mode & 0o777 == 0o600
 
+    @pytest.mark.file_of_sqlite("a file is what several processes cannot share")
+    def test_several_processes_over_a_file_are_refused(
+        self, run: Run, home: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.api.web_processes.serve_with", lambda *_arguments: None)
+        code, out, err = run("serve", "--port", "0", "--workers", "2")
+        assert (code, out) == (1, "")
+        assert "PostgreSQL alone" in err
+        assert "TOUCHLINE_DATABASE_URL" in err
+
 
 class TestMigrate:
     def test_is_refused_beside_a_server_which_it_names(self, run: Run, home: Path) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
+import pyotp
 import pytest
 from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
@@ -15,9 +16,14 @@ from typer.testing import CliRunner, Result
 
 from app.cli import app
 from app.config import Settings
+from app.errors import NotLoggedInError
+from app.review.importing.ingest import ensure_dataset
 from app.review.people import links, passwords
-from app.review.people.logins import Logins
-from app.review.people.roles import Role
+from app.review.people.access_tokens import AccessTokens
+from app.review.people.logins import Login, Logins
+from app.review.people.roles import Role, Scope
+from app.review.people.second_factor import SecondFactors
+from app.store.identities import put_identity
 from app.store.session import Store
 
 SECRET = "three plain words"
@@ -47,6 +53,12 @@ def run(*words: str) -> Result:
 
 def token_in(text: str) -> str:
     return text.partition("/join#")[2].split()[0].strip('",')
+
+
+def found(logins: Logins, name: str) -> Login:
+    login = logins.find(logins.log_in(name, SECRET))
+    assert login is not None
+    return login
 
 
 class TestUsers:
@@ -80,6 +92,77 @@ class TestUsers:
         links.use(store, token_in(run("users", "reset", "anna").stdout), "other plain words")
         assert Logins(store).log_in("anna", "other plain words")
 
+    def test_a_role_in_one_dataset_is_granted_and_taken(self, store: Store) -> None:
+        for dataset in ("issia", "league"):
+            ensure_dataset(store, dataset, "local")
+        links.use(store, token_in(run("users", "add", "anna", "--role", "none").stdout), SECRET)
+        assert run("users", "grant", "anna", "issia", "reviewer").exit_code == 0
+        logins = Logins(store)
+        roles = found(logins, "anna").roles
+        assert [roles.role_in(key) for key in (1, 2)] == [Role.REVIEWER, Role.NONE]
+        listed = json.loads(run("users", "list", "--json").stdout)
+        assert listed[0]["datasets"] == {"issia": "reviewer"}
+        assert "issia: reviewer" in run("users", "list").stdout
+        assert run("users", "take", "anna", "issia").exit_code == 0
+        assert found(logins, "anna").roles.role_in(1) is Role.NONE
+        assert "of the whole server" in str(run("users", "grant", "anna", "1", "admin").exception)
+
+    def test_a_second_factor_is_required_and_taken_away(self, store: Store) -> None:
+        links.use(store, token_in(run("users", "add", "anna").stdout), SECRET)
+        logins, factors = Logins(store), SecondFactors(store)
+        login = logins.find(logins.log_in("anna", SECRET))
+        assert login is not None and not login.must_enrol
+        assert run("users", "require-second-factor", "on").exit_code == 0
+        login = logins.find(logins.log_in("anna", SECRET))
+        assert login is not None and login.must_enrol
+        factors.confirm(login, pyotp.TOTP(factors.begin(login, SECRET).secret).now())
+        links.use(store, token_in(run("users", "reset", "anna").stdout), SECRET)
+        with pytest.raises(NotLoggedInError, match="second factor"):
+            logins.log_in("anna", SECRET)
+        assert run("users", "reset", "anna", "--second-factor").exit_code == 0
+        assert run("users", "require-second-factor", "off").exit_code == 0
+        assert logins.log_in("anna", SECRET)
+
+    def test_an_account_of_the_provider_is_listed_and_unlinked(self, store: Store) -> None:
+        run("users", "add", "anna")
+        values = {"issuer": "https://club.example", "subject": "s", "shown": "anna@club.example"}
+        with store.write() as session:
+            put_identity(session, {**values, "person_id": 1, "created": "2026-11-01"})
+        assert "active" in run("users", "list").stdout
+        assert "anna@club.example" in run("users", "list").stdout
+        assert run("users", "unlink", "anna").exit_code == 0
+        assert "club.example" not in run("users", "list").stdout
+        assert "no account of a provider" in str(run("users", "unlink", "anna").exception)
+
+    def test_the_last_admin_who_can_log_in_keeps_it(self, store: Store) -> None:
+        run("users", "add", "anna", "--role", "admin")
+        values = {"issuer": "https://club.example", "subject": "s", "shown": "anna@club.example"}
+        with store.write() as session:
+            put_identity(session, {**values, "person_id": 1, "created": "2026-11-01"})
+        assert "/join#" not in run("serve", "--team", "--port", "0").stdout, "anna can log in"
+        assert "last admin" in str(run("users", "unlink", "anna").exception)
+        assert "anna@club.example" in run("users", "list").stdout
+
+    def test_tokens_are_listed_and_ended(self, store: Store) -> None:
+        for name in ("anna", "bob"):
+            links.use(store, token_in(run("users", "add", name).stdout), SECRET)
+            logins, tokens = Logins(store), AccessTokens(store)
+            login = logins.find(logins.log_in(name, SECRET))
+            assert login is not None
+            made, text = tokens.make(login, "deploy", [Scope.EXPORT])
+        found = json.loads(run("users", "tokens", "--json").stdout)
+        assert [(one["person"], one["name"]) for one in found] == [
+            ("anna", "deploy"),
+            ("bob", "deploy"),
+        ]
+        assert "export" in run("users", "tokens", "anna").stdout
+        assert text not in run("users", "tokens").stdout
+        assert run("users", "tokens", "anna", "--end", str(made.id)).exit_code == 1, "it is bob's"
+        assert run("users", "tokens", "--end", str(made.id)).exit_code == 0
+        assert "bob" not in run("users", "tokens").stdout
+        with pytest.raises(NotLoggedInError):
+            tokens.find(text)
+
     @pytest.mark.parametrize("role", ["boss", ""])
     def test_a_role_that_is_none_is_wrong_usage(self, role: str) -> None:
         done = run("users", "add", "anna", "--role", role)
@@ -105,6 +188,15 @@ class TestServe:
         done = run("serve", *words)
         assert done.exit_code == 2
         assert told in " ".join(done.output.replace("│", " ").split())
+        assert not home.exists()
+
+    def test_half_a_single_sign_on_is_refused(
+        self, home: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("TOUCHLINE_SSO_ISSUER", "https://accounts.club.example")
+        done = run("serve", "--team")
+        assert done.exit_code == 1
+        assert "lacks TOUCHLINE_SSO_CLIENT_ID and" in str(done.exception)
         assert not home.exists()
 
     def test_the_first_start_prints_a_link_for_an_admin_until_there_is_one(

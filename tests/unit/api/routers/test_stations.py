@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from tests.waiting import SECONDS
+
 API = "/api/v1"
 
 
@@ -73,7 +75,7 @@ class TestStations:
             json=moved(view["lines"]),
             headers={"If-Match": view["station"]["etag"]},
         )
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + SECONDS
         solved = 0
         while solved < 3 and time.monotonic() < deadline:
             time.sleep(0.05)

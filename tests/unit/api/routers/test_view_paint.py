@@ -70,13 +70,29 @@ class TestPaint:
 
 
 class TestPropose:
+    def test_lines_that_determine_no_camera_stay_and_choose_the_half(self, api, document) -> None:
+        points = document["views"][0]["lines"]["Side line right"]
+        gone = dict.fromkeys(document["views"][0]["lines"])
+        few = {"lines": {**gone, "Side line left": points}}
+        found = ask(api, document, "propose", few).json()
+        assert (found["outcome"], found["sentence"]) == ("proposed", "")
+        assert "Side line left" not in found["lines"] and "Big rect. left main" in found["lines"]
+        assert ask(api, document, "propose", {"lines": {"Halfway": []}}).status_code == 422
+
     def test_lines_lie_where_the_view_s_own_lie(self, api, document) -> None:
-        found = ask(api, document, "propose").json()
+        gone = dict.fromkeys(document["views"][0]["lines"])
+        found = ask(api, document, "propose", {"lines": gone}).json()
         assert (found["outcome"], found["sentence"]) == ("proposed", "")
         curve = CAMERA.project(Pitch().sample("Side line right", 0.05, 0.05))
         for point in found["lines"]["Side line right"]:
             assert np.hypot(*(curve - (point["x"], point["y"])).T).min() < 1.5
         assert api.get(f"{API}/groups/{document['id']}").json()["etag"] == document["etag"]
+
+    def test_lines_that_determine_a_camera_stay_too(self, api, document) -> None:
+        one = "Big rect. right main"
+        assert one in document["views"][0]["lines"]
+        found = ask(api, document, "propose", {"lines": {one: None}}).json()
+        assert (found["outcome"], [*found["lines"]]) == ("proposed", [one])
 
     def test_a_frame_that_is_gone_is_named(self, api, document, tmp_path: Path) -> None:
         (tmp_path / "7.png").unlink()

@@ -19,6 +19,8 @@ from app.api.security.lanes import (
     LOGINS,
     PREVIEWS,
     READS,
+    SIGN_ONS,
+    STREAMS,
     UPLOADS,
     ZIPS,
     Doors,
@@ -49,7 +51,7 @@ class TestLaneOf:
             ("POST", "/views/1/propose", IMAGES),
             ("POST", "/uploads", UPLOADS),
             ("GET", "/uploads", READS),
-            ("GET", "/events", None),
+            ("GET", "/events", STREAMS),
         ],
     )
     def test_is_told_by_method_and_path(self, method: str, path: str, lane: Any) -> None:
@@ -66,7 +68,7 @@ class TestLaneOf:
             (method, path)
             for method, path in routes
             if method != "GET"
-            and lane_of(method, path) not in (CHANGES, PREVIEWS, UPLOADS, IMAGES, LOGINS)
+            and lane_of(method, path) not in (CHANGES, PREVIEWS, UPLOADS, IMAGES, LOGINS, SIGN_ONS)
         ] == []
 
 
@@ -188,6 +190,20 @@ class TestLanes:
             service.ask("GET", "/views/2/image")
             await service.settle()
             assert service.work.begun[-1].endswith("/views/2/image")
+            await service.end()
+
+        run(test)
+
+    def test_streams_begin_a_few_at_a_time_and_hold_up_nobody_while_they_last(self) -> None:
+        async def test(service: Service) -> None:
+            for _ in range(3 * STREAMS.width):
+                service.ask("GET", "/events")
+            await service.settle()
+            assert len(service.work.begun) == STREAMS.width
+            service.work.may_answer.set()
+            await service.settle()
+            assert service.statuses == [200] * (3 * STREAMS.width)
+            assert [door.busy for door in service.doors.all] == [0] * len(LANES)
             await service.end()
 
         run(test)

@@ -1,0 +1,138 @@
+"""Agreement: how far people agree, and deciding where they do not."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id
+from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document
+from app.api.routers.groups import ETAG, group_answer
+from app.api.schemas.agreement import (
+    AgreementDocument,
+    CaseDocument,
+    Decision,
+    GroupComparisonDocument,
+    LimitsDocument,
+    LimitsEdit,
+    WaitingList,
+)
+from app.api.schemas.group import GroupDocument
+from app.api.schemas.take import TakeHandBack
+from app.evaluation.agreement_limits import Limits
+from app.review.agreement import adjudicate, limits
+from app.review.agreement.compare import compare_groups
+from app.review.agreement.summary import agreement_csv, agreement_of
+
+router = APIRouter(tags=["agreement"])
+CSV_FILE = "text/csv"
+OfBatch = Annotated[
+    int | None, Query(ge=0, le=MAX_ID, description="One batch alone; 0: what belongs to none.")
+]
+
+
+@router.get(
+    "/groups/{group}/comparison",
+    operation_id="compareGroups",
+    response_model=GroupComparisonDocument,
+    responses=responses(404),
+)
+def compare(
+    group: Id,
+    store: AppStore,
+    other: Annotated[
+        int, Query(alias="with", ge=1, le=MAX_ID, description="Another group of the same frames.")
+    ],
+) -> Response:
+    """Two annotations of the same frames, and how far they lie apart; saves nothing."""
+    return document(GroupComparisonDocument.of(compare_groups(store, [group, other], Limits())))
+
+
+@router.get("/datasets/{dataset}/agreement", operation_id="getAgreement", responses=responses(404))
+def get_agreement(
+    dataset: DatasetPath, store: AppStore, of_batch: OfBatch = None
+) -> AgreementDocument:
+    """How far the people of a dataset agree: kappa, pixels, metres and JaC, the worst group first."""
+    return AgreementDocument.model_validate(agreement_of(store, dataset, of_batch))
+
+
+@router.get(
+    "/datasets/{dataset}/agreement/groups.csv",
+    operation_id="getAgreementFile",
+    response_class=Response,
+    responses={
+        **responses(404),
+        200: {"content": {CSV_FILE: {}}, "description": "A row for each group."},
+    },
+)
+def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch = None) -> Response:
+    """The same as CSV, a row for each group."""
+    headers = {"Content-Disposition": 'attachment; filename="touchline-agreement.csv"'}
+    text = agreement_csv(agreement_of(store, dataset, of_batch))
+    return Response(text, headers=headers, media_type=CSV_FILE)
+
+
+@router.put(
+    "/datasets/{dataset}/agreement/limits",
+    operation_id="setAgreementLimits",
+    response_model=LimitsDocument,
+    responses=responses(404, 413, 415),
+)
+def put_limits(dataset: DatasetPath, asked: LimitsEdit, store: AppStore, actor: Actor) -> Limits:
+    """How far annotations may lie apart and still agree; counts for what is handed in from now on."""
+    return limits.set_limits(store, dataset, Limits(**asked.model_dump()), actor=actor)
+
+
+@router.get(
+    "/datasets/{dataset}/adjudications", operation_id="listWaitingGroups", responses=responses(404)
+)
+def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
+    """Groups whose annotations disagree and wait for a decision, the worst first."""
+    return WaitingList.model_validate({"items": adjudicate.list_waiting(store, dataset)})
+
+
+@router.get(
+    "/groups/{group}/adjudication",
+    operation_id="getAdjudication",
+    response_model=CaseDocument,
+    responses=responses(404),
+)
+def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
+    """The annotations of a group that disagree, beside each other."""
+    return document(CaseDocument.of(adjudicate.get_case(store, group, actor=actor)))
+
+
+@router.post(
+    "/groups/{group}/adjudication",
+    operation_id="decideAdjudication",
+    response_model=GroupDocument,
+    responses={**responses(403, 404, 409, 413, 415), 200: {"headers": ETAG}},
+)
+def decide(
+    group: Id, decision: Decision, services: AppServices, actor: Actor, asked: AskedUnder
+) -> Response:
+    """Take one annotation over into the group, or let a third one begin from it."""
+    reply = Reply(asked, group_answer)
+    state = adjudicate.decide(
+        services.store,
+        group,
+        decision.take,
+        as_start=decision.as_start,
+        actor=actor,
+        paint=services.paint,
+        keep=reply.keep,
+    )
+    return reply.of(state)
+
+
+@router.post(
+    "/groups/{group}/adjudication/hand-back",
+    operation_id="handBackAdjudicated",
+    status_code=204,
+    responses=responses(403, 404, 409, 413, 415),
+)
+def hand_back(group: Id, back: TakeHandBack, store: AppStore, actor: Actor) -> None:
+    """Hand one of the annotations back to its person; it is compared again when it is handed in."""
+    adjudicate.hand_back(store, group, back.take, back.reason, actor=actor)

@@ -1,0 +1,288 @@
+"""About: which datasets a request is about, and whether its reader may ask that of them.
+
+A route that stands in none of these tables is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+from urllib.parse import parse_qsl
+
+from pydantic import Field, TypeAdapter, ValidationError
+from starlette.types import Scope
+
+from app.api.security.bodies import VALUE
+from app.errors import ForbiddenError
+from app.review.people.logins import Login
+from app.review.people.roles import Action, DatasetRoles, Role, Sight, require
+from app.review.people.whereabouts import MAX_ID, Kind, Named, Place, find_place, role_at
+from app.review.queue.fields import BLIND
+from app.store.session import Store
+
+PATH: Mapping[str, Kind] = {
+    "datasets": Kind.DATASET,
+    "groups": Kind.GROUP,
+    "views": Kind.VIEW,
+    "stations": Kind.STATION,
+    "versions": Kind.VERSION,
+    "exports": Kind.EXPORT,
+    "jobs": Kind.JOB,
+    "predictions": Kind.PREDICTIONS,
+    "evaluations": Kind.EVALUATION,
+    "saved-views": Kind.SAVED_VIEW,
+    "verdict-batches": Kind.BATCH,
+    "batches": Kind.WORK,
+    "uploads": Kind.UPLOAD,
+}
+"""What the parameter is that follows such a word at the beginning of an address."""
+_DATASET = {"dataset": Kind.DATASET}
+QUERY: Mapping[str, Mapping[str, Kind]] = {
+    "GET /api/v1/groups": _DATASET,
+    "GET /api/v1/audit": {**_DATASET, "group": Kind.GROUP},
+    "GET /api/v1/audit/export.{ending}": {**_DATASET, "group": Kind.GROUP},
+    "GET /api/v1/groups/ids": _DATASET,
+    "GET /api/v1/findings": _DATASET,
+    "GET /api/v1/exports": _DATASET,
+    "GET /api/v1/jobs": _DATASET,
+    "GET /api/v1/events": _DATASET,
+    "GET /api/v1/versions/{version}": _DATASET,
+    "GET /api/v1/versions/{version}/manifest": _DATASET,
+    "GET /api/v1/versions/{version}/changelog": _DATASET,
+    "GET /api/v1/versions/{version}/diff": _DATASET,
+    "POST /api/v1/versions/{version}/verify": _DATASET,
+    "GET /api/v1/evaluations/{evaluation}/compare": {"with": Kind.EVALUATION},
+    "GET /api/v1/groups/{group}/comparison": {"with": Kind.GROUP},
+    "PATCH /api/v1/stations/{station}": {"group": Kind.GROUP},
+    "PATCH /api/v1/stations/{station}/lines": {"group": Kind.GROUP},
+    "POST /api/v1/stations/{station}/undo": {"group": Kind.GROUP},
+    "POST /api/v1/stations/{station}/redo": {"group": Kind.GROUP},
+}
+"""What query parameters name, by route."""
+BODY: Mapping[str, Mapping[str, Kind]] = {
+    "POST /api/v1/exports": _DATASET,
+    "POST /api/v1/tokens": _DATASET,
+    "POST /api/v1/imports": {
+        "dataset": Kind.NEW_DATASET,
+        "source/upload": Kind.UPLOAD,
+        "options/lines/upload": Kind.UPLOAD,
+    },
+    "POST /api/v1/predictions/accept": {**_DATASET, "predictions": Kind.PREDICTIONS},
+    "POST /api/v1/datasets/{dataset}/predictions": {
+        "upload": Kind.UPLOAD,
+        "images_upload": Kind.UPLOAD,
+        "cameras_upload": Kind.UPLOAD,
+    },
+    "POST /api/v1/datasets/{dataset}/guidelines/pictures": {"upload": Kind.UPLOAD},
+    "POST /api/v1/datasets/{dataset}/evaluations": {
+        "predictions": Kind.PREDICTIONS,
+        "careful": Kind.PREDICTIONS,
+    },
+}
+"""What fields of a JSON body name, by route; a slash leads into an object."""
+LISTS = frozenset(
+    {
+        "GET /api/v1/openapi.json",
+        "GET /api/v1/datasets",
+        "GET /api/v1/uploads",
+        "POST /api/v1/uploads",
+        "GET /api/v1/pitch",
+        "GET /api/v1/policies",
+        "GET /api/v1/query-fields",
+        "GET /api/v1/practice",
+        "GET /api/v1/exports",
+        "GET /api/v1/jobs",
+        "GET /api/v1/events",
+        "GET /api/v1/work",
+        "GET /api/v1/audit",
+        "GET /api/v1/audit/export.{ending}",
+    }
+)
+"""Routes that name no dataset, or need not; what they list they leave to ``Login.sight``."""
+EVERYWHERE = frozenset({"GET /api/v1/imports/folders"})
+"""Routes about what belongs to no dataset: only the role counts that somebody has in all of them."""
+EVERYWHERE_FIELDS: Mapping[str, tuple[str, ...]] = {
+    "POST /api/v1/imports": ("source/folder", "options/lines/folder"),
+}
+"""Fields of a JSON body that name what belongs to no dataset, by route."""
+FIXED: Mapping[str, Named] = {"POST /api/v1/practice": Named(Kind.NEW_DATASET, "practice")}
+"""Routes about one dataset that no request names."""
+
+HERE, ALL = " in this dataset", " in all datasets"
+"""Where a role would have to be, in a refusal."""
+OWNED = frozenset({Kind.JOB, Kind.EXPORT, Kind.UPLOAD})
+"""Kinds that belong to somebody while they have no dataset."""
+TEXTS = frozenset({Kind.DATASET, Kind.NEW_DATASET, Kind.VERSION, Kind.EXPORT, Kind.UPLOAD})
+_BLIND = re.compile(rf"\b({'|'.join(BLIND)})[:=<>]")
+"""Also within quotes: rather once too often."""
+_ID: TypeAdapter[int] = TypeAdapter(Annotated[int, Field(ge=1, le=MAX_ID)])
+
+
+@dataclass(frozen=True)
+class Mention:
+    """One thing that a request names, and where: ``place`` is ``path``, ``query`` or ``body``."""
+
+    place: str
+    field: str
+    named: Named
+    index: int = 0
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A request as far as it says what it is about."""
+
+    route: str
+    path: Mapping[str, str]
+    query: tuple[tuple[str, str], ...]
+    body: Any
+    mentions: tuple[Mention, ...]
+
+    @staticmethod
+    def of(route: str, scope: Scope, path: Mapping[str, str]) -> Asked:
+        """What a request names.
+
+        Args:
+            route: Its row in the table: method and address.
+            scope: The request, its JSON body read already.
+            path: Parameters of its address.
+        """
+        text = scope.get("query_string", b"").decode("latin-1")
+        query = tuple(parse_qsl(text, keep_blank_values=True))
+        body = scope.get(VALUE)
+        return Asked(route, path, query, body, tuple(_mentions(route, path, query, body)))
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Where something is that a request mentions; ``place`` None: nowhere that the reader sees."""
+
+    mention: Mention
+    place: Place | None
+
+
+def kind_of_path(route: str) -> tuple[str, Kind] | None:
+    """Name and kind of the parameter that says what an address is about; None where none does."""
+    parts = route.partition(" ")[2].split("/")
+    if parts[:3] != ["", "api", "v1"] or len(parts) < 5 or parts[3] not in PATH:
+        return None
+    return (parts[4][1:-1], PATH[parts[3]]) if parts[4].startswith("{") else None
+
+
+def is_known(route: str) -> bool:
+    """Whether somebody has decided which datasets a route is about."""
+    decided = (*QUERY, *BODY, *LISTS, *EVERYWHERE, *FIXED)
+    return kind_of_path(route) is not None or route in decided
+
+
+def datasets_of(store: Store, asked: Asked, login: Login) -> list[Finding]:
+    """Where everything is that a request mentions, as far as a reader may know.
+
+    Each is found by one indexed statement, and none is asked for where it decides nothing: an
+    admin sees everything, and who is the same everywhere is so there.
+    """
+    if login.roles.is_admin:
+        return []
+    found: list[Finding] = []
+    sight = login.sight
+    # What a query names comes first: it says which of the versions of a name is meant.
+    for mention in sorted(asked.mentions, key=lambda item: item.place != "query"):
+        place = _place(store, mention.named, login, sight)
+        if mention.place == "query" and place is not None and place.dataset is not None:
+            sight = Sight(False, frozenset({place.dataset}), login.owner)
+        found.append(Finding(mention, place))
+    return found
+
+
+def require_allowed(asked: Asked, findings: list[Finding], login: Login, action: Action) -> None:
+    """Raise ForbiddenError unless somebody may do that wherever they see what a request names."""
+    roles = login.roles
+    if roles.is_admin:
+        return
+    if asked.route in EVERYWHERE or _names_what_is_nobodys(asked):
+        require(roles.everywhere, action, ALL)
+    elif not asked.mentions and action is Action.ADMINISTER:
+        require(roles.everywhere, action)
+    elif not asked.mentions and not (asked.route in LISTS and action is Action.READ):
+        require(roles.highest, action)
+    for item in findings:
+        if item.mention.named.kind is Kind.NEW_DATASET:
+            _require_new(item.place, roles, action)
+        elif item.place is not None:
+            here = HERE if roles.single and item.place.dataset is not None else ""
+            role = role_at(item.place, roles, login.owner)
+            require(role, action, here)
+            if asks_what_is_blind(asked):
+                require(role, Action.REVIEW, here)
+
+
+def asks_what_is_blind(asked: Asked) -> bool:
+    """Whether a query of groups asks what others made of them: annotators are not to know."""
+    return any(name == "q" and _BLIND.search(value) is not None for name, value in asked.query)
+
+
+def _names_what_is_nobodys(asked: Asked) -> bool:
+    """Whether a body names a folder of the operator, which lies beside all datasets."""
+    fields = EVERYWHERE_FIELDS.get(asked.route, ())
+    return any(_field(asked.body, field) is not None for field in fields)
+
+
+def _require_new(place: Place | None, roles: DatasetRoles, action: Action) -> None:
+    """What is made where it is not there; whoever cannot know that it is, is not told."""
+    role = roles.everywhere if place is None else roles.role_in(place.dataset)
+    if role is not Role.NONE or place is None:
+        require(role, action, HERE if place is not None and roles.single else ALL)
+        return
+    require(roles.everywhere, action, ALL)
+    raise ForbiddenError(
+        "there is a dataset of that name, in which you have no role", hint="Choose another name."
+    )
+
+
+def _place(store: Store, named: Named, login: Login, sight: Sight) -> Place | None:
+    roles: DatasetRoles = login.roles
+    if not roles.single and named.kind not in OWNED | {Kind.NEW_DATASET}:
+        return None if roles.everywhere is Role.NONE else Place(None, frozenset({login.owner}))
+    found = find_place(store, named, sight)
+    if found is None or named.kind is Kind.NEW_DATASET:
+        return found
+    return None if role_at(found, roles, login.owner) is Role.NONE else found
+
+
+def _mentions(
+    route: str, path: Mapping[str, str], query: tuple[tuple[str, str], ...], body: Any
+) -> Iterator[Mention]:
+    if route in FIXED:
+        yield Mention("route", "", FIXED[route])
+    first = kind_of_path(route)
+    if first is not None:
+        yield from _mention("path", first[0], first[1], path[first[0]])
+    wanted = QUERY.get(route, {})
+    for index, (name, value) in enumerate(query):
+        if name in wanted:
+            yield from _mention("query", name, wanted[name], value, index)
+    for field, kind in BODY.get(route, {}).items():
+        value = _field(body, field)
+        if isinstance(value, str if kind in TEXTS else int) and not isinstance(value, bool):
+            yield from _mention("body", field, kind, value)
+
+
+def _mention(
+    place: str, field: str, kind: Kind, value: str | int, index: int = 0
+) -> Iterator[Mention]:
+    """Nothing for what is no id: the route refuses it by the same rule."""
+    if kind in TEXTS:
+        yield Mention(place, field, Named(kind, value), index)
+        return
+    try:
+        yield Mention(place, field, Named(kind, _ID.validate_python(value)), index)
+    except ValidationError:
+        return
+
+
+def _field(body: Any, field: str) -> Any:
+    for name in field.split("/"):
+        body = body.get(name) if isinstance(body, dict) else None
+    return body

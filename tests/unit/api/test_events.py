@@ -1,0 +1,30 @@
+"""Events: what a listener is told of what is gone."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from app.api.events import Feed
+from app.review.queue.changes import Change
+from app.store.sight import EVERYTHING, Sight
+
+
+@pytest.mark.parametrize(
+    ("sight", "entry", "told"),
+    [
+        (Sight(True, frozenset({9}), "ann", frozenset()), 9, False),
+        (Sight(True, frozenset({9}), "ann", frozenset()), 11, True),
+        (Sight(False, frozenset({9}), "ann"), 11, False),
+        (EVERYTHING, 9, True),
+    ],
+)
+def test_who_comes_once_a_dataset_is_gone_is_told_of_it_only_if_they_see_everything(
+    sight: Sight, entry: int, told: bool
+) -> None:
+    async def ask() -> bool:
+        feed = Feed(None, 5, sight, began=10)
+        return feed.is_told(Change(entry, 3, None, "delete", "eve"))
+
+    assert asyncio.run(ask()) is told

@@ -1,0 +1,265 @@
+"""The command line against the server of a team: what it prints is what it prints of a home."""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from app.api.application import create_app
+from app.api.server import listen, make_server
+from app.api.team import Team
+from app.cli import app
+from app.commands.remote import write_evaluation
+from app.commands.server import Server, _explained, connected
+from app.commands.terminal import log_to_stderr
+from app.config import Settings
+from app.datasets.soccernet_v3_writer import write_soccernet_v3
+from app.errors import InputError, UnsafePathError
+from app.finite import json_text
+from app.review.evaluating.evaluation import get_evaluation
+from app.review.evaluating.folder import evaluation_values
+from app.review.evaluating.predictions import list_predictions
+from app.review.people.access_tokens import new_text
+from app.review.people.logins import Login
+from app.review.people.people import invite
+from app.review.people.roles import DatasetRoles, Role, Scope
+from app.review.versions.version import list_versions
+from app.review.work.batches import get_batch
+from app.store.session import Store
+from tests.scenes import make_scenes
+from tests.waiting import SECONDS
+from touchline.client import Client
+from touchline.errors import RequestError, UnreachableError
+
+Run = Callable[..., Result]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A server, its home, and the files with tokens of anna, a lead."""
+
+    url: str
+    home: Path
+    files: Path
+    store: Store
+    team: Team
+
+    def token(self, *scopes: Scope) -> Path:
+        path = self.files / "-".join(scopes)
+        if not path.exists():
+            person, _ = invite(self.store, f"anna-{path.name}"[:40], Role.LEAD, actor="local")
+            roles = DatasetRoles(Role.LEAD)
+            anna = Login(1, person.id, person.name, roles, self.team.logins._clock())
+            _, text = self.team.tokens.make(anna, "cli", scopes)
+            path.touch(0o600)
+            path.write_text(f"{text}\n")
+        return path
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+    home, files = tmp_path_factory.mktemp("served"), tmp_path_factory.mktemp("tokens")
+    settings = Settings(home=home, team=True)
+    Store.open(settings).close()
+    # The server is in this process: what it logs must not stand in what commands print.
+    log_to_stderr()
+    served = create_app(settings)
+    with listen("127.0.0.1", 0) as (socket, url):
+        server = make_server(served)
+        thread = threading.Thread(target=lambda: server.run(sockets=[socket]))
+        thread.start()
+        yield Place(url, home, files, served.state.services.store, served.state.team)
+        server.should_exit = True
+        thread.join(SECONDS)
+
+
+@pytest.fixture(autouse=True)
+def surroundings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def remote(place: Place) -> Run:
+    """A command against the server, with a token of these scopes."""
+
+    def run(*words: str, scopes: tuple[Scope, ...] = (Scope.LEAD, Scope.EXPORT)) -> Result:
+        given = ["--server", place.url, "--token-file", str(place.token(*scopes))]
+        return CliRunner().invoke(app, [*given, *words])
+
+    return run
+
+
+def told(done: Result) -> Any:
+    assert done.exit_code == 0, (done.output, done.exception)
+    return json.loads(done.stdout)
+
+
+def test_what_is_imported_frozen_exported_and_measured_there_is_as_here(
+    place: Place, remote: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent: list[Path] = []
+    upload = Client.upload
+    monkeypatch.setattr(
+        Client, "upload", lambda self, path: sent.append(path) or upload(self, path)
+    )
+
+    def local(*words: str) -> Result:
+        return CliRunner(env={"TOUCHLINE_HOME": str(place.home)}).invoke(app, list(words))
+
+    groups = [scene.group for scene in make_scenes(groups=2, seed=3, faults=False)]
+    write_soccernet_v3(tmp_path / "tree", groups)
+    words = ("import", "soccernet-v3", str(tmp_path / "tree"), "--dataset", "small", "--json")
+    assert told(remote(*words))["new"] == 2
+    assert told(remote(*words))["unchanged"] == 2
+    assert [path.name for path in sent] == ["tree.zip"], "the same files go once"
+    end = time.monotonic() + SECONDS
+    while told(remote("datasets", "list", "--json"))[0]["solved"] < 2:
+        assert time.monotonic() < end
+        time.sleep(0.1)
+    for words in (("datasets", "list"), ("findings", "--dataset", "small")):
+        for more in ((), ("--json",)):
+            assert remote(*words, *more).stdout == local(*words, *more).stdout
+
+    freeze = ("freeze", "--dataset", "small", "--groups", "passing", "--json")
+    assert told(remote(*freeze, "--dry-run"))["groups"] == 2
+    assert told(remote(*freeze))["name"] == "v1"
+    versions = ("versions", "--dataset", "small")
+    assert told(remote(*versions, "--json")) == told(local(*versions, "--json"))
+    assert remote(*versions).stdout == local(*versions).stdout
+    actors = [version.actor for version in list_versions(place.store, "small")]
+    assert actors == ["anna-lead-export (token cli)"]
+
+    give = ("batch", "give", "small", "First", "--query", "sort:number-desc", "--size", "1")
+    given = told(remote(*give, "--due", "2030-01-02", "--json"))
+    assert (given["groups"], given["due"], given["state"]) == (1, "2030-01-02", "open")
+    assert given["created_by"] == "anna-lead-export (token cli)"
+    assert told(local("batch", "give", "small", "Rest", "--json"))["groups"] == 1
+    rest = str(given["id"] + 1)
+    assert told(remote("batch", "close", rest, "--json"))["state"] == "closed"
+    for words in (("list", "small"), ("show", rest)):
+        for more in ((), ("--json",)):
+            assert remote("batch", *words, *more).stdout == local("batch", *words, *more).stdout
+    assert "closed" in told(local("batch", "show", rest, "--json"))["state"]
+    assert remote(*give, "--due", "soon").exit_code == 2
+    for run, every in ((remote, "5"), (local, "7")):
+        run("batch", "change", rest, "--gold-every", every)
+        assert get_batch(place.store, int(rest)).gold_every == int(every)
+        assert "nothing is known" in str(run("batch", "gold", "small").exception)
+    remote("batch", "change", rest, "--no-gold")
+    assert get_batch(place.store, int(rest)).gold_every is None
+    assert remote("batch", "change", rest).exit_code == 2
+
+    export = ("--dataset", "small", "--format", "soccernet-v3d", "--version", "v1", "--json")
+    for out in ("folder", "one.zip"):
+        there = told(remote("export", f"there-{out}", *export))
+        here = told(local("export", f"here-{out}", *export))
+        assert {**there, "out": ""} == {**here, "out": ""}
+    files = {path.name: path.read_bytes() for path in Path("there-folder").rglob("*.*")}
+    assert files == {path.name: path.read_bytes() for path in Path("here-folder").rglob("*.*")}
+    assert Path("there-one.zip").read_bytes() == Path("here-one.zip").read_bytes()
+
+    frame = f"{groups[0].match}/{groups[0].views[0].key}"
+    Path("found.csv").write_text(f"image,x,y,w,h,score\n{frame},600,300,9,9,0.5\n")
+    measure = ("evaluate", "found.csv", "--dataset", "small", "--groups", "all", "--json")
+    there = told(remote(*measure, "--out", "measured"))
+    here = evaluation_values(get_evaluation(place.store, there["id"]))
+    assert {name: there[name] for name in here} == json.loads(json_text(here))
+    assert set(there) == {*here, "sets"}
+    assert {"evaluation.json", "detection.csv", "frames.jsonl"} <= {
+        path.name for path in Path("measured").iterdir()
+    }
+    assert "AP" in remote(*measure[:-1]).stdout
+    assert len(list_predictions(place.store, "small")) == 1, "the same files are read once"
+
+
+class TestRefusals:
+    @pytest.mark.parametrize("command", ["solve", "serve", "users", "restore", "calibrate"])
+    def test_what_needs_a_home_says_so(self, remote: Run, command: str) -> None:
+        assert "not against a server" in str(remote(command).exception)
+
+    def test_deleting_needs_a_home_too(self, remote: Run) -> None:
+        assert "not against a server" in str(remote("datasets", "delete", "x").exception)
+
+    def test_a_token_says_what_it_lacks(self, remote: Run) -> None:
+        done = remote("freeze", "v9", "--dataset", "x", scopes=(Scope.READ,))
+        assert "lacks the scope lead; it has read" in str(done.exception)
+
+    def test_a_token_that_is_not_valid_is_told_so_once(self, place: Place, tmp_path: Path) -> None:
+        path = tmp_path / "token"
+        path.touch(0o600)
+        path.write_text(new_text())
+        for content, sentence in (
+            (None, "is not valid (any more)"),
+            ("tl_x", "holds no whole token"),
+        ):
+            path.write_text(content or path.read_text())
+            words = ["--server", place.url, "--token-file", str(path), "datasets", "list"]
+            refused = str(CliRunner().invoke(app, words).exception)
+            assert sentence in refused
+            assert path.read_text() not in refused
+
+    @pytest.mark.parametrize("mode", [0o640, 0o604, 0o620])
+    def test_a_token_that_others_can_read_is_refused(
+        self, place: Place, tmp_path: Path, mode: int
+    ) -> None:
+        path = tmp_path / "token"
+        path.write_text(new_text())
+        path.chmod(mode)
+        with pytest.raises(InputError, match="others can read"), connected(Server(place.url, path)):
+            pass
+
+    def test_without_a_token_it_asks_for_one(self, place: Place) -> None:
+        done = CliRunner().invoke(app, ["--server", place.url, "datasets", "list"])
+        assert "asks who you are" in str(done.exception)
+
+    @pytest.mark.parametrize(
+        ("url", "sentence"),
+        [
+            ("http://example.org", "is not encrypted"),
+            ("http://127.0.0.1.example.org", "is not encrypted"),
+            ("ftp://127.0.0.1", "no address"),
+            ("https://user:pass@example.org", "no address"),
+            ("http://127.0.0.1:1", "does not answer"),
+        ],
+    )
+    def test_an_address_that_cannot_be_one(self, url: str, sentence: str) -> None:
+        done = CliRunner().invoke(app, ["--server", url, "datasets", "list"])
+        assert sentence in str(done.exception)
+
+    def test_tls_that_fails_is_told_as_such(self, place: Place) -> None:
+        secure = place.url.replace("http://", "https://")
+        done = CliRunner().invoke(app, ["--server", secure, "datasets", "list"])
+        assert "cannot prove who it is" in str(done.exception)
+
+    def test_an_answer_that_only_sounds_like_it_is_told_as_it_is(self) -> None:
+        server = Server("http://127.0.0.1:8000", None)
+        said = RequestError("there is no dataset crossland", None, 404)
+        assert _explained(server, said).message == "there is no dataset crossland"
+        broken = UnreachableError("the SSL handshake failed")
+        assert "cannot prove who it is" in _explained(server, broken).message
+
+    @pytest.mark.parametrize("named", ["tables", "figures"])
+    def test_no_name_of_a_server_leads_out_of_the_folder(self, tmp_path: Path, named: str) -> None:
+        values = {"id": 1, "tables": [], "figures": []}
+        values[named] = [{"name": "../x"}] if named == "tables" else ["../x"]
+        with pytest.raises(UnsafePathError):
+            write_evaluation(cast(Client, None), values, tmp_path / "out")
+        assert [file.name for file in tmp_path.iterdir()] == ["out"]
+
+    def test_another_version_is_not_spoken_to(
+        self, place: Place, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.datasets.manifest.software_version", lambda: "9.9.0")
+        done = CliRunner().invoke(app, ["--server", place.url, "datasets", "list"])
+        assert "and this is 9.9.0" in str(done.exception)
