@@ -10,12 +10,17 @@ import { startRouter } from './lib/router.js';
 import { startArrivals } from './state/arrival.js';
 import { draft } from './state/group.js';
 import { startInsight } from './state/insight.js';
+import { startLeases } from './state/leases.js';
 import { startLive } from './state/live.js';
-import { askWhoIsThere, isTeam, me } from './state/me.js';
+import { askWhoIsThere, isTeam, me, startRights } from './state/me.js';
 import { startMends } from './state/mends.js';
 import { lasting, outbox } from './state/outbox.js';
+import { startBell } from './state/bell.js';
+import { startThreads } from './state/threads.js';
 import { startSending } from './state/sending.js';
+import { refuses } from './state/rights.js';
 import { App } from './views/app.js';
+import { datasetHere, startNeeds } from './views/needs.js';
 
 addEventListener('beforeunload', (event) => {
 	// What is in the outbox comes back with the page; what is in hand does not.
@@ -25,14 +30,19 @@ addEventListener('beforeunload', (event) => {
 /** What asks the server by itself. */
 function startWork() {
 	startArrivals();
+	startLeases();
 	startSending();
 	startInsight();
 	startMends();
 	startLive();
+	startThreads();
+	startBell();
+	startRights();
 }
 
 startRouter();
-startKeys();
+startKeys((needs) => refuses(needs, datasetHere()));
+startNeeds();
 if (isTeam) {
 	await askWhoIsThere();
 	let begun = false;

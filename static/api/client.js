@@ -16,13 +16,26 @@ const ROOT = '/api/v1';
 /** Whether the server has refused a request because nobody is logged in. */
 export const loggedOut = signal(false);
 
-/** @param {number} status @param {any} body @returns {ApiError} */
-function refusal(status, body) {
-	if (status === 401) loggedOut.value = true;
+/** How often the server has refused a request because the person may not. */
+export const forbidden = signal(0);
+
+/** How often somebody has come in again. */
+let entrances = 0;
+
+/** Somebody has logged in: a refusal of what was asked before says nothing of them. */
+export function cameIn() {
+	if (loggedOut.value) entrances += 1;
+	loggedOut.value = false;
+}
+
+/** @param {number} status @param {any} body @param {number} [since] what `entrances` was when it was asked @returns {ApiError} */
+function refusal(status, body, since = entrances) {
+	if (status === 401 && since === entrances) loggedOut.value = true;
+	if (status === 403) forbidden.value += 1;
 	return new ApiError(status, body);
 }
 
-/** @typedef {{method?: string, body?: unknown, etag?: string, key?: string, signal?: AbortSignal}} RequestOptions */
+/** @typedef {{method?: string, body?: unknown, etag?: string, key?: string, signal?: AbortSignal, keepalive?: boolean}} RequestOptions   `keepalive`: it is sent also while the page goes away */
 
 /**
  * @param {string} path below the API's root, or absolute @param {RequestOptions} [options]
@@ -39,31 +52,45 @@ export async function request(path, options) {
  * @param {string} path @param {RequestOptions} [options]
  * @returns {Promise<{json: any, etag: string, replayed: boolean}>}
  */
-export async function requestTagged(path, { method = 'GET', body, etag, key, signal } = {}) {
+export async function requestTagged(path, { method = 'GET', body, etag, key, signal, keepalive } = {}) {
 	/** @type {Record<string, string>} */
 	const headers = { accept: 'application/json' };
 	if (body !== undefined) headers['content-type'] = 'application/json';
 	if (etag) headers['if-match'] = etag;
 	if (key) headers['idempotency-key'] = key;
+	const since = entrances;
 	let response;
 	try {
 		response = await fetch(path.startsWith('/api/') ? path : ROOT + path, {
-			method, headers, signal, body: body === undefined ? undefined : JSON.stringify(body),
+			method, headers, signal, keepalive, body: body === undefined ? undefined : JSON.stringify(body),
 		});
 	} catch (error) {
 		if (signal?.aborted) throw error;
 		throw new ApiError(0, null);
 	}
-	const json = await response.json().catch(() => null);
-	if (!response.ok) throw refusal(response.status, json);
+	const json = await bodyOf(response, signal);
+	if (!response.ok) throw refusal(response.status, json, since);
 	const { headers: said } = response;
 	return { json, etag: said.get('etag') ?? '', replayed: said.get('idempotency-replayed') === 'true' };
 }
 
+/** The JSON of an answer; null where it has none. @param {Response} response @param {AbortSignal} [signal] @returns {Promise<any>} */
+async function bodyOf(response, signal) {
+	try {
+		return await response.json();
+	} catch (error) {
+		// Its reader has gone, or the connection ended amid it: that is no answer.
+		if (signal?.aborted) throw error;
+		if (response.ok && !(error instanceof SyntaxError)) throw new ApiError(0, null);
+		return null;
+	}
+}
+
 /** A frame, as it lies on the server. @param {string} url absolute @returns {Promise<Blob>} */
 export async function getFrame(url) {
+	const since = entrances;
 	const response = await fetch(url);
-	if (!response.ok) throw refusal(response.status, null);
+	if (!response.ok) throw refusal(response.status, null, since);
 	return response.blob();
 }
 

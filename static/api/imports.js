@@ -7,7 +7,7 @@ import { idempotencyKey, queryText, request, upload } from './client.js';
 
 /** @typedef {{id: string, name: string, bytes: number, format: string | null}} UploadJson   `format`: what it most likely holds */
 /** @typedef {{upload: string} | {folder: string}} ImportSource */
-/** @typedef {{dataset: string, format: string, source: ImportSource, options: {[name: string]: any}, dry_run: boolean}} ImportRequest */
+/** @typedef {{dataset: string, format: string, source: ImportSource, options: {[name: string]: any}, dry_run: boolean, policy?: string}} ImportRequest   policy: of a dataset that is made; without one it follows the pictures */
 
 /**
  * @typedef {object} ImportReport

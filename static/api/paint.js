@@ -39,9 +39,15 @@ export function readPaint(view, lines, signal) {
 	return request(`/views/${view}/paint`, { method: 'POST', body: { lines }, signal });
 }
 
-/** Lines for a view that has none. @param {number} view @param {AbortSignal} [signal] @returns {Promise<ProposalJson>} */
-export function proposeLines(view, signal) {
-	return request(`/views/${view}/propose`, { method: 'POST', signal });
+/**
+ * Lines for a view without a camera, beside those that it has.
+ *
+ * @param {number} view @param {Record<string, import('./types.js').PointJson[] | null>} lines changes that are not saved
+ * @param {AbortSignal} [signal]
+ * @returns {Promise<ProposalJson>}
+ */
+export function proposeLines(view, lines, signal) {
+	return request(`/views/${view}/propose`, { method: 'POST', body: { lines }, signal });
 }
 
 /**

@@ -3,24 +3,51 @@
 
 import { request } from './client.js';
 
-/** @typedef {'viewer' | 'annotator' | 'reviewer' | 'lead' | 'admin'} Role */
-/** @typedef {'account' | 'read' | 'annotate' | 'review' | 'lead' | 'administer'} Action */
-/** @typedef {{team: boolean, name: string | null, role: Role | null, may: Action[]}} SessionJson */
+/** @typedef {'none' | 'viewer' | 'annotator' | 'reviewer' | 'lead' | 'admin'} Role */
+/** @typedef {{id: number, dataset: string, role: Role}} SingleRole   what somebody is in one dataset */
+/** @typedef {{id: number, name: string, role: Role, everywhere: Role, single: Role | null}} MemberJson */
+/** @typedef {'account' | 'read' | 'describe' | 'annotate' | 'review' | 'export' | 'lead' | 'administer'} Action */
+/** @typedef {{password: boolean, sign_on: string | null}} WaysIn   how people log in */
+/** @typedef {{team: boolean, name: string | null, role: Role | null, enrol: boolean, way?: 'password' | 'passkey' | 'sign_on' | null, ways?: WaysIn | null, may: Action[], datasets: SingleRole[], allows: Record<Role, Action[]>}} SessionJson */
 /** @typedef {{id: number, this: boolean, browser: string, address: string, created: string, seen: string, expires: string}} OpenSessionJson */
-/** @typedef {{id: number, name: string, role: Role, disabled: boolean, joined: boolean, invited: boolean, created: string, created_by: string, seen: string | null}} UserJson */
+/** @typedef {{id: number, name: string, role: Role, disabled: boolean, joined: boolean, invited: boolean, created: string, created_by: string, seen: string | null, second_factor: boolean, tokens: number, sign_on: string | null, datasets: SingleRole[]}} UserJson */
 /** @typedef {{user: UserJson, link: string, expires: string}} UserWithLink */
 
 /** @returns {Promise<SessionJson>} */
 export const getSession = () => request('/session');
 
-/** @param {string} name @param {string} password @returns {Promise<SessionJson>} */
-export const postSession = (name, password) => request('/session', { method: 'POST', body: { name, password } });
+/** @param {string} name @param {string} password @param {string | null} [code] @returns {Promise<SessionJson>} */
+export const postSession = (name, password, code = null) => request('/session', { method: 'POST', body: code === null ? { name, password } : { name, password, code } });
 
 /** @returns {Promise<SessionJson>} */
 export const deleteSession = () => request('/session', { method: 'DELETE' });
 
 /** @param {string} old @param {string} fresh @returns {Promise<SessionJson>} */
 export const putPassword = (old, fresh) => request('/session/password', { method: 'PUT', body: { old, new: fresh } });
+
+/** @typedef {{on: boolean, required: boolean, codes_left: number, authenticator: boolean}} SecondFactorJson */
+/** @typedef {{secret: string, uri: string, picture: string}} EnrolmentJson */
+
+/** @returns {Promise<SecondFactorJson>} */
+export const getSecondFactor = () => request('/session/second-factor');
+
+/** @param {string | null} password @returns {Promise<EnrolmentJson>} */
+export const beginSecondFactor = (password) => request('/session/second-factor', { method: 'POST', body: { password } });
+
+/** @param {string} code @returns {Promise<{codes: string[]}>} */
+export const confirmSecondFactor = (code) => request('/session/second-factor/confirm', { method: 'POST', body: { code } });
+
+/** @param {string | null} password */
+export const deleteSecondFactor = (password) => request('/session/second-factor', { method: 'DELETE', body: { password } });
+
+/** Take away the second factor of another person. @param {number} user */
+export const deleteSecondFactorOf = (user) => request(`/users/${user}/second-factor`, { method: 'DELETE' });
+
+/** @returns {Promise<{require_second_factor: boolean}>} */
+export const getTeam = () => request('/team');
+
+/** @param {boolean} on @returns {Promise<{require_second_factor: boolean}>} */
+export const putTeam = (on) => request('/team', { method: 'PUT', body: { require_second_factor: on } });
 
 /** @returns {Promise<{items: OpenSessionJson[]}>} */
 export const getSessions = () => request('/sessions');
@@ -34,7 +61,7 @@ export const lookAtLink = (token) => request('/links/look', { method: 'POST', bo
 /** @param {{token: string, password: string, name?: string}} body @returns {Promise<SessionJson>} */
 export const postLink = (body) => request('/links/use', { method: 'POST', body });
 
-/** @returns {Promise<{items: UserJson[]}>} */
+/** @returns {Promise<{items: UserJson[], adopted_by: string | null}>} */
 export const getUsers = () => request('/users');
 
 /** @param {string} name @param {Role} role @returns {Promise<UserWithLink>} */
@@ -45,3 +72,12 @@ export const patchUser = (id, body) => request(`/users/${id}`, { method: 'PATCH'
 
 /** @param {number} id @returns {Promise<UserWithLink>} */
 export const postUserLink = (id) => request(`/users/${id}/link`, { method: 'POST' });
+
+/** Show what was done before there were accounts as somebody's; once. @param {number} id @returns {Promise<unknown>} */
+export const postAdoption = (id) => request(`/users/${id}/adoption`, { method: 'POST' });
+
+/** @param {string} dataset name or id @returns {Promise<{items: MemberJson[]}>} */
+export const getMembers = (dataset) => request(`/datasets/${encodeURIComponent(dataset)}/members`);
+
+/** @param {string} dataset name or id @param {number} id @param {Role | null} role null: as everywhere @returns {Promise<MemberJson>} */
+export const putMember = (dataset, id, role) => request(`/datasets/${encodeURIComponent(dataset)}/members/${id}`, { method: 'PUT', body: { role } });

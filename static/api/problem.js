@@ -7,13 +7,15 @@ export class ApiError extends Error {
 	 * @param {any} body problem JSON, or null
 	 */
 	constructor(status, body) {
-		super(sentenceOf(status, body));
+		super(detailOf(status, body));
 		this.name = 'ApiError';
 		this.status = status;
 		/** What to do about it, when the server says so. @type {string | null} */
 		this.hint = body?.hint ?? null;
 		/** Which field of the request is at fault. @type {string | null} */
 		this.pointer = body?.pointer ?? null;
+		/** Who has the group of a batch open. @type {{person: string, since: string}[] | null} */
+		this.here = body?.here ?? null;
 		/** The state as it is now, when somebody else was first. @type {any} */
 		this.current = body?.current ?? null;
 	}
@@ -25,9 +27,17 @@ export class ApiError extends Error {
 }
 
 /** @param {number} status @param {any} body */
-function sentenceOf(status, body) {
+function detailOf(status, body) {
 	if (status === 0) return 'The server cannot be reached. Is it still running?';
 	if (typeof body?.detail === 'string') return body.detail;
 	if (typeof body?.title === 'string') return body.title;
 	return `The server answered ${status} without saying why.`;
+}
+
+/** The sentence of what went wrong, for people. @param {unknown} error @returns {string} */
+export function sentenceOf(error) {
+	if (!(error instanceof Error)) return String(error);
+	const hint = error instanceof ApiError ? error.hint : null;
+	const text = error.message.replace(/[^.?!]$/, '$&.');
+	return (text.charAt(0).toUpperCase() + text.slice(1)) + (hint ? ` ${hint}` : '');
 }

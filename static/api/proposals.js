@@ -1,5 +1,5 @@
 // @ts-check
-/** Requests about lines that are proposed for views without any. */
+/** Requests about lines that are proposed for views without a camera. */
 
 import { idempotencyKey, request } from './client.js';
 
@@ -10,10 +10,10 @@ import { idempotencyKey, request } from './client.js';
  * @typedef {object} ViewProposalJson what was proposed for one view
  * @property {number} view
  * @property {string} key
- * @property {boolean} open whether the view still has neither lines nor a given camera
+ * @property {boolean} open whether the view has the lines that it had when it was looked at, and no given camera
  * @property {'proposed' | 'unsure' | 'nothing'} outcome
- * @property {string} sentence
- * @property {LinesJson} lines
+ * @property {string} sentence why nothing is proposed, or which drawn lines lie elsewhere
+ * @property {LinesJson} lines markings that nobody drew
  * @property {number | null} supported
  * @property {number | null} explained
  * @property {number} points
@@ -23,7 +23,7 @@ import { idempotencyKey, request } from './client.js';
 /**
  * @typedef {object} MatchProposalsJson
  * @property {string} match
- * @property {number} views without lines and camera, with a picture
+ * @property {number} views without a camera, with a picture
  * @property {number} looked how many of them were looked at
  * @property {number} proposed
  * @property {number} unsure
@@ -41,7 +41,7 @@ export function getProposals(dataset, signal) {
 	return request(`/datasets/${dataset}/proposals`, { signal });
 }
 
-/** Look at every view without lines. @param {number} dataset @returns {Promise<JobJson>} */
+/** Look at every view without a camera. @param {number} dataset @returns {Promise<JobJson>} */
 export function proposeForDataset(dataset) {
 	return request(`/datasets/${dataset}/proposals`, { method: 'POST', body: {}, key: idempotencyKey() });
 }

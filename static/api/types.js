@@ -268,6 +268,7 @@
  * @property {boolean} can_undo
  * @property {boolean} can_redo
  * @property {VerdictJson} verdict
+ * @property {VerdictJson[]} verdicts the last one of every person
  * @property {PolicyJson} policy
  * @property {ViewJson[]} views
  * @property {SolutionJson | null} solution
@@ -297,6 +298,9 @@
  * @property {string | null} reason why it was rejected
  * @property {string | null} override gate that failed when it was accepted all the same
  * @property {boolean} fixed
+ * @property {number} comments threads that are open
+ * @property {number | null} takes how many people handed in an annotation of their own; null: for reviewers alone
+ * @property {'agreed' | 'open' | 'decided' | null} came_to what these came to; open: somebody has to decide
  * @property {string[]} findings
  * @property {string | null} thumbnail
  */

@@ -15,6 +15,7 @@ import { stored } from './storage.js';
  * @property {{start: () => void, end: () => void}} [hold] what holding the key does; `run` is then
  *   the tap, and comes when the key is let go
  * @property {boolean} [once] a key held down does it once
+ * @property {import('../api/people.js').Action} [needs] what somebody must be allowed to do
  */
 
 /** @type {Set<readonly Binding[]>} */
@@ -147,6 +148,7 @@ function dispatch(event) {
 		));
 		if (!found) continue;
 		event.preventDefault();
+		if (found.needs && refused(found.needs)) return;
 		if (found.hold) press(found, event);
 		else if (!event.repeat || !found.once) found.run(event);
 		return;
@@ -187,8 +189,12 @@ function letGo() {
 	pressed = null;
 }
 
-/** Listen to the keyboard. */
-export function startKeys() {
+/** @type {(needs: import('../api/people.js').Action) => boolean} */
+let refused = () => false;
+
+/** Listen to the keyboard. @param {typeof refused} [refuses] whether somebody may not do that, in which case they are told */
+export function startKeys(refuses = () => false) {
+	refused = refuses;
 	addEventListener('keydown', dispatch);
 	addEventListener('keyup', release);
 	addEventListener('blur', letGo);

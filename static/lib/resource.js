@@ -44,11 +44,3 @@ export function useResource(read, inputs) {
 	}, [...inputs, turn]);
 	return { ...state, reload: useCallback(() => setTurn((n) => n + 1), []) };
 }
-
-/** The sentence of what went wrong, for people. @param {unknown} error @returns {string} */
-export function sentenceOf(error) {
-	if (!(error instanceof Error)) return String(error);
-	const hint = error instanceof ApiError ? error.hint : null;
-	const text = error.message.replace(/[.]?$/, '.');
-	return (text.charAt(0).toUpperCase() + text.slice(1)) + (hint ? ` ${hint}` : '');
-}

@@ -13,16 +13,16 @@ function here() {
 /** Where the person is. */
 export const place = signal(here());
 
-/** @typedef {'yield' | 'policy' | 'statistics' | 'versions' | 'evaluation'} DatasetPage */
-/** @typedef {'queue' | 'datasets' | 'import' | 'jobs' | 'exports' | 'account' | 'people' | 'join' | 'unknown'} PlainPage */
-/** @typedef {{page: PlainPage} | {page: 'help', tab: string} | {page: 'review', group: number | null} | {page: 'calibration', group: number} | {page: DatasetPage, dataset: string}} Page */
+/** @typedef {'yield' | 'policy' | 'statistics' | 'versions' | 'evaluation' | 'agreement'} DatasetPage */
+/** @typedef {'queue' | 'datasets' | 'import' | 'jobs' | 'work' | 'exports' | 'account' | 'people' | 'audit' | 'join' | 'login' | 'unknown'} PlainPage */
+/** @typedef {{page: PlainPage} | {page: 'help', tab: string} | {page: 'review', group: number | null} | {page: 'calibration' | 'history', group: number} | {page: 'compare', group: number, other: number} | {page: 'adjudicate', group: number} | {page: DatasetPage, dataset: string}} Page */
 
 const PLAIN = /** @type {{[path: string]: PlainPage}} */ ({
-	'/': 'queue', '/groups': 'queue', '/datasets': 'datasets', '/import': 'import', '/jobs': 'jobs', '/exports': 'exports',
-	'/account': 'account', '/people': 'people', '/join': 'join',
+	'/': 'queue', '/groups': 'queue', '/datasets': 'datasets', '/import': 'import', '/jobs': 'jobs', '/work': 'work', '/exports': 'exports',
+	'/account': 'account', '/people': 'people', '/audit': 'audit', '/join': 'join', '/login': 'login',
 });
 /** A dataset without a page is its yield, which says most about it. */
-const OF_DATASET = /^\/datasets\/([^/]+)(?:\/(yield|policy|statistics|versions|evaluation))?\/?$/;
+const OF_DATASET = /^\/datasets\/([^/]+)(?:\/(yield|policy|statistics|versions|evaluation|agreement))?\/?$/;
 
 /** Which page that is. */
 export const page = computed(/** @returns {Page} */ () => {
@@ -32,6 +32,12 @@ export const page = computed(/** @returns {Page} */ () => {
 	if (review) return { page: 'review', group: review[1] ? Number(review[1]) : null };
 	const editor = /^\/review\/(\d+)\/calibration\/?$/.exec(path);
 	if (editor) return { page: 'calibration', group: Number(editor[1]) };
+	const compared = /^\/compare\/(\d+)\/(\d+)\/?$/.exec(path);
+	if (compared) return { page: 'compare', group: Number(compared[1]), other: Number(compared[2]) };
+	const disputed = /^\/adjudicate\/(\d+)\/?$/.exec(path);
+	if (disputed) return { page: 'adjudicate', group: Number(disputed[1]) };
+	const past = /^\/review\/(\d+)\/history\/?$/.exec(path);
+	if (past) return { page: 'history', group: Number(past[1]) };
 	const help = /^\/help(?:\/(keys|legend|words|guide|practice))?\/?$/.exec(path);
 	if (help) return { page: 'help', tab: help[1] ?? 'keys' };
 	const found = OF_DATASET.exec(path);

@@ -40,7 +40,7 @@ import { pinsOf } from '../lib/pins.js';
  * @property {Pin[]} pins notes that stand at a place of this view
  * @property {ViewPredictions} [predictions] once they are known
  * @property {ViewPaint} [paint] once it is read, while it is shown
- * @property {ViewProposal} [proposal] lines that are proposed, where there are none
+ * @property {ViewProposal} [proposal] lines that are proposed, where there is no camera
  */
 /**
  * @typedef {object} Scene

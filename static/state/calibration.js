@@ -10,7 +10,7 @@ import { page, param } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 import { applyEdit } from './edits.js';
 import { group, groupDocument, solution, submit } from './group.js';
-import { redo as redoSaved, undo as undoSaved } from './history.js';
+import { redo as redoSaved, undo as undoSaved } from './undo.js';
 import { sameLines } from './line_changes.js';
 import { announce } from './notice.js';
 import { asProposed } from './proposal_lines.js';

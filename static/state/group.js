@@ -17,6 +17,7 @@ import { applyEdit, describe, previewBody, requestOf, sameTarget, stationOf, vie
 import { did } from './last_action.js';
 import { announce, complain } from './notice.js';
 import { discard, enqueue, outbox, revise } from './outbox.js';
+import { refuses } from './rights.js';
 import { hearFrom, isAway, wake } from './sending.js';
 import { resetForGroup } from './workspace.js';
 
@@ -124,6 +125,7 @@ export function renew(newer) {
 
 /** Lay an edit over the group without saving it. @param {Edit} edit */
 export function propose(edit) {
+	if (refuses('annotate', groupDocument.value?.dataset.name)) return;
 	if (draft.value && !sameTarget(draft.value, edit)) settle();
 	draft.value = edit;
 	// Cameras, gates and uncertainty are the server's; a ball moves without waiting for them.
@@ -145,7 +147,7 @@ export function settle() {
 /** Save an edit. @param {Edit} edit */
 export function submit(edit) {
 	const at = groupDocument.value;
-	if (!at) return;
+	if (!at || refuses('annotate', at.dataset.name)) return;
 	const shown = pending.value.reduce(applyEdit, at);
 	batch(() => {
 		draft.value = null;
@@ -161,7 +163,7 @@ export function submit(edit) {
 /** Save a verdict. @param {Verdict} verdict */
 export function submitVerdict(verdict) {
 	const at = groupDocument.value;
-	if (!at) return;
+	if (!at || refuses('review', at.dataset.name)) return;
 	enqueue({
 		path: `/groups/${at.id}/verdict`, body: verdict, etag: at.etag, group: at.id, method: 'PUT',
 		station: null, edit: null, verdict, base: baseOf(at, at.views[0]?.key),
@@ -172,7 +174,7 @@ export function submitVerdict(verdict) {
 /** Take the last edit back, or make it again. @param {'undo' | 'redo'} verb */
 export function submitTurn(verb) {
 	const at = groupDocument.value;
-	if (!at) return;
+	if (!at || refuses('annotate', at.dataset.name)) return;
 	const last = lastStation.value?.group === at.id ? lastStation.value.station : null;
 	const station = at.views.find((view) => view.station.id === last)?.station;
 	enqueue({

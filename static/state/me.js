@@ -1,12 +1,17 @@
 // @ts-check
 /** Who is logged in, on the server of a team; one that somebody runs alone asks nobody. */
 
-import { computed, signal } from '@preact/signals';
+import { computed, effect, signal, untracked } from '@preact/signals';
 
-import { loggedOut } from '../api/client.js';
+import { cameIn, forbidden, loggedOut } from '../api/client.js';
+import { connected } from '../api/events.js';
 import { deleteSession, getSession } from '../api/people.js';
+import { inform } from './notice.js';
 
-/** @import {Action, SessionJson} from '../api/people.js' */
+/** @import {Action, SessionJson, WaysIn} from '../api/people.js' */
+
+/** Ids of datasets of copies lie above it (app/store/sight.py). */
+export const COPIES = 1e9;
 
 /** Whether people log in here. */
 export const isTeam = typeof document !== 'undefined' && document.documentElement.hasAttribute('data-team');
@@ -14,8 +19,11 @@ export const isTeam = typeof document !== 'undefined' && document.documentElemen
 /** Who is logged in, or was until their session ended; null: nobody yet. */
 export const me = signal(/** @type {SessionJson | null} */ (null));
 
+/** How people log in here. */
+export const ways = signal(/** @type {WaysIn} */ ({ password: true, sign_on: null }));
+
 /** Whether somebody has to log in before anything is sent. */
-export const mustLogIn = computed(() => isTeam && (loggedOut.value || me.value === null));
+export const mustLogIn = computed(() => isTeam && (loggedOut.value || me.value === null || me.value.enrol));
 
 /** Whose a write is: their name, or null where nobody logs in. */
 export const myName = computed(() => me.value?.name ?? null);
@@ -31,14 +39,32 @@ export function welcome(session) {
 		location.reload();
 		return;
 	}
+	cameIn();
+	const before = me.value;
+	if (JSON.stringify(before) === JSON.stringify(session)) return;
 	me.value = session;
-	loggedOut.value = false;
+	if (before?.name && rightsOf(before) !== rightsOf(session)) inform(`Your rights were changed: ${rightsOf(session)}. What you have not sent yet stays here.`);
+}
+
+/** @param {SessionJson} session */
+function rightsOf({ role, datasets: every }) {
+	// Copies of groups that somebody annotates on their own come and go; rights in them are those in what they are of.
+	const datasets = every.filter(({ id }) => id <= COPIES);
+	return [...datasets.map((one) => `${one.role} in ${one.dataset}`), `${role} in ${datasets.length ? 'the other' : 'all'} datasets`].join(', ');
+}
+
+/** Hear of other rights: when something was refused, when the stream begins anew, when somebody comes back to the window. */
+export function startRights() {
+	if (!isTeam) return;
+	effect(() => { if (connected.value || forbidden.value) untracked(askWhoIsThere); });
+	addEventListener('focus', () => { if (!mustLogIn.value) askWhoIsThere(); });
 }
 
 /** Ask the server who is there. */
 export async function askWhoIsThere() {
 	const session = await getSession().catch(() => null);
-	if (session?.name) welcome(session);
+	if (session?.ways) ways.value = session.ways;
+	if (session?.name) welcome({ ...session, ways: null });
 }
 
 /** Log out, and leave nothing of it in this window. */

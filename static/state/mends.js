@@ -1,22 +1,25 @@
 // @ts-check
-/** What would mend the group on screen, the likeliest first: findings with a fix, missing balls and lines, remedies. */
+/** What would mend the group on screen, the likeliest first: proposed lines, findings with a fix, missing balls and lines, remedies. */
 
 import { computed, effect, signal, untracked } from '@preact/signals';
 
+import { plural } from '../lib/format.js';
 import { findingTitle } from './advice.js';
 import { editOf } from './edits.js';
 import { group, groupDocument, solution } from './group.js';
 import { remedies } from './insight.js';
+import { openProposals, scoreWords, settledState, stateOf, waitingViews } from './proposal_lines.js';
 import { fitPanel, returnLent } from './viewports.js';
 import { focused } from './workspace.js';
 
+/** @import {ViewProposalJson} from '../api/proposals.js' */
 /** @import {FindingJson, FixJson, GroupDocument, OfferJson, SolutionJson, ViewJson} from '../api/types.js' */
 /** @import {Edit} from './edits.js' */
 /** @import {Remedy} from './insight.js' */
 
 /**
  * @typedef {object} Mend one thing that a person can do about a group
- * @property {FixJson} fix what it is about; beside the server's actions `place_ball`, `draw_ball` and `resize_ball`
+ * @property {FixJson} fix what it is about; beside the server's actions `place_ball`, `draw_ball`, `resize_ball` and `accept_proposal`
  * @property {Edit | null} edit null: it leads the person to the place and leaves the drawing to them
  * @property {string | null} title null: that of the gate that fails
  * @property {string} sentence
@@ -30,6 +33,7 @@ const chosen = signal(0);
 /** Buttons of what leads a person to the place. */
 const GUIDES = /** @type {Record<string, string>} */ ({
 	draw_marking: 'Draw it', look_ball: 'Show the place', place_ball: 'Place it there', draw_ball: 'Draw it', resize_ball: 'Fit the box', read_paint: 'Read its paint',
+	accept_proposal: 'Accept the lines',
 });
 
 /** @typedef {Pick<Mend, 'fix' | 'edit' | 'label'>} Way */
@@ -82,6 +86,20 @@ function missingBalls(shown, solved) {
 	});
 }
 
+/** Lines that are proposed for views without a camera. @param {GroupDocument} shown @param {ReadonlyMap<string, ViewProposalJson>} proposed @returns {Mend[]} */
+function proposedLines(shown, proposed) {
+	return shown.views.flatMap((view) => {
+		const item = proposed.get(view.key);
+		if (item?.outcome !== 'proposed') return [];
+		const drawn = Object.keys(view.lines).length && !item.sentence ? ' What is drawn stays.' : '';
+		return [{
+			...guide('accept_proposal', view.key), passes: false,
+			title: `${plural(Object.keys(item.lines).length, 'line')} ${Object.keys(item.lines).length === 1 ? 'is' : 'are'} proposed for ${view.letter}`,
+			sentence: [`Violet and dashed, read from its paint: ${scoreWords(item)}.${drawn}`, item.sentence].filter(Boolean).join(' '),
+		}];
+	});
+}
+
 /** @param {Remedy} remedy @returns {Mend[]} */
 function ofRemedy({ edit: fix, offers, sentence, passes }) {
 	const ways = fix.action in GUIDES ? [guide(fix.action, fix.view, fix)] : offered(fix, offers);
@@ -94,13 +112,17 @@ function isSame(a, b) {
 }
 
 /**
- * What would mend a group. What is known at once comes first, so that nothing moves under a finger.
+ * What would mend a group. Proposed lines come first, and the card waits for them (`isHeld`); after them
+ * what is known at once comes before what the solver tries out, so that nothing moves under a finger.
  *
  * @param {GroupDocument} shown @param {SolutionJson | null} solved @param {readonly Remedy[]} helping
+ * @param {ReadonlyMap<string, ViewProposalJson>} proposed
  * @returns {Mend[]}
  */
-function mendsOf(shown, solved, helping) {
-	if (!solved) return [];
+function mendsOf(shown, solved, helping, proposed) {
+	// Without its camera a view says nothing of the ball: that comes before everything else.
+	const lines = proposedLines(shown, proposed);
+	if (!solved) return lines;
 	const missing = missingBalls(shown, solved);
 	const short = solved.first_failing?.gate === 'ball';
 	const found = solved.findings.flatMap((finding) => waysOf(finding).map((way) => ({
@@ -109,7 +131,7 @@ function mendsOf(shown, solved, helping) {
 	})));
 	const known = short ? [...missing, ...found] : [...found, ...missing];
 	const more = helping.flatMap(ofRemedy).filter(({ fix }) => !known.some((mend) => isSame(mend.fix, fix)));
-	return [...known, ...more];
+	return [...lines, ...known, ...more];
 }
 
 /** Everything that would mend the group on screen. */
@@ -117,13 +139,19 @@ export const mends = computed(() => {
 	const shown = group.value;
 	if (!shown) return [];
 	const known = remedies.value?.key.startsWith(`remedies ${shown.id} `) ? remedies.value.items : [];
-	return mendsOf(shown, solution.value, known);
+	return mendsOf(shown, solution.value, known, openProposals.value);
 });
 
 /** Which of them is meant: its place from 0, -1 without any. */
 export const mendIndex = computed(() => Math.min(chosen.value, mends.value.length - 1));
+/** Whether lines may still be proposed that would come first: until that is known the card offers nothing. */
+export const isHeld = computed(() => {
+	const saved = groupDocument.value;
+	if (!saved || settledState.value === stateOf(saved) || waitingViews(saved).length === 0) return false;
+	return ![...openProposals.value.values()].some(({ outcome }) => outcome === 'proposed');
+});
 /** The one that the card shows and Enter carries out. */
-export const mend = computed(() => mends.value[mendIndex.value] ?? null);
+export const mend = computed(() => (isHeld.value ? null : mends.value[mendIndex.value] ?? null));
 
 /** The finding that the card speaks about; null where it speaks of something else. */
 export const toldFinding = computed(() => {
@@ -141,19 +169,22 @@ export function turnMend(step) {
 
 /** Begin with the first one in every group, and after everything that changed it. */
 export function startMends() {
-	let at = { id: 0, etag: '' };
+	let at = { id: 0, etag: '', proposed: 0 };
 	return effect(() => {
 		const { id = 0, etag = '' } = groupDocument.value ?? {};
+		const proposed = [...openProposals.value.values()].filter(({ outcome }) => outcome === 'proposed').length;
 		if (id !== at.id || etag !== at.etag) chosen.value = 0;
+		// They come first and a moment later: who has turned to another one by then keeps it.
+		else if (proposed > at.proposed && chosen.peek() > 0) chosen.value = chosen.peek() + proposed - at.proposed;
 		if (id !== at.id) untracked(focusMeant);
-		at = { id, etag };
+		at = { id, etag, proposed };
 	});
 }
 
 /** Keys speak about the view that the card speaks about, and it is seen whole, whatever was looked at before. */
 function focusMeant() {
 	returnLent();
-	const meant = group.value?.views.find(({ key }) => key === mend.value?.fix.view);
+	const meant = group.value?.views.find(({ key }) => key === mends.value[mendIndex.value]?.fix.view);
 	if (!meant) return;
 	focused.value = meant.letter;
 	fitPanel(meant.letter);

@@ -17,7 +17,13 @@ import { announce, complain, dismiss } from './notice.js';
 export const neighbours = signal(/** @type {(Neighbours & {id: number, q: string}) | null} */ (null));
 
 /** The query that makes the queue, as in the address bar. */
-export const query = computed(() => param('q'));
+export const query = computed(() => (/^\d+$/.test(param('batch')) ? `batch:${param('batch')}` : param('q')));
+
+/** The batch that is walked; null: another queue, or a part of one. */
+export const batchId = computed(() => {
+	const found = /^batch:(\d+)$/.exec(query.value.trim());
+	return found ? Number(found[1]) : null;
+});
 
 /** The group that was last on screen, for the way back to it. */
 export const lastGroup = stored('last-group', 0);
@@ -25,6 +31,11 @@ export const lastGroup = stored('last-group', 0);
 /** @param {number} id @param {string} [q] */
 export function reviewAddress(id, q = query.value) {
 	return address(`/review/${id}`, { q });
+}
+
+/** The history of a group. @param {number} id */
+export function historyAddress(id) {
+	return address(`/review/${id}/history`, { q: query.value });
 }
 
 /** @param {string} dataset @param {string} q */
@@ -72,9 +83,13 @@ export function currentId() {
 	return page.value.page === 'review' ? page.value.group : null;
 }
 
-/** Go to the group after this one; says so, and answers false, when there is none. */
-export function goNext() {
-	return go(1, 'This is the last group of the queue.');
+/**
+ * Go to the group after this one; says so, and answers false, when there is none.
+ *
+ * @param {() => boolean} [stillWanted] asked once it is known which group that is
+ */
+export function goNext(stillWanted) {
+	return go(1, 'This is the last group of the queue.', stillWanted);
 }
 
 /** Go to the group before this one. */
@@ -86,15 +101,16 @@ export function goPrevious() {
  * At once where the queue is known, so that the next key already speaks about the next group;
  * whoever is faster than the answer about a group's neighbours goes on when it is there.
  *
- * @param {1 | -1} step @param {string} otherwise @returns {Promise<boolean>}
+ * @param {1 | -1} step @param {string} otherwise @param {() => boolean} [stillWanted]
+ * @returns {Promise<boolean>}
  */
-async function go(step, otherwise) {
+async function go(step, otherwise, stillWanted = () => true) {
 	const from = currentId();
 	let id = beside(from, step);
 	if (id === undefined && neighbours.value?.id !== from) {
 		await located;
-		// The person has gone somewhere else meanwhile.
-		if (currentId() !== from) return true;
+		// The person has gone somewhere else meanwhile, or has a reason to stay.
+		if (currentId() !== from || !stillWanted()) return true;
 		id = beside(from, step);
 	}
 	if (id === undefined) {

@@ -4,7 +4,7 @@
  * has, so that neither a lost network nor a reload loses one.
  */
 
-import { signal } from '@preact/signals';
+import { computed, signal } from '@preact/signals';
 import { openDB } from 'idb';
 
 import { idempotencyKey } from '../api/client.js';
@@ -31,10 +31,13 @@ import { myName } from './me.js';
  * @property {Verdict | null} verdict
  * @property {Base | null} base what the edit or verdict found
  * @property {string | null} person who made it; null where nobody logs in
+ * @property {string} [barred] why the person may not; it waits until they may, or drop it
  * @property {boolean} held somebody else was first; it waits for the person to choose
  */
 
 const STORE = 'writes';
+/** How long the browser's database may take before a write is sent without it, ms. */
+const PATIENCE = 5000;
 
 /** Those of this tab, in their order. */
 export const outbox = signal(/** @type {Item[]} */ ([]));
@@ -50,6 +53,8 @@ let opened = null;
 function database() {
 	opened ??= openDB('touchline', 1, {
 		upgrade: (db) => { db.createObjectStore(STORE, { keyPath: 'id' }); },
+		// The browser may close it at any time, to make room for instance.
+		terminated: () => { opened = null; },
 	}).catch(() => {
 		lasting.value = false;
 		return null;
@@ -63,12 +68,28 @@ async function inDatabase(work) {
 	if (db) await work(db).catch(() => { lasting.value = false; });
 }
 
+/** Those that are on their way into the database. @type {Map<string, Promise<void>>} */
+const keeping = new Map();
+
+/**
+ * Wait until a write is in the browser's database: one that is sent before it is kept is lost when
+ * the page is loaded anew while it is on its way. A database that takes too long is none.
+ *
+ * @param {Item} item
+ */
+export async function isKept({ id }) {
+	const kept = keeping.get(id);
+	if (!kept || !lasting.value) return;
+	const late = new Promise((done) => { setTimeout(done, PATIENCE, 'late'); });
+	if (await Promise.race([kept, late]) === 'late') lasting.value = false;
+}
+
 /** Put a write last. @param {Omit<Item, 'id' | 'tab' | 'at' | 'person' | 'held'>} write @returns {Item} */
 export function enqueue(write) {
 	const at = performance.timeOrigin + performance.now();
 	const item = { ...write, id: idempotencyKey(), tab, at, person: myName.value, held: false };
 	outbox.value = [...outbox.value, item];
-	inDatabase((db) => db.put(STORE, item));
+	keeping.set(item.id, inDatabase((db) => db.put(STORE, item)).finally(() => keeping.delete(item.id)));
 	return item;
 }
 
@@ -123,6 +144,14 @@ export async function adopt(again) {
 	const adopted = orphans.map((item) => ({ ...item, tab })).sort((a, b) => a.at - b.at);
 	outbox.value = [...adopted, ...outbox.value];
 	await inDatabase((one) => Promise.all(adopted.map((item) => one.put(STORE, item))));
+}
+
+/** Writes that the person may not make any more, or not yet. */
+export const barred = computed(() => outbox.value.filter((item) => item.barred));
+
+/** Try again what somebody was not allowed. */
+export function unbar() {
+	revise((item) => (item.barred ? { ...item, barred: undefined } : item));
 }
 
 /** @param {string} name */

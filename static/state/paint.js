@@ -9,9 +9,10 @@ import { linesOntoPaint, ontoPaint, reachOf } from '../geometry/paint.js';
 import { fixed, plural } from '../lib/format.js';
 import { latest } from '../lib/latest.js';
 import { page } from '../lib/router.js';
-import { changes, lines, staging, stageLines, view } from './calibration.js';
+import { changed, changes, lines, shownSolution, staging, stageLines, view } from './calibration.js';
 import { sameLines } from './line_changes.js';
 import { announce, complain } from './notice.js';
+import { besideDrawn, leavesOpen } from './proposal_lines.js';
 import { proposals } from './proposals.js';
 import { linesOf, PROPOSED } from './staging.js';
 
@@ -124,25 +125,33 @@ export function fetchPaint() {
 	if (at?.image && !isPaintCurrent.value && asking.value === null) ask(at);
 }
 
-/** Stage lines from the paint where there are none. */
+/** Whether the lines as they are staged wait for others: there are none, or they determine no camera. */
+export const isWaiting = computed(() => {
+	const solved = shownSolution.value?.views.find(({ view: key }) => key === view.value?.key);
+	return Object.keys(lines.value).length === 0 || leavesOpen(solved?.calibration);
+});
+
+/** Stage lines from the paint beside those that are there, as long as they determine no camera. */
 export async function proposeFromPaint() {
 	const at = view.value;
 	if (!at || asking.value !== null) return;
-	if (Object.keys(lines.value).length > 0) {
-		announce('Lines are proposed where there are none: this view has some.');
+	if (!isWaiting.value) {
+		announce('Lines are proposed where those of a view determine no camera: this one has a camera.');
 		return;
 	}
 	const known = proposals.peek().get(at.key);
-	if (known?.outcome === 'proposed') {
-		stageProposed(known.lines);
+	if (known?.outcome === 'proposed' && !changed.value) {
+		stageProposed(known);
 		return;
 	}
 	asking.value = 'lines';
+	const before = lines.value;
 	try {
-		const found = await proposeLines(at.id);
-		if (view.value?.id !== at.id || Object.keys(lines.value).length > 0) return;
-		if (found.outcome !== 'proposed') complain(`No lines are proposed. ${found.sentence}`);
-		else stageProposed(found.lines);
+		const found = await proposeLines(at.id, changes.value);
+		if (view.value?.id !== at.id) return;
+		if (!sameLines(before, lines.value)) announce('The lines have changed meanwhile: nothing was proposed.');
+		else if (found.outcome !== 'proposed') complain(`No lines are proposed. ${found.sentence}`);
+		else stageProposed(found);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		complain(`Nothing can be proposed: ${error.message}`);
@@ -151,8 +160,11 @@ export async function proposeFromPaint() {
 	}
 }
 
-/** @param {LinesJson} proposed */
-function stageProposed(proposed) {
-	stageLines(proposed, 'Lines proposed from the paint', PROPOSED);
-	announce(`${plural(Object.keys(proposed).length, 'marking')} proposed: check the sides, then save. Swap sides (M) turns them round.`);
+/** @param {{lines: LinesJson, sentence: string}} proposed */
+function stageProposed({ lines: proposed, sentence }) {
+	const there = Object.keys(lines.value).length > 0;
+	const { all, added } = besideDrawn(lines.value, proposed);
+	stageLines(all, 'Lines proposed from the paint', PROPOSED);
+	const next = there ? 'What was drawn stays; check, then save.' : 'Check the sides, then save. Swap sides (M) turns them round.';
+	announce(`${plural(added.length, 'marking')} proposed. ${sentence ? `${sentence} ` : ''}${next}`);
 }

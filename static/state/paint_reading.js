@@ -2,7 +2,7 @@
 /** Reading the pictures of a group's match again; loaded when somebody asks for it. */
 
 import { readDatasetPaint } from '../api/paint.js';
-import { sentenceOf } from '../lib/resource.js';
+import { sentenceOf } from '../api/problem.js';
 import { follow } from './jobs.js';
 import { announce, complain } from './notice.js';
 

@@ -1,7 +1,7 @@
 // @ts-check
-/** Lines that are proposed for the views of the group on screen; they count for nothing until accepted. */
+/** Lines that are proposed for views of the group on screen; they count for nothing until accepted. */
 
-import { computed, effect, signal, untracked } from '@preact/signals';
+import { batch, computed, effect, signal, untracked } from '@preact/signals';
 
 import { getGroupProposals } from '../api/proposals.js';
 import { ApiError } from '../api/problem.js';
@@ -9,7 +9,7 @@ import { plural } from '../lib/format.js';
 import { page } from '../lib/router.js';
 import { group, groupDocument, submit } from './group.js';
 import { announce, complain } from './notice.js';
-import { bareViews, isBare } from './proposal_lines.js';
+import { areNew, openProposals, settledState, stateOf, waitingViews, waitsForLines } from './proposal_lines.js';
 import { focused, overlaysHidden } from './workspace.js';
 
 /** @import {ViewProposalJson} from '../api/proposals.js' */
@@ -21,32 +21,35 @@ const PAGES = ['review', 'calibration'];
 
 const answered = signal(/** @type {{group: number, items: ViewProposalJson[]} | null} */ (null));
 
-/** What is proposed for views of the group on screen that have no lines, by key of the view. */
+/** What is proposed for views of the group on screen that have no camera, by key of the view. */
 export const proposals = computed(() => {
-	const [at, known] = [group.value, answered.value];
-	if (!at || known?.group !== at.id) return new Map();
-	const bare = new Set(at.views.filter(isBare).map(({ id }) => id));
-	return new Map(/** @type {[string, ViewProposalJson][]} */ (known.items.filter(({ view }) => bare.has(view)).map((item) => [item.key, item])));
+	const [at, saved, known] = [group.value, groupDocument.value, answered.value];
+	if (!at || !saved || known?.group !== at.id) return new Map();
+	const waiting = new Map(at.views.filter((view) => waitsForLines(view, saved.solution)).map((view) => [view.id, view.lines]));
+	const items = known.items.filter(({ open, view, lines }) => open && waiting.has(view) && areNew(waiting.get(view) ?? {}, lines));
+	return new Map(/** @type {[string, ViewProposalJson][]} */ (items.map((item) => [item.key, item])));
 });
 
 /** @type {ReturnType<typeof setTimeout> | undefined} */
 let timer;
 let controller = new AbortController();
 
-/** Ask about groups with views without lines, for as long as a page shows them. @returns {() => void} */
+/** Ask about groups with views without a camera, for as long as a page shows them. @returns {() => void} */
 export function followProposals() {
+	// Which proposals are open depends on the lines: every state is asked about.
 	const wanted = computed(() => {
 		const at = groupDocument.value;
-		return at && PAGES.includes(page.value.page) && bareViews(at).length > 0 ? at.id : null;
+		return at && PAGES.includes(page.value.page) && waitingViews(at).length > 0 ? stateOf(at) : null;
 	});
 	const stop = effect(() => {
-		const id = wanted.value;
+		const state = wanted.value;
 		untracked(() => {
 			leave();
-			if (id !== null) timer = setTimeout(ask, PAUSE, id, controller.signal);
+			if (state !== null) timer = setTimeout(ask, PAUSE, state, controller.signal);
 		});
 	});
-	return () => { stop(); leave(); };
+	const show = effect(() => { openProposals.value = proposals.value; });
+	return () => { stop(); show(); leave(); openProposals.value = new Map(); };
 }
 
 function leave() {
@@ -55,27 +58,43 @@ function leave() {
 	controller = new AbortController();
 }
 
-/** @param {number} id @param {AbortSignal} abort */
-async function ask(id, abort) {
+/** @param {string} state @param {AbortSignal} abort */
+async function ask(state, abort) {
+	const id = parseInt(state, 10);
 	try {
 		const { items } = await getGroupProposals(id, abort);
-		if (!abort.aborted) answered.value = { group: id, items };
+		if (abort.aborted) return;
+		batch(() => {
+			answered.value = { group: id, items };
+			settledState.value = state;
+		});
 	} catch (error) {
 		// The server is away, or another group came: the group can be worked on without.
-		if (!abort.aborted && !(error instanceof ApiError)) throw error;
+		if (abort.aborted) return;
+		settledState.value = state;
+		if (!(error instanceof ApiError)) throw error;
 	}
 }
 
-/** Make the proposed lines of a view its lines. @param {ViewJson} view */
+/** Why there is no proposal for a view. @param {ViewJson} view */
+function whyNone(view) {
+	if (!waitsForLines(view, groupDocument.value?.solution ?? null)) return `View ${view.letter} has a camera already.`;
+	const looked = `Nothing was proposed for view ${view.letter} yet: Statistics has the button that looks.`;
+	return view.station.shared ? `${looked} Of a static camera the first view with a picture has the proposal, maybe in another group.` : looked;
+}
+
+/** Add the proposed lines of a view to its lines. @param {ViewJson} view */
 export function acceptProposal(view) {
 	const item = proposals.peek().get(view.key);
-	if (!item) announce(isBare(view) ? `Nothing was proposed for view ${view.letter} yet: Statistics has the button that looks.` : `View ${view.letter} has lines already.`);
+	if (!item) announce(whyNone(view));
 	else if (item.outcome !== 'proposed') complain(`No lines are proposed for view ${view.letter}. ${item.sentence}`);
 	else if (overlaysHidden.value) complain('What is proposed is hidden. H shows what you would accept.');
 	else {
 		const names = Object.keys(item.lines);
 		submit({ kind: 'lines', view: view.key, lines: item.lines, proposed: names });
-		announce(`${plural(names.length, 'marking')} of view ${view.letter} accepted as proposed. Undo takes them back; M swaps the sides.`);
+		const drawn = Object.keys(view.lines).length;
+		const beside = drawn ? `, beside the ${plural(drawn, 'marking')} that ${drawn === 1 ? 'is' : 'are'} drawn` : '';
+		announce(`${plural(names.length, 'marking')} of view ${view.letter} accepted as proposed${beside}. Undo takes them back; M swaps the sides.`);
 	}
 }
 

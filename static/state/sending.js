@@ -5,8 +5,8 @@ import { computed, effect, signal, untracked } from '@preact/signals';
 
 import { getGroup, requestTagged } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
-import { mustLogIn } from './me.js';
-import { adopt, claimTab, outbox } from './outbox.js';
+import { isTeam, me, mustLogIn } from './me.js';
+import { adopt, claimTab, isKept, outbox, revise, unbar } from './outbox.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
 /** @import {Item} from './outbox.js' */
@@ -32,7 +32,7 @@ export const savedAt = signal(/** @type {number | null} */ (null));
 export const wasRefused = signal(false);
 
 /** Writes that wait for the server, and not for the person. */
-export const waiting = computed(() => outbox.value.filter(({ held }) => !held));
+export const waiting = computed(() => outbox.value.filter(({ held, barred }) => !held && !barred));
 
 /** @type {Receiver} */
 let receiver = { delivered: () => {}, refused: () => {} };
@@ -51,6 +51,8 @@ export function startSending() {
 	addEventListener('online', takeUp);
 	// Whoever logs in again finds their writes sent.
 	effect(() => { if (!mustLogIn.value) untracked(wake); });
+	// Other rights: what they bar now is barred again.
+	effect(() => { if (me.value) untracked(tryBarred); });
 	takeUp();
 }
 
@@ -68,7 +70,9 @@ export async function wake() {
 	isSending.value = true;
 	try {
 		for (let next = waiting.value[0]; next; next = waiting.value[0]) {
-			if (!(await send(next))) break;
+			await isKept(next);
+			// Meanwhile it may have been taken back, or changed.
+			if (waiting.value[0] === next && !(await send(next))) break;
 		}
 	} finally {
 		isSending.value = false;
@@ -90,8 +94,15 @@ async function send({ id, path, method, body, etag, ...rest }) {
 		return true;
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
-		// It waits for whoever logs in again; the page asks them to.
-		if (error.status === 401) return false;
+		// It waits for whoever logs in again; the page asks them to. Who has done so meanwhile is not asked once more.
+		if (error.status === 401) {
+			if (!mustLogIn.value) timer = setTimeout(wake, FIRST_RETRY);
+			return false;
+		}
+		if (isTeam && (error.status === 403 || error.status === 404)) {
+			bar(item, error);
+			return true;
+		}
 		if (AWAY.has(error.status)) {
 			tryLater();
 			return false;
@@ -101,6 +112,19 @@ async function send({ id, path, method, body, etag, ...rest }) {
 		receiver.refused(item, error);
 		return true;
 	}
+}
+
+/** Keep what somebody may not do, and what they said on top of it. @param {Item} item @param {ApiError} error */
+function bar({ group }, error) {
+	isAway.value = false;
+	wasRefused.value = true;
+	revise((other) => (other.group === group && !other.held ? { ...other, barred: error.message } : other));
+}
+
+/** Send what somebody was not allowed, for they may now. */
+export function tryBarred() {
+	unbar();
+	wake();
 }
 
 function tryLater() {

@@ -56,8 +56,11 @@ export function changesOf(staging) {
 export const PROPOSED = 'proposed';
 
 /** The lines as they were proposed, where a step in force has staged such. @param {Staging} staging @returns {LinesJson} */
-export function proposedLines({ steps, at }) {
-	return steps.slice(0, at).findLast(({ run }) => run === PROPOSED)?.lines ?? {};
+export function proposedLines({ base, steps, at }) {
+	const last = steps.slice(0, at).findLastIndex(({ run }) => run === PROPOSED);
+	if (last < 0) return {};
+	const before = last > 0 ? steps[last - 1].lines : base;
+	return Object.fromEntries(Object.entries(steps[last].lines).filter(([marking]) => !(marking in before)));
 }
 
 /**

@@ -7,10 +7,13 @@ import { navigate } from '../lib/router.js';
 import { doubt } from './advice.js';
 import { conflict } from './conflict.js';
 import { group, groupDocument, onRefused, open, settle, submit, submitVerdict } from './group.js';
+import { frozen } from './hand_back.js';
 import { actions, did, didAgain, forget, tookBack } from './last_action.js';
-import { currentId, goNext, query, queueAddress, reviewAddress } from './navigation.js';
+import { batchId, currentId, goNext, query, queueAddress, reviewAddress } from './navigation.js';
+import { isMoving, nextOfBatch } from './leases.js';
 import { announce, complain, inform } from './notice.js';
 import { reasonText } from './reasons.js';
+import { refuses } from './rights.js';
 import { asking, focused } from './workspace.js';
 
 /** @import {VerdictDone} from './last_action.js' */
@@ -104,7 +107,13 @@ export function cancelAsking() {
 /** @param {string} state @param {string | null} reason @param {string | null} note */
 function decide(state, reason, note) {
 	const group = groupDocument.value;
-	if (!group) return;
+	if (!group || isMoving.value) return;
+	if (refuses('review', group.dataset.name)) return;
+	if (frozen.value) {
+		asking.value = null;
+		complain(frozen.value);
+		return;
+	}
 	if (conflict.value) {
 		announce('First choose whose edit counts.');
 		return;
@@ -122,9 +131,17 @@ function decide(state, reason, note) {
 	leave(group.dataset.name);
 }
 
+/** Verdicts that the server has refused. */
+let refusals = 0;
+
 /** On to the next group, or back to the queue when that was the last one. @param {string} dataset */
 async function leave(dataset) {
-	if (await goNext()) return;
+	const before = refusals;
+	if (batchId.value !== null) {
+		await nextOfBatch(() => refusals === before);
+		return;
+	}
+	if (await goNext(() => refusals === before)) return;
 	inform('That was the last group of this queue.', {
 		label: 'Back to the queue', run: () => navigate(queueAddress(dataset, query.value)),
 	});
@@ -133,7 +150,7 @@ async function leave(dataset) {
 /** Keep a note with the verdict that the group has; the group stays on screen. @param {string} text */
 export function addNote(text) {
 	const present = group.value?.verdict;
-	if (!present) return;
+	if (!present || refuses('review', group.value?.dataset.name)) return;
 	asking.value = null;
 	const note = [present.note, text].filter(Boolean).join('\n').slice(0, MAX_NOTE);
 	submitVerdict({ state: present.state, reason: present.reason, note });
@@ -170,6 +187,7 @@ export async function giveVerdictAgain(action) {
 // A verdict that was refused brings its group back to the screen; the notice says why.
 onRefused(({ verdict, group: id }) => {
 	if (!verdict) return;
+	refusals += 1;
 	const given = actions.value.findLast((action) => action.kind === 'verdict' && action.group === id);
 	if (given) forget(given);
 	if (currentId() !== id) navigate(reviewAddress(id));

@@ -1,7 +1,7 @@
 // @ts-check
 /** Other thresholds tried out: what they would let through, as fast as they are moved. */
 
-import { useEffect, useMemo, useState } from 'preact/hooks';
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 
 import { askYield } from '../api/policies.js';
 import { ApiError } from '../api/problem.js';
@@ -11,6 +11,8 @@ import { latest } from '../lib/latest.js';
 
 /** One frame: the newest position of a slider is asked for, the ones before it are not. */
 const PAUSE = 16;
+/** Milliseconds until it is asked again where the groups are still being counted. */
+const GATHERING = 2000;
 
 /**
  * The yield of the thresholds that are on screen; the last answer stays until the next.
@@ -21,6 +23,7 @@ const PAUSE = 16;
  */
 export function useWhatIf(dataset, values, hash) {
 	const [state, setState] = useState(/** @type {{answer: YieldJson | null, error: ApiError | null}} */ ({ answer: null, error: null }));
+	const again = useRef(/** @type {ReturnType<typeof setTimeout> | undefined} */ (undefined));
 	const asking = useMemo(() => latest(PAUSE, async (/** @type {Values} */ asked, signal) => {
 		try {
 			const answer = await askYield(dataset, asked, signal);
@@ -29,9 +32,11 @@ export function useWhatIf(dataset, values, hash) {
 			if (signal.aborted) return;
 			if (!(error instanceof ApiError)) throw error;
 			setState((before) => ({ ...before, error }));
+			// So many groups have changed that they are counted first; the sentence says how far it is.
+			if (error.status === 503) again.current = setTimeout(() => asking.run(asked), GATHERING);
 		}
 	}), [dataset]);
-	useEffect(() => { asking.run(values); }, [asking, values, hash]);
-	useEffect(() => () => asking.cancel(), [asking]);
+	useEffect(() => { clearTimeout(again.current); asking.run(values); }, [asking, values, hash]);
+	useEffect(() => () => { clearTimeout(again.current); asking.cancel(); }, [asking]);
 	return state;
 }

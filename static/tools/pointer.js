@@ -128,20 +128,14 @@ export function attachPointer(element, panel) {
 		gesture = null;
 	}
 
-	element.addEventListener('pointerdown', down);
-	element.addEventListener('pointermove', move);
-	element.addEventListener('pointerup', up);
-	element.addEventListener('pointercancel', lost);
-	element.addEventListener('pointerleave', left);
-	element.addEventListener('wheel', wheel, { passive: false });
-	addEventListener('keydown', key, true);
-	return () => {
-		element.removeEventListener('pointerdown', down);
-		element.removeEventListener('pointermove', move);
-		element.removeEventListener('pointerup', up);
-		element.removeEventListener('pointercancel', lost);
-		element.removeEventListener('pointerleave', left);
-		element.removeEventListener('wheel', wheel);
-		removeEventListener('keydown', key, true);
-	};
+	const attached = new AbortController();
+	const { signal } = attached;
+	element.addEventListener('pointerdown', down, { signal });
+	element.addEventListener('pointermove', move, { signal });
+	element.addEventListener('pointerup', up, { signal });
+	element.addEventListener('pointercancel', lost, { signal });
+	element.addEventListener('pointerleave', left, { signal });
+	element.addEventListener('wheel', wheel, { passive: false, signal });
+	addEventListener('keydown', key, { capture: true, signal });
+	return () => attached.abort();
 }

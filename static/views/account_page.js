@@ -1,17 +1,24 @@
 // @ts-check
-/** One's own account: where one is logged in, and the password. */
+/** One's own account: where one is logged in, the password, the second factor, passkeys, and tokens for scripts. */
 
 import { html } from 'htm/preact';
 import { useEffect, useState } from 'preact/hooks';
 
 import { endSession, getSessions, putPassword } from '../api/people.js';
 import { ApiError } from '../api/problem.js';
+import { getOwnWays } from '../api/sign_on.js';
 import { logOut, me } from '../state/me.js';
-import { FormError, useSessionForm } from './login.js';
+import { FormError } from './form_error.js';
+import { useSessionForm } from './login.js';
 import { Loading, PageFrame, Trouble } from './page_frame.js';
+import { PasskeysCard } from './passkeys_card.js';
+import { SecondFactorCard } from './second_factor.js';
+import { TokenCard } from './token_card.js';
+import { IdentityCard } from './identity_card.js';
 import { When } from './when.js';
 
 /** @import {OpenSessionJson} from '../api/people.js' */
+/** @import {OwnWaysJson} from '../api/sign_on.js' */
 
 /** The browser and the system of a session, as far as they say. @param {string} text */
 function browserOf(text) {
@@ -29,7 +36,7 @@ function SessionRow({ one, end }) {
 			<th scope="row">${browserOf(one.browser)}${one.this ? html` <strong>(this one)</strong>` : null}<small>${one.address}</small></th>
 			<td><${When} at=${one.created} /></td>
 			<td><${When} at=${one.seen} /></td>
-			<td class="table__actions">${one.this ? null : html`<button class="button button--small" type="button" onClick=${() => end(one.id)}>End</button>`}</td>
+			<td><span class="table__actions">${one.this ? null : html`<button class="button button--small" type="button" onClick=${() => end(one.id)}>End</button>`}</span></td>
 		</tr>
 	`;
 }
@@ -61,7 +68,9 @@ function PasswordForm({ changed }) {
 export function AccountPage() {
 	const [sessions, setSessions] = useState(/** @type {OpenSessionJson[] | null} */ (null));
 	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
-	const read = () => getSessions().then(({ items }) => { setSessions(items); setError(null); }, setError);
+	const [factors, setFactors] = useState(0);
+	const [ways, setWays] = useState(/** @type {OwnWaysJson | null} */ (null));
+	const read = () => Promise.all([getSessions(), getOwnWays()]).then(([{ items }, own]) => { setSessions(items); setWays(own); setError(null); }, setError);
 	useEffect(() => { read(); }, []);
 	/** @param {number | null} id */
 	const end = (id) => { endSession(id).then(read, setError); };
@@ -71,7 +80,7 @@ export function AccountPage() {
 		>
 			${error ? html`<${Trouble} title="The account cannot be shown" error=${error} retry=${read} />` : null}
 			${!sessions && !error ? html`<${Loading} what="sessions" />` : null}
-			${sessions ? html`
+			${sessions && ways ? html`
 				<div class="page__columns">
 					<section class="card card--flush" aria-labelledby="account-sessions">
 						<h2 id="account-sessions">Where ${me.value?.name} (${me.value?.role}) is logged in</h2>
@@ -81,8 +90,12 @@ export function AccountPage() {
 						</table>
 						${sessions.length > 1 ? html`<p class="buttons"><button class="button" type="button" onClick=${() => end(null)}>End all others</button></p>` : null}
 					</section>
-					<${PasswordForm} changed=${read} />
-				</div>` : null}
+					<${IdentityCard} ways=${ways} changed=${read} />
+					${ways.password && !ways.only ? html`<${PasswordForm} changed=${read} />` : null}
+					<${SecondFactorCard} changed=${read} again=${factors} />
+					<${PasskeysCard} changed=${() => { read(); setFactors(factors + 1); }} />
+				</div>
+				<${TokenCard} />` : null}
 		<//>
 	`;
 }

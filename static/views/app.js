@@ -4,15 +4,17 @@
 import { html } from 'htm/preact';
 import { useEffect } from 'preact/hooks';
 
+import { loggedOut } from '../api/client.js';
 import { useKeys } from '../lib/hooks.js';
 import { lazy } from '../lib/lazy.js';
 import { page } from '../lib/router.js';
-import { me, mustLogIn } from '../state/me.js';
+import { isTeam, me, mustLogIn } from '../state/me.js';
 import { openPalette, paletteOpen } from '../state/palette.js';
 import { helpOpen, openHelp } from '../state/workspace.js';
 import { Announcer } from './bars.js';
 import { Header } from './header.js';
 import { LazyPage, loadPage } from './lazy_page.js';
+import { openBell } from './talk/bell_button.js';
 import { LoginAgain, LoginPage } from './login.js';
 import { ReviewPage } from './review_page.js';
 import { explainTerms } from './term.js';
@@ -24,11 +26,13 @@ const FETCH_AHEAD_AFTER = 1500;
 const GLOBAL_KEYS = [
 	{ keys: ['?', 'Shift+?'], label: 'Help: keys, legend, words, guide, practice', group: 'Everywhere', shown: '?', run: openHelp },
 	{ keys: ['Ctrl+k'], label: 'Go to a page, dataset, group or action', group: 'Everywhere', typing: true, run: openPalette },
+	{ keys: ['Shift+b'], label: 'What you are told', group: 'Everywhere', when: () => isTeam, run: openBell },
 	// Pages with a search field of their own bind it to that.
 	{ keys: ['/'], label: 'Search', group: 'Everywhere', run: openPalette },
 ];
 
-const Help = lazy(async () => (await import('./help.js')).Help);
+const Help = lazy(async () => (await import('./help/help_dialog.js')).Help);
+const EnrolPage = lazy(async () => (await import('./enrol_page.js')).EnrolPage);
 const Palette = lazy(async () => (await import('./palette.js')).Palette);
 
 function UnknownPage() {
@@ -55,7 +59,7 @@ function Page() {
 /** What is one key away is fetched once the first screen stands. */
 function fetchAhead() {
 	Promise.all([
-		import('./palette.js'), import('./help.js'), import('./loupe.js'),
+		import('./palette.js'), import('./help/help_dialog.js'), import('./loupe.js'),
 		import('./adjust_popover.js'), import('./conflict_bar.js'), loadPage('queue'),
 	]).catch(() => {
 		// It is asked for again, and complained about, when somebody goes there.
@@ -63,7 +67,11 @@ function fetchAhead() {
 }
 
 export function App() {
-	if (mustLogIn.value && me.value === null && page.value.page !== 'join') return html`<${LoginPage} />`;
+	const { page: name } = page.value;
+	// The way back from the provider, whoever is there.
+	if (name === 'login') return html`<${LazyPage} key="login" name="login" />`;
+	if (mustLogIn.value && me.value === null && name !== 'join') return html`<${LoginPage} />`;
+	if (me.value?.enrol && !loggedOut.value) return html`<${EnrolPage} />`;
 	return html`<${Everything} />${mustLogIn.value && me.value ? html`<${LoginAgain} />` : null}`;
 }
 

@@ -3,9 +3,29 @@
 
 import { html } from 'htm/preact';
 
+import { plural } from '../lib/format.js';
 import { announced, dismiss, notice } from '../state/notice.js';
+import { barred, discard } from '../state/outbox.js';
+import { tryBarred } from '../state/sending.js';
+
+/** What waits here because the person may not do it. */
+function BarredBar() {
+	const waiting = barred.value;
+	if (waiting.length === 0) return null;
+	return html`
+		<div class="bar" data-tone="bad" role="alert">
+			<p>${plural(waiting.length, 'change')} of yours ${waiting.length === 1 ? 'waits' : 'wait'} here: ${waiting[0].barred}. ${waiting.length === 1 ? 'It is' : 'They are'} sent when you may.</p>
+			<button class="button" type="button" onClick=${tryBarred}>Try again</button>
+			<button class="button" type="button" onClick=${() => discard((item) => Boolean(item.barred))}>Drop ${waiting.length === 1 ? 'it' : 'them'}</button>
+		</div>
+	`;
+}
 
 export function NoticeBar() {
+	return html`<${BarredBar} /><${Notice} />`;
+}
+
+function Notice() {
 	const present = notice.value;
 	if (!present) return null;
 	const { text, tone, action } = present;

@@ -4,9 +4,10 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
+import { sentenceOf } from '../api/problem.js';
 import { postVerdicts, previewVerdicts } from '../api/queue.js';
 import { count, plural, words } from '../lib/format.js';
-import { sentenceOf, useResource } from '../lib/resource.js';
+import { useResource } from '../lib/resource.js';
 import { reviewAddress } from '../state/navigation.js';
 import { readAgain, tellBatch } from '../state/queue_batches.js';
 import { clearTicks } from '../state/queue_ticks.js';

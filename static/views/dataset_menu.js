@@ -7,6 +7,7 @@ import { useRef, useState } from 'preact/hooks';
 import { count } from '../lib/format.js';
 import { datasets, loadDatasets, useDataset } from '../state/datasets.js';
 import { isTeam, may } from '../state/me.js';
+import { whyNot } from '../state/rights.js';
 import { queueAddress } from '../state/navigation.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
@@ -17,10 +18,12 @@ export const DATASET_PAGES = [
 	{ name: 'policy', label: 'Policy' },
 	{ name: 'statistics', label: 'Statistics' },
 	{ name: 'versions', label: 'Versions' },
+	{ name: 'agreement', label: 'Agreement' },
 	{ name: 'evaluation', label: 'Evaluation' },
 ];
 
 const PLAIN_PAGES = [
+	{ name: 'work', label: 'My work', href: '/work' },
 	{ name: 'datasets', label: 'Datasets', href: '/datasets' },
 	{ name: 'import', label: 'Import', href: '/import' },
 	{ name: 'jobs', label: 'Jobs', href: '/jobs' },
@@ -35,7 +38,8 @@ const TEAM_PAGES = /** @type {const} */ ([
 
 /** Pages that belong to no dataset, for whoever is there. */
 export function plainPages() {
-	return [...PLAIN_PAGES, ...(isTeam ? TEAM_PAGES.filter(({ action }) => may(action)) : [])];
+	const audit = whyNot('lead') === '' ? [{ name: 'audit', label: 'Audit', href: '/audit' }] : [];
+	return [...PLAIN_PAGES, ...audit, ...(isTeam ? TEAM_PAGES.filter(({ action }) => may(action)) : [])];
 }
 
 /** The address of a page of a dataset. @param {string} dataset @param {string} page */

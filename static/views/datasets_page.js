@@ -5,6 +5,8 @@ import { html } from 'htm/preact';
 import { useEffect, useState } from 'preact/hooks';
 
 import { plural } from '../lib/format.js';
+import { isTeam } from '../state/me.js';
+import { whyNot } from '../state/rights.js';
 import { datasets, failure, loadDatasets } from '../state/datasets.js';
 import { DATASET_PAGES, pageAddress } from './dataset_menu.js';
 import { DeleteDataset } from './delete_dataset.js';
@@ -26,11 +28,12 @@ function DatasetCard({ one, ask }) {
 				</div>
 				<${ProgressLine} progress=${one} />
 				<div class="buttons">
-					<button class="button" type="button" onClick=${() => ask('export')}>Export…</button>
-					<button class="button button--danger" type="button" onClick=${() => ask('delete')}>Delete…</button>
+					<button data-needs="review" data-of=${one.name} class="button" type="button" onClick=${() => ask('export')}>Export…</button>
+					<button data-needs="administer" data-of=${one.name} class="button button--danger" type="button" onClick=${() => ask('delete')}>Delete…</button>
 				</div>
 				<nav class="dataset-card__links" aria-label=${`Pages of ${one.name}`}>
 					${DATASET_PAGES.map((page) => html`<a key=${page.name} href=${pageAddress(one.name, page.name)}>${page.label}</a>`)}
+					${isTeam && whyNot('lead', one.name) === '' ? html`<a href=${pageAddress(one.name, 'statistics')}>Who works here</a>` : null}
 				</nav>
 			</section>
 		</li>
@@ -38,6 +41,14 @@ function DatasetCard({ one, ask }) {
 }
 
 function NoDatasets() {
+	if (isTeam && whyNot('lead')) {
+		return html`
+			<section class="card empty">
+				<h2>No dataset that you may see</h2>
+				<p>A lead of a dataset, or an admin, gives you a role in it.</p>
+			</section>
+		`;
+	}
 	return html`
 		<section class="card empty">
 			<h2>No dataset yet</h2>

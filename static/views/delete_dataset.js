@@ -5,41 +5,38 @@ import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
 import { deleteDataset, previewDeletion } from '../api/datasets.js';
+import { useAttempt } from '../lib/attempt.js';
 import { count, words } from '../lib/format.js';
-import { sentenceOf, useResource } from '../lib/resource.js';
+import { useResource } from '../lib/resource.js';
 import { loadDatasets } from '../state/datasets.js';
 import { announce } from '../state/notice.js';
 import { FormDialog } from './dialog.js';
+import { FormError } from './form_error.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
 
 /** @param {{one: DatasetJson, onClose: () => void}} props */
 export function DeleteDataset({ one, onClose }) {
 	const [typed, setTyped] = useState('');
-	const [state, setState] = useState({ busy: false, error: '' });
+	const { error, busy, attempt } = useAttempt();
 	const preview = useResource((signal) => previewDeletion(one.id, signal), [one.id]);
 	const counts = Object.entries(preview.value?.counts ?? {}).filter(([, n]) => n > 0);
 	const meant = typed === one.name;
-	async function send() {
-		if (!meant || state.busy) return;
-		setState({ busy: true, error: '' });
-		try {
-			await deleteDataset(one.id, typed);
-			await loadDatasets();
+	function send() {
+		if (!meant || busy) return;
+		attempt(deleteDataset(one.id, typed).then(loadDatasets), () => {
 			announce(`Dataset ${one.name} is deleted.`);
 			onClose();
-		} catch (error) {
-			setState({ busy: false, error: sentenceOf(error) });
-		}
+		});
 	}
 	return html`
 		<${FormDialog}
 			title=${`Delete ${one.name}?`} onClose=${onClose} onSubmit=${send}
 			buttons=${html`
 				<button
-					class="button button--danger" type="submit" aria-disabled=${!meant || state.busy}
+					class="button button--danger" type="submit" aria-disabled=${!meant || busy}
 					title=${meant ? '' : 'Type the name of the dataset first'}
-				>${state.busy ? 'Deleting…' : 'Delete for good'}</button>`}
+				>${busy ? 'Deleting…' : 'Delete for good'}</button>`}
 		>
 			<p><strong>${one.name}</strong> goes with every edit, verdict, frozen version, prediction and evaluation. Frames on disk stay. This cannot be undone.</p>
 			${counts.length ? html`<dl class="number-list">${counts.map(([name, n]) => html`<div key=${name}><dt>${words(name)}</dt><dd>${count(n)}</dd></div>`)}</dl>` : null}
@@ -50,7 +47,7 @@ export function DeleteDataset({ one, onClose }) {
 					onInput=${(/** @type {InputEvent} */ event) => setTyped(/** @type {HTMLInputElement} */ (event.target).value)}
 				/>
 			</div>
-			${state.error ? html`<p class="form__error" role="alert">${state.error}</p>` : null}
+			${error ? html`<${FormError} error=${error} />` : null}
 		<//>
 	`;
 }

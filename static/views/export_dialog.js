@@ -123,7 +123,7 @@ export function ExportButton() {
 	const one = dataset.value;
 	if (!one) return null;
 	return html`
-		<button class="button" type="button" onClick=${() => setOpen(true)}>Export…</button>
+		<button data-needs="review" class="button" type="button" onClick=${() => setOpen(true)}>Export…</button>
 		${open ? html`<${ExportDialog} one=${one} onClose=${() => setOpen(false)} />` : null}
 	`;
 }

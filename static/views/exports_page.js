@@ -6,11 +6,13 @@ import { useEffect, useState } from 'preact/hooks';
 
 import { listen } from '../api/events.js';
 import { deleteExport, getExports } from '../api/exports.js';
+import { useAttempt } from '../lib/attempt.js';
 import { count, plural, words } from '../lib/format.js';
-import { sentenceOf, useResource } from '../lib/resource.js';
+import { useResource } from '../lib/resource.js';
 import { dataset, loadDatasets } from '../state/datasets.js';
 import { isOver } from '../state/jobs.js';
 import { ExportDialog } from './export_dialog.js';
+import { FormError } from './form_error.js';
 import { Loading, PageFrame, Trouble } from './page_frame.js';
 import { sizeText } from './source_choice.js';
 import { When } from './when.js';
@@ -41,7 +43,7 @@ function Row({ row, remove }) {
 			<td><${When} at=${row.created} /></td>
 			<td><span class="table__actions">
 				${row.content ? html`<a class="button button--small" href=${row.content} download>Download<span class="hidden-text"> export ${row.id}</span></a>` : null}
-				${open ? html`<a class="button button--small" href="/jobs">Job<span class="hidden-text"> of export ${row.id}</span></a>` : ['ready', 'failed', 'cancelled'].includes(row.status) ? html`<button class="button button--small" type="button" onClick=${remove}>Delete<span class="hidden-text"> export ${row.id}</span></button>` : null}
+				${open ? html`<a class="button button--small" href="/jobs">Job<span class="hidden-text"> of export ${row.id}</span></a>` : ['ready', 'failed', 'cancelled'].includes(row.status) ? html`<button class="button button--small" type="button" data-needs="lead" data-of=${row.request.dataset} onClick=${remove}>Delete<span class="hidden-text"> export ${row.id}</span></button>` : null}
 			</span></td>
 		</tr>
 	`;
@@ -50,31 +52,23 @@ function Row({ row, remove }) {
 export function ExportsPage() {
 	const exports = useResource((signal) => getExports({ limit: 100 }, signal), []);
 	const [asking, setAsking] = useState(false);
-	const [problem, setProblem] = useState('');
+	const { error, attempt } = useAttempt();
 	const one = dataset.value;
 	useEffect(() => {
 		loadDatasets();
 		return listen('job', (/** @type {JobJson} */ job) => { if (job.kind === 'export' && (isOver(job) || job.done === 0)) exports.reload(); }, () => exports.reload());
 	}, []);
 	/** @param {ExportRow} row */
-	async function remove(row) {
-		try {
-			await deleteExport(row.id);
-			setProblem('');
-			exports.reload();
-		} catch (error) {
-			setProblem(sentenceOf(error));
-		}
-	}
+	const remove = (row) => attempt(deleteExport(row.id), exports.reload);
 	const items = exports.value?.items ?? [];
 	return html`
 		<${PageFrame}
 			current="exports" title="Exports" where=${html`<strong>Exports</strong>`}
-			actions=${one ? html`<button class="button button--primary" type="button" onClick=${() => setAsking(true)}>Export ${one.name}…</button>` : null}
+			actions=${one ? html`<button data-needs="review" class="button button--primary" type="button" onClick=${() => setAsking(true)}>Export ${one.name}…</button>` : null}
 		>
 			${exports.error ? html`<${Trouble} title="The exports cannot be shown" error=${exports.error} retry=${exports.reload} />` : null}
 			${!exports.value && !exports.error ? html`<${Loading} what="exports" />` : null}
-			${problem ? html`<p class="card form__error" role="alert">${problem}</p>` : null}
+			${error ? html`<${FormError} error=${error} card=${true} />` : null}
 			${exports.value && items.length === 0 ? html`<section class="card empty"><h2>No export yet</h2><p>An export is a zip with a manifest: what is in it, by which policy, with the digest of each file.</p></section>` : null}
 			${items.length ? html`
 				<section class="card card--flush" aria-label="Exports">

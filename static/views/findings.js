@@ -27,7 +27,7 @@ function Finding({ group, finding }) {
 			${finding.kind === 'pitch_size' ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
 			${offered.length === 0 ? null : html`
 				<p class="finding__fixes">
-					${offered.map((mend) => html`<button type="button" class="button button--fix" onClick=${() => carryOut(mend)}>${mend.label}</button>`)}
+					${offered.map((mend) => html`<button type="button" data-needs="annotate" class="button button--fix" onClick=${() => carryOut(mend)}>${mend.label}</button>`)}
 				</p>`}
 		</li>
 	`;

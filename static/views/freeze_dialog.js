@@ -4,9 +4,10 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
+import { sentenceOf } from '../api/problem.js';
 import { postVersion, previewFreeze } from '../api/versions.js';
 import { count, words } from '../lib/format.js';
-import { sentenceOf, useResource } from '../lib/resource.js';
+import { useResource } from '../lib/resource.js';
 import { follow } from '../state/jobs.js';
 import { FormDialog } from './dialog.js';
 import { JobProgress } from './job_progress.js';

@@ -55,7 +55,7 @@ function RemedyRow({ group, remedy }) {
 	return html`
 		<li class="remedy" data-passes=${remedy.passes}>
 			<button class="remedy__sentence" type="button" title="Show what this is about" onClick=${() => show(group, remedy.fix)}>${remedy.sentence}</button>
-			<button class="button button--fix" type="button" onClick=${() => carryOut(remedy)}>${remedy.label}</button>
+			<button data-needs="annotate" class="button button--fix" type="button" onClick=${() => carryOut(remedy)}>${remedy.label}</button>
 		</li>
 	`;
 }

@@ -8,6 +8,7 @@ import { groupDocument } from '../state/group.js';
 import { myName } from '../state/me.js';
 import { lastGroup, query, queueAddress, reviewAddress } from '../state/navigation.js';
 import { openHelp } from '../state/workspace.js';
+import { BellButton } from './talk/bell_button.js';
 import { DatasetMenu, pageAddress } from './dataset_menu.js';
 
 /** @import {ComponentChildren} from 'preact' */
@@ -37,16 +38,17 @@ function Navigation({ current, name }) {
 	`;
 }
 
-/** @param {{current: string, children?: ComponentChildren}} props `current` names the page */
-export function Header({ current, children }) {
+/** @param {{current: string, of?: string, children?: ComponentChildren}} props `current` names the page, `of` its dataset where the address does not */
+export function Header({ current, of, children }) {
 	const group = current === 'review' || current === 'calibration' ? groupDocument.value : null;
-	const name = group?.dataset.name ?? dataset.value?.name ?? '';
+	const name = group?.dataset.name ?? of ?? dataset.value?.name ?? '';
 	return html`
 		<header class="header">
 			<a class="header__brand" href="/groups">Touchline</a>
 			<${DatasetMenu} current=${current} name=${name} />
 			<${Navigation} current=${current} name=${name} />
 			${children ?? html`<span class="header__middle"></span>`}
+			<${BellButton} />
 			${myName.value ? html`<a class="header__person" href="/account" title="Your account, sessions and password" aria-current=${current === 'account' ? 'page' : undefined}>${myName.value}</a>` : null}
 			<button class="header__help" type="button" aria-label="Help" title="Help: keys, legend, words, guide, practice" onClick=${openHelp}><kbd>?</kbd></button>
 		</header>

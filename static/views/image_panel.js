@@ -2,7 +2,7 @@
 /** One view of the group: its frame with everything drawn on it. */
 
 import { html } from 'htm/preact';
-import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { useSize } from '../lib/hooks.js';
@@ -11,7 +11,6 @@ import { filterOf } from '../state/adjustments.js';
 import { conflict } from '../state/conflict.js';
 import { drawAt, insertAt } from '../state/drawing.js';
 import { draft } from '../state/group.js';
-import { decoded, loadImage } from '../state/images.js';
 import { mend } from '../state/mends.js';
 import { panPanel, viewportOf, zoomPanel } from '../state/viewports.js';
 import {
@@ -22,6 +21,7 @@ import { attachPointer } from '../tools/pointer.js';
 import { ClassChooser } from './class_chooser.js';
 import { DrawingChip } from './drawing_chip.js';
 import { DrawingCross } from './drawing_cross.js';
+import { useFrame } from './frame.js';
 import { InstantChip } from './instant_chip.js';
 import { ObjectList } from './object_list.js';
 import { PanelCaption } from './panel_caption.js';
@@ -34,26 +34,6 @@ import { PredictionChip } from './prediction_parts.js';
 
 /** @type {import('../state/conflict.js').Field[]} */
 const NO_GHOSTS = [];
-
-/** The frame of a view: undefined while it loads, null when there is none. @param {string | null} url */
-function useFrame(url) {
-	const [frame, setFrame] = useState(
-		/** @type {{url: string | null, image: ImageBitmap | null, error: boolean}} */
-		({ url: null, image: null, error: false }),
-	);
-	useEffect(() => {
-		let wanted = true;
-		if (url) {
-			loadImage(url).then(
-				(image) => { if (wanted) setFrame({ url, image, error: false }); },
-				() => { if (wanted) setFrame({ url, image: null, error: true }); },
-			);
-		}
-		return () => { wanted = false; };
-	}, [url]);
-	// A frame that was loaded ahead is there in the same moment as its group.
-	return frame.url === url ? frame : { url, image: decoded(url), error: false };
-}
 
 /** @type {Map<number, ImagePoint | null>} */
 const middles = new Map();

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useEffect, useState } from 'preact/hooks';
 
 import { postImport } from '../api/imports.js';
-import { sentenceOf } from '../lib/resource.js';
+import { sentenceOf } from '../api/problem.js';
 import { param } from '../lib/router.js';
 import { datasets, loadDatasets } from '../state/datasets.js';
 import { IMPORT_FORMATS, optionValue } from '../state/import_formats.js';
@@ -21,6 +21,13 @@ import { SourceChoice, UploadField } from './source_choice.js';
 /** @import {FormatOption} from '../state/import_formats.js' */
 
 /** @typedef {{[name: string]: any}} Options */
+
+const POLICIES = [
+	{ name: '', label: 'by the pictures: touchline where most views have one, else paper' },
+	{ name: 'touchline', label: 'touchline: cameras from the paint of the pictures' },
+	{ name: 'paper', label: 'paper: cameras from the clicks, the thresholds of the paper' },
+	{ name: 'strict', label: 'strict: as paper, with rays 5° apart and σ below 0.5 m' },
+];
 
 const valueOf = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.target).value;
 
@@ -59,6 +66,19 @@ function LinesField({ source, change }) {
 		`;
 	}
 	return html`<${UploadField} id="import-lines" label=${label} hint="a zip of sn-calibration line files" onUploaded=${(/** @type {UploadJson | null} */ sent) => change(sent ? { upload: sent.id } : undefined)} />`;
+}
+
+/** Thresholds of a dataset that the import makes. @param {{kept: boolean, change: (policy: string) => void}} props `kept`: the dataset is there */
+function PolicyField({ kept, change }) {
+	return html`
+		<div class="form__row">
+			<label for="import-policy">Policy</label>
+			<select class="field" id="import-policy" disabled=${kept} title=${kept ? 'The dataset is there and keeps its policy' : ''} onChange=${(/** @type {Event} */ event) => change(valueOf(event))}>
+				${POLICIES.map(({ name, label }) => html`<option key=${name} value=${name}>${label}</option>`)}
+			</select>
+			<small>${kept ? 'This dataset is there and keeps its policy; it is changed on the page Policy.' : 'The thresholds of the new dataset, and whether cameras come from the paint of its pictures. It can be changed later.'}</small>
+		</div>
+	`;
 }
 
 /** @param {{format: string, choose: (format: string) => void}} props */
@@ -107,17 +127,19 @@ export function ImportPage() {
 	const [format, setFormat] = useState(IMPORT_FORMATS[0].name);
 	const [source, setSource] = useState(/** @type {ImportSource | null} */ (null));
 	const [options, setOptions] = useState(/** @type {Options} */ ({}));
+	const [policy, setPolicy] = useState('');
 	const { job, dry, error, run } = useImport();
 	useEffect(() => { loadDatasets(); }, []);
 	const chosen = IMPORT_FORMATS.find(({ name }) => name === format) ?? IMPORT_FORMATS[0];
 	const name = dataset.trim();
+	const kept = (datasets.value ?? []).some((one) => one.name === name);
 	const busy = job !== null && !isOver(job);
 	const why = busy ? 'An import is under way' : !name ? 'Name the dataset first' : !source ? 'Choose a file or folder first' : '';
 	/** @param {boolean} dry_run */
 	function start(dry_run) {
 		if (why || !source) return;
 		const asked = Object.entries(options).filter(([key, value]) => value !== undefined && (chosen.options.some((option) => option.name === key) || (key === 'lines' && chosen.lines)));
-		run({ dataset: name, format, source, options: Object.fromEntries(asked), dry_run });
+		run({ dataset: name, format, source, options: Object.fromEntries(asked), dry_run, ...(policy && !kept ? { policy } : {}) });
 	}
 	/** @param {SubmitEvent} event */
 	function submit(event) {
@@ -141,9 +163,10 @@ export function ImportPage() {
 						${chosen.options.map((option) => html`<${OptionField} key=${option.name} option=${option} change=${(/** @type {any} */ value) => setOptions({ ...options, [option.name]: value })} />`)}
 						${chosen.lines ? html`
 							<${LinesField} source=${source} change=${(/** @type {ImportSource | undefined} */ lines) => setOptions({ ...options, lines })} />` : null}
+						<${PolicyField} kept=${kept} change=${setPolicy} />
 						<p class="buttons">
-							<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Try it out</button>
-							<button class="button" type="button" aria-disabled=${why !== ''} title=${why} onClick=${() => start(false)}>Import</button>
+							<button data-needs="lead" data-of="" class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Try it out</button>
+							<button data-needs="lead" data-of="" class="button" type="button" aria-disabled=${why !== ''} title=${why} onClick=${() => start(false)}>Import</button>
 						</p>
 						${error ? html`<p class="form__error" role="alert">${error}</p>` : null}
 					</form>

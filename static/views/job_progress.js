@@ -2,12 +2,12 @@
 /** How far a job is, in one line, with the way to end it. */
 
 import { html } from 'htm/preact';
-import { useState } from 'preact/hooks';
 
 import { cancelJob } from '../api/jobs.js';
+import { useAttempt } from '../lib/attempt.js';
 import { capital, count } from '../lib/format.js';
-import { sentenceOf } from '../lib/resource.js';
 import { isOver, shareOf } from '../state/jobs.js';
+import { FormError } from './form_error.js';
 
 /** @import {JobJson} from '../api/jobs.js' */
 
@@ -42,24 +42,18 @@ function Meter({ job }) {
 
 /** @param {{job: JobJson, cancellable?: boolean}} props */
 export function JobProgress({ job, cancellable = true }) {
-	const [problem, setProblem] = useState('');
-	async function cancel() {
-		try {
-			await cancelJob(job.id);
-		} catch (error) {
-			setProblem(sentenceOf(error));
-		}
-	}
+	const { error, attempt } = useAttempt();
+	const cancel = () => attempt(cancelJob(job.id));
 	return html`
 		<div class="job" role="status">
 			<div class="job__line">
 				<span class="pill" data-state=${toneOf(job)}>${toneOf(job) === 'partial' ? 'done in part' : job.state}</span>
 				<strong>${job.title}</strong>
 				<span class="job__sentence">${jobText(job)}</span>
-				${cancellable && !isOver(job) ? html`<button class="button button--small" type="button" onClick=${cancel}>Cancel<span class="hidden-text"> ${job.title}</span></button>` : null}
+				${cancellable && !isOver(job) ? html`<button class="button button--small" type="button" data-needs="lead" data-of=${job.dataset ?? ''} onClick=${cancel}>Cancel<span class="hidden-text"> ${job.title}</span></button>` : null}
 			</div>
 			${isOver(job) ? null : html`<${Meter} job=${job} />`}
-			${problem ? html`<p class="form__error" role="alert">${problem}</p>` : null}
+			${error ? html`<${FormError} error=${error} />` : null}
 		</div>
 	`;
 }

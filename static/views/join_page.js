@@ -6,8 +6,12 @@ import { useEffect, useState } from 'preact/hooks';
 
 import { lookAtLink, postLink } from '../api/people.js';
 import { ApiError } from '../api/problem.js';
+import { beginSignOn } from '../api/sign_on.js';
 import { navigate } from '../lib/router.js';
-import { FormError, useSessionForm } from './login.js';
+import { ways } from '../state/me.js';
+import { FormError } from './form_error.js';
+import { useSessionForm } from './login.js';
+import { SignOnButton } from './sign_on_button.js';
 
 /** @typedef {{name: string | null, joined: boolean}} Meant */
 
@@ -18,18 +22,32 @@ function titleOf({ name, joined }) {
 }
 
 /** @param {{meant: Meant, token: string}} props */
-function JoinForm({ meant, token }) {
+function Ways({ meant, token }) {
+	const [name, setName] = useState('');
+	const { password, sign_on: provider } = ways.value;
+	const said = meant.name === null ? { name } : {};
+	return html`
+		${meant.name === null ? html`<div class="form"><div class="form__row"><label for="join-name">Name</label><input class="field" id="join-name" name="name" required maxlength="40" autocomplete="username" autocapitalize="none" spellcheck=${false} value=${name} onInput=${(/** @type {Event} */ event) => setName(/** @type {HTMLInputElement} */ (event.currentTarget).value)} /><small>Small letters and digits; history and verdicts will name you so.</small></div></div>` : null}
+		${provider ? html`<${SignOnButton} primary=${!password} begin=${() => beginSignOn({ link: token, ...said })}>Come in with ${provider}<//>` : null}
+		${provider && password ? html`<p class="login__or">or choose a password of this server</p>` : null}
+		${password ? html`<${JoinForm} meant=${meant} token=${token} said=${said} />` : null}
+	`;
+}
+
+/** @param {{meant: Meant, token: string, said: {name?: string}}} props */
+function JoinForm({ meant, token, said }) {
 	const { error, busy, send } = useSessionForm(async (form) => {
-		const name = meant.name === null ? { name: String(form.get('name')) } : {};
-		const session = await postLink({ token, password: String(form.get('password')), ...name });
+		const session = await postLink({ token, password: String(form.get('password')), ...said }).catch((problem) => {
+			// The password is set; the login asks for the rest.
+			if (problem instanceof ApiError && problem.pointer === '/code') location.assign('/groups');
+			throw problem;
+		});
 		navigate('/groups', { replace: true });
 		return session;
 	});
 	return html`
 		<form class="form" onSubmit=${send}>
-			${meant.name === null
-				? html`<div class="form__row"><label for="join-name">Name</label><input class="field" id="join-name" name="name" required maxlength="40" autocomplete="username" autocapitalize="none" spellcheck=${false} /><small>Small letters and digits; history and verdicts will name you so.</small></div>`
-				: html`<input class="hidden-text" name="username" autocomplete="username" value=${meant.name} readonly tabindex="-1" aria-hidden="true" />`}
+			<input class="hidden-text" name="username" autocomplete="username" value=${meant.name ?? said.name} readonly tabindex="-1" aria-hidden="true" />
 			<div class="form__row"><label for="join-password">Password</label><input class="field" id="join-password" name="password" type="password" required minlength="10" maxlength="200" autocomplete="new-password" /><small>At least 10 letters. Three or four plain words do well.</small></div>
 			<${FormError} error=${error} />
 			<p><button class="button button--primary" type="submit" aria-disabled=${busy}>Set the password and log in</button></p>
@@ -55,7 +73,7 @@ export function JoinPage() {
 			<section class="card" aria-labelledby="join-title">
 				<p class="login__brand">Touchline</p>
 				<h1 id="join-title">${meant ? titleOf(meant) : 'Choose a password'}</h1>
-				${meant ? html`<${JoinForm} meant=${meant} token=${token} />` : null}
+				${meant ? html`<${Ways} meant=${meant} token=${token} />` : null}
 				${error ? html`<${FormError} error=${error} /><p><a class="button" href="/groups">Log in</a></p>` : null}
 			</section>
 		</main>

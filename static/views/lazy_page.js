@@ -12,6 +12,9 @@ import { Header } from './header.js';
 const LOADERS = {
 	queue: async () => (await import('./queue_page.js')).QueuePage,
 	calibration: async () => (await import('./calibration/calibration_page.js')).CalibrationPage,
+	compare: async () => (await import('./compare/compare_page.js')).ComparePage,
+	adjudicate: async () => (await import('./compare/adjudication_page.js')).AdjudicationPage,
+	agreement: async () => (await import('./compare/agreement_page.js')).AgreementPage,
 	datasets: async () => (await import('./datasets_page.js')).DatasetsPage,
 	yield: async () => (await import('./yield_page.js')).YieldPage,
 	policy: async () => (await import('./policy_page.js')).PolicyPage,
@@ -23,7 +26,11 @@ const LOADERS = {
 	help: async () => (await import('./help/help_page.js')).HelpPage,
 	account: async () => (await import('./account_page.js')).AccountPage,
 	people: async () => (await import('./people_page.js')).PeoplePage,
+	login: async () => (await import('./sign_on_page.js')).SignOnPage,
 	join: async () => (await import('./join_page.js')).JoinPage,
+	work: async () => (await import('./work/work_page.js')).WorkPage,
+	history: async () => (await import('./past/history_page.js')).HistoryPage,
+	audit: async () => (await import('./past/audit_page.js')).AuditPage,
 	jobs: async () => (await import('./jobs_page.js')).JobsPage,
 };
 

@@ -4,18 +4,17 @@
 import { html } from 'htm/preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 
+import { enterWithPasskey, passkeysWork } from '../api/passkeys.js';
 import { postSession } from '../api/people.js';
 import { ApiError } from '../api/problem.js';
+import { beginSignOn } from '../api/sign_on.js';
 import { outbox } from '../state/outbox.js';
-import { me, welcome } from '../state/me.js';
+import { me, ways, welcome } from '../state/me.js';
 import { plural } from '../lib/format.js';
+import { FormError } from './form_error.js';
+import { SignOnButton } from './sign_on_button.js';
 
 /** @import {SessionJson} from '../api/people.js' */
-
-/** What went wrong, in a sentence and what to do about it. @param {{error: ApiError | null}} props */
-export function FormError({ error }) {
-	return html`<p class="form__error" role="alert">${error ? `${error.message[0].toUpperCase()}${error.message.slice(1)}. ${error.hint ?? ''}` : ''}</p>`;
-}
 
 /**
  * A form whose answer is a session.
@@ -37,6 +36,7 @@ export function useSessionForm(ask) {
 		} catch (problem) {
 			if (!(problem instanceof ApiError)) throw problem;
 			setError(problem);
+			if (problem.pointer === '/code') return;
 			/** @type {HTMLInputElement | null} */ (form.querySelector('input[type="password"]'))?.select();
 		} finally {
 			setBusy(false);
@@ -45,13 +45,50 @@ export function useSessionForm(ask) {
 	return { error, busy, send };
 }
 
-/** @param {{name?: string}} props */
+/** What has just appeared is typed into next. @param {HTMLInputElement | null} field */
+function focused(field) {
+	if (field && !field.value) field.focus();
+}
+
+/** In the place of name and password. */
+function PasskeyButton() {
+	const { error, busy, send } = useSessionForm(enterWithPasskey);
+	if (!passkeysWork()) return null;
+	return html`
+		<form class="form" onSubmit=${send}>
+			<p class="login__or">or</p>
+			<p><button class="button" type="submit" aria-disabled=${busy}>Log in with a passkey</button></p>
+			<${FormError} error=${error} />
+		</form>
+	`;
+}
+
+/** Every way in that there is here. @param {{name?: string}} props */
 function LoginForm({ name = '' }) {
-	const { error, busy, send } = useSessionForm((form) => postSession(String(form.get('name')), String(form.get('password'))));
+	const { password, sign_on: provider } = ways.value;
+	return html`
+		${provider ? html`<${SignOnButton} primary=${!password} begin=${() => beginSignOn({ to: location.pathname + location.search })}>Log in with ${provider}<//>` : null}
+		${provider && password ? html`<p class="login__or">or</p>` : null}
+		${password ? html`<${PasswordForm} name=${name} /><${PasskeyButton} />` : null}
+	`;
+}
+
+/** @param {{name: string}} props */
+function PasswordForm({ name }) {
+	const [asked, setAsked] = useState(false);
+	const { error, busy, send } = useSessionForm(async (form) => {
+		try {
+			return await postSession(String(form.get('name')), String(form.get('password')), asked ? String(form.get('code')) : null);
+		} catch (problem) {
+			if (problem instanceof ApiError && problem.pointer === '/code') setAsked(true);
+			throw problem;
+		}
+	});
 	return html`
 		<form class="form" onSubmit=${send}>
 			<div class="form__row"><label for="login-name">Name</label><input class="field" id="login-name" name="name" required maxlength="200" autocomplete="username" autocapitalize="none" spellcheck=${false} defaultValue=${name} autofocus=${!name} /></div>
 			<div class="form__row"><label for="login-password">Password</label><input class="field" id="login-password" name="password" type="password" required maxlength="200" autocomplete="current-password" autofocus=${Boolean(name)} /></div>
+			${asked ? html`<div class="form__row"><label for="login-code">Code of your second factor</label><input class="field" id="login-code" name="code" required maxlength="40" autocomplete="one-time-code" spellcheck=${false} ref=${focused} /></div>` : null}
 			<${FormError} error=${error} />
 			<p><button class="button button--primary" type="submit" aria-disabled=${busy}>Log in</button></p>
 		</form>
@@ -62,7 +99,7 @@ export function LoginPage() {
 	const main = useRef(/** @type {HTMLElement | null} */ (null));
 	useEffect(() => {
 		document.title = 'Log in · Touchline';
-		main.current?.querySelector('input')?.focus();
+		/** @type {HTMLElement | null | undefined} */ (main.current?.querySelector('input') ?? main.current?.querySelector('button'))?.focus();
 	}, []);
 	return html`
 		<main class="login" ref=${main}>
@@ -70,7 +107,7 @@ export function LoginPage() {
 				<p class="login__brand">Touchline</p>
 				<h1 id="login-title">Log in</h1>
 				<${LoginForm} />
-				<p class="note">No account, or no password? Whoever runs this server can send you a link.</p>
+				<p class="note">${ways.value.password ? 'No account, or no password?' : 'No account here?'} Whoever runs this server can send you a link.</p>
 			</section>
 		</main>
 	`;
@@ -81,7 +118,7 @@ export function LoginAgain() {
 	const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
 	useEffect(() => {
 		dialog.current?.showModal();
-		/** @type {HTMLElement | null | undefined} */ (dialog.current?.querySelector('input[type="password"]'))?.focus();
+		/** @type {HTMLElement | null | undefined} */ (dialog.current?.querySelector('input[type="password"]') ?? dialog.current?.querySelector('button'))?.focus();
 	}, []);
 	const waiting = outbox.value.length;
 	return html`

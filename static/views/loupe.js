@@ -12,8 +12,8 @@ import { fixed } from '../lib/format.js';
 import { drawPixelGrid } from '../overlays/pixel_grid.js';
 import { drawOverlays } from '../overlays/stage.js';
 import { filterOf } from '../state/adjustments.js';
-import { loadImage } from '../state/images.js';
 import { boxes, focused, gain, pointerPlace, projections, selected } from '../state/workspace.js';
+import { useFrame } from './frame.js';
 
 /** @import {ImagePoint} from '../geometry/camera.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
@@ -51,18 +51,6 @@ function predictedAt({ predictions }, prediction) {
 	return box && boxCenter(box);
 }
 
-/** @param {string | null} url */
-function useImage(url) {
-	const [image, setImage] = useState(/** @type {ImageBitmap | null} */ (null));
-	useEffect(() => {
-		let wanted = true;
-		setImage(null);
-		if (url) loadImage(url).then((loaded) => { if (wanted) setImage(loaded); }, () => {});
-		return () => { wanted = false; };
-	}, [url]);
-	return image;
-}
-
 /** The half of the window that the panel is not in. @param {string} letter */
 function sideOf(letter) {
 	const panel = document.querySelector(`.image-panel[data-view="${letter}"]`)?.getBoundingClientRect();
@@ -73,7 +61,7 @@ function sideOf(letter) {
 function Glass({ picture, at }) {
 	const [step, setStep] = useState(0);
 	const { view } = picture;
-	const image = useImage(view.image);
+	const { image } = useFrame(view.image);
 	const filter = filterOf(view.letter);
 	const scale = SCALES[step];
 	const draw = useCallback((/** @type {CanvasRenderingContext2D} */ context) => {

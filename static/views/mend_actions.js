@@ -95,6 +95,7 @@ export function carryOut({ fix, edit }) {
 	else if (fix.action === 'draw_marking' && fix.marking) drawMissing(view, fix.marking);
 	else if (fix.action === 'resize_ball') fitBox(view);
 	else if (fix.action === 'read_paint') import('../state/paint_reading.js').then(({ readAgain }) => readAgain(shown));
+	else if (fix.action === 'accept_proposal') import('../state/proposals.js').then(({ acceptProposal }) => acceptProposal(view));
 	else if (fix.action === 'look_ball' && fix.point) {
 		showPlace(view, [{ x: fix.point[0], y: fix.point[1] }]);
 		selected.value = { kind: 'ball', view: view.key };

@@ -30,8 +30,8 @@ export function MendBox({ group, solution }) {
 		<div class="mend" role="group" aria-label="What to do">
 			${offered && !offered.title ? html`<p class="mend__sentence">${offered.sentence}</p>` : null}
 			<p class="mend__row">
-				${offered ? html`<button class="button button--fix" type="button" onClick=${mendNow}>${offered.label} <kbd>Enter</kbd></button>` : null}
-				${count > 1 ? html`
+				${offered ? html`<button data-needs="annotate" class="button button--fix" type="button" onClick=${mendNow}>${offered.label} <kbd>Enter</kbd></button>` : null}
+				${offered && count > 1 ? html`
 					<button class="mend__more" type="button" title="Show another way to mend it (Shift+Enter)" onClick=${() => turnMend(1)}>
 						${mendIndex.value + 1} of ${count}${isSearching.value ? ' or more' : ''} <kbd>Shift Enter</kbd>
 					</button>` : null}
@@ -41,7 +41,7 @@ export function MendBox({ group, solution }) {
 			${reason ? html`
 				<p class="mend__reject">
 					${offered ? 'If that is not it: ' : 'Nothing here mends it: '}
-					<button class="mend__more" type="button" onClick=${askReason}>reject, ${reason.label.toLowerCase()} <kbd>X</kbd> <kbd>Enter</kbd></button>
+					<button data-needs="review" class="mend__more" type="button" onClick=${askReason}>reject, ${reason.label.toLowerCase()} <kbd>X</kbd> <kbd>Enter</kbd></button>
 				</p>` : null}
 		</div>
 	`;

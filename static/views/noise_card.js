@@ -9,7 +9,7 @@ import { useResource } from '../lib/resource.js';
 import { Loading, Trouble } from './page_frame.js';
 
 /** @import {ComponentChildren} from 'preact' */
-/** @import {AdviceJson, NoiseJson} from '../api/noise.js' */
+/** @import {AdviceJson, FactorJson, NoiseJson, SourceNoiseJson} from '../api/noise.js' */
 
 /**
  * What the estimates change in the policy, for people.
@@ -18,7 +18,29 @@ import { Loading, Trouble } from './page_frame.js';
  */
 export function changesOf({ advice, values }) {
 	const changed = advice.filter(({ name, present }) => name in values && values[name] !== present);
-	return changed.map(({ name, label, present }) => `“${label}” to ${values[name].toFixed(2)} (now ${present.toFixed(2)})`).join(', ');
+	return changed.map(({ name, label, present }) => `“${label}” to ${values[name].toFixed(2)} (now ${shownPresent(present)})`).join(', ');
+}
+
+/** Whether judging by the estimates would change anything. @param {NoiseJson} noise */
+export function isNews({ values, is_new }) {
+	return is_new || Object.keys(values).length > 0;
+}
+
+/**
+ * Who has a sigma of their own, for people.
+ *
+ * @param {FactorJson[]} factors @returns {string}
+ */
+export function unlike(factors) {
+	const own = factors.filter(({ camera, person, ratio }) => ratio !== 1 && (camera === null || person === null));
+	const names = own.map(({ camera, person, ratio }) => `${camera === null ? person : `camera ${camera}`} (${ratio.toFixed(2)} times)`);
+	if (names.length) return names.join(', ');
+	return factors.some(({ ratio }) => ratio !== 1) ? 'some cameras and people together' : '';
+}
+
+/** @param {number | null} value @returns {string} what the policy says */
+function shownPresent(value) {
+	return value === null ? 'each image by itself' : value.toFixed(2);
 }
 
 /** @param {{item: AdviceJson}} props */
@@ -28,18 +50,39 @@ function Row({ item }) {
 			<th scope="row">${item.label}<small> ${item.unit}</small></th>
 			<td data-numeric="true">${item.estimate.toFixed(2)}</td>
 			<td data-numeric="true">${item.low.toFixed(2)} to ${item.high.toFixed(2)}</td>
-			<td data-numeric="true">${item.present.toFixed(2)}${item.agrees ? '' : ' (differs)'}</td>
+			<td data-numeric="true">${shownPresent(item.present)}${item.agrees || item.present === null ? '' : ' (differs)'}</td>
 		</tr>`;
+}
+
+/** @param {{of: string, one: SourceNoiseJson}} props */
+function SourceRow({ of, one }) {
+	return html`
+		<tr>
+			<th scope="row">Balls ${of} ${one.source}<small> px at 1920x1080</small></th>
+			<td data-numeric="true">${one.sigma_px.toFixed(2)}</td>
+			<td data-numeric="true">${one.low.toFixed(2)} to ${one.high.toFixed(2)}</td>
+			<td data-numeric="true">${one.differs ? 'differs from the dataset’s' : 'like the dataset’s'}</td>
+		</tr>`;
+}
+
+/** What sigma makes of cameras and people. @param {{noise: NoiseJson}} props */
+function Own({ noise }) {
+	const { factors = [], used = [], stations = [], people = [] } = noise;
+	if (!stations.length && !people.length && !used.length) return null;
+	const [now, shown] = [unlike(used), unlike(factors)];
+	return html`
+		<p class="note">${now ? `Sigma uses the own noise of ${now}.` : 'Sigma takes all balls to be as noisy as the dataset’s.'}
+			${noise.is_new ? (shown ? ` The estimates show ${shown} unlike the dataset.` : ' The estimates show no difference any more.') : ''}</p>`;
 }
 
 /** @param {{lines: NonNullable<NoiseJson['lines']>}} props */
 function Lines({ lines }) {
 	return html`
 		<tr>
-			<th scope="row">Sigma of a point on a line<small> px at 960x540</small></th>
+			<th scope="row">Sigma of a point on a line, image by image<small> px at 960x540</small></th>
 			<td data-numeric="true">${lines.sigma_px.toFixed(2)}</td>
 			<td data-numeric="true">${lines.low.toFixed(2)} to ${lines.high.toFixed(2)}</td>
-			<td>each image has its own</td>
+			<td data-numeric="true">half of the images</td>
 		</tr>`;
 }
 
@@ -60,8 +103,11 @@ export function NoiseCard({ dataset, version = '', children }) {
 					<tbody>
 						${noise.advice.map((item) => html`<${Row} key=${item.name} item=${item} />`)}
 						${noise.lines ? html`<${Lines} lines=${noise.lines} />` : null}
+						${noise.stations?.map((one) => html`<${SourceRow} key=${`camera ${one.source}`} of="of camera" one=${one} />`)}
+						${noise.people?.map((one) => html`<${SourceRow} key=${`person ${one.source}`} of="placed by" one=${one} />`)}
 					</tbody>
 				</table>
+				<${Own} noise=${noise} />
 				${noise.notices.map((sentence) => html`<p class="note" key=${sentence}>${sentence}</p>`)}
 				${children?.(noise)}` : found.error ? null : html`<${Loading} what="the noise" />`}
 		</section>

@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useEffect } from 'preact/hooks';
 
-import { sentenceOf } from '../lib/resource.js';
+import { sentenceOf } from '../api/problem.js';
 import { datasets, loadDatasets } from '../state/datasets.js';
 import { dismiss } from '../state/notice.js';
 import { NoticeBar } from './bars.js';

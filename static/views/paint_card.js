@@ -47,7 +47,7 @@ function MatchPaint({ one, used, busy, onRead }) {
 			<td>${capital(one.sentence)}</td>
 			<td><span class="table__actions">
 				${used && leftToRead(one) > 0 ? html`
-					<button class="button button--small" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : 'Read the pictures of this match'} onClick=${() => { if (!busy) onRead(); }}>Read<span class="hidden-text"> ${name}</span></button>` : null}
+					<button data-needs="lead" class="button button--small" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : 'Read the pictures of this match'} onClick=${() => { if (!busy) onRead(); }}>Read<span class="hidden-text"> ${name}</span></button>` : null}
 			</span></td>
 		</tr>`;
 }
@@ -75,7 +75,7 @@ export function PaintCard({ dataset }) {
 	const isTold = value.used || isRead;
 	/** @param {string} text @param {string} title @param {() => void} act @param {string} [kind] */
 	const button = (text, title, act, kind = '') => html`
-		<button class=${`button ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) act(); }}>${text}</button>`;
+		<button data-needs="lead" class=${`button ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) act(); }}>${text}</button>`;
 	return html`
 		<section class="card card--flush statistics__matches paint-card" aria-labelledby="paint-title" ref=${card}>
 			<h2 id="paint-title" tabindex="-1"><${Term} word="reading of paint">Paint of the pictures<//></h2>

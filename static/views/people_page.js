@@ -4,16 +4,27 @@
 import { html } from 'htm/preact';
 import { useEffect, useState } from 'preact/hooks';
 
-import { getUsers, patchUser, postUser, postUserLink } from '../api/people.js';
+import { deleteSecondFactorOf, getTeam, getUsers, patchUser, postAdoption, postUser, postUserLink, putTeam } from '../api/people.js';
 import { ApiError } from '../api/problem.js';
+import { deleteIdentityOf } from '../api/sign_on.js';
+import { endToken, getTokens } from '../api/tokens.js';
+import { useAttempt } from '../lib/attempt.js';
+import { plural } from '../lib/format.js';
+import { useResource } from '../lib/resource.js';
+import { datasets } from '../state/datasets.js';
 import { myName } from '../state/me.js';
-import { FormError } from './login.js';
+import { CopyField } from './copy_field.js';
+import { FormError } from './form_error.js';
+import { MembersCard } from './members_card.js';
 import { Loading, PageFrame, Trouble } from './page_frame.js';
+import { TokenTable } from './token_table.js';
 import { When } from './when.js';
 
 /** @import {Role, UserJson, UserWithLink} from '../api/people.js' */
+/** @import {TokenJson} from '../api/tokens.js' */
 
 const ROLES = /** @type {{name: Role, note: string}[]} */ ([
+	{ name: 'none', note: 'sees no dataset but those where they have a role' },
 	{ name: 'viewer', note: 'looks at everything' },
 	{ name: 'annotator', note: 'changes lines, balls and cameras' },
 	{ name: 'reviewer', note: 'judges groups, makes exports' },
@@ -30,17 +41,40 @@ function stateOf(one) {
 
 /** A link that is shown once. @param {{made: UserWithLink, close: () => void}} props */
 function LinkCard({ made, close }) {
-	const [copied, setCopied] = useState(false);
-	const copy = () => navigator.clipboard?.writeText(made.link).then(() => setCopied(true));
 	return html`
 		<section class="card" role="status" aria-labelledby="people-link">
 			<h2 id="people-link">Send this link to ${made.user.name}</h2>
 			<p>It sets their password, works once, until ${new Date(made.expires).toLocaleString('en-GB', { day: 'numeric', month: 'short', hour: '2-digit', minute: '2-digit' })}, and is not shown again.</p>
-			<p class="people__link">
-				<input class="field" aria-label="Link" readonly value=${made.link} onFocus=${(/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.currentTarget).select()} />
-				<button class="button" type="button" onClick=${copy}>${copied ? 'Copied' : 'Copy'}</button>
-				<button class="button" type="button" onClick=${close}>Done</button>
-			</p>
+			<${CopyField} label="Link" text=${made.link} close=${close} />
+		</section>
+	`;
+}
+
+/** Whether everybody needs a second factor. @param {{act: (doing: Promise<unknown>) => Promise<boolean>}} props */
+function FactorRule({ act }) {
+	const [on, setOn] = useState(/** @type {boolean | null} */ (null));
+	/** @param {{require_second_factor: boolean}} said */
+	const told = (said) => setOn(said.require_second_factor);
+	useEffect(() => { act(getTeam().then(told)); }, []);
+	if (on === null) return null;
+	return html`
+		<p class="people__rule"><label class="form__check">
+			<input type="checkbox" checked=${on} onChange=${(/** @type {Event} */ event) => act(putTeam(/** @type {HTMLInputElement} */ (event.currentTarget).checked).then(told))} />
+			<span>Everybody needs a second factor: who has none makes one before anything else</span>
+		</label></p>
+	`;
+}
+
+/** The tokens of somebody. @param {{of: UserJson, act: (doing: Promise<unknown>) => Promise<boolean>, close: () => void}} props */
+function TokensCard({ of, act, close }) {
+	const [tokens, setTokens] = useState(/** @type {TokenJson[]} */ ([]));
+	const read = () => act(getTokens(of.id).then(({ items }) => setTokens(items)));
+	useEffect(() => { read(); }, [of.id]);
+	return html`
+		<section class="card card--flush" aria-labelledby="people-tokens">
+			<h2 id="people-tokens">Tokens of ${of.name}</h2>
+			<${TokenTable} tokens=${tokens} end=${(/** @type {number} */ id) => act(endToken(id, of.id)).then(read)} />
+			<p class="buttons"><button class="button" type="button" onClick=${close}>Done</button></p>
 		</section>
 	`;
 }
@@ -69,74 +103,116 @@ function InviteCard({ invite, error }) {
 	`;
 }
 
-/** @param {{one: UserJson, change: (change: {role?: Role, disabled?: boolean}) => void, link: () => void}} props */
-function PersonRow({ one, change, link }) {
+/** @param {{one: UserJson, change: (change: {role?: Role, disabled?: boolean}) => void, link: () => void, tokens: () => void, factor: () => void, unlink: () => void}} props */
+function PersonRow({ one, change, link, tokens, factor, unlink }) {
 	const mine = one.name === myName.value;
 	const why = mine ? 'Nobody changes their own rights' : undefined;
 	return html`
 		<tr>
-			<th scope="row">${one.name}${mine ? ' (you)' : ''}<small>invited by ${one.created_by}</small></th>
+			<th scope="row">${one.name}${mine ? ' (you)' : ''}<small>invited by ${one.created_by}</small>${one.datasets.length ? html`<small>${one.datasets.map(({ dataset, role }) => `${role} in ${dataset}`).join(', ')}</small>` : null}</th>
 			<td>
 				<select class="field" aria-label=${`Role of ${one.name}`} value=${one.role} disabled=${mine} title=${why} onChange=${(/** @type {Event} */ event) => change({ role: /** @type {Role} */ (/** @type {HTMLSelectElement} */ (event.currentTarget).value) })}>
 					${ROLES.map(({ name }) => html`<option key=${name} value=${name}>${name}</option>`)}
 				</select>
 			</td>
-			<td>${stateOf(one)}</td>
+			<td>${stateOf(one)}${one.sign_on ? html`<small>single sign-on: ${one.sign_on}</small>` : null}</td>
 			<td>${one.seen ? html`<${When} at=${one.seen} />` : 'not logged in'}</td>
-			<td class="table__actions">
-				${one.disabled ? null : html`<button class="button button--small" type="button" aria-label=${`New link for ${one.name}`} onClick=${link}>New link</button>`}
+			<td><span class="table__actions">
+				${one.tokens ? html`<button class="button button--small" type="button" aria-label=${`Tokens of ${one.name}`} onClick=${tokens}>${plural(one.tokens, 'token')}</button>` : null}
+				${one.second_factor && !mine ? html`<button class="button button--small" type="button" aria-label=${`Second factor off for ${one.name}`} title="For somebody who has lost it" onClick=${factor}>Second factor off</button>` : null}
+				${one.sign_on && !mine ? html`<button class="button button--small" type="button" aria-label=${`Unlink ${one.name}`} title="Their account of the provider logs them in no more" onClick=${unlink}>Unlink</button>` : null}
+				${one.disabled || mine ? null : html`<button class="button button--small" type="button" aria-label=${`New link for ${one.name}`} onClick=${link}>New link</button>`}
 				<button class="button button--small ${one.disabled ? '' : 'button--danger'}" type="button" disabled=${mine} title=${why} aria-label=${`${one.disabled ? 'Enable' : 'Disable'} ${one.name}`} onClick=${() => change({ disabled: !one.disabled })}>${one.disabled ? 'Enable' : 'Disable'}</button>
-			</td>
+			</span></td>
 		</tr>
 	`;
 }
 
 /** Everybody, and what can be done about them. */
 function usePeople() {
-	const [people, setPeople] = useState(/** @type {UserJson[] | null} */ (null));
+	const found = useResource(() => getUsers(), []);
 	const [made, setMade] = useState(/** @type {UserWithLink | null} */ (null));
-	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
-	const [failure, setFailure] = useState(/** @type {ApiError | null} */ (null));
-	const read = () => getUsers().then(({ items }) => { setPeople(items); setFailure(null); }, setFailure);
-	useEffect(() => { read(); }, []);
+	const [shown, setShown] = useState(/** @type {UserJson | null} */ (null));
+	const { error, attempt } = useAttempt();
 	/** @template T @param {Promise<T>} doing @param {(done: T) => void} [then] */
-	async function act(doing, then = () => {}) {
-		try {
-			then(await doing);
-			setError(null);
-			return true;
-		} catch (problem) {
-			if (!(problem instanceof ApiError)) throw problem;
-			setError(problem);
-			return false;
-		} finally {
-			read();
-		}
+	async function act(doing, then) {
+		const done = await attempt(doing, then);
+		found.reload();
+		return done;
 	}
-	return { people, made, error, failure, read, act, setMade };
+	return { found, made, shown, error, act, setMade, setShown };
+}
+
+/** What people are in one dataset, in place of what they are in all of them. */
+function InOneDataset() {
+	const all = datasets.value ?? [];
+	const [name, setName] = useState('');
+	const chosen = name || all[0]?.name;
+	if (!chosen) return null;
+	return html`
+		<section class="card" aria-labelledby="people-datasets">
+			<h2 id="people-datasets">In one dataset</h2>
+			<div class="form"><div class="form__row">
+				<label for="people-dataset">Dataset</label>
+				<select class="field" id="people-dataset" value=${chosen} onChange=${(/** @type {Event} */ event) => setName(/** @type {HTMLSelectElement} */ (event.currentTarget).value)}>
+					${all.map((one) => html`<option key=${one.id} value=${one.name}>${one.name}</option>`)}
+				</select>
+				<small>A role here takes the place of the one in all datasets. Leads of a dataset give roles in it, too.</small>
+			</div></div>
+		</section>
+		<${MembersCard} key=${chosen} dataset=${chosen} />
+	`;
+}
+
+/** What was done before there were accounts. @param {{people: UserJson[], adoptedBy: string | null, give: (id: number) => void}} props */
+function LocalWork({ people, adoptedBy, give }) {
+	/** @param {SubmitEvent} event */
+	function send(event) {
+		event.preventDefault();
+		give(Number(new FormData(/** @type {HTMLFormElement} */ (event.currentTarget)).get('person')));
+	}
+	return html`
+		<section class="card" aria-labelledby="people-local">
+			<h2 id="people-local">Work from before there were accounts</h2>
+			${adoptedBy ? html`<p>It is shown as ${adoptedBy}'s. The log keeps the name local.</p>` : html`
+				<form class="form" onSubmit=${send}>
+					<div class="form__row">
+						<label for="people-adopter">Show what local did until now as the work of</label>
+						<select class="field" id="people-adopter" name="person">${people.map((one) => html`<option key=${one.id} value=${one.id}>${one.name}</option>`)}</select>
+						<small>This can be done once. The log keeps the name local.</small>
+					</div>
+					<p><button class="button" type="submit">Show it as theirs</button></p>
+				</form>`}
+		</section>
+	`;
 }
 
 export function PeoplePage() {
-	const { people, made, error, failure, read, act, setMade } = usePeople();
+	const { found, made, shown, error, act, setMade, setShown } = usePeople();
+	const people = found.value?.items;
 	return html`
 		<${PageFrame} current="people" title="People" where=${html`<strong>People</strong>`}>
-			${failure ? html`<${Trouble} title="The people cannot be shown" error=${failure} retry=${read} />` : null}
-			${!people && !failure ? html`<${Loading} what="people" />` : null}
+			${found.error ? html`<${Trouble} title="The people cannot be shown" error=${found.error} retry=${found.reload} />` : null}
+			${!people && !found.error ? html`<${Loading} what="people" />` : null}
 			${made ? html`<${LinkCard} key=${made.link} made=${made} close=${() => setMade(null)} />` : null}
+			${shown ? html`<${TokensCard} of=${shown} act=${act} close=${() => setShown(null)} />` : null}
 			${people ? html`
 				<${InviteCard} error=${error} invite=${(/** @type {string} */ name, /** @type {Role} */ role) => act(postUser(name, role), setMade)} />
 				<section class="card card--flush" aria-labelledby="people-all">
 					<h2 id="people-all">Everybody</h2>
 					<div class="table__scroll"><table class="table">
-						<thead><tr><th>Name</th><th>Role</th><th>State</th><th>Seen</th><td></td></tr></thead>
+						<thead><tr><th>Name</th><th>In all datasets</th><th>State</th><th>Seen</th><td></td></tr></thead>
 						<tbody>${people.map((one) => html`
 							<${PersonRow}
-								key=${one.id} one=${one} link=${() => act(postUserLink(one.id), setMade)}
+								key=${one.id} one=${one} tokens=${() => setShown(one)} factor=${() => act(deleteSecondFactorOf(one.id))} unlink=${() => act(deleteIdentityOf(one.id))} link=${() => act(postUserLink(one.id), setMade)}
 								change=${(/** @type {{role?: Role, disabled?: boolean}} */ wanted) => act(patchUser(one.id, wanted))}
 							/>`)}
 						</tbody>
 					</table></div>
-				</section>` : null}
+					<${FactorRule} act=${act} />
+				</section>
+				<${InOneDataset} key=${String(people.length)} />
+				<${LocalWork} people=${people} adoptedBy=${found.value?.adopted_by ?? null} give=${(/** @type {number} */ id) => act(postAdoption(id))} />` : null}
 		<//>
 	`;
 }

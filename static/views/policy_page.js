@@ -4,14 +4,15 @@
 import { html } from 'htm/preact';
 import { useRef, useState } from 'preact/hooks';
 
+import { acceptNoise, takeNoiseBack } from '../api/noise.js';
 import { getPolicies, getPolicy, putPolicy, putPolicyText } from '../api/policies.js';
 import { saveText } from '../lib/save_text.js';
 import { useResource } from '../lib/resource.js';
 import { loadDatasets } from '../state/datasets.js';
 import { pageAddress } from './dataset_menu.js';
-import { DatasetFrame } from './dataset_page.js';
+import { DatasetFrame } from './dataset_frame.js';
 import { JobProgress } from './job_progress.js';
-import { changesOf, NoiseCard } from './noise_card.js';
+import { changesOf, isNews, NoiseCard } from './noise_card.js';
 import { Loading, Trouble } from './page_frame.js';
 import { useSavePolicy } from './save_policy.js';
 import { When } from './when.js';
@@ -49,7 +50,7 @@ function PolicyText({ one, policy, etag, busy, send }) {
 					onInput=${(/** @type {InputEvent} */ event) => setText(/** @type {HTMLTextAreaElement} */ (event.target).value)}
 				></textarea>
 				<p class="buttons">
-					<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Save and solve</button>
+					<button data-needs="lead" class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Save and solve</button>
 					<button class="button" type="button" aria-disabled=${!changed} title=${changed ? '' : why} onClick=${() => setText(policy.yaml)}>Reset</button>
 					<button class="button" type="button" onClick=${() => saveText(`${one.name}-policy.yaml`, policy.yaml)}>Download</button>
 					<label class="button">Open a file…<input class="hidden-text" type="file" accept=".yaml,.yml,text/yaml" onChange=${pick} /></label>
@@ -68,10 +69,10 @@ function Shipped({ one, policy, etag, shipped, busy, send }) {
 				<tbody>${shipped.map(({ name, hash }) => html`
 					<tr key=${name}>
 						<th scope="row">${name}</th>
-						<td class="table__actions">
+						<td><span class="table__actions">
 							${hash === policy.hash ? html`<span class="note">in force</span>` : html`
-								<button class="button button--small" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : ''} onClick=${() => { if (!busy) send(() => putPolicy(one.id, name, null, etag)); }}>Use ${name}</button>`}
-						</td>
+								<button data-needs="lead" class="button button--small" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : ''} onClick=${() => { if (!busy) send(() => putPolicy(one.id, name, null, etag)); }}>Use ${name}</button>`}
+						</span></td>
 					</tr>`)}
 				</tbody>
 			</table>
@@ -79,18 +80,27 @@ function Shipped({ one, policy, etag, shipped, busy, send }) {
 	`;
 }
 
-/** @param {{one: DatasetJson, policy: PolicyState, etag: string, shipped: ShippedPolicy[], busy: boolean, send: Send}} props */
-function NoiseOf({ one, policy, etag, shipped, busy, send }) {
-	const name = shipped.some((item) => item.name === policy.name) ? 'custom' : policy.name;
-	const version = useRef('');
+/** @param {{one: DatasetJson, policy: PolicyState, busy: boolean, send: Send}} props */
+function NoiseOf({ one, policy, busy, send }) {
+	const version = useRef(''), sent = useRef(0);
 	// While groups are solved the answer would be of no use a moment later.
-	if (!busy || !version.current) version.current = `${policy.hash} ${policy.version}`;
+	if (!busy || !version.current) version.current = `${policy.hash} ${policy.version} ${sent.current}`;
+	/** @param {() => Promise<JobJson>} put */
+	function act(put) {
+		if (busy) return;
+		sent.current += 1;
+		send(put);
+	}
+	/** @param {string} text @param {() => Promise<JobJson>} put */
+	const button = (text, put) => html`
+		<button data-needs="lead" class="button" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : ''} onClick=${() => act(put)}>${text}</button>`;
 	return html`
 		<${NoiseCard} dataset=${one.id} version=${version.current}>
-			${(/** @type {NoiseJson} */ noise) => (Object.keys(noise.values).length === 0 ? null : html`
-				<p class="note">The button sets ${changesOf(noise)}.</p>
+			${(/** @type {NoiseJson} */ noise) => (!isNews(noise) && !noise.used?.length ? null : html`
+				${changesOf(noise) ? html`<p class="note">The button sets ${changesOf(noise)}.</p>` : null}
 				<p class="buttons">
-					<button class="button" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : ''} onClick=${() => { if (!busy) send(() => putPolicy(one.id, name, noise.values, etag)); }}>Use the estimates and solve</button>
+					${isNews(noise) ? button('Use the estimates and solve', () => acceptNoise(one.id)) : null}
+					${noise.used?.length ? button('Take all balls to be alike', () => takeNoiseBack(one.id)) : null}
 				</p>`)}
 		<//>
 	`;
@@ -153,7 +163,7 @@ function PolicyOf({ one }) {
 			<${PolicyText} key=${`${policy.hash} ${policy.version}`} one=${one} policy=${policy} etag=${etag} busy=${busy} send=${send} />
 			<div class="page__list">
 				<${Shipped} one=${one} policy=${policy} etag=${etag} shipped=${shipped} busy=${busy} send=${send} />
-				<${NoiseOf} one=${one} policy=${policy} etag=${etag} shipped=${shipped} busy=${busy} send=${send} />
+				<${NoiseOf} one=${one} policy=${policy} busy=${busy} send=${send} />
 				<${ValueTable} policy=${policy} fields=${fields} />
 				<${History} policy=${policy} />
 			</div>

@@ -89,7 +89,7 @@ export function PredictionCard({ group }) {
 			<ul class="predictions__views">
 				${group.views.map((view) => html`<${Row} key=${view.key} view=${view} own=${found.views.get(view.key) ?? { marks: [], fewer: 0, origin: null }} sets=${found.set === '' ? found.sets.length : 1} />`)}
 			</ul>
-			<button class="button predictions__all" type="button" aria-disabled=${why !== ''} title=${why || 'Each is an edit that undo takes back (Shift+Y)'} onClick=${() => { if (!why) acceptAll(); }}>
+			<button data-needs="annotate" class="button predictions__all" type="button" aria-disabled=${why !== ''} title=${why || 'Each is an edit that undo takes back (Shift+Y)'} onClick=${() => { if (!why) acceptAll(); }}>
 				${ready ? `Accept in ${plural(ready, 'view')} without a ball` : 'Nothing more to accept'}
 			</button>
 		</section>

@@ -1,5 +1,5 @@
 // @ts-check
-/** What is proposed for the views without lines, with its scores, and the way to accept it. */
+/** What is proposed for the views without a camera, with its scores, and the way to accept it. */
 
 import { html } from 'htm/preact';
 
@@ -26,7 +26,7 @@ export function ProposalScores({ item }) {
 
 /** @param {{picture: ViewPicture, item: ViewProposalJson}} props */
 function Row({ picture: { view }, item }) {
-	const why = item.outcome === 'proposed' ? '' : item.sentence;
+	const why = item.sentence;
 	return html`
 		<li data-proposal=${view.letter} data-outcome=${item.outcome}>
 			<button class="row-button" type="button" title=${`Show ${view.label}`} aria-label=${`Show the proposal for view ${view.letter}`} onClick=${() => focusView(view.letter)}><${Letter} letter=${view.letter} /></button>
@@ -36,7 +36,7 @@ function Row({ picture: { view }, item }) {
 				<${ProposalScores} item=${item} />
 			</span>
 			${item.outcome === 'proposed' ? html`
-				<button class="button button--small" type="button" title="Make them the lines of this view (Shift+P)" aria-label=${`Accept the lines proposed for view ${view.letter}`} onClick=${() => acceptProposal(view)}>Accept</button>` : null}
+				<button data-needs="annotate" class="button button--small" type="button" title="Add them to the lines of this view (Shift+P)" aria-label=${`Accept the lines proposed for view ${view.letter}`} onClick=${() => acceptProposal(view)}>Accept</button>` : null}
 		</li>
 	`;
 }

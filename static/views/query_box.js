@@ -52,14 +52,21 @@ export function QueryBox({ field, invalid, onQuery }) {
 	const known = facets.value;
 	const fields = queryFields.value;
 	useEffect(() => {
-		// What arrives while somebody waits for it.
-		if (document.activeElement === field.current && /\S$/.test(text)) offer(text);
+		// What arrives while somebody waits for it; what they have chosen meanwhile stays chosen.
+		if (document.activeElement !== field.current || !/\S$/.test(text)) return;
+		const found = completionOf(text);
+		setActive(found.offers.findIndex((one) => one.text === offers[active]?.text));
+		setCompletion(found);
 	}, [known, fields]);
 
 	/** @param {string} now */
+	function completionOf(now) {
+		return complete(now, field.current?.selectionStart ?? now.length, facets.value, queryFields.value);
+	}
+	/** @param {string} now */
 	function offer(now) {
 		setActive(-1);
-		setCompletion(complete(now, field.current?.selectionStart ?? now.length, facets.value, queryFields.value));
+		setCompletion(completionOf(now));
 	}
 	/** @param {Offer} chosen */
 	function choose(chosen) {

@@ -10,6 +10,7 @@ import { activeRow } from '../state/queue.js';
 import { reasonText } from '../state/reasons.js';
 import { isTicked, tickTo, ticks, turnTick } from '../state/queue_ticks.js';
 import { GATE_TITLES } from './gate_names.js';
+import { OpenComments } from './talk/open_comments.js';
 
 /** @import {GroupRow} from '../api/types.js' */
 
@@ -38,6 +39,17 @@ function whyAndWho(row) {
 	const override = row.override ? `although ${(GATE_TITLES[row.override] ?? words(row.override)).toLowerCase()}` : '';
 	const who = row.reviewer && row.reviewer !== 'local' ? row.reviewer : '';
 	return [reasonText(row.reason ? { reason: row.reason, note: null } : null), override, row.fixed ? 'fixed' : '', who].filter(Boolean).join(' · ');
+}
+
+const CAME_TO = { agreed: 'agree', open: 'differ', decided: 'differed' };
+
+/** How many people annotated it on their own, and what that came to. @param {{row: GroupRow}} props */
+function OwnAnnotations({ row }) {
+	if (!row.takes) return null;
+	const text = row.came_to ? `${row.takes} ${CAME_TO[row.came_to]}` : row.takes === 1 ? '1 annotation' : `${row.takes} annotations`;
+	const title = `${row.takes === 1 ? 'One person has' : `${row.takes} people have`} handed in an annotation of their own${row.came_to === 'open' ? '; they differ, and somebody has to decide' : ''}`;
+	if (row.came_to !== 'open') return html`<span class="own-annotations" title=${title}>${text}</span>`;
+	return html`<a class="own-annotations" data-state="open" href=${`/adjudicate/${row.id}`} tabindex="-1" title=${title}>${text}</a>`;
 }
 
 /** @param {{row: GroupRow, index: number, active: boolean, ticked: boolean}} props */
@@ -74,7 +86,7 @@ function Cells({ row, index, q, painted, active, ticked }) {
 		</div>
 		<div role="gridcell" class="queue-cell">
 			<span class="pill" data-status=${status}><span aria-hidden="true">${GLYPHS[status] ?? ''}</span> ${text}</span>
-			<span class="queue-cell__sub queue-cell__by">${whyAndWho(row)}</span>
+			<span class="queue-cell__sub queue-cell__by"><${OwnAnnotations} row=${row} /><${OpenComments} count=${row.comments} />${whyAndWho(row)}</span>
 		</div>
 		<div role="gridcell" class="queue-cell queue-cell--two" data-passes=${row.passes === true}>
 			<span>${title}</span><span class="queue-cell__sub">${detail}</span>

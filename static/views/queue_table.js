@@ -113,16 +113,17 @@ const KEYS = [
 	{ keys: ['Shift+ArrowUp'], label: 'Tick on upwards', group: 'Queue', run: () => extend(-1) },
 ];
 
-/** The scroll position, as near as can be, at which a row is in sight. @param {number} top @param {number} height @param {number} row */
+/** First pixel in sight, as near as can be, with which a row is. @param {number} top @param {number} height @param {number} row */
 function reaching(top, height, row) {
 	if (row * ROW < top) return row * ROW;
 	return Math.max(top, (row + 1) * ROW - height);
 }
 
+/** @import {VirtualList} from '../lib/virtual_list.js' */
 /** @typedef {import('preact').RefObject<HTMLDivElement | null>} Scroller */
 
-/** Scroll to where somebody was when rows arrive, and along with keys. @param {Scroller} scroller */
-function useScrolling(scroller) {
+/** Scroll to where somebody was when rows arrive, and along with keys. @param {Scroller} scroller @param {VirtualList} list */
+function useScrolling(scroller, list) {
 	const { shown } = queue.value;
 	const active = activeRow.value;
 	const arrived = `${shown} ${arrivals.value}`;
@@ -133,12 +134,12 @@ function useScrolling(scroller) {
 		const arriving = before.current !== arrived;
 		before.current = arrived;
 		const left = leftAt(shown);
-		if (arriving) element.scrollTop = left.top * ROW;
+		if (arriving) list.moveTo(left.top * ROW);
 		// Who had scrolled away from the active row finds what was in sight.
 		if (following.current || (arriving && active !== left.active)) {
-			element.scrollTop = reaching(element.scrollTop, element.clientHeight, active);
+			list.moveTo(reaching(list.top(), element.clientHeight, active));
 		}
-		remember(shown, element.scrollTop / ROW);
+		remember(shown, list.top() / ROW);
 	}, [arrived, active]);
 }
 
@@ -160,31 +161,29 @@ export function QueueTable({ q, painted, onQuery }) {
 	const scroller = useRef(/** @type {HTMLDivElement | null} */ (null));
 	const { pages, total, loaded, shown } = queue.value;
 	const rows = loaded ? total : UNKNOWN;
-	const list = useVirtualList(scroller, { count: rows, rowHeight: ROW });
-	const items = list.getVirtualItems();
-	const first = items[0]?.index ?? 0;
-	const last = items.at(-1)?.index ?? 0;
+	const list = useVirtualList(scroller, {
+		count: rows, rowHeight: ROW, onScroll: (top) => { if (shown) remember(shown, top / ROW); },
+	});
+	const first = list.rows[0] ?? 0;
+	const last = list.rows.at(-1) ?? 0;
 	const active = activeRow.value;
 	useKeys(KEYS);
-	useScrolling(scroller);
-	useRovingFocus(scroller, items.some(({ index }) => index === active));
+	useScrolling(scroller, list);
+	useRovingFocus(scroller, list.rows.includes(active));
 	useEffect(() => { if (total > 0) look(first, last); }, [first, last, total, pages]);
-	function scrolled() {
-		if (shown && scroller.current) remember(shown, scroller.current.scrollTop / ROW);
-	}
 	return html`
 		<section class="card queue-table" role="grid" data-painted=${painted} aria-label="Groups" aria-multiselectable="true" aria-rowcount=${loaded ? total + 1 : -1} aria-busy=${!loaded}>
 			<div class="queue-row queue-row--head" role="row" aria-rowindex="1">
 				<${HeadTick} />
 				${COLUMNS.filter(({ paint }) => painted || !paint).map((column) => html`<${HeadCell} key=${column.label} column=${column} q=${q} onQuery=${onQuery} />`)}
 			</div>
-			<div class="queue-table__rows" role="rowgroup" ref=${scroller} tabindex="0" aria-label="Rows" onScroll=${scrolled}>
-				<div role="presentation" class="queue-table__space" style=${{ height: `${list.getTotalSize()}px` }}>
-					${items.map(({ index, start }) => {
+			<div class="queue-table__rows" role="rowgroup" ref=${scroller} tabindex="0" aria-label="Rows">
+				<div role="presentation" class="queue-table__space" style=${{ height: `${list.space}px` }}>
+					${list.rows.map((index) => {
 						const row = rowAt(pages, index);
 						return html`
 							<${QueueRow}
-								key=${index} index=${index} start=${start} row=${row} q=${q} painted=${painted} active=${loaded && index === active}
+								key=${index} index=${index} start=${list.placeOf(index)} row=${row} q=${q} painted=${painted} active=${loaded && index === active}
 								ticked=${row !== null && isTicked(ticks.value, row.id)}
 							/>`;
 					})}

@@ -7,12 +7,15 @@ import { useState } from 'preact/hooks';
 import { count } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
 import { valueOf, withField, wordsOf } from '../state/query.js';
-import { redo, redoable, undo, undoable } from '../state/history.js';
+import { redo, redoable, undo, undoable } from '../state/undo.js';
+import { isTeam, myName } from '../state/me.js';
 import { queue, statusCounts } from '../state/queue.js';
 import { clearTicks, countOf, queryOf, ticks } from '../state/queue_ticks.js';
+import { whyNot } from '../state/rights.js';
 import { BulkDialog } from './bulk_dialog.js';
 import { Reviewers } from './reviewers.js';
 import { SavedViews } from './saved_views.js';
+import { BatchDialog } from './work/batch_dialog.js';
 import { VALUE_OF_REVIEW, ValueOfReview } from './value_of_review.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
@@ -23,18 +26,20 @@ const STATUSES = [
 ];
 const FLAGS = [
 	{ word: 'finding:any', label: 'with findings' }, { word: 'passes:no', label: 'failing' },
-	{ word: 'stale:yes', label: 'stale' },
+	{ word: 'stale:yes', label: 'stale' }, { word: 'comments:open', label: 'with comments' },
 ];
 const ORDERS = [
 	{ sort: '', label: 'Order of the dataset', title: 'As the groups were imported' }, { sort: 'value', label: 'Value of review', title: VALUE_OF_REVIEW },
 	{ sort: 'sigma-desc', label: 'Largest σ first', title: 'First the balls whose position is least certain' }, { sort: 'newest-desc', label: 'Newest change first', title: 'First the groups that were changed or judged last' },
 ];
 
-/** @param {{q: string, onQuery: (q: string) => void}} props */
-function Facets({ q, onQuery }) {
+/** @param {{dataset: string, q: string, onQuery: (q: string) => void}} props */
+function Facets({ dataset, q, onQuery }) {
 	const chosen = valueOf(q, 'status').split(',').filter(Boolean);
 	const counts = statusCounts.value;
 	const words = wordsOf(q);
+	const judges = isTeam && !whyNot('review', dataset);
+	const flags = [...FLAGS, ...(myName.value ? [{ word: `mentions:${myName.value}`, label: 'mentions me' }] : []), ...(judges ? [{ word: 'annotations:waiting', label: 'to decide' }] : [])];
 	/** @param {string} name */
 	function turn(name) {
 		const next = chosen.includes(name) ? chosen.filter((one) => one !== name) : [...chosen, name];
@@ -50,7 +55,7 @@ function Facets({ q, onQuery }) {
 				<button key=${name} class="facet" type="button" data-status=${name} aria-pressed=${chosen.includes(name)} onClick=${() => turn(name)}>
 					<span aria-hidden="true">${glyph}</span> ${name} <span class="facet__count">${counts ? count(counts[name] ?? 0) : ''}</span>
 				</button>`)}
-			${FLAGS.map(({ word, label }) => html`
+			${flags.map(({ word, label }) => html`
 				<button key=${word} class="facet" type="button" aria-pressed=${words.includes(word)} onClick=${() => turnFlag(word)}>${label}</button>`)}
 		</div>
 	`;
@@ -102,31 +107,41 @@ function RedoButton() {
 /** @param {{dataset: DatasetJson, q: string, onQuery: (q: string) => void}} props */
 export function QueueTools({ dataset, q, onQuery }) {
 	const [deciding, setDeciding] = useState(false);
+	const [giving, setGiving] = useState(false);
 	const { total, loaded, error } = queue.value;
 	const ticked = countOf(ticks.value, total);
 	const reason = !loaded || error ? 'The query has no answer yet' : total === 0 ? 'No group matches' : '';
 	const open = () => { if (!reason) setDeciding(true); };
-	const [keys] = useState(() => ({ run: open }));
+	const give = () => { if (!reason) setGiving(true); };
+	const [keys] = useState(() => ({ run: open, give }));
 	keys.run = open;
+	keys.give = give;
 	const [bindings] = useState(() => [
 		{ keys: ['b'], label: 'Decide what is ticked, or all that match', group: 'Queue', run: () => keys.run() },
+		{ keys: ['Shift+d'], label: 'Give out what is ticked, or all that match, as a batch', group: 'Queue', needs: /** @type {const} */ ('lead'), run: () => keys.give() },
 		{ keys: ['Ctrl+z'], label: 'Take back the last verdict, of one group or of many', group: 'Queue', run: undo },
 		{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Give the verdict again that was taken back last', group: 'Queue', run: redo },
 	]);
 	useKeys(bindings);
 	return html`
 		<div class="queue-tools">
-			<${Facets} q=${q} onQuery=${onQuery} />
+			<${Facets} dataset=${dataset.name} q=${q} onQuery=${onQuery} />
 			<${OrderChoice} q=${q} onQuery=${onQuery} />
 			<${SavedViews} dataset=${dataset} q=${q} onQuery=${onQuery} />
 			<${Reviewers} dataset=${dataset} onQuery=${onQuery} />
 			<${UndoButton} />
 			<${RedoButton} />
 			<${Ticked} ticked=${ticked} />
-			<button class=${ticked > 0 ? 'button button--primary' : 'button'} type="button" aria-disabled=${reason !== ''} title=${reason} onClick=${open}>
+			${whyNot('lead', dataset.name) ? null : html`<button class="button" type="button" aria-disabled=${reason !== ''} title=${reason || 'Make a batch of these groups for people to work on (Shift D)'} onClick=${give}>Give out…</button>`}
+			<button data-needs="review" class=${ticked > 0 ? 'button button--primary' : 'button'} type="button" aria-disabled=${reason !== ''} title=${reason} onClick=${open}>
 				${reason ? 'Decide…' : ticked > 0 ? `Decide ${count(ticked)} ticked…` : `Decide all ${count(total)}…`}
 			</button>
 			<${ValueOfReview} q=${q} />
+			${giving ? html`
+				<${BatchDialog}
+					dataset=${dataset} q=${q} total=${total} onClose=${() => setGiving(false)}
+					ticked=${ticked > 0 ? { count: ticked, q: queryOf(ticks.value, q) } : null}
+				/>` : null}
 			${deciding ? html`
 				<${BulkDialog}
 					dataset=${dataset} q=${q} total=${total} onClose=${() => setDeciding(false)}

@@ -19,6 +19,7 @@ import { ViewTable } from './view_table.js';
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
 const FirstSteps = lazy(async () => (await import('./first_steps.js')).FirstSteps);
+const CommentsCard = lazy(async () => (await import('./talk/comments_card.js')).CommentsCard);
 const LessonCard = lazy(async () => (await import('./lesson_card.js')).LessonCard);
 
 /**
@@ -41,6 +42,7 @@ export function Rail({ group, solution, pictures, live }) {
 					<${Findings} group=${group} solution=${solution} />
 				` : null}
 				<${ViewLines} group=${group} pictures=${pictures} />
+				<${CommentsCard} group=${group} />
 				<${FirstSteps} dataset=${group.dataset.name} />
 			</div>
 			<${VerdictButtons} group=${group} />

@@ -8,14 +8,18 @@ import { ago, count } from '../lib/format.js';
 import { useNow } from '../lib/hooks.js';
 import { held } from '../state/conflict.js';
 import { groupDocument, unsaved } from '../state/group.js';
-import { redo, redoable, undo, undoable } from '../state/history.js';
-import { goNext, goPrevious, neighbours, query, queueAddress, reviewAddress } from '../state/navigation.js';
+import { redo, redoable, undo, undoable } from '../state/undo.js';
+import { batchId, goNext, goPrevious, neighbours, query, queueAddress, reviewAddress } from '../state/navigation.js';
 import { standing } from '../state/walk.js';
+import { batch } from '../state/leases.js';
 import { changedElsewhere } from '../state/live.js';
 import { lasting } from '../state/outbox.js';
 import { isAway, isSending, savedAt, waiting, wake, wasRefused } from '../state/sending.js';
+import { openThreads } from '../state/threads.js';
 import { isBlind } from '../state/verdicts.js';
 import { Header } from './header.js';
+import { Presence } from './lease_bar.js';
+import { OpenComments } from './talk/open_comments.js';
 
 /** @import {Standing} from '../state/walk.js' */
 
@@ -84,7 +88,7 @@ function Place() {
 	const at = standing.value;
 	const group = groupDocument.value;
 	if (!group || !at) return null;
-	const queue = query.value || group.dataset.name;
+	const queue = (batch.value?.id === batchId.value && batch.value?.name) || query.value || group.dataset.name;
 	const { done, left } = at;
 	return html`
 		<span class="header__place">
@@ -105,6 +109,12 @@ function HeaderButton({ label, keys, run, reason, path }) {
 	`;
 }
 
+/** @param {Event} event */
+function toComments(event) {
+	event.preventDefault();
+	document.querySelector('.talk')?.scrollIntoView({ block: 'nearest' });
+}
+
 export function ReviewHeader() {
 	const group = groupDocument.value;
 	const at = neighbours.value;
@@ -116,11 +126,12 @@ export function ReviewHeader() {
 				<${HeaderButton} label="Previous group" keys="D" run=${goPrevious} path="M10 3 5 8l5 5"
 					reason=${at && !at.previous.length ? 'This is the first group of the queue' : null} />
 				<span class="header__where">
-					<strong class="header__group" title=${group ? `${group.label} (${group.key})` : ''}><span>${match}</span>${when.length ? html`<span class="header__when"> · ${when.join(' · ')}</span>` : null}</strong> ${group && isBlind(group) ? html`<span class="pill" data-status="no-picture">no picture</span> ` : null}<${Place} />
+					<strong class="header__group" title=${group ? `${group.label} (${group.key})` : ''}><span>${match}</span>${when.length ? html`<span class="header__when"> · ${when.join(' · ')}</span>` : null}</strong> ${group && isBlind(group) ? html`<span class="pill" data-status="no-picture">no picture</span> ` : null}${openThreads.value ? html`<a class="header__comments" href="#talk-title" onClick=${toComments}><${OpenComments} count=${openThreads.value} /></a>` : null}<${Place} />
 				</span>
 				<${HeaderButton} label="Next group" keys="F" run=${goNext} path="m6 3 5 5-5 5"
 					reason=${at && !at.next.length ? 'This is the last group of the queue' : null} />
 			</div>
+			<${Presence} />
 			<${SaveState} />
 			<${HeaderButton} label="Undo" keys="Ctrl Z" run=${undo} path="M6 3 3 6l3 3M3 6h6a4 4 0 0 1 0 8H6"
 				reason=${undoable.value ? null : 'Nothing to undo in this group'} />

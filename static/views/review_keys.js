@@ -8,14 +8,17 @@ import { toggleOccluded, toggleOutOfView } from '../state/ball_edits.js';
 import { drawHere, endDrawing, startDrawing } from '../state/drawing.js';
 import { moveCross } from '../state/drawing_cross.js';
 import { swapSides } from '../state/edits.js';
-import { draft, group, solution, submit, withdraw } from '../state/group.js';
-import { redo, undo } from '../state/history.js';
+import { draft, group, groupDocument, solution, submit, withdraw } from '../state/group.js';
+import { askHandBack, askTakeOver, canHandBack, canTakeOver } from '../state/hand_back.js';
+import { redo, undo } from '../state/undo.js';
 import { backToInstant, stepInstant } from '../state/instants.js';
-import { mend, mends, turnMend } from '../state/mends.js';
-import { goBy, goFlagged, goNext, goPrevious } from '../state/navigation.js';
+import { canHandIn, handInAndNext } from '../state/leases.js';
+import { isHeld, mend, mends, turnMend } from '../state/mends.js';
+import { goBy, goFlagged, goNext, goPrevious, historyAddress } from '../state/navigation.js';
 import { announce, dismiss, notice } from '../state/notice.js';
 import { revertSelected } from '../state/revert.js';
 import { swapWarning, swappedViews } from '../state/sides.js';
+import { annotateOwn, guidelinesShown, markGold } from '../state/takes.js';
 import { accept, askReason, askViewReason, cancelAsking, defer } from '../state/verdicts.js';
 import { filled, fitAll, fitPanel, isZoomed, toggleFilled, viewportOf, zoomTo } from '../state/viewports.js';
 import {
@@ -23,6 +26,8 @@ import {
 	gatesOpen, loupe, maximised, otherInstant, overlaysHidden, paintWhiskers, pinPlace, pointerPlace, projections,
 	selected, stripCollapsed, toggleMaximised,
 } from '../state/workspace.js';
+import { navigate } from '../lib/router.js';
+import { compose } from '../state/threads.js';
 import { deleteSelected, nudge, nudgeDiameter } from '../tools/nudge.js';
 import { EDITOR_DOOR } from './calibration/open.js';
 import { mendNow, placeExpected } from './mend_actions.js';
@@ -149,6 +154,12 @@ function otherEstimator() {
 	announce(`${capital(ballName(solution.value, estimator.value))}.`);
 }
 
+/** Who changed what in the group. */
+function openHistory() {
+	const at = groupDocument.value;
+	if (at) navigate(historyAddress(at.id));
+}
+
 /** Ask for a note at the pointer. */
 function askNote() {
 	pinPlace.value = pointerPlace.value;
@@ -185,7 +196,7 @@ function aim(x, y, event) {
 /** @param {string} arrow @param {number} x @param {number} y @returns {Binding} */
 function arrowKey(arrow, x, y) {
 	return {
-		keys: [`Arrow${arrow}`, `Shift+Arrow${arrow}`, `Alt+Arrow${arrow}`], group: 'Edit',
+		keys: [`Arrow${arrow}`, `Shift+Arrow${arrow}`, `Alt+Arrow${arrow}`], group: 'Edit', needs: 'annotate',
 		label: `Move the selected object ${arrow.toLowerCase()}`, shown: 'hidden',
 		when: () => isDrawing() || isSelected(), run: (event) => (isDrawing() ? aim(x, y, event) : nudge(x, y, event)),
 	};
@@ -193,18 +204,22 @@ function arrowKey(arrow, x, y) {
 
 /** @type {Binding[]} */
 const VERDICT = [
-	{ keys: ['a', 'Ctrl+Enter'], label: 'Accept and next', group: 'Verdict', run: accept },
-	{ keys: ['x'], label: 'Reject; then a digit for the reason', group: 'Verdict', run: askReason },
-	{ keys: ['s'], label: 'Defer and next', group: 'Verdict', run: defer },
-	{ keys: ['Shift+a'], label: 'Use the focused view', group: 'Verdict', run: useView },
-	{ keys: ['Shift+x'], label: 'Leave the focused view out; then a digit for the reason', group: 'Verdict', run: askViewReason },
-	{ keys: ['Shift+n'], label: 'Note at the pointer', group: 'Verdict', run: askNote },
+	{ keys: ['a', 'Ctrl+Enter'], label: 'Accept and next', group: 'Verdict', needs: 'review', run: accept },
+	{ keys: ['x'], label: 'Reject; then a digit for the reason', group: 'Verdict', needs: 'review', run: askReason },
+	{ keys: ['s'], label: 'Defer and next', group: 'Verdict', needs: 'review', run: defer },
+	{ keys: ['Shift+a'], label: 'Use the focused view', group: 'Verdict', needs: 'annotate', run: useView },
+	{ keys: ['Shift+x'], label: 'Leave the focused view out; then a digit for the reason', group: 'Verdict', needs: 'annotate', run: askViewReason },
+	{ keys: ['Shift+n'], label: 'Note at the pointer', group: 'Verdict', needs: 'review', run: askNote },
+	{ keys: ['Shift+c'], label: 'Comment at the pointer, or on the group', group: 'Verdict', needs: 'annotate', run: compose },
 ];
 
 /** @type {Binding[]} */
 const NAVIGATE = [
 	{ keys: ['f'], label: 'Next group', group: 'Navigate', run: () => { goNext(); } },
 	{ keys: ['d'], label: 'Previous group', group: 'Navigate', run: () => { goPrevious(); } },
+	{ keys: ['Shift+f'], label: 'Done and next: hand the group in, in a batch that you annotate', group: 'Navigate', needs: 'annotate', when: () => canHandIn.value, run: () => { handInAndNext(); } },
+	{ keys: ['Shift+u'], label: 'Hand the group back to who handed it in, and say why', group: 'Verdict', needs: 'review', when: () => canHandBack.value, run: askHandBack },
+	{ keys: ['Shift+r'], label: 'Take somebody’s own annotation over into the group', group: 'Verdict', needs: 'lead', when: () => canTakeOver.value, run: askTakeOver },
 	{ keys: ['v'], label: 'Ten groups on', group: 'Navigate', run: () => { goBy(1, FAR); } },
 	{ keys: ['c'], label: 'Ten groups back', group: 'Navigate', run: () => { goBy(-1, FAR); } },
 	{ keys: ['r'], label: 'Next flagged group', group: 'Navigate', run: () => { goFlagged(1); } },
@@ -218,7 +233,7 @@ const VIEW = [
 		shown: i === 0 ? '1 … 6' : 'hidden', run: () => focusAt(i),
 	})),
 	...DIGITS.map((digit, i) => ({
-		keys: [`Shift+${digit}`], label: 'Use a view or leave it out', group: 'View',
+		keys: [`Shift+${digit}`], label: 'Use a view or leave it out', group: 'View', needs: /** @type {const} */ ('annotate'),
 		shown: i === 0 ? 'Shift + 1 … 6' : 'hidden', run: () => toggleIncluded(i),
 	})),
 	{
@@ -251,6 +266,7 @@ const VIEW = [
 			announce(paintWhiskers.value ? 'Whiskers lead to the paint.' : 'Whiskers lead to the clicks.');
 		},
 	},
+	{ keys: ['Shift+t'], label: 'History of the group: who changed what, with pictures', group: 'View', run: openHistory },
 	{ keys: [','], label: 'The focused view one frame before, where the dataset has it', group: 'View', run: () => { stepInstant(-1); } },
 	{ keys: ['.'], label: 'The focused view one frame after', group: 'View', run: () => { stepInstant(1); } },
 	{ keys: ['t'], label: '3D ball: mean of pairs, or most likely point', group: 'View', run: otherEstimator },
@@ -267,21 +283,21 @@ const VIEW = [
 
 /** @type {Binding[]} */
 const EDIT = [
-	{ keys: ['n'], label: 'Draw a ball, a marking, or one more point', group: 'Edit', run: () => startDrawing() },
+	{ keys: ['n'], label: 'Draw a ball, a marking, or one more point', group: 'Edit', needs: 'annotate', run: () => startDrawing() },
 	{
-		keys: ['Enter'], label: 'Put a point at the pointer', group: 'Edit', shown: 'hidden',
+		keys: ['Enter'], label: 'Put a point at the pointer', group: 'Edit', needs: 'annotate', shown: 'hidden',
 		when: isDrawing, run: drawHere,
 	},
 	{
 		keys: [], label: 'Put a point on the line there', group: 'Edit', shown: 'Alt click', run: () => {},
 	},
 	{
-		keys: ['Enter'], label: 'Do what the card on the right offers', group: 'Edit', once: true,
-		when: () => !editing.value && mend.value !== null, run: mendNow,
+		keys: ['Enter'], label: 'Do what the card on the right offers', group: 'Edit', needs: 'annotate', once: true,
+		when: () => !editing.value && (mend.value !== null || isHeld.value), run: mendNow,
 	},
 	{
 		keys: ['Shift+Enter'], label: 'Show another way to mend the group', group: 'Edit',
-		when: () => mends.value.length > 1, run: () => turnMend(1),
+		when: () => mend.value !== null && mends.value.length > 1, run: () => turnMend(1),
 	},
 	{
 		// Where the card offers nothing, Enter leads in.
@@ -295,25 +311,28 @@ const EDIT = [
 		run: () => {},
 	},
 	arrowKey('Left', -1, 0), arrowKey('Right', 1, 0), arrowKey('Up', 0, -1), arrowKey('Down', 0, 1),
-	{ keys: ['['], label: 'Ball smaller by 0.25 px', group: 'Edit', run: () => nudgeDiameter(-1) },
-	{ keys: [']'], label: 'Ball larger by 0.25 px', group: 'Edit', run: () => nudgeDiameter(1) },
+	{ keys: ['['], label: 'Ball smaller by 0.25 px', group: 'Edit', needs: 'annotate', run: () => nudgeDiameter(-1) },
+	{ keys: [']'], label: 'Ball larger by 0.25 px', group: 'Edit', needs: 'annotate', run: () => nudgeDiameter(1) },
 	{
-		keys: ['Delete', 'Backspace'], label: 'Delete the selected object', group: 'Edit',
+		keys: ['Delete', 'Backspace'], label: 'Delete the selected object', group: 'Edit', needs: 'annotate',
 		when: isSelected, run: deleteSelected,
 	},
 	{
-		keys: ['q'], label: 'Ball occluded, or not', group: 'Edit',
+		keys: ['q'], label: 'Ball occluded, or not', group: 'Edit', needs: 'annotate',
 		run: () => changeBall(toggleOccluded, 'There is no ball in view'),
 	},
 	{
-		keys: ['o'], label: 'Ball out of view, or not', group: 'Edit',
+		keys: ['o'], label: 'Ball out of view, or not', group: 'Edit', needs: 'annotate',
 		run: () => changeBall(toggleOutOfView, ''),
 	},
-	{ keys: ['y'], label: 'Take the predicted ball, else place it where the other views see it', group: 'Edit', run: takeBall },
-	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', run: acceptAll },
-	{ keys: ['Shift+p'], label: 'Accept the lines that are proposed for the view', group: 'Edit', run: acceptProposed },
-	{ keys: ['u'], label: 'Give the selected object back what it was', group: 'Edit', run: () => { revertSelected(); } },
-	{ keys: ['m'], label: 'Swap left and right, in the view that a finding names', group: 'Edit', run: swap },
+	{ keys: ['y'], label: 'Take the predicted ball, else place it where the other views see it', group: 'Edit', needs: 'annotate', run: takeBall },
+	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', needs: 'annotate', run: acceptAll },
+	{ keys: ['Shift+p'], label: 'Accept the lines that are proposed for the view', group: 'Edit', needs: 'annotate', run: acceptProposed },
+	{ keys: ['u'], label: 'Give the selected object back what it was', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },
+	{ keys: ['m'], label: 'Swap left and right, in the view that a finding names', group: 'Edit', needs: 'annotate', run: swap },
+	{ keys: ['Shift+g'], label: 'Guidelines of the dataset', group: 'View', run: () => { guidelinesShown.value = !guidelinesShown.value; } },
+	{ keys: ['Shift+o'], label: 'Annotate the group on your own, on a copy', group: 'Edit', needs: 'annotate', run: annotateOwn },
+	{ keys: ['Shift+k'], label: 'Gold group: its truth is known', group: 'Edit', needs: 'lead', run: markGold },
 	{ keys: ['Ctrl+z'], label: 'Undo', group: 'Edit', run: undo },
 	{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Redo', group: 'Edit', run: redo },
 ];

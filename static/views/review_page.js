@@ -11,12 +11,16 @@ import { picturesOf } from '../overlays/scene.js';
 import { absent } from '../state/arrival.js';
 import { conflict } from '../state/conflict.js';
 import { group, groupDocument, isPreview, solution } from '../state/group.js';
+import { question } from '../state/hand_back.js';
 import { sceneShown } from '../state/scene3d.js';
+import { guidelinesShown, isCopy } from '../state/takes.js';
+import { threads, withThreads } from '../state/threads.js';
 import { estimator, focused, loupe, maximised } from '../state/workspace.js';
 import { NoticeBar } from './bars.js';
 import { ImageGrid, ReviewMain } from './image_grid.js';
 import { usePredictions, withPredictions } from './prediction_parts.js';
 import { useProposals } from './proposal_parts.js';
+import { LeaseBar } from './lease_bar.js';
 import { Rail } from './rail.js';
 import { ReviewHeader } from './review_header.js';
 import { REVIEW_KEYS } from './review_keys.js';
@@ -25,11 +29,15 @@ import { BottomStrip } from './strip.js';
 import { usePaint } from './view_paint.js';
 
 const ConflictBar = lazy(async () => (await import('./conflict_bar.js')).ConflictBar);
+const Guidelines = lazy(async () => (await import('./guidelines.js')).Guidelines);
+const HandBackDialog = lazy(async () => (await import('./hand_back_dialog.js')).HandBackDialog);
+const TakeBar = lazy(async () => (await import('./take_bar.js')).TakeBar);
 const Loupe = lazy(async () => (await import('./loupe.js')).Loupe);
 
-/** What is focused or shown alone must exist in this group. @param {string[]} letters */
+/** What is focused or shown alone must exist in this group; before there is one, nothing is known. @param {string[]} letters */
 function keepWithin(letters) {
-	if (!letters.includes(focused.value)) focused.value = letters[0] ?? 'A';
+	if (letters.length === 0) return;
+	if (!letters.includes(focused.value)) focused.value = letters[0];
 	if (maximised.value && !letters.includes(maximised.value)) maximised.value = null;
 }
 
@@ -55,7 +63,9 @@ function Workspace() {
 	const plain = useMemo(() => (shown ? picturesOf(shown, solved, saved) : []), [shown, solved, saved]);
 	const predicted = usePredictions(shown !== null);
 	const marked = useMemo(() => withPredictions(plain, predicted), [plain, predicted]);
-	const pictures = useProposals(usePaint(marked, saved), saved);
+	const drawn = useProposals(usePaint(marked, saved), saved);
+	const said = threads.value;
+	const pictures = useMemo(() => withThreads(drawn, said), [drawn, said]);
 	useEffect(() => keepWithin(pictures.map(({ view }) => view.letter)), [pictures]);
 	if (!shown) return html`<${Absent} />`;
 	return html`
@@ -76,8 +86,10 @@ export function ReviewPage() {
 	return html`
 		<div class="review">
 			<${ReviewHeader} />
-			<div class="bars"><${NoticeBar} />${conflict.value ? html`<${ConflictBar} />` : null}</div>
+			<div class="bars">${isCopy(groupDocument.value) ? html`<${TakeBar} />` : null}<${NoticeBar} /><${LeaseBar} />${conflict.value ? html`<${ConflictBar} />` : null}</div>
 			<${Workspace} />
+			${question.value ? html`<${HandBackDialog} />` : null}
+			${guidelinesShown.value ? html`<${Guidelines} />` : null}
 		</div>
 	`;
 }

@@ -3,10 +3,11 @@
 
 import { html } from 'htm/preact';
 
+import { sentenceOf } from '../api/problem.js';
 import { getBatches, getReviewers } from '../api/queue.js';
 import { ago, count } from '../lib/format.js';
 import { useNow } from '../lib/hooks.js';
-import { sentenceOf, useResource } from '../lib/resource.js';
+import { useResource } from '../lib/resource.js';
 import { batchText, giveBatchAgain, takeBatchBack } from '../state/queue_batches.js';
 import { Popover } from './popover.js';
 
@@ -67,8 +68,8 @@ function Batches({ dataset }) {
 							${batchText(batch.changed, batch.state)}
 							<small>${batch.actor} · ${ago(Date.parse(batch.at), now)}${batch.undone ? ` · taken back by ${batch.undone_by}` : ''}${batch.redone ? ' · given again' : ''}</small>
 						</span>
-						${batch.undone ? null : html`<button class="button" type="button" onClick=${() => undo(batch)}>Undo</button>`}
-						${batch.undone && !batch.redone ? html`<button class="button" type="button" title="Give these verdicts again; groups judged or edited since stay as they are" onClick=${() => redo(batch)}>Redo</button>` : null}
+						${batch.undone ? null : html`<button data-needs="review" class="button" type="button" onClick=${() => undo(batch)}>Undo</button>`}
+						${batch.undone && !batch.redone ? html`<button data-needs="review" class="button" type="button" title="Give these verdicts again; groups judged or edited since stay as they are" onClick=${() => redo(batch)}>Redo</button>` : null}
 					</li>`)}
 			</ul>
 		</section>

@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
-import { sentenceOf } from '../lib/resource.js';
+import { sentenceOf } from '../api/problem.js';
 import { follow } from '../state/jobs.js';
 import { FormDialog } from './dialog.js';
 import { JobProgress } from './job_progress.js';

@@ -5,9 +5,11 @@ import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
 import { deleteSavedView, getSavedViews, postSavedView } from '../api/queue.js';
+import { useAttempt } from '../lib/attempt.js';
 import { count } from '../lib/format.js';
-import { sentenceOf, useResource } from '../lib/resource.js';
+import { useResource } from '../lib/resource.js';
 import { announce } from '../state/notice.js';
+import { FormError } from './form_error.js';
 import { Popover } from './popover.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
@@ -31,7 +33,7 @@ function SaveForm({ q, save }) {
 					class="field" id="view-name" maxlength="80" autocomplete="off" value=${name}
 					onInput=${(/** @type {InputEvent} */ event) => setName(/** @type {HTMLInputElement} */ (event.target).value)}
 				/>
-				<button class="button" type="submit" aria-disabled=${!name.trim()}>Save</button>
+				<button data-needs="annotate" class="button" type="submit" aria-disabled=${!name.trim()}>Save</button>
 			</div>
 		</form>
 	`;
@@ -40,22 +42,13 @@ function SaveForm({ q, save }) {
 /** @param {{dataset: DatasetJson, q: string, open: (q: string) => void}} props */
 function Views({ dataset, q, open }) {
 	const views = useResource((signal) => getSavedViews(dataset.id, signal), [dataset.id]);
-	const [problem, setProblem] = useState('');
+	const { error, attempt } = useAttempt();
 	/** @param {() => Promise<unknown>} work @param {string} said */
-	async function change(work, said) {
-		try {
-			await work();
-			announce(said);
-			setProblem('');
-			views.reload();
-		} catch (error) {
-			setProblem(sentenceOf(error));
-		}
-	}
+	const change = (work, said) => attempt(work(), () => { announce(said); views.reload(); });
 	const items = views.value?.items ?? [];
 	return html`
 		<h2>Saved views of ${dataset.name}</h2>
-		${views.error ? html`<p class="form__error" role="alert">${sentenceOf(views.error)}</p>` : null}
+		${views.error ? html`<${FormError} error=${views.error} />` : null}
 		${views.value && items.length === 0 ? html`<p class="empty-note">None yet.</p>` : null}
 		<ul class="saved-views">
 			${items.map((view) => html`
@@ -64,13 +57,13 @@ function Views({ dataset, q, open }) {
 						${view.name} <span class="saved-views__count">${count(view.groups)} groups · ${view.by}</span><small>${view.q}</small>
 					</button>
 					<button
-						class="icon-button" type="button" aria-label=${`Delete the view ${view.name}`} title="Delete"
+						class="icon-button" type="button" data-needs="annotate" aria-label=${`Delete the view ${view.name}`} title="Delete"
 						onClick=${() => change(() => deleteSavedView(view.id), `View ${view.name} deleted.`)}
 					><svg viewBox="0 0 16 16" aria-hidden="true"><path d="m4 4 8 8M12 4l-8 8" /></svg></button>
 				</li>`)}
 		</ul>
 		<${SaveForm} q=${q} save=${(/** @type {string} */ name) => change(() => postSavedView(dataset.id, { name, q }), `View ${name} saved.`)} />
-		${problem ? html`<p class="form__error" role="alert">${problem}</p>` : null}
+		${error ? html`<${FormError} error=${error} />` : null}
 	`;
 }
 

@@ -5,7 +5,8 @@ import { html } from 'htm/preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 
 import { getFolders, postUpload } from '../api/imports.js';
-import { sentenceOf, useResource } from '../lib/resource.js';
+import { sentenceOf } from '../api/problem.js';
+import { useResource } from '../lib/resource.js';
 
 /** @import {FolderEntry, ImportSource, UploadJson} from '../api/imports.js' */
 
@@ -81,7 +82,7 @@ function FolderList({ chosen, choose, guess }) {
 					</li>`)}
 			</ul>
 			${folders.value?.more ? html`<small>There is more than is listed here.</small>` : null}
-			${folders.value && items.length === 0 && trail.length === 0 ? html`<small>The operator has allowed no folder (TOUCHLINE_IMPORT_FOLDERS).</small>` : null}
+			${folders.value && items.length === 0 && trail.length === 0 ? html`<small>The operator has allowed no folder (TOUCHLINE_IMPORT_FOLDERS) and named no store (TOUCHLINE_STORES).</small>` : null}
 		</div>
 	`;
 }
@@ -99,7 +100,7 @@ export function SourceChoice({ onSource, guess }) {
 		<fieldset class="choice import__choice">
 			<legend>Source</legend>
 			<label><input type="radio" name="source" checked=${kind === 'upload'} onChange=${() => change('upload')} /><span>A file on this computer<small>zip, JSON or CSV</small></span></label>
-			<label><input type="radio" name="source" checked=${kind === 'folder'} onChange=${() => change('folder')} /><span>A folder on the server<small>frames stay where they are</small></span></label>
+			<label><input type="radio" name="source" checked=${kind === 'folder'} onChange=${() => change('folder')} /><span>A folder on the server<small>or in an object store; frames stay there</small></span></label>
 		</fieldset>
 		${kind === 'upload'
 			? html`<${UploadField} id="import-file" label="File" onUploaded=${(/** @type {UploadJson | null} */ sent) => {

@@ -10,17 +10,24 @@ import { matchName } from '../lib/match_name.js';
 import { useResource } from '../lib/resource.js';
 import { address, navigate, pageDataset, param } from '../lib/router.js';
 import { queueAddress } from '../state/navigation.js';
-import { DatasetFrame } from './dataset_page.js';
+import { pageAddress } from './dataset_menu.js';
+import { DatasetFrame } from './dataset_frame.js';
+import { GoldCard } from './gold_card.js';
+import { GuidelinesCard } from './guidelines_card.js';
 import { HeatMap } from './heat_map.js';
-import { NoiseCard } from './noise_card.js';
+import { MembersCard } from './members_card.js';
+import { isNews, NoiseCard } from './noise_card.js';
 import { Loading, Trouble } from './page_frame.js';
 import { PaintCard } from './paint_card.js';
-import { Pitches } from './pitches.js';
-import { Positions } from './positions.js';
-import { Proposals } from './proposals.js';
+import { Pictures } from './pictures_card.js';
+import { Pitches } from './pitches_card.js';
+import { Positions } from './positions_card.js';
+import { Proposals } from './proposals_card.js';
 import { QueryBox } from './query_box.js';
 import { seriesColour, Spread } from './spread.js';
+import { WebhooksCard } from './webhooks_card.js';
 
+/** @import {NoiseJson} from '../api/noise.js' */
 /** @import {MatchCounts, StatisticsJson} from '../api/statistics.js' */
 /** @import {DatasetJson} from '../api/types.js' */
 
@@ -92,11 +99,20 @@ function StatisticsOf({ one }) {
 		${found.value ? html`
 			<${Body} found=${found.value} dataset=${one.name} q=${q} />
 			<h2 class="statistics__whole">Of the whole dataset</h2>
-			<${NoiseCard} dataset=${one.id} />
+			<${MembersCard} dataset=${one.name} />
+			<${GuidelinesCard} dataset=${one} />
+			<${GoldCard} dataset=${one} />
+			<${NoiseCard} dataset=${one.id}>
+				${(/** @type {NoiseJson} */ noise) => (noise.advice.length === 0 ? null : html`
+					<p class="note">Uncertainties are right where the policy says what this dataset shows.
+						${isNews(noise) ? html` It does not: <a class="link" href=${pageAddress(one.name, 'policy')}>judge by the estimates</a> on the page Policy.` : ' It does.'}</p>`)}
+			<//>
 			<${Pitches} dataset=${one.id} />
+			<${Pictures} dataset=${one.id} />
 			<${Positions} dataset=${one.id} />
 			<${Proposals} dataset=${one.id} name=${one.name} />
-			<${PaintCard} dataset=${one} />` : found.error ? null : html`<${Loading} what="statistics" />`}
+			<${PaintCard} dataset=${one} />
+			<${WebhooksCard} dataset=${one} />` : found.error ? null : html`<${Loading} what="statistics" />`}
 	`;
 }
 

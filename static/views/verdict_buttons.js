@@ -6,12 +6,14 @@ import { useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
 import { doubt, suggestedReason } from '../state/advice.js';
+import { frozen } from '../state/hand_back.js';
 import { REASONS } from '../state/reasons.js';
 import {
 	accept, addNote, answer, askReason, cancelAsking, defer, isBlind, lastReason, reject, rejectView, rejectViewBecause,
 } from '../state/verdicts.js';
 import { asking, pinPlace } from '../state/workspace.js';
 import { pinText } from '../lib/pins.js';
+import { HandIn } from './lease_bar.js';
 import { SwapAsk } from './swap_ask.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
@@ -128,16 +130,18 @@ function Ask({ group }) {
 /** @param {{group: GroupDocument}} props */
 export function VerdictButtons({ group }) {
 	const unsolved = group.solution === null;
+	const why = frozen.value;
 	return html`
 		<div class="verdicts">
 			<${Ask} group=${group} />
+			<${HandIn} />
 			<div class="verdicts__buttons">
 				<button
-					class="button button--accept" type="button" onClick=${accept}
-					aria-disabled=${unsolved} title=${unsolved ? 'This group is not solved yet' : 'Accept and go on'}
+					class="button button--accept" type="button" data-needs="review" onClick=${accept}
+					aria-disabled=${unsolved || why !== ''} title=${why || (unsolved ? 'This group is not solved yet' : 'Accept and go on')}
 				>Accept <kbd>A</kbd></button>
-				<button class="button button--reject" type="button" aria-expanded=${asking.value === 'reason'} onClick=${askReason}>Reject <kbd>X</kbd></button>
-				<button class="button" type="button" onClick=${defer}>Defer <kbd>S</kbd></button>
+				<button class="button button--reject" type="button" data-needs="review" aria-disabled=${why !== ''} title=${why || undefined} aria-expanded=${asking.value === 'reason'} onClick=${askReason}>Reject <kbd>X</kbd></button>
+				<button class="button" type="button" data-needs="review" aria-disabled=${why !== ''} title=${why || undefined} onClick=${defer}>Defer <kbd>S</kbd></button>
 			</div>
 		</div>
 	`;

@@ -4,9 +4,10 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
+import { sentenceOf } from '../api/problem.js';
 import { getVersions } from '../api/versions.js';
 import { plural } from '../lib/format.js';
-import { sentenceOf, useResource } from '../lib/resource.js';
+import { useResource } from '../lib/resource.js';
 import { FreezeDialog } from './freeze_dialog.js';
 import { pageAddress } from './dataset_menu.js';
 import { verifiedWord } from './verify_report.js';
@@ -42,7 +43,7 @@ export function VersionCard({ one }) {
 			${versions.value && items.length === 0 ? html`<p class="empty-note">Nothing is frozen yet. A version never changes and can be cited.</p>` : null}
 			${items.slice(0, SHOWN).map((version) => html`<${Line} key=${version.id} version=${version} address=${address} />`)}
 			${items.length > SHOWN ? html`<p><a class="link" href=${address}>All ${items.length} versions</a></p>` : null}
-			<p class="version-card__freeze"><button class="button button--primary" type="button" onClick=${() => setFreezing(true)}>Freeze a version…</button></p>
+			<p class="version-card__freeze"><button data-needs="lead" class="button button--primary" type="button" onClick=${() => setFreezing(true)}>Freeze a version…</button></p>
 			${freezing ? html`<${FreezeDialog} one=${one} taken=${items.map(({ name }) => name)} onClose=${() => setFreezing(false)} onFrozen=${versions.reload} />` : null}
 		</section>
 	`;

@@ -3,10 +3,11 @@
 
 import { html } from 'htm/preact';
 
+import { sentenceOf } from '../api/problem.js';
 import { getDiff } from '../api/versions.js';
 import { count, fixed, plural, words } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
-import { sentenceOf, useResource } from '../lib/resource.js';
+import { useResource } from '../lib/resource.js';
 import { queueAddress } from '../state/navigation.js';
 import { Loading } from './page_frame.js';
 

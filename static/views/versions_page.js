@@ -4,11 +4,12 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
+import { sentenceOf } from '../api/problem.js';
 import { getVersions, manifestAddress, verifyVersion } from '../api/versions.js';
 import { count, plural } from '../lib/format.js';
-import { sentenceOf, useResource } from '../lib/resource.js';
+import { useResource } from '../lib/resource.js';
 import { follow } from '../state/jobs.js';
-import { DatasetFrame } from './dataset_page.js';
+import { DatasetFrame } from './dataset_frame.js';
 import { ExportDialog } from './export_dialog.js';
 import { FreezeDialog } from './freeze_dialog.js';
 import { Loading, Trouble } from './page_frame.js';
@@ -63,13 +64,13 @@ function VersionSection({ version, others, job, verify, compare, ask }) {
 					<h2 id=${`version-${version.id}`}>${version.name}</h2>
 					<p class="note">frozen <${When} at=${version.created} />${version.actor ? ` by ${version.actor}` : ''}</p>
 					<div class="buttons">
-						<button class="button" type="button" onClick=${verify} title="Compute every group again and compare it with what was frozen">Verify</button>
+						<button data-needs="lead" class="button" type="button" onClick=${verify} title="Compute every group again and compare it with what was frozen">Verify</button>
 						<select class="field" aria-label=${`Compare ${version.name} with`} disabled=${others.length === 0} title=${others.length ? '' : 'There is no other version yet'} onChange=${choose}>
 							<option value="">Compare with…</option>
 							${others.map(({ id, name }) => html`<option key=${id} value=${String(id)}>${name}</option>`)}
 						</select>
 						<a class="button" href=${manifestAddress(version.id)} target="_blank" rel="noopener">Manifest</a>
-						<button class="button" type="button" onClick=${ask}>Export…</button>
+						<button data-needs="review" class="button" type="button" onClick=${ask}>Export…</button>
 					</div>
 				</header>
 				${version.note ? html`<p>${version.note}</p>` : null}
@@ -110,7 +111,7 @@ function VersionsOf({ one }) {
 	return html`
 		<div class="page__title">
 			<p>A version never changes: its hash says what is in it, and anybody can compute it again.</p>
-			<button class="button button--primary" type="button" onClick=${() => setAsked('freeze')}>Freeze a version…</button>
+			<button data-needs="lead" class="button button--primary" type="button" onClick=${() => setAsked('freeze')}>Freeze a version…</button>
 		</div>
 		${problem ? html`<p class="card form__error" role="alert">${problem}</p>` : null}
 		${diff ? html`<${VersionDiff} ...${diff} dataset=${one.name} onClose=${() => setDiff(null)} />` : null}

@@ -77,7 +77,7 @@ function ViewRow({ group, picture }) {
 			<td data-grade=${gradeOfSize(ball?.size_ratio)} data-number="ratio">${fixed(ball?.size_ratio, 2)}</td>
 			<td>
 				<input
-					type="checkbox" checked=${view.included}
+					type="checkbox" data-needs="annotate" checked=${view.included}
 					aria-label=${`Include view ${view.letter}`} title="Use this view (Shift+digit)"
 					onChange=${() => submit({ kind: 'include', view: view.key, included: !view.included })}
 				/>

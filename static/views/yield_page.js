@@ -9,7 +9,7 @@ import { count, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { loadDatasets } from '../state/datasets.js';
 import { useWhatIf } from '../state/what_if.js';
-import { DatasetFrame } from './dataset_page.js';
+import { DatasetFrame } from './dataset_frame.js';
 import { pageAddress } from './dataset_menu.js';
 import { Funnel } from './funnel.js';
 import { Loading, Trouble } from './page_frame.js';
@@ -56,7 +56,7 @@ function YieldBody({ one, loaded, reload }) {
 				${answer ? html`<${Difference} answer=${answer} name=${policy.name} changed=${changed} />` : null}
 				${error ? html`<p class="form__error" role="alert">${error.message}</p>` : null}
 				<p class="buttons">
-					<button class="button button--fix" type="button" aria-disabled=${changed === 0} title=${changed ? '' : 'Nothing is changed'} onClick=${() => { if (changed) setSaving(true); }}>Save as policy…</button>
+					<button data-needs="lead" class="button button--fix" type="button" aria-disabled=${changed === 0} title=${changed ? '' : 'Nothing is changed'} onClick=${() => { if (changed) setSaving(true); }}>Save as policy…</button>
 					<button class="button" type="button" aria-disabled=${changed === 0} title=${changed ? '' : 'Nothing is changed'} onClick=${() => setValues({})}>Reset</button>
 				</p>
 				${answer ? html`<${Distances} answer=${answer} />` : null}

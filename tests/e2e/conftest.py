@@ -12,6 +12,7 @@ from playwright.sync_api import ConsoleMessage, Page, Playwright, expect, sync_p
 
 from tests.e2e.homes import build_film, build_sample, build_season
 from tests.e2e.install_chromium import ADVICE, find_chromium
+from tests.e2e.lateness import make_late
 from tests.e2e.screen import Screen, passing
 from tests.e2e.service import ROOT, serving
 from tests.e2e.windows import TIMEOUT_MS, Windows
@@ -84,6 +85,7 @@ def playwright() -> Iterator[Playwright]:
     """What drives browsers, for the tests of this folder: while it runs, no event loop can."""
     # On a busy machine five seconds are little.
     expect.set_options(timeout=TIMEOUT_MS)
+    make_late()
     with sync_playwright() as running:
         yield running
 
@@ -126,7 +128,8 @@ class Console:
     def hear(self, message: ConsoleMessage) -> None:
         """Keep errors and warnings."""
         if message.type in ("error", "warning"):
-            self.messages.append(f"{message.type}: {message.text}")
+            place = message.location.get("url", "")
+            self.messages.append(f"{message.type}: {message.text} {place}")
 
 
 @pytest.fixture

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from re import Pattern
 from time import monotonic
 from typing import Any
 
-from playwright.sync_api import Page, Request, expect
+from playwright.sync_api import APIResponse, Error, Locator, Page, Request, Route, expect
 
-from tests.e2e.windows import TIMEOUT_MS
+from tests.e2e.windows import NOTHING_ON_ITS_WAY, TIMEOUT_MS
 
 Document = dict[str, Any]
+Box = Mapping[str, float]
 TWO_FRAMES = "() => new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))"
+SAME = 2
+"""Times a box must be the same, two frames apart, until it counts as at rest."""
+CHANGED_MEANWHILE = 412
+JOB_IS_OVER = {"done", "failed", "cancelled"}
+LIES_READY = """async (ids) => {
+  const { known } = await import(
+    document.querySelector('script[src$="main.js"]').src.replace('main.js', 'state/documents.js'));
+  return ids.every((id) => known(id));
+}"""
+CONNECTED = """async () => (await import(
+  document.querySelector('script[src$="main.js"]').src.replace('main.js', 'api/events.js')
+)).connected.value"""
 
 
 class Screen:
@@ -40,8 +55,7 @@ class Screen:
     def place(self, view: Document, x: float, y: float) -> tuple[float, float]:
         """Where an image point stands in the window, while the image is shown whole."""
         stage = self.page.locator(f'.image-panel[data-view="{view["letter"]}"] .image-panel__stage')
-        box = stage.bounding_box()
-        assert box is not None
+        box = at_rest(stage)
         scale = min(box["width"] / view["width"], box["height"] / view["height"])
         left = box["x"] + (box["width"] - view["width"] * scale) / 2
         top = box["y"] + (box["height"] - view["height"] * scale) / 2
@@ -87,6 +101,113 @@ def until(page: Page, happens: Callable[[], Any]) -> None:
     while not happens():
         assert monotonic() < end, "it did not happen in time"
         page.wait_for_timeout(50)
+
+
+class Held:
+    """Requests that wait until a test lets them go."""
+
+    def __init__(self, page: Page):
+        self.page = page
+        self.routes: list[Route] = []
+        self._goes_on = False
+
+    def hear(self, route: Route) -> None:
+        """Keep a request; those that come after the release pass."""
+        if self._goes_on:
+            route.continue_()
+        else:
+            self.routes.append(route)
+
+    def arrive(self) -> None:
+        """Wait until there is one."""
+        until(self.page, lambda: self.routes)
+
+    def release(self) -> None:
+        """Let all of them go on."""
+        self._goes_on = True
+        while self.routes:
+            # Its page may have gone to another address meanwhile.
+            with suppress(Error):
+                self.routes.pop(0).continue_()
+
+
+@contextmanager
+def holding(page: Page, url: str | Pattern[str]) -> Iterator[Held]:
+    """Hold what a page asks for at an address; what is held goes on at the end at the latest."""
+    held = Held(page)
+    page.route(url, held.hear)
+    try:
+        yield held
+    finally:
+        # A route that is taken away before its requests went on waits for them for ever.
+        held.release()
+    page.unroute(url, held.hear)
+
+
+def at_rest(element: Locator) -> Box:
+    """The box of an element in the window once it has stopped moving."""
+    boxes: list[Box] = []
+
+    def rests() -> bool:
+        box = element.bounding_box()
+        if box is None:
+            boxes.clear()
+            return False
+        boxes.append(box)
+        element.page.evaluate(TWO_FRAMES)
+        return len(boxes) > SAME and all(one == box for one in boxes[-SAME - 1 :])
+
+    until(element.page, rests)
+    return boxes[-1]
+
+
+def hears(page: Page) -> None:
+    """Wait until a page is told what others do; what they did before it may never hear of."""
+    until(page, lambda: page.evaluate(CONNECTED))
+
+
+def lie_ready(page: Page, groups: list[int]) -> None:
+    """Wait until the page knows groups, so that a key can speak about them at once."""
+    until(page, lambda: page.evaluate(LIES_READY, groups))
+
+
+def settled(page: Page) -> None:
+    """Wait until nothing that was said is on its way, at two looks in a row."""
+    looks: list[bool] = []
+
+    def nothing() -> bool:
+        # Without a frame of the page's: a test may have held those back.
+        looks.append(page.evaluate(NOTHING_ON_ITS_WAY))
+        return looks[-2:] == [True, True]
+
+    until(page, nothing)
+
+
+def jobs_end(page: Page, address: str = "") -> None:
+    """Wait until the server has done what it was asked for: numbers change until then."""
+
+    def are_over() -> bool:
+        items = page.request.get(f"{address}/api/v1/jobs?limit=100").json()["items"]
+        return all(job["state"] in JOB_IS_OVER for job in items)
+
+    until(page, are_over)
+
+
+def on_present(page: Page, group: int, send: Callable[[dict[str, str]], APIResponse]) -> None:
+    """Change a group from elsewhere, in its present state: a page may still be writing to it."""
+    refused: list[str] = []
+
+    def is_done() -> bool:
+        present = page.request.get(f"/api/v1/groups/{group}")
+        answer = send({"If-Match": present.headers["etag"]})
+        if answer.status == CHANGED_MEANWHILE:
+            return False
+        if not answer.ok:
+            refused.append(answer.text())
+        return True
+
+    until(page, is_done)
+    assert refused == []
 
 
 def go_offline(page: Page) -> None:
@@ -149,10 +270,26 @@ def submitted(page: Page) -> list[str]:
 
 def withdraw_verdict(page: Page, group: int) -> None:
     """Leave a group as the next test expects it."""
-    present = page.request.get(f"/api/v1/groups/{group}")
-    answer = page.request.put(
-        f"/api/v1/groups/{group}/verdict",
-        data={"state": "unreviewed"},
-        headers={"If-Match": present.headers["etag"]},
+    judge(page, group, "unreviewed")
+
+
+def judge(page: Page, group: int, state: str, reason: str | None = None) -> None:
+    """A verdict from elsewhere."""
+    on_present(
+        page,
+        group,
+        lambda headers: page.request.put(
+            f"/api/v1/groups/{group}/verdict",
+            data={"state": state, **({"reason": reason} if reason else {})},
+            headers=headers,
+        ),
     )
-    assert answer.ok
+
+
+def undo_edit(page: Page, group: int) -> None:
+    """Take the last edit of a group back from elsewhere."""
+    on_present(
+        page,
+        group,
+        lambda headers: page.request.post(f"/api/v1/groups/{group}/undo", headers=headers),
+    )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import socket
-import subprocess
 import sys
 import time
 import urllib.request
@@ -14,6 +13,8 @@ from pathlib import Path
 
 import httpx
 import pytest
+
+from tests.starting import Process, run
 
 ROOT = Path(__file__).resolve().parents[2]
 START_SECONDS = 180.0
@@ -30,15 +31,13 @@ for line in sys.argv[1:]:
 
 def run_touchline(home: Path, *lines: str, seconds: float = COMMAND_SECONDS) -> None:
     """Run command lines of ``touchline`` in a home, one after the other."""
-    done = subprocess.run(
-        [sys.executable, "-c", COMMANDS, *lines],
-        cwd=ROOT,
-        env=_environment(home),
-        capture_output=True,
-        text=True,
-        timeout=seconds,
-    )
+    command = [sys.executable, "-c", COMMANDS, *lines]
+    done = run(command, cwd=ROOT, env=_environment(home), timeout=seconds)
     assert done.returncode == 0, f"touchline {lines}: {done.stderr}"
+
+
+NOBODY = "http://127.0.0.1:9/hook"
+"""An address that webhooks may have, and at which nobody listens."""
 
 
 @contextmanager
@@ -47,7 +46,7 @@ def serving(home: Path, *options: str) -> Iterator[str]:
     port = free_port()
     address = f"http://127.0.0.1:{port}"
     with (home / "server.log").open("wb") as log:
-        process = subprocess.Popen(
+        process = Process(
             [sys.executable, "-c", SERVE, "serve", *options],
             cwd=ROOT,
             env=_environment(home, port),
@@ -59,7 +58,7 @@ def serving(home: Path, *options: str) -> Iterator[str]:
             yield address
         finally:
             process.terminate()
-            process.wait(timeout=60)
+            process.wait(timeout=START_SECONDS)
 
 
 def delete_dataset(address: str, name: str) -> None:
@@ -72,7 +71,12 @@ def delete_dataset(address: str, name: str) -> None:
 
 
 def _environment(home: Path, port: int = 0) -> dict[str, str]:
-    return {**os.environ, "TOUCHLINE_HOME": str(home), "TOUCHLINE_PORT": str(port)}
+    return {
+        **os.environ,
+        "TOUCHLINE_HOME": str(home),
+        "TOUCHLINE_PORT": str(port),
+        "TOUCHLINE_WEBHOOKS": f'["{NOBODY}"]',
+    }
 
 
 def free_port() -> int:
@@ -82,7 +86,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def _wait_for(address: str, process: subprocess.Popen[bytes], log: Path) -> None:
+def _wait_for(address: str, process: Process, log: Path) -> None:
     deadline = time.monotonic() + START_SECONDS
     while time.monotonic() < deadline:
         assert process.poll() is None, log.read_text()

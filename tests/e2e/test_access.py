@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Error, Page
+from playwright.sync_api import Error, Page, expect
 
 OpenPage = Callable[..., Page]
 
@@ -56,7 +56,7 @@ def shown(open_page: OpenPage, name: str) -> Page:
     page = open_page(PAGES[name])
     waited = ".image-panel__stage[data-ready=true]" if name == "review" else ".queue-row a"
     page.wait_for_selector(waited)
-    page.wait_for_load_state("networkidle")
+    expect(page.locator('[aria-busy="true"]')).to_have_count(0)
     return page
 
 

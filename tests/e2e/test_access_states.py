@@ -53,7 +53,7 @@ class TestStates:
         page.goto(f"/review/{group}")
         screen = Screen(page)
         screen.ready()
-        assert page.locator(".image-panel").count() == views
+        expect(page.locator(".image-panel")).to_have_count(views)
         fits(page)
         screen.press("l")
         expect(page.locator(".review__main[data-collapsed=true]")).to_be_visible()

@@ -8,7 +8,16 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.e2e.screen import Document, Screen, go_offline, interior_point, passing
+from tests.e2e.screen import (
+    Document,
+    Screen,
+    go_offline,
+    hears,
+    interior_point,
+    on_present,
+    passing,
+    settled,
+)
 
 OpenPage = Callable[..., Page]
 GONE = ("ERR_INTERNET_DISCONNECTED", "ERR_NETWORK_CHANGED", "ERR_FAILED", "ERR_NETWORK_IO")
@@ -25,25 +34,30 @@ def both(open_page: OpenPage) -> Iterator[tuple[Screen, Screen]]:
     for page in (first, second):
         page.goto(f"/review/{group}")
         Screen(page).ready()
+        hears(page)
     screen = Screen(first)
     before = screen.document()["views"][0]
     yield screen, Screen(second)
+    for page in (first, second):
+        settled(page)
     put_back(screen, before)
 
 
 def put_back(screen: Screen, view: Document) -> None:
     """Give a view its ball and lines back."""
     request = screen.page.request
+    address = f"/api/v1/views/{view['id']}"
     for part, body in (
         ("ball", {"box": view["balls"][0]["box"]}),
         ("lines", {"lines": view["lines"]}),
     ):
-        answer = request.patch(
-            f"/api/v1/views/{view['id']}/{part}",
-            data=body,
-            headers={"If-Match": screen.document()["etag"]},
+        on_present(
+            screen.page,
+            screen.group,
+            lambda headers, part=part, body=body: request.patch(  # type: ignore[misc]
+                f"{address}/{part}", data=body, headers=headers
+            ),
         )
-        assert answer.ok
 
 
 def move_ball(screen: Screen, by: float, *, drop: bool = True) -> None:
@@ -87,6 +101,7 @@ class TestLiveUpdates:
         before = mine.number("A", "error")
         move_ball(theirs, 6)
         expect(mine.page.locator('[data-row="A"] [data-number="error"]')).not_to_have_text(before)
+        theirs.saved()
         expect(mine.page.locator('[data-row="A"] [data-number="error"]')).to_have_text(
             theirs.number("A", "error")
         )
@@ -121,6 +136,7 @@ class TestLiveUpdates:
         page = open_page("/jobs")
         for _ in range(MORE_THAN_CONNECTIONS):
             page.wait_for_selector(".page__main > :nth-child(2)")
+            hears(page)
             with page.expect_event("requestfailed", lambda gone: gone.url.endswith("/events")):
                 see(page, False)
             page = page.context.new_page()

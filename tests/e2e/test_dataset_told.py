@@ -7,6 +7,8 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page
 
+from tests.e2e.screen import until
+
 OpenPage = Callable[..., Page]
 
 STREAM = """() => {
@@ -41,5 +43,12 @@ def test_the_page_reads_again(open_page: OpenPage, path: str, ready: str, read: 
     page.wait_for_selector(ready)
     page.wait_for_function("() => window.stream")
     page.wait_for_timeout(1500)
-    with page.expect_request(lambda request: read in request.url):
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+
+    def is_read() -> bool:
+        # Again: a part of the page that comes late has not begun to listen.
         page.evaluate(TELL)
+        return any(read in address for address in asked)
+
+    until(page, is_read)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import expect
 
-from tests.e2e.screen import Document, Screen, interior_point, until
+from tests.e2e.screen import Document, Screen, interior_point, until, withdraw_verdict
 
 Review = Callable[..., Screen]
 
@@ -170,27 +170,27 @@ class TestLooking:
         _, _, point = interior_point(view)
         screen.page.mouse.move(*screen.place(view, point["x"], point["y"]))
         screen.press("Shift+n")
+        expect(screen.page.locator("#verdict-note")).to_be_focused()
         screen.page.keyboard.type("look here")
         screen.press("Enter")
         screen.saved()
         note = screen.document()["verdict"]["note"]
         assert note.startswith("A ") and note.endswith(": look here")
-        answer = screen.page.request.put(
-            f"/api/v1/groups/{screen.group}/verdict",
-            data={"state": "unreviewed"},
-            headers={"If-Match": screen.document()["etag"]},
-        )
-        assert answer.ok
+        withdraw_verdict(screen.page, screen.group)
 
     def test_single_letters_can_be_switched_off(self, review: Review) -> None:
         screen = review(1)
         screen.press("?")
         screen.page.get_by_label("Use single-letter keys").click()
-        screen.press("Escape", "x")
+        screen.press("Escape")
+        expect(screen.page.locator("dialog[open]")).to_have_count(0)
+        screen.press("x")
         expect(screen.page.locator(".reasons")).to_have_count(0)
         screen.press("?")
         screen.page.get_by_label("Use single-letter keys").click()
-        screen.press("Escape", "x")
+        screen.press("Escape")
+        expect(screen.page.locator("dialog[open]")).to_have_count(0)
+        screen.press("x")
         expect(screen.page.locator(".reasons")).to_be_visible()
 
     def test_another_key_is_chosen_for_a_verdict(self, review: Review) -> None:
@@ -200,7 +200,9 @@ class TestLooking:
         screen.page.get_by_role("button", name=name, exact=True).click()
         screen.press("a")
         expect(screen.page.locator(".key-field")).to_contain_text("Accept and next")
-        screen.press(";", "Escape", "x")
+        screen.press(";", "Escape")
+        expect(screen.page.locator("dialog[open]")).to_have_count(0)
+        screen.press("x")
         expect(screen.page.locator(".reasons")).to_have_count(0)
         screen.press(";")
         expect(screen.page.locator(".reasons")).to_be_visible()

@@ -15,10 +15,10 @@ from app.sample.scene import Scene
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.solving.jaccard import project_markings
-from tests.e2e.conftest import OpenPage
-from tests.e2e.screen import Screen, until
+from tests.e2e.conftest import Console, OpenPage
+from tests.e2e.screen import Screen, at_rest, holding, until
 from tests.e2e.service import run_touchline, serving
-from tests.e2e.test_access import serious, serious_in_both
+from tests.e2e.test_access import serious, serious_in_both, soon
 
 Json = dict[str, Any]
 TOKENS = Path(__file__).resolve().parents[2] / "static" / "css" / "tokens.css"
@@ -50,7 +50,7 @@ class TestFound:
             expect(page.get_by_role("tabpanel")).to_contain_text(words)
         page.keyboard.press("Escape")
         expect(page.locator("dialog[open]")).to_have_count(0)
-        assert page.url == address
+        expect(page).to_have_url(address)
         # The keys of the review work again.
         page.keyboard.press("2")
         expect(page.locator('.image-panel[data-view="B"][data-focused="true"]')).to_be_visible()
@@ -62,12 +62,13 @@ class TestFound:
             page.keyboard.press("Control+k")
             expect(page.get_by_role("combobox")).to_be_focused()
             page.keyboard.type(typed)
+            expect(page.get_by_role("combobox")).to_have_value(typed)
             page.keyboard.press("Enter")
             chosen = page.get_by_role("tab", name=re.compile(typed, re.I))
             expect(chosen).to_have_attribute("aria-selected", "true")
             page.keyboard.press("Escape")
             expect(page.locator("dialog[open]")).to_have_count(0)
-        assert page.url.endswith("/jobs")
+        expect(page).to_have_url(re.compile("/jobs$"))
 
     def test_the_palette_finds_help_itself(self, open_page: OpenPage) -> None:
         page = open_page("/jobs")
@@ -111,7 +112,7 @@ class TestFound:
         expect(page.locator(".help-words dt")).to_have_text(["lineage"])
         page.get_by_role("tab", name="Legend").click()
         expect(page.locator(".legend__row").first).to_be_visible()
-        assert page.url.endswith("/help/legend")
+        expect(page).to_have_url(re.compile("/help/legend$"))
         page.goto("/help")
         expect(page.get_by_role("tabpanel")).to_contain_text("Accept and next")
 
@@ -150,6 +151,7 @@ class TestLegend:
         page = open_page("/help/legend")
         page.wait_for_selector(".legend__row")
         rows = page.locator(".legend__row")
+        until(page, lambda: rows.count() >= 40)
         named = page.eval_on_selector_all(
             ".legend__row", "rows => rows.map((row) => row.dataset.tokens).join(' ')"
         )
@@ -157,13 +159,15 @@ class TestLegend:
             re.findall(r"--((?:canvas|scene|view)-[\w-]+):", TOKENS.read_text(encoding="utf-8"))
         )
         assert drawn - STRUCTURE - set(named.split()) == set()
-        assert rows.count() >= 40
 
-    def test_every_row_has_a_picture_that_shows_something(self, open_page: OpenPage) -> None:
+    def test_every_row_has_a_picture_that_shows_something(
+        self, open_page: OpenPage, console: Console
+    ) -> None:
+        # They are looked at until all are drawn.
+        console.expect("willReadFrequently")
         page = open_page("/help/legend")
         page.wait_for_selector(".legend__row canvas")
-        page.wait_for_load_state("networkidle")
-        assert page.evaluate(LEGEND_FAULTS) == []
+        assert soon(page, LEGEND_FAULTS) == []
 
 
 class TestTerms:
@@ -172,19 +176,17 @@ class TestTerms:
     ) -> None:
         page = review(0).page
         gate = page.locator('.gates [data-gate="jac"] .gates__name')
-        before = gate.bounding_box()
-        page.get_by_role("button", name="margins").focus()
-        page.keyboard.press("Tab")
+        page.get_by_role("button", name="margins").press("Tab")
         page.keyboard.press("Tab")
         tip = page.get_by_role("tooltip")
         expect(gate).to_be_focused()
         expect(tip).to_contain_text("Do the field lines fit?")
-        described = gate.get_attribute("aria-describedby")
-        assert described == tip.get_attribute("id")
-        assert gate.bounding_box() == before
+        expect(gate).to_have_attribute("aria-describedby", tip.get_attribute("id") or "none")
+        explained = at_rest(gate)
         page.keyboard.press("Escape")
         expect(tip).to_be_hidden()
         expect(gate).to_be_focused()
+        assert at_rest(gate) == explained
 
     def test_a_column_of_the_queue_explains_itself_to_the_pointer(
         self, open_page: OpenPage
@@ -221,6 +223,7 @@ class TestPractice:
     ) -> None:
         page, found = lessons
         page.goto(f"/review/{found[0]['group']}")
+        Screen(page).ready()
         card = page.get_by_role("region", name="Practice")
         expect(card).to_contain_text("Lesson 1 of 8")
         expect(card).to_contain_text("Would you let this group into the dataset?")
@@ -254,19 +257,16 @@ class TestPractice:
         card = page.get_by_role("region", name="Practice")
         expect(card).to_contain_text("Lesson 1 of 8")
         first, second = page.request.get("/api/v1/practice").json()["lessons"][:2]
-        held: list[Route] = []
-        page.route(
-            re.compile(rf"/api/v1/groups/{second['group']}$"), lambda route: held.append(route)
-        )
-        # Afresh: the page may have loaded the second group already.
-        page.goto(f"/review/{first['group']}")
-        expect(card).to_contain_text("Lesson 1 of 8")
-        page.keyboard.press("a")
-        expect(page).to_have_url(re.compile(rf"/review/{second['group']}"))
-        # The card goes with the first group, and comes with the second.
-        expect(card).to_have_count(0)
-        until(page, lambda: held)
-        held[0].continue_()
+        with holding(page, re.compile(rf"/api/v1/groups/{second['group']}$")) as groups:
+            # Afresh: the page may have loaded the second group already.
+            page.goto(f"/review/{first['group']}")
+            expect(card).to_contain_text("Lesson 1 of 8")
+            Screen(page).ready()
+            page.keyboard.press("a")
+            expect(page).to_have_url(re.compile(rf"/review/{second['group']}"))
+            # The card goes with the first group, and comes with the second.
+            expect(card).to_have_count(0)
+            groups.arrive()
         expect(card).to_contain_text("Lesson 2 of 8")
         expect(card).to_contain_text("Right: nothing is wrong with this group")
 
@@ -278,7 +278,8 @@ class TestPractice:
         page.get_by_role("button", name="Start again").click()
         card = page.get_by_role("region", name="Practice")
         expect(card).to_contain_text("Lesson 1 of 8")
-        assert int(page.url.split("/review/")[1]) not in {lesson["group"] for lesson in found}
+        before = "|".join(str(lesson["group"]) for lesson in found)
+        expect(page).to_have_url(re.compile(rf"/review/(?!({before})\b)\d+$"))
         states = {
             lesson["state"] for lesson in page.request.get("/api/v1/practice").json()["lessons"]
         }
@@ -326,6 +327,7 @@ class TestFiveKeys:
     def mend(screen: Screen, lesson: Lesson, scene: Scene) -> int:
         page = screen.page
         before = screen.document()["etag"]
+        expect(page.locator(".mend .button--fix")).to_be_visible()
         screen.press("Enter")
         # It may lead to a place, which it shows with the next frame.
         screen.drawn()
@@ -364,7 +366,6 @@ class TestEverybody:
         self, open_page: OpenPage, part: str
     ) -> None:
         page = open_page(f"/help/{part}")
-        page.wait_for_load_state("networkidle")
         expect(page.get_by_role("tabpanel").locator("p, dt").first).to_be_visible()
         assert serious_in_both(page) == []
 

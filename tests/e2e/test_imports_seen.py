@@ -86,7 +86,12 @@ class TestGroupsWithoutAPicture:
         self, blind: Path, open_page: OpenPage
     ) -> None:
         page = open_page("/import")
+        page.get_by_label("Policy").select_option("touchline")
         bring_in(page, blind, "blind")
+        policy = page.request.get("/api/v1/datasets/blind/policy").json()
+        assert policy["name"] == "touchline"
+        # Another import would not change it.
+        expect(page.get_by_label("Policy")).to_be_disabled()
         # Done in part, in orange, with counts.
         expect(page.locator(".pill").first).to_have_text("done in part")
         assert colour(page, '.pill[data-state="partial"]', "--warn")
@@ -112,7 +117,7 @@ class TestGroupsWithoutAPicture:
         field = page.locator("#verdict-note")
         expect(field).to_be_focused()
         expect(page.locator(".ask")).to_contain_text("no view has a picture to look at")
-        assert page.url == address
+        expect(page).to_have_url(address)
         assert serious_in_both(page) == []
         group = int(address.split("/review/")[1].split("?")[0])
         assert (

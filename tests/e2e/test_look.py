@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.screen import rows
+from tests.e2e.screen import at_rest as box_of
+from tests.e2e.screen import rows, until
 
 OpenPage = Callable[..., Page]
 SIZES = {
@@ -123,9 +124,8 @@ class TestArrangement:
     def test_two_views_fill_their_panels(self, open_page: OpenPage, size: str) -> None:
         page = opened(open_page, 2, size)
         assert at_rest(page, PICTURE_SHARE) > 0.82
-        strip = page.locator(".strip").bounding_box()
-        grid = page.locator(".image-grid").bounding_box()
-        assert strip is not None and grid is not None
+        strip = box_of(page.locator(".strip"))
+        grid = box_of(page.locator(".image-grid"))
         assert strip["x"] > grid["x"] + grid["width"]
 
     def test_a_cropped_image_fills_its_panel_and_that_choice_is_kept(
@@ -137,8 +137,7 @@ class TestArrangement:
         whole = picture_share(page, "A")
         page.get_by_role("button", name="Fill the panels with the images").first.click()
         expect(page.get_by_role("button", name="Show whole images").first).to_be_visible()
-        page.wait_for_timeout(200)
-        assert picture_share(page, "A") > whole + 0.04
+        until(page, lambda: picture_share(page, "A") > whole + 0.04)
         page.reload()
         page.wait_for_selector('.image-panel__stage[data-ready="true"] canvas')
         expect(page.get_by_role("button", name="Show whole images").first).to_be_visible()
@@ -150,13 +149,12 @@ class TestArrangement:
         page.keyboard.press("h")
         at_rest(page, PICTURE_SHARE)
         before = picture_share(page, "A")
-        stage = page.locator('.image-panel[data-view="A"] .image-panel__stage').bounding_box()
-        assert stage is not None
+        stage = box_of(page.locator('.image-panel[data-view="A"] .image-panel__stage'))
         page.mouse.move(stage["x"] + stage["width"] / 2, stage["y"] + stage["height"] - 4)
         for _ in range(6):
             page.mouse.wheel(0, -240)
         page.wait_for_timeout(250)
-        assert picture_share(page, "A") >= before
+        until(page, lambda: picture_share(page, "A") >= before)
         # However far it is dragged away, it stays in the middle of the panel at least.
         for _ in range(3):
             page.mouse.down()
@@ -164,7 +162,7 @@ class TestArrangement:
             page.mouse.up()
             page.mouse.move(stage["x"] + stage["width"] - 4, stage["y"] + stage["height"] - 4)
         page.wait_for_timeout(250)
-        assert picture_share(page, "A") > 0.2
+        until(page, lambda: picture_share(page, "A") > 0.2)
 
     @pytest.mark.parametrize("views", [2, 4])
     def test_the_ball_card_fills_its_width(self, open_page: OpenPage, views: int) -> None:
@@ -188,7 +186,8 @@ class TestPitch:
         page.goto(f"{film}/review/{first['id']}")
         page.wait_for_selector(".mini-pitch__camera")
         marks = at_rest(page, MARKS)
-        assert len(marks) == 6
+        until(page, lambda: len(page.evaluate(MARKS)) == 6)
+        marks = at_rest(page, MARKS)
         for i, (x, y, width) in enumerate(marks):
             for other_x, other_y, _ in marks[i + 1 :]:
                 assert np.hypot(x - other_x, y - other_y) > width

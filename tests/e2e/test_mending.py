@@ -10,7 +10,16 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from app.soccer.pitch import twin_marking
-from tests.e2e.screen import Document, Screen, rows, submitted
+from tests.e2e.screen import (
+    Document,
+    Screen,
+    holding,
+    rows,
+    settled,
+    submitted,
+    undo_edit,
+    until,
+)
 
 OpenPage = Callable[..., Page]
 SMALL = {"width": 1100, "height": 700}
@@ -66,11 +75,9 @@ class Bench:
 
     def undo_all(self) -> None:
         """As if nothing had been; what earlier tests said stays."""
+        settled(self.page)
         while said(state := self.document()) != self.before and state["can_undo"]:
-            answer = self.page.request.post(
-                f"/api/v1/groups/{self.group}/undo", headers={"If-Match": state["etag"]}
-            )
-            assert answer.ok, answer.text()
+            undo_edit(self.page, self.group)
 
 
 @pytest.fixture
@@ -94,6 +101,28 @@ def bench(open_page: OpenPage) -> Iterator[Callable[..., Bench]]:
 
 
 class TestHeadline:
+    def test_the_view_that_the_card_speaks_about_is_in_focus_though_the_group_came_late(
+        self, bench: Callable[..., Bench]
+    ) -> None:
+        one = bench(2)
+        one.swap(1)
+        # What follows the first drawing of the page comes after the group.
+        one.page.add_init_script(
+            "{ const [frame, timer] = [requestAnimationFrame, setTimeout];"
+            " const late = (go) => timer(go, Math.max(0, 4000 - performance.now()));"
+            " window.requestAnimationFrame = (draw) => late(() => frame(draw));"
+            " window.setTimeout = (go, wait, ...told) =>"
+            " (wait >= 30 ? late(() => go(...told)) : timer(go, wait, ...told)); }"
+        )
+        with holding(one.page, f"**/groups/{one.group}") as groups:
+            one.page.goto(f"/review/{one.group}")
+            groups.arrive()
+            expect(one.page.locator("main[aria-busy]")).to_have_count(1)
+        expect(one.card.locator("h1")).to_have_text("Left and right are swapped in B")
+        expect(one.page.locator('.image-panel[data-view="B"]')).to_have_attribute(
+            "data-focused", "true"
+        )
+
     def test_a_swapped_replay_is_named_and_mended_by_enter_in_that_view(
         self, bench: Callable[..., Bench]
     ) -> None:
@@ -136,10 +165,11 @@ class TestHeadline:
             expect(one.page.locator(f'.gates [data-gate="{name}"]')).to_have_attribute(
                 "data-state", "follows"
             )
-        assert gates.and_(one.page.locator('[data-state="failed"]')).count() == 1
+        expect(gates.and_(one.page.locator('[data-state="failed"]'))).to_have_count(1)
         one.undo_all()
         one.swap(1)
         one.open()
+        expect(one.card.locator("h1")).to_have_text("Left and right are swapped in B")
         sentence = one.card.locator(".verdict-card__text").inner_text()
         below = one.page.get_by_label("Findings", exact=True)
         assert sentence[:40] not in "".join(below.all_inner_texts())
@@ -164,6 +194,7 @@ class TestHeadline:
         screen.saved()
         assert one.document()["verdict"]["reason"] == "not_same_instant"
         screen.press("Control+z")
+        until(one.page, lambda: one.document()["verdict"]["reason"] is None)
         screen.saved()
 
 
@@ -314,10 +345,12 @@ class TestUndrawnLine:
         one.change(1, "/lines", {"lines": {missing: None}})
         screen = one.open()
         page = one.page
+        fix = page.locator(".mend .button--fix")
         for _ in range(6):
-            if page.locator(".mend .button--fix").inner_text().startswith("Draw it"):
+            if fix.inner_text().startswith("Draw it"):
                 break
             screen.press("Shift+Enter")
+            screen.drawn()
         expect(one.card).to_contain_text(missing)
         screen.press("Enter")
         expect(page.locator('.image-panel[data-view="B"] .drawing-chip')).to_contain_text(missing)

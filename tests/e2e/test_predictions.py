@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.screen import Document, Screen, passing
+from tests.e2e.screen import Document, Screen, passing, undo_edit
 from tests.e2e.test_access import serious_in_both
 
 OpenPage = Callable[..., Page]
@@ -92,8 +92,7 @@ def give_back(page: Page, group: int, before: list[Document]) -> None:
         now = page.request.get(f"{API}/groups/{group}").json()
         if [view["balls"] for view in now["views"]] == [view["balls"] for view in before]:
             return
-        undone = page.request.post(f"{API}/groups/{group}/undo", headers={"If-Match": now["etag"]})
-        assert undone.ok, undone.text()
+        undo_edit(page, group)
     pytest.fail("undo did not lead back")
 
 

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from urllib.parse import parse_qsl, urlencode, urlsplit
 
 import pytest
 from playwright.sync_api import Locator, Page, Request, Route, expect
 
-from tests.e2e.screen import until, withdraw_verdict
+from tests.e2e.screen import at_rest, hears, holding, judge, until, withdraw_verdict
 from tests.e2e.season import SEASON
 from tests.e2e.test_access import serious
 
 OpenPage = Callable[..., Page]
 ROW_HEIGHT = 72
-CONNECTED = """async () => (await import(
-  document.querySelector('script[src$="main.js"]').src.replace('main.js', 'api/events.js')
-)).connected.value"""
+MILLION = 1_000_000
 
 
 def opened(open_page: OpenPage, query: str = "") -> Page:
@@ -39,9 +38,11 @@ class TestQueryBox:
     def test_completion_fills_in_a_field_and_its_value(self, open_page: OpenPage) -> None:
         page = opened(open_page)
         page.keyboard.press("/")
+        expect(page.locator(".field--query")).to_be_focused()
         page.keyboard.type("number<=9 spl")
         expect(page.get_by_role("option", name="split:")).to_be_visible()
         page.keyboard.press("ArrowDown")
+        expect(page.locator('[role="option"][aria-selected="true"]')).to_contain_text("split:")
         page.keyboard.press("Enter")
         expect(page.get_by_role("option", name="train")).to_be_visible()
         page.get_by_role("option", name="train").click()
@@ -63,8 +64,9 @@ class TestQueryBox:
 
     def test_the_ends_of_a_histogram_move_by_keyboard(self, open_page: OpenPage) -> None:
         page = opened(open_page)
-        page.get_by_role("slider", name="min JaC 0.5 % from").focus()
-        page.keyboard.press("ArrowRight")
+        slider = page.get_by_role("slider", name="min JaC 0.5 % from")
+        slider.focus()
+        slider.press("ArrowRight")
         expect(page.locator(".field--query")).to_have_value("jac>=0.05 jac<=1")
 
 
@@ -73,13 +75,8 @@ class TestVerdicts:
         page = opened(open_page, "number<=1")
         found = page.request.get("/api/v1/groups?dataset=sample&q=number<=1").json()
         group = found["items"][0]["id"]
-        present = page.request.get(f"/api/v1/groups/{group}")
         try:
-            page.request.put(
-                f"/api/v1/groups/{group}/verdict",
-                data={"state": "rejected", "reason": "not_same_instant"},
-                headers={"If-Match": present.headers["etag"]},
-            )
+            judge(page, group, "rejected", "not_same_instant")
             page.reload()
             expect(page.locator(".queue-cell__by").first).to_have_text("not the same instant")
         finally:
@@ -103,23 +100,20 @@ class TestBulkVerdicts:
         page.locator(".bar").get_by_role("button", name="Undo").click()
         expect(page.locator(".bar")).to_contain_text("3 verdicts are taken back")
         expect(page.locator(".pill[data-status=deferred]")).to_have_count(0)
-        assert statuses(page) == before
+        until(page, lambda: statuses(page) == before)
 
     def test_what_is_below_the_answer_stays_where_it_is_when_it_comes(
         self, open_page: OpenPage
     ) -> None:
         page = opened(open_page)
-        held: list[Route] = []
-        page.route("**/verdicts*", lambda route: held.append(route))
-        page.keyboard.press("b")
-        until(page, lambda: held)
-        decide = page.locator("dialog[open] .dialog__buttons [type=submit]")
-        expect(page.locator(".bulk__outcome")).to_have_text("Counting…")
-        before = decide.bounding_box()
-        held.pop().continue_()
+        with holding(page, "**/verdicts*") as verdicts:
+            page.keyboard.press("b")
+            verdicts.arrive()
+            decide = page.locator("dialog[open] .dialog__buttons [type=submit]")
+            expect(page.locator(".bulk__outcome")).to_have_text("Counting…")
+            before = at_rest(decide)
         expect(page.locator(".bulk__sample li")).to_have_count(5)
-        after = decide.bounding_box()
-        assert before is not None and after is not None
+        after = at_rest(decide)
         assert (after["y"], after["x"] + after["width"]) == (
             before["y"],
             before["x"] + before["width"],
@@ -143,12 +137,31 @@ def row(page: Page, number: int) -> Locator:
     return page.locator(f'.queue-row[aria-rowindex="{number + 1}"]')
 
 
+def of_a_million(route: Route) -> None:
+    """The rows of the season again and again, under numbers up to a million."""
+    asked = urlsplit(route.request.url)
+    query = dict(parse_qsl(asked.query))
+    start = int(query["from"])
+    query["from"] = str(start % 1000)
+    found = route.fetch(url=asked._replace(query=urlencode(query)).geturl()).json()
+    for place, item in enumerate(found["items"]):
+        item["number"] = item["id"] = start + place + 1
+    route.fulfill(json={**found, "total": MILLION})
+
+
+def top_of(element: Locator) -> float:
+    """Where an element begins, px below the top of the window."""
+    return at_rest(element)["y"]
+
+
 @pytest.fixture
 def long_list(open_page: OpenPage, season: str) -> Page:
     """The queue of a season."""
     page = open_page(None)
     page.goto(f"{season}/groups")
     expect(row(page, 1).get_by_role("link", name="1", exact=True)).to_be_visible()
+    # Nothing of the beginning comes later and is taken for an answer to what a test does.
+    hears(page)
     return page
 
 
@@ -193,6 +206,26 @@ class TestFarJumps:
         expect(row(long_list, 301)).to_have_attribute("data-active", "true")
         expect(row(long_list, 301).get_by_role("link")).to_have_text("301")
         expect(row(long_list, 301)).to_be_in_viewport(ratio=1)
+
+    def test_every_row_of_a_million_is_reached(self, long_list: Page) -> None:
+        long_list.route("**/api/v1/groups?*", of_a_million)
+        long_list.reload()
+        rows = long_list.locator(".queue-table__rows")
+        expect(row(long_list, 1).get_by_role("link")).to_have_text("1")
+        rows.focus()
+        long_list.keyboard.press("End")
+        expect(row(long_list, MILLION)).to_be_focused()
+        expect(row(long_list, MILLION).get_by_role("link")).to_have_text(str(MILLION))
+        long_list.keyboard.press("PageUp")
+        expect(row(long_list, MILLION - 10)).to_be_focused()
+        rows.evaluate("(rows) => { rows.scrollTop = (rows.scrollHeight - rows.clientHeight) / 2; }")
+        expect(row(long_list, MILLION // 2)).to_be_visible()
+        before = top_of(row(long_list, MILLION // 2))
+        rows.hover()
+        long_list.mouse.wheel(0, 36)
+        until(long_list, lambda: top_of(row(long_list, MILLION // 2)) == before - 36)
+        long_list.reload()
+        expect(row(long_list, MILLION // 2)).to_be_in_viewport()
 
     def test_the_place_survives_a_reload_and_a_visit_to_a_group(self, long_list: Page) -> None:
         page = long_list
@@ -251,7 +284,7 @@ class TestTicks:
         page.keyboard.press("Control+z")
         expect(page.locator(".bar")).to_contain_text("2 verdicts are taken back")
         expect(page.locator(".pill[data-status=deferred]")).to_have_count(0)
-        assert statuses(page) == before
+        until(page, lambda: statuses(page) == before)
 
     def test_a_click_with_shift_ticks_all_in_between_and_another_query_nothing(
         self, long_list: Page
@@ -280,7 +313,7 @@ class TestTicks:
         expect(ticked(page)).to_have_text(f"{SEASON:,} ticked")
         row(page, 3).get_by_role("checkbox").click()
         expect(ticked(page)).to_have_text(f"{SEASON - 1:,} ticked")
-        assert everything.evaluate("(box) => box.indeterminate")
+        until(page, lambda: everything.evaluate("(box) => box.indeterminate"))
         page.get_by_role("button", name=f"Decide {SEASON - 1:,} ticked").click()
         page.get_by_label("Defer").check()
         page.get_by_role("button", name=f"Defer {SEASON - 1:,} groups").click()
@@ -317,7 +350,8 @@ class TestFollowing:
         page = opened(open_page, "number<=2")
         other = opened(open_page, "number<=2")
         # The stream must be open before the other window acts.
-        until(page, lambda: page.evaluate(CONNECTED))
+        hears(page)
+        hears(other)
         other.keyboard.press("b")
         other.get_by_label("Defer").check()
         other.get_by_role("button", name="Defer 2 groups").click()

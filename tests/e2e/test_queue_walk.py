@@ -8,12 +8,13 @@ from urllib.parse import quote
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.screen import Screen
+from tests.e2e.screen import Screen, judge, settled, until
 
 OpenPage = Callable[..., Page]
 
 QUERY = "status:unreviewed number>=4 number<=9"
 """Six groups, each of which leaves the queue once it is judged."""
+KEPT = "() => JSON.parse(sessionStorage.getItem('touchline.walk')).ids"
 SMALL = {"width": 1100, "height": 700}
 
 
@@ -22,15 +23,6 @@ def ids(page: Page) -> list[int]:
     params = {"dataset": "sample", "q": QUERY}
     found: list[int] = page.request.get("/api/v1/groups/ids", params=params).json()["ids"]
     return found
-
-
-def judge(page: Page, group: int, state: str) -> None:
-    """A verdict from elsewhere."""
-    etag = page.request.get(f"/api/v1/groups/{group}").json()["etag"]
-    answer = page.request.put(
-        f"/api/v1/groups/{group}/verdict", data={"state": state}, headers={"If-Match": etag}
-    )
-    assert answer.ok, answer.text()
 
 
 def stands(page: Page, group: int, *texts: str) -> None:
@@ -51,6 +43,7 @@ def page(open_page: OpenPage) -> Iterator[Page]:
     page.goto(f"/review/{queue[0]}?q={quote(QUERY)}")
     Screen(page).ready()
     yield page
+    settled(page)
     for group in queue:
         judge(page, group, "unreviewed")
 
@@ -86,6 +79,8 @@ class TestWalk:
     def test_what_others_judge_meanwhile_is_not_left(self, page: Page) -> None:
         queue = ids(page)
         stands(page, queue[0], "group 1 of 6")
+        # The queue is kept as it was before somebody else judges.
+        until(page, lambda: page.evaluate(KEPT) == queue)
         judge(page, queue[5], "deferred")
         page.keyboard.press("s")
         stands(page, queue[1], "group 2 of 6", "1 done, 4 left")
@@ -102,7 +97,7 @@ class TestWalk:
                 "link", name=name
             )
             expect(link).to_be_visible()
-        assert collisions(page, ".header") == []
+        until(page, lambda: collisions(page, ".header") == [])
 
 
 COLLISIONS = """(selector) => {

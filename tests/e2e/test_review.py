@@ -5,10 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from threading import Timer
 from typing import Any
 
 import pytest
@@ -16,7 +16,10 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.screen import (
     Screen,
+    at_rest,
+    holding,
     interior_point,
+    lie_ready,
     passing,
     rows,
     submitted,
@@ -49,9 +52,10 @@ class TestQueue:
         page = open_page("/groups")
         expect(page.locator(".save")).to_contain_text("14 of 14 match")
         page.keyboard.press("/")
+        expect(page.locator(".field--query")).to_be_focused()
         page.keyboard.type("number<=5 sort:number-desc")
         expect(page.locator(".save")).to_contain_text("5 of 14 match")
-        assert "q=number" in page.url
+        expect(page).to_have_url(re.compile("q=number"))
         first = page.locator(".queue-row:not(.queue-row--head)").first
         expect(first.locator("a")).to_have_text("5")
 
@@ -69,8 +73,7 @@ class TestQueue:
 
     def test_a_histogram_brushes_the_query(self, open_page: OpenPage) -> None:
         page = open_page("/groups")
-        box = page.locator(".histogram:not([aria-busy]) svg").first.bounding_box()
-        assert box is not None
+        box = at_rest(page.locator(".histogram:not([aria-busy]) svg").first)
         page.mouse.move(box["x"] + 0.82 * box["width"], box["y"] + 20)
         page.mouse.down()
         page.mouse.move(box["x"] + 0.99 * box["width"], box["y"] + 20, steps=4)
@@ -149,8 +152,8 @@ class TestEditing:
         view = screen.document()["views"][0]
         x, y, width, height = view["balls"][0]["box"]
         gate = screen.page.locator(".gates [data-gate=reprojection] .gates__value")
+        expect(gate).not_to_contain_text("left out")
         before, sigma = gate.inner_text(), screen.pitch("sigma")
-        assert "left out" not in before
         screen.drag(screen.place(view, x + width / 2, y + height / 2), 60, 90, drop=False)
         expect(gate).to_contain_text("left out")
         expect(screen.page.locator('.mini-pitch [data-number="sigma"]')).not_to_have_text(sigma)
@@ -219,6 +222,7 @@ class TestEditing:
         assert screen.document()["views"][1]["included"] is False
         screen.press("Shift+2")
         expect(panel).to_have_attribute("data-included", "true")
+        screen.saved()
 
 
 class TestLooking:
@@ -294,6 +298,8 @@ class TestVerdicts:
         download.value.save_as(target)
         check_export(target, key)
         expect(page.locator(".export__result")).to_contain_text("Ready")
+        for group in (first, second):
+            withdraw_verdict(page, group)
 
     def test_keys_faster_than_the_network_lose_nothing(self, open_page: OpenPage) -> None:
         page = open_page(None)
@@ -301,10 +307,12 @@ class TestVerdicts:
         page.goto(f"/review/{chain[0]}")
         screen = Screen(page)
         screen.ready()
-        page.wait_for_load_state("networkidle")
-        page.route("**/neighbours*", lambda route: Timer(1.0, route.continue_).run())
-        screen.press("s", "x", "1", "s")
-        page.wait_for_url(f"**/review/{chain[3]}")
+        expect(page.locator(".header__place")).to_contain_text("of 14")
+        lie_ready(page, chain)
+        with holding(page, "**/neighbours*") as neighbours:
+            screen.press("s", "x", "1", "s")
+            neighbours.arrive()
+            page.wait_for_url(f"**/review/{chain[3]}")
         screen.saved()
         verdicts = {row["id"]: row["status"] for row in rows(page)}
         assert [verdicts[group] for group in chain[:3]] == ["deferred", "rejected", "deferred"]
@@ -327,6 +335,7 @@ class TestVerdicts:
         assert row["status"] == "accepted"
         document = page.request.get(f"/api/v1/groups/{failing}").json()
         assert document["verdict"]["note"] == "seen on video"
+        withdraw_verdict(page, failing)
 
     def test_a_verdict_that_is_refused_puts_the_group_back(
         self, review: Callable[..., Screen], console: Any
@@ -347,6 +356,25 @@ class TestVerdicts:
         assert screen.group == group
         expect(screen.page.locator('.pill[data-status="deferred"]')).to_have_count(0)
         assert screen.document()["verdict"]["state"] == before
+
+    def test_a_refusal_that_is_there_before_the_next_group_is_known_keeps_the_group(
+        self, open_page: Callable[..., Page], console: Any
+    ) -> None:
+        console.expect("503")
+        page = open_page(None)
+        page.route("**/verdict", lambda route: route.fulfill(status=503, body="{}"))
+        with holding(page, re.compile("/neighbours")) as neighbours:
+            page.goto(f"/review/{passing(page, 4)}")
+            screen = Screen(page)
+            screen.ready()
+            neighbours.arrive()
+            group = screen.group
+            screen.press("s")
+            expect(page.get_by_role("alert")).to_contain_text("Not saved")
+        expect(page.locator(".header__place")).to_contain_text("of 14")
+        screen.drawn()
+        expect(page.get_by_role("alert")).to_contain_text("Not saved")
+        assert screen.group == group
 
     def test_the_help_lists_the_keys(self, review: Callable[..., Screen]) -> None:
         screen = review(0)

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Page, Playwright, expect
 
 from tests.e2e.conftest import windows_of
-from tests.e2e.screen import Screen, passing
+from tests.e2e.screen import Screen, at_rest, passing, until
 from tests.e2e.test_access import serious
 from tests.e2e.windows import Windows
 
@@ -86,7 +86,7 @@ class TestScene:
         page = review(0).page
         show(page)
         expect(page.locator('[data-label="A"]')).to_be_visible()
-        assert colours(page) > 30
+        until(page, lambda: colours(page) > 30)
         before = label(page, "ball")
         page.keyboard.press("7")
         expect(page.get_by_role("button", name="Top 7")).to_have_attribute("aria-pressed", "true")
@@ -106,8 +106,7 @@ class TestScene:
         view, solved = next((view, solved) for view, solved in pairs if solved["ball"])
         page.get_by_role("button", name=f"Look through camera {view['letter']}").click()
         expect(page.locator(".scene3d__through")).to_have_text(f"Through camera {view['letter']}")
-        box = page.locator(".scene3d__stage").bounding_box()
-        assert box is not None
+        box = at_rest(page.locator(".scene3d__stage"))
         scale = min(box["width"] / view["width"], box["height"] / view["height"])
         u, v = solved["ball"]["reprojected"]
         left = (box["width"] - view["width"] * scale) / 2
@@ -168,12 +167,10 @@ class TestWhole:
         page.keyboard.press("\\")
         page.wait_for_selector('.scene3d__stage[data-ready="true"]')
         page.wait_for_function("() => !document.querySelector('.scene3d__camera')?.hidden")
-        page.wait_for_timeout(300)
+        stage = at_rest(page.locator(".scene3d__stage"))
+        at_rest(page.locator(".scene3d__camera").first)
+        until(page, lambda: [one["hidden"] for one in page.evaluate(LABELS)] == [False] * 6)
         labels = page.evaluate(LABELS)
-        assert len(labels) == 6
-        assert not any(label["hidden"] for label in labels)
-        stage = page.locator(".scene3d__stage").bounding_box()
-        assert stage is not None
         for i, label in enumerate(labels):
             assert stage["x"] < label["x"] < stage["x"] + stage["width"]
             assert stage["y"] < label["y"] < stage["y"] + stage["height"]

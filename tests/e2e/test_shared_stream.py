@@ -18,7 +18,10 @@ READ = """async () => {
   readStream(['group'], {
     opened: () => { window.openings += 1; },
     lost: () => {},
-    told: (kind, data) => { window.heard.push(JSON.parse(data).kind); },
+    told: (kind, data) => {
+      const told = JSON.parse(data);
+      if (told.group === 1) window.heard.push(told.kind);
+    },
   });
 }"""
 

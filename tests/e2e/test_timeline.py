@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -9,18 +10,11 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.film import FRAMES, SEEN_BY_TWO, WORST
-from tests.e2e.test_access import CUT_OFF, NESTED_SCROLLERS, SIZES, serious
+from tests.e2e.screen import at_rest, holding
+from tests.e2e.test_access import CUT_OFF, NESTED_SCROLLERS, SIZES, serious, soon
 
 OpenPage = Callable[..., Page]
-SLOW_GROUPS = r"""() => {
-    const quick = window.fetch;
-    window.fetch = async (address, ...rest) => {
-        const isGroup = /\/groups\/\d+$/.test(String(address.url ?? address));
-        if (isGroup) await new Promise((done) => setTimeout(done, 700));
-        return quick(address, ...rest);
-    };
-}"""
-"""Groups that come late, each after the same while."""
+GROUPS = re.compile(r"/groups/\d+$")
 
 
 def columns(page: Page, film: str) -> dict[str, Any]:
@@ -73,10 +67,10 @@ class TestTimeline:
         expect_frame(page, FRAMES[6])
         page.keyboard.press("End")
         expect_frame(page, FRAMES[-1])
-        box = curve.bounding_box()
-        assert box is not None
+        box = at_rest(curve)
         page.mouse.click(box["x"] + 3, box["y"] + box["height"] / 2)
         expect_frame(page, FRAMES[0])
+        box = at_rest(curve)
         page.mouse.click(box["x"] + box["width"] - 3, box["y"] + box["height"] / 2)
         expect_frame(page, FRAMES[-1])
 
@@ -85,15 +79,20 @@ class TestTimeline:
     ) -> None:
         page = open_page(None)
         open_timeline(page, film, FRAMES[5])
-        page.get_by_role("slider", name="Frame").focus()
-        # As slow as a busy machine: nothing that comes next is there before it is asked for.
-        page.evaluate(SLOW_GROUPS)
-        page.keyboard.press("End")
-        page.wait_for_timeout(200)
-        # The frame before stays, and so does the keyboard's focus.
-        expect_frame(page, FRAMES[5])
+        curve = page.get_by_role("slider", name="Frame")
+        curve.focus()
+        with holding(page, GROUPS) as groups:
+            page.keyboard.press("End")
+            groups.arrive()
+            page.wait_for_timeout(200)
+            # The frame before stays, and so does the keyboard's focus.
+            expect_frame(page, FRAMES[5])
+            expect(curve).to_be_focused()
         expect_frame(page, FRAMES[-1])
-        page.keyboard.press("Home")
+        with holding(page, GROUPS) as groups:
+            page.keyboard.press("Home")
+            groups.arrive()
+            expect(curve).to_be_focused()
         expect_frame(page, FRAMES[0])
 
     def test_plays_to_the_end(self, open_page: OpenPage, film: str) -> None:
@@ -124,6 +123,6 @@ class TestTimeline:
     ) -> None:
         page = open_page(None, size={"width": size[0], "height": size[1]})
         open_timeline(page, film, FRAMES[3])
-        assert page.locator(".image-panel").count() == 6
-        assert page.evaluate(CUT_OFF) == []
-        assert page.evaluate(NESTED_SCROLLERS) == []
+        expect(page.locator(".image-panel")).to_have_count(6)
+        assert soon(page, CUT_OFF) == []
+        assert soon(page, NESTED_SCROLLERS) == []

@@ -1,16 +1,17 @@
 """Windows of a browser, each as new to the page as if nobody had been there.
 
 What a window has loaded from the server stays with the browser from test to test; what the page
-kept for itself (storage, databases, cookies) does not.
+kept for itself (storage, databases, cookies, its history) does not, nor what a test asked of it.
 """
 
 from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Set
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 from urllib.parse import urlsplit
 
 from playwright.sync_api import Browser, BrowserContext, CDPSession, Error, Page
@@ -18,7 +19,9 @@ from playwright.sync_api import Browser, BrowserContext, CDPSession, Error, Page
 SIZE = {"width": 1440, "height": 900}
 SLOW = int(os.environ.get("TOUCHLINE_SLOW_PAGES", "0"))
 """Milliseconds by which pages are late at most, to find tests that do not wait for them."""
-TIMEOUT_MS = 30_000 if SLOW else 120_000
+PROCESSOR = int(os.environ.get("TOUCHLINE_SLOW_PROCESSOR", "1"))
+"""How many times slower pages reckon, to the same end."""
+TIMEOUT_MS = 30_000 * PROCESSOR if SLOW else 120_000
 """What a machine that does much else may take for anything a page waits for."""
 NOTHING_ON_ITS_WAY = """() => {
   const save = document.querySelector('.save[data-unsaved]');
@@ -27,7 +30,8 @@ NOTHING_ON_ITS_WAY = """() => {
 LATE = """(most) => {
   const late = (value) => new Promise((go) => setTimeout(go, Math.random() * most, value));
   const { fetch, requestAnimationFrame: frame, createImageBitmap: decode } = window;
-  window.fetch = (...asked) => late().then(() => fetch(...asked)).then(late);
+  // A page that goes away would never send what it says last.
+  window.fetch = (...asked) => (asked[1]?.keepalive ? fetch(...asked) : late().then(() => fetch(...asked)).then(late));
   window.createImageBitmap = (...asked) => decode(...asked).then(late);
   // One delay for all that ask for the same frame, which keeps their order.
   let waiting = null;
@@ -49,7 +53,22 @@ LATE = """(most) => {
     addEventListener.call(this, kind, heard, ...more);
   };
 }"""
+LATE_ANSWERS = {
+    "offline": False,
+    "latency": SLOW / 5,
+    "downloadThroughput": -1,
+    "uploadThroughput": -1,
+}
+"""Of modules, too, which a page fetches when something is first shown."""
 KEPT_BY_PAGES = "cookies,indexeddb,local_storage,service_workers,cache_storage"
+LASTING = ("add_init_script", "expose_function", "expose_binding")
+"""What a tab goes on doing after it was told once."""
+HELD = ("Shift", "Control", "Alt", "Meta", "z")
+"""Keys that tests hold down."""
+EMPTYING_MS = 10_000
+"""A tab that cannot be left within that is closed."""
+BLANK = "about://"
+"""Where a tab is that nobody has used, as an origin."""
 
 
 def _let_write(page: Page) -> None:
@@ -60,18 +79,63 @@ def _let_write(page: Page) -> None:
 
 @dataclass
 class _Window:
-    """One profile of the browser, and a blank page through which it is cleaned."""
+    """One profile of the browser, its tab, and a blank page through which it is cleaned."""
 
     address: str
     context: BrowserContext
     blank: Page
     cleaner: CDPSession
+    tab: Page | None = None
+    history: CDPSession | None = None
+    heard: list[tuple[str, Callable[..., Any]]] = field(default_factory=list)
+    spent: bool = False
+    """The tab does at every page what it was once told; nobody can take that back."""
 
     @classmethod
     def new(cls, browser: Browser, address: str) -> _Window:
         context = browser.new_context(base_url=address, accept_downloads=True)
+        context.set_default_timeout(TIMEOUT_MS)
         blank = context.new_page()
         return cls(address, context, blank, context.new_cdp_session(blank))
+
+    def page(self) -> Page:
+        """The tab; a new one where there is none that can be used again.
+
+        One that is used again still has in memory what it loaded: to read two hundred modules
+        anew is most of what a page costs.
+        """
+        if self.tab is None:
+            self.tab = self.context.new_page()
+            self.history = self.context.new_cdp_session(self.tab)
+            self.spent = False
+            if SLOW:
+                self.tab.add_init_script(f"({LATE})({SLOW})")
+            self._watch(self.tab)
+        if SLOW:
+            assert self.history
+            self.history.send("Network.enable")
+            self.history.send("Network.emulateNetworkConditions", {**LATE_ANSWERS})
+            self.history.send("Emulation.setCPUThrottlingRate", {"rate": PROCESSOR})
+        return self.tab
+
+    def _watch(self, tab: Page) -> None:
+        """Remember what somebody asks of the tab that would outlive their test."""
+        listen = tab.on
+
+        def on(event: str, hear: Callable[..., Any]) -> None:
+            self.heard.append((event, hear))
+            listen(event, hear)
+
+        def lasting(ask: Callable[..., Any]) -> Callable[..., Any]:
+            def asked(*words: Any, **options: Any) -> Any:
+                self.spent = True
+                return ask(*words, **options)
+
+            return asked
+
+        tab.on = on  # type: ignore[method-assign, assignment]
+        for name in LASTING:
+            setattr(tab, name, lasting(getattr(tab, name)))
 
     def clean(self) -> None:
         origins = {self.address}
@@ -81,11 +145,41 @@ class _Window:
             if page is not self.blank:
                 _let_write(page)
                 origins.add("{0.scheme}://{0.netloc}".format(urlsplit(page.url)))
+        for page in self.context.pages:
+            if page is not self.blank and not (page is self.tab and self._emptied(page, origins)):
                 page.close()
+        if self.tab is not None and self.tab.is_closed():
+            self.tab, self.heard = None, []
         for origin in origins:
             self.cleaner.send(
                 "Storage.clearDataForOrigin", {"origin": origin, "storageTypes": KEPT_BY_PAGES}
             )
+
+    def _emptied(self, tab: Page, origins: Set[str]) -> bool:
+        """Bring the tab to where it was when it was new; whether that can be done."""
+        if self.spent or not origins <= {self.address, BLANK}:
+            return False
+        while self.heard:
+            # A test may have taken its own away.
+            with suppress(KeyError):
+                tab.remove_listener(*self.heard.pop())
+        with suppress(Error):
+            # The page is gone before its requests can reach the server again.
+            tab.goto("about:blank", timeout=EMPTYING_MS)
+            tab.unroute_all()
+            # What a tab keeps for itself is forgotten where it was kept, once the page is gone.
+            tab.goto("/healthz", timeout=EMPTYING_MS)
+            tab.evaluate("() => sessionStorage.clear()")
+            tab.goto("about:blank", timeout=EMPTYING_MS)
+            # What is still held is let go where nothing happens.
+            tab.mouse.up()
+            tab.mouse.move(0, 0)
+            for key in HELD:
+                tab.keyboard.up(key)
+            assert self.history
+            self.history.send("Page.resetNavigationHistory")
+            return True
+        return False
 
 
 class Windows:
@@ -103,11 +197,15 @@ class Windows:
         free = self._free[address]
         window = free.pop() if free else _Window.new(self.browser, address)
         self._taken.append(window)
-        page = window.context.new_page()
-        if SLOW:
-            page.add_init_script(f"({LATE})({SLOW})")
+        page = window.page()
         page.set_viewport_size(size or SIZE)  # type: ignore[arg-type]
-        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        page.emulate_media(
+            media="null",
+            color_scheme=scheme,  # type: ignore[arg-type]
+            reduced_motion="null",
+            forced_colors="null",
+            contrast="null",
+        )
         page.set_default_timeout(TIMEOUT_MS)
         return page
 

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
 import { applyEdit, describe as describe_, editOf, requestOf, swapSides } from '../../static/state/edits.js';
-import { asProposed, isBare } from '../../static/state/proposal_lines.js';
+import { areNew, asProposed, besideDrawn, scoreWords, waitingViews, waitsForLines } from '../../static/state/proposal_lines.js';
 import { begin, PROPOSED, proposedLines, stage, stepBack } from '../../static/state/staging.js';
 
 const SIDE = [{ x: 0, y: 0 }, { x: 0, y: 90 }];
@@ -12,12 +12,43 @@ const view = { id: 31, key: '7.png', letter: 'A', station: { id: 3, shared: fals
 const group = { id: 12, etag: '"g"', views: [view] };
 const accept = { kind: 'lines', view: '7.png', lines: LINES, proposed: Object.keys(LINES) };
 
-describe('isBare', () => {
+describe('waitsForLines', () => {
+	/** @param {object} calibration */
+	const solved = (calibration) => ({ views: [{ view: '7.png', calibration: { camera: {}, unobservable: [], ...calibration } }] });
+	const lined = { ...view, lines: LINES };
+
 	it('asks for a picture, and for neither lines nor a given camera', () => {
-		assert.ok(isBare(view));
-		assert.ok(!isBare({ ...view, image: null }));
-		assert.ok(!isBare({ ...view, lines: LINES }));
-		assert.ok(!isBare({ ...view, station: { ...view.station, has_given: true } }));
+		assert.ok(waitsForLines(view, null));
+		assert.ok(!waitsForLines({ ...view, image: null }, null));
+		assert.ok(!waitsForLines({ ...view, station: { ...view.station, has_given: true } }, null));
+	});
+
+	it('asks for lines that determine no camera, once that is known', () => {
+		assert.ok(!waitsForLines(lined, null));
+		assert.ok(!waitsForLines(lined, solved({})));
+		assert.ok(waitsForLines(lined, solved({ camera: null })));
+		assert.ok(waitsForLines(lined, solved({ unobservable: ['position'] })));
+		assert.deepEqual(waitingViews({ ...group, views: [lined], solution: solved({ camera: null }) }), [lined]);
+	});
+
+	it('is over once one of the proposed markings is there', () => {
+		assert.ok(areNew({ 'Side line left': SIDE }, { 'Middle line': MIDDLE }));
+		assert.ok(!areNew(LINES, { 'Middle line': MIDDLE }));
+	});
+});
+
+describe('besideDrawn', () => {
+	it('adds what nobody drew and leaves what is drawn', () => {
+		const moved = [{ x: 3, y: 0 }];
+		assert.deepEqual(besideDrawn({ 'Middle line': moved }, LINES), { all: { 'Side line left': SIDE, 'Middle line': moved }, added: ['Side line left'] });
+	});
+});
+
+describe('scoreWords', () => {
+	it('says what was measured', () => {
+		const item = { supported: 0.92, explained: 0.8, error_px: 0.214 };
+		assert.equal(scoreWords(item), '92\u00a0% of its markings have paint, 80\u00a0% of the paint has a marking, 0.21 px between them');
+		assert.equal(scoreWords({ ...item, explained: null, error_px: null }), '92\u00a0% of its markings have paint');
 	});
 });
 
@@ -29,8 +60,14 @@ describe('asProposed', () => {
 
 	it('knows what was proposed for as long as that step is in force', () => {
 		const staged = stage(stage(begin({}), LINES, 'Lines proposed', PROPOSED), { 'Middle line': MIDDLE }, 'deleted');
-		assert.equal(proposedLines(staged), LINES);
+		assert.deepEqual(proposedLines(staged), LINES);
 		assert.deepEqual(proposedLines(stepBack(stepBack(staged))), {});
+	});
+
+	it('does not name what was drawn before, saved or staged', () => {
+		const drawn = stage(begin({ 'Side line top': SIDE }), { 'Side line top': SIDE, 'Side line left': SIDE }, 'drawn');
+		const staged = stage(drawn, { 'Side line top': SIDE, ...LINES }, 'Lines proposed', PROPOSED);
+		assert.deepEqual(proposedLines(staged), { 'Middle line': MIDDLE });
 	});
 });
 

@@ -11,7 +11,7 @@ import { useResource } from '../../lib/resource.js';
 import { navigate, page } from '../../lib/router.js';
 import { picturesOf } from '../../overlays/scene.js';
 import {
-	changed, lines, resetForView, shown, shownSolution, startAsking, view,
+	changed, resetForView, shown, shownSolution, startAsking, view,
 } from '../../state/calibration.js';
 import { editorAddress } from '../../state/editor_address.js';
 import { groupDocument, open, pending } from '../../state/group.js';
@@ -90,7 +90,7 @@ function Workspace({ group, at }) {
 	const saved = groupDocument.value;
 	const before = saved?.solution ?? null;
 	const plain = useMemo(() => picturesOf(group, after, saved).find(({ view: { key } }) => key === at.key), [group, after, saved, at.key]);
-	const item = Object.keys(lines.value).length === 0 ? proposals.value.get(at.key) : undefined;
+	const item = changed.value ? undefined : proposals.value.get(at.key);
 	const picture = useMemo(() => (plain && item ? { ...plain, proposal: { item, draw: proposalDrawing(item.lines) } } : plain), [plain, item]);
 	const solved = before?.views.find((one) => one.view === at.key)?.calibration ?? null;
 	const readInfluence = useCallback((/** @type {AbortSignal} */ signal) => getInfluence(at.id, signal), [at.id]);

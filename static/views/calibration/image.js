@@ -2,17 +2,17 @@
 /** The view in hand, large: its frame, its lines, the camera before and after. */
 
 import { html } from 'htm/preact';
-import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { useEffect, useMemo, useRef } from 'preact/hooks';
 
 import { plural } from '../../lib/format.js';
 import { useSize } from '../../lib/hooks.js';
 import Konva from '../../lib/konva.js';
 import { ImageStage } from '../../overlays/stage.js';
 import { changed, choice, hovered, lines, mode } from '../../state/calibration.js';
-import { loadImage } from '../../state/images.js';
 import { paint, paintShown } from '../../state/paint.js';
 import { fitPanel, panPanel, viewportOf, zoomPanel } from '../../state/viewports.js';
 import { gain, overlaysHidden, projections } from '../../state/workspace.js';
+import { useFrame } from '../frame.js';
 import { PanelCaption } from '../panel_caption.js';
 import { ProposalScores } from '../proposal_card.js';
 import { drawEditorMarks } from './marks.js';
@@ -23,17 +23,6 @@ import { attachEditor } from './pointer.js';
 /** @import {CalibrationJson} from '../../api/types.js' */
 /** @import {ViewPicture} from '../../overlays/scene.js' */
 /** @import {EditorMarks} from './marks.js' */
-
-/** @param {string | null} url */
-function useImage(url) {
-	const [loaded, setLoaded] = useState(/** @type {{url: string | null, image: ImageBitmap | null}} */ ({ url: null, image: null }));
-	useEffect(() => {
-		let wanted = true;
-		if (url) loadImage(url).then((image) => { if (wanted) setLoaded({ url, image }); }, () => {});
-		return () => { wanted = false; };
-	}, [url]);
-	return loaded.url === url ? loaded.image : null;
-}
 
 /** The stage of the review screen with the editor's marks on top. */
 class EditorStage extends ImageStage {
@@ -56,7 +45,7 @@ function ProposalChip({ item }) {
 	const found = item.outcome === 'proposed';
 	return html`
 		<div class="paint-chip proposal-chip" role="status" data-outcome=${item.outcome}>
-			<p>${found ? `${plural(Object.keys(item.lines).length, 'marking')} proposed` : `Looked at before: ${item.outcome}. ${item.sentence}`}</p>
+			<p>${found ? `${plural(Object.keys(item.lines).length, 'marking')} proposed. ${item.sentence}` : `Looked at before: ${item.outcome}. ${item.sentence}`}</p>
 			<${ProposalScores} item=${item} />
 		</div>
 	`;
@@ -67,7 +56,7 @@ export function EditorImage({ picture, before }) {
 	const { view } = picture;
 	const [ref, size] = useSize();
 	const stage = useRef(/** @type {EditorStage | null} */ (null));
-	const image = useImage(view.image);
+	const { image } = useFrame(view.image);
 	const key = panelKey(view.letter);
 	const viewport = viewportOf(key, view, size);
 	const now = useRef({ view, size, viewport, picture });

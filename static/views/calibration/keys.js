@@ -84,7 +84,7 @@ export const EDITOR_KEYS = [
 	{ keys: ['k'], label: 'Move all points onto the paint', group: 'Edit', run: () => { snapToPaint(); } },
 	{ keys: ['Shift+k'], label: 'Move the marking’s points onto the paint', group: 'Edit', run: snapMarking },
 	{ keys: [], label: 'Drag a point along the paint', group: 'Edit', shown: '⇧ drag', run: () => {} },
-	{ keys: ['Shift+p'], label: 'Propose lines from the paint, where there are none', group: 'Edit', run: () => { proposeFromPaint(); } },
+	{ keys: ['Shift+p'], label: 'Propose lines from the paint, where there is no camera', group: 'Edit', run: () => { proposeFromPaint(); } },
 	{ keys: ['Delete', 'Backspace'], label: 'Delete the point, or the marking', group: 'Edit', run: deleteChosen },
 	{ keys: ['Shift+Delete', 'Shift+Backspace'], label: 'Delete the marking', group: 'Edit', run: deleteMarking },
 	{ keys: [], label: 'Move by 1 px; Shift 5 px; Alt 0.1 px', group: 'Edit', shown: '← ↑ → ↓', run: () => {} },

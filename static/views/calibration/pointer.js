@@ -148,12 +148,10 @@ export function attachEditor(element, panel) {
 		['pointerdown', down], ['pointermove', move], ['pointerup', up], ['pointercancel', lost],
 		['pointerleave', left], ['dblclick', twice],
 	]);
-	for (const [name, heard] of listeners) element.addEventListener(name, heard);
-	element.addEventListener('wheel', wheel, { passive: false });
-	addEventListener('keydown', key, true);
-	return () => {
-		for (const [name, heard] of listeners) element.removeEventListener(name, heard);
-		element.removeEventListener('wheel', wheel);
-		removeEventListener('keydown', key, true);
-	};
+	const attached = new AbortController();
+	const { signal } = attached;
+	for (const [name, heard] of listeners) element.addEventListener(name, heard, { signal });
+	element.addEventListener('wheel', wheel, { passive: false, signal });
+	addEventListener('keydown', key, { capture: true, signal });
+	return () => attached.abort();
 }

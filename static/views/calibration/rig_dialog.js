@@ -5,10 +5,10 @@ import { html } from 'htm/preact';
 import { useCallback, useState } from 'preact/hooks';
 
 import { getStation } from '../../api/calibration.js';
-import { ApiError } from '../../api/problem.js';
+import { ApiError, sentenceOf } from '../../api/problem.js';
 import { deleteRig, postRig } from '../../api/rig.js';
 import { capital, count, fixed } from '../../lib/format.js';
-import { sentenceOf, useResource } from '../../lib/resource.js';
+import { useResource } from '../../lib/resource.js';
 import { follow, isOver } from '../../state/jobs.js';
 import { announce } from '../../state/notice.js';
 import { watchSolving } from '../../state/solving.js';

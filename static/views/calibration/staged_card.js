@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 
 import { fixed, pixels } from '../../lib/format.js';
-import { asking, proposeFromPaint, snapToPaint } from '../../state/paint.js';
+import { asking, isWaiting, proposeFromPaint, snapToPaint } from '../../state/paint.js';
 import { changed, changes, choice, discardStaged, lines, mode, redo, staging, undo } from '../../state/calibration.js';
 import { deleteChosen, deleteMarking, insertPoint, save, swapAllSides, toggleDrawing, toggleRelabelling } from './actions.js';
 
@@ -59,11 +59,11 @@ export function MarkingCard({ picture }) {
 				<${Action} label=${chosen?.index === null || !chosen ? 'Delete' : 'Delete point'} keys="Del" run=${deleteChosen} off=${absent} />
 				${chosen && chosen.index !== null ? html`<${Action} label="Delete marking" keys="⇧ Del" run=${deleteMarking} off=${absent} />` : null}
 				<${Action} label="Swap sides" keys="M" run=${swapAllSides} off=${lined ? null : 'There are no lines'} />
-				${lined
-					? html`<${Action} label=${asking.value ? 'Reading…' : 'Snap to paint'} keys="K" run=${() => { snapToPaint(); }} off=${frameless ?? busy} />`
-					: html`<${Action} label=${asking.value ? 'Looking…' : 'Propose lines'} keys="⇧ P" run=${() => { proposeFromPaint(); }} off=${frameless ?? busy} />`}
+				${isWaiting.value
+					? html`<${Action} label=${asking.value ? 'Looking…' : 'Propose lines'} keys="⇧ P" run=${() => { proposeFromPaint(); }} off=${frameless ?? busy} />`
+					: html`<${Action} label=${asking.value ? 'Reading…' : 'Snap to paint'} keys="K" run=${() => { snapToPaint(); }} off=${frameless ?? busy} />`}
 			</div>
-			${chosen ? null : html`<p class="note">${lined ? 'Click a line in the diagram, in the table or on the picture.' : proposed ? 'The violet dashed lines are proposed: ⇧ P stages them.' : 'Click a line in the diagram to draw it, or have lines proposed from the paint.'}</p>`}
+			${chosen ? null : html`<p class="note">${proposed ? 'The violet dashed lines are proposed: ⇧ P stages them.' : lined ? 'Click a line in the diagram, in the table or on the picture.' : 'Click a line in the diagram to draw it, or have lines proposed from the paint.'}</p>`}
 			<${Points} picture=${picture} />
 		</section>
 	`;
@@ -83,7 +83,7 @@ export function CommitBar({ shared }) {
 				<${Action} label="Undo" keys="Ctrl Z" run=${undo} />
 				<${Action} label="Redo" keys="Ctrl ⇧ Z" run=${redo} off=${at < steps.length ? null : 'Nothing to do again'} />
 				<${Action} label="Discard" keys="Ctrl Del" run=${discardStaged} off=${off} />
-				<button class="button button--primary" type="button" aria-disabled=${off !== null} title=${off ?? 'Save everything staged as one edit (Ctrl S)'} onClick=${() => { if (off === null) save(); }}>
+				<button data-needs="annotate" class="button button--primary" type="button" aria-disabled=${off !== null} title=${off ?? 'Save everything staged as one edit (Ctrl S)'} onClick=${() => { if (off === null) save(); }}>
 					${shared ? 'Save for all its views' : 'Save'} <kbd>Ctrl S</kbd>
 				</button>
 			</div>

@@ -5,9 +5,10 @@ import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
 import { getComparison } from '../../api/evaluations.js';
+import { sentenceOf } from '../../api/problem.js';
 import { count, plural, words } from '../../lib/format.js';
 import { matchName } from '../../lib/match_name.js';
-import { sentenceOf, useResource } from '../../lib/resource.js';
+import { useResource } from '../../lib/resource.js';
 import { reviewAddress } from '../../state/navigation.js';
 import { Loading } from '../page_frame.js';
 import { Cell, number } from './cell.js';

@@ -13,7 +13,7 @@ export function ConfirmButton({ label, question, what, small = false, run }) {
 	}
 	return html`
 		<button
-			class=${`button ${small ? 'button--small ' : ''}${asked || !small ? 'button--danger' : ''}`} type="button" aria-live="polite"
+			data-needs="lead" class=${`button ${small ? 'button--small ' : ''}${asked || !small ? 'button--danger' : ''}`} type="button" aria-live="polite"
 			onClick=${press} onBlur=${() => setAsked(false)}
 		>${asked ? question : label}<span class="hidden-text"> ${what}</span></button>
 	`;

@@ -5,7 +5,8 @@ import { html } from 'htm/preact';
 import { useMemo } from 'preact/hooks';
 
 import { figureAddress, getFigure, getFrames } from '../../api/evaluations.js';
-import { sentenceOf, useResource } from '../../lib/resource.js';
+import { sentenceOf } from '../../api/problem.js';
+import { useResource } from '../../lib/resource.js';
 import { navigate } from '../../lib/router.js';
 import { reviewAddress } from '../../state/navigation.js';
 import { complain } from '../../state/notice.js';

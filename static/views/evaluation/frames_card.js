@@ -5,10 +5,9 @@ import { html } from 'htm/preact';
 import { useEffect, useState } from 'preact/hooks';
 
 import { getFrames } from '../../api/evaluations.js';
-import { ApiError } from '../../api/problem.js';
+import { ApiError, sentenceOf } from '../../api/problem.js';
 import { count, fixed } from '../../lib/format.js';
 import { matchName } from '../../lib/match_name.js';
-import { sentenceOf } from '../../lib/resource.js';
 import { reviewAddress } from '../../state/navigation.js';
 import { number } from './cell.js';
 

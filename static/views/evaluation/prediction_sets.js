@@ -5,10 +5,12 @@ import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
 import { deletePredictions, postPredictions } from '../../api/evaluations.js';
+import { sentenceOf } from '../../api/problem.js';
+import { useAttempt } from '../../lib/attempt.js';
 import { count, plural } from '../../lib/format.js';
-import { sentenceOf } from '../../lib/resource.js';
 import { forgetPredictions } from '../../state/predictions.js';
 import { FormDialog } from '../dialog.js';
+import { FormError } from '../form_error.js';
 import { UploadField } from '../source_choice.js';
 import { When } from '../when.js';
 import { AcceptPredictions } from './accept_predictions.js';
@@ -114,23 +116,14 @@ function UploadDialog({ one, onClose, onAdded }) {
 /** @param {{one: DatasetJson, sets: PredictionSet[], changed: () => void}} props */
 export function PredictionSets({ one, sets, changed }) {
 	const [asked, setAsked] = useState(/** @type {PredictionSet | 'upload' | null} */ (null));
-	const [problem, setProblem] = useState('');
+	const { error, attempt } = useAttempt();
 	const close = () => setAsked(null);
 	/** @param {PredictionSet} set */
-	async function remove(set) {
-		try {
-			await deletePredictions(set.id);
-			forgetPredictions();
-			setProblem('');
-			changed();
-		} catch (error) {
-			setProblem(sentenceOf(error));
-		}
-	}
+	const remove = (set) => attempt(deletePredictions(set.id), () => { forgetPredictions(); changed(); });
 	return html`
 		<section class="card" aria-labelledby="sets-title">
 			<h2 id="sets-title">Predictions</h2>
-			<p><button class="button" type="button" onClick=${() => setAsked('upload')}>Upload predictions…</button></p>
+			<p><button data-needs="lead" class="button" type="button" onClick=${() => setAsked('upload')}>Upload predictions…</button></p>
 			${sets.length === 0 ? html`<p class="empty-note">None yet: COCO results, YOLO files, a CSV, or cameras.</p>` : null}
 			<ul>
 				${sets.map((set) => html`
@@ -139,12 +132,12 @@ export function PredictionSets({ one, sets, changed }) {
 						<p class="note">${count(set.boxes)} ${set.boxes === 1 ? 'box' : 'boxes'} in ${plural(set.frames, 'frame')}${set.cameras ? ` · ${plural(set.cameras, 'camera')}` : ''} · ${set.format} · <${When} at=${set.created} /></p>
 						<${Report} set=${set} />
 						<p class="buttons">
-							${set.boxes ? html`<button class="button button--small" type="button" onClick=${() => setAsked(set)}>Accept…<span class="hidden-text"> ${set.name}</span></button>` : null}
+							${set.boxes ? html`<button data-needs="lead" class="button button--small" type="button" onClick=${() => setAsked(set)}>Accept…<span class="hidden-text"> ${set.name}</span></button>` : null}
 							<${ConfirmButton} small=${true} label="Delete" question="Delete for good?" what=${set.name} run=${() => remove(set)} />
 						</p>
 					</li>`)}
 			</ul>
-			${problem ? html`<p class="form__error" role="alert">${problem}</p>` : null}
+			${error ? html`<${FormError} error=${error} />` : null}
 			${asked === 'upload' ? html`<${UploadDialog} one=${one} onClose=${close} onAdded=${changed} />` : null}
 			${asked && asked !== 'upload' ? html`<${AcceptPredictions} one=${one} set=${asked} onClose=${close} />` : null}
 		</section>

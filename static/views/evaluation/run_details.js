@@ -5,8 +5,10 @@ import { html } from 'htm/preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 
 import { deleteEvaluation, getEvaluation } from '../../api/evaluations.js';
+import { useAttempt } from '../../lib/attempt.js';
 import { count, words } from '../../lib/format.js';
-import { sentenceOf, useResource } from '../../lib/resource.js';
+import { useResource } from '../../lib/resource.js';
+import { FormError } from '../form_error.js';
 import { Loading, Trouble } from '../page_frame.js';
 import { When } from '../when.js';
 import { Comparison } from './comparison.js';
@@ -84,7 +86,7 @@ export function RunDetails({ id, runs, changed }) {
 	const found = useResource((signal) => getEvaluation(id, signal), [id]);
 	const [frames, setFrames] = useState(/** @type {{query: FrameQuery, title: string} | null} */ (null));
 	const [other, setOther] = useState(0);
-	const [problem, setProblem] = useState('');
+	const { error, attempt } = useAttempt();
 	const opened = useRef(/** @type {HTMLDivElement | null} */ (null));
 	useEffect(() => { if (frames || other) opened.current?.scrollIntoView({ block: 'nearest' }); }, [frames?.title, other]);
 	if (found.error) return html`<${Trouble} title="The run cannot be shown" error=${found.error} retry=${found.reload} />`;
@@ -92,17 +94,10 @@ export function RunDetails({ id, runs, changed }) {
 	const run = found.value;
 	/** @param {FrameQuery} query @param {string} title */
 	const open = (query, title) => setFrames({ query, title });
-	async function remove() {
-		try {
-			await deleteEvaluation(id);
-			changed();
-		} catch (error) {
-			setProblem(sentenceOf(error));
-		}
-	}
+	const remove = () => attempt(deleteEvaluation(id), changed);
 	return html`
 		<${Head} run=${run} others=${runs.filter((one) => one.id !== id)} compare=${setOther} remove=${remove} openFrames=${() => open({ sort: 'error_m-desc' }, 'all')} />
-		${problem ? html`<p class="card form__error" role="alert">${problem}</p>` : null}
+		${error ? html`<${FormError} error=${error} card=${true} />` : null}
 		<div class="page__list" ref=${opened}>
 			${other ? html`<${Comparison} run=${run} other=${other} onClose=${() => setOther(0)} />` : null}
 			${frames ? html`<${FramesCard} evaluation=${id} query=${frames.query} title=${frames.title} sort=${(/** @type {string} */ sort) => setFrames({ ...frames, query: { ...frames.query, sort } })} onClose=${() => setFrames(null)} />` : null}

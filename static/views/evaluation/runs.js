@@ -5,8 +5,8 @@ import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
 import { postEvaluation } from '../../api/evaluations.js';
+import { sentenceOf } from '../../api/problem.js';
 import { count } from '../../lib/format.js';
-import { sentenceOf } from '../../lib/resource.js';
 import { follow, isOver } from '../../state/jobs.js';
 import { JobProgress } from '../job_progress.js';
 import { When } from '../when.js';
@@ -59,7 +59,7 @@ function RunForm({ sets, versions, why, send }) {
 					<div class="form__row"><label for="run-score">Smallest score for localisation</label><input class="field" id="run-score" name="min_score" type="number" min="0" max="1" step="0.05" defaultValue="0" /></div>
 				</div>
 			</details>
-			<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Evaluate</button>
+			<button data-needs="lead" class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Evaluate</button>
 		</form>
 	`;
 }

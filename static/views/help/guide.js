@@ -32,8 +32,13 @@ function Part({ block }) {
 	`;
 }
 
+/** A text in Markdown. @param {{text: string}} props */
+export function MarkdownBlocks({ text }) {
+	return blocksOf(text).map((block) => html`<${Part} block=${block} />`);
+}
+
 export function Guide() {
 	const { value, error } = useResource(() => getOwn(new URL('../../help/guide.json', import.meta.url).href), []);
 	if (error) return html`<p role="alert">The guide could not be read. Is the server still running?</p>`;
-	return html`<div class="guide">${value ? blocksOf(value.text).map((block) => html`<${Part} block=${block} />`) : null}</div>`;
+	return html`<div class="guide">${value ? html`<${MarkdownBlocks} text=${value.text} />` : null}</div>`;
 }

@@ -64,20 +64,15 @@ export function attachOrbit(element, stage) {
 		event.preventDefault();
 	}
 
-	element.addEventListener('pointerdown', down);
-	element.addEventListener('pointermove', move);
-	element.addEventListener('pointerup', up);
-	element.addEventListener('pointercancel', lost);
-	element.addEventListener('wheel', wheel, { passive: false });
-	element.addEventListener('contextmenu', menu);
-	return () => {
-		element.removeEventListener('pointerdown', down);
-		element.removeEventListener('pointermove', move);
-		element.removeEventListener('pointerup', up);
-		element.removeEventListener('pointercancel', lost);
-		element.removeEventListener('wheel', wheel);
-		element.removeEventListener('contextmenu', menu);
-	};
+	const attached = new AbortController();
+	const { signal } = attached;
+	element.addEventListener('pointerdown', down, { signal });
+	element.addEventListener('pointermove', move, { signal });
+	element.addEventListener('pointerup', up, { signal });
+	element.addEventListener('pointercancel', lost, { signal });
+	element.addEventListener('wheel', wheel, { passive: false, signal });
+	element.addEventListener('contextmenu', menu, { signal });
+	return () => attached.abort();
 }
 
 /** Whoever turns the scene has left the camera. */

@@ -21,7 +21,7 @@ function MatchPosition({ one, used, busy, onShare, onBack }) {
 	const { name, aside } = matchName(one.match);
 	/** @param {string} text @param {string} title @param {() => void} act @param {string} kind */
 	const button = (text, title, act, kind) => html`
-		<button class=${`button button--small ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) act(); }}>${text}<span class="hidden-text"> for ${name}</span></button>`;
+		<button data-needs="lead" class=${`button button--small ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) act(); }}>${text}<span class="hidden-text"> for ${name}</span></button>`;
 	return html`
 		<tr>
 			<th scope="row">${name}${aside ? html`<small>${aside}</small>` : null}</th>

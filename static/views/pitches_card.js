@@ -20,10 +20,10 @@ const CONCERNED = ['pitch', 'import', 'solved'];
  * @param {{one: MatchPitchJson, busy: boolean, onSet: (size: PitchSizeJson) => void}} props
  */
 function MatchPitch({ one, busy, onSet }) {
-	const { name, aside } = matchName(one.match);
+	const { name, aside } = one.match ? matchName(one.match) : { name: 'groups without a match', aside: '' };
 	/** @param {string} text @param {string} title @param {PitchSizeJson} size @param {string} kind */
 	const button = (text, title, size, kind) => html`
-		<button class=${`button button--small ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) onSet(size); }}>${text}<span class="hidden-text"> for ${name}</span></button>`;
+		<button data-needs="lead" class=${`button button--small ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) onSet(size); }}>${text}<span class="hidden-text"> for ${name}</span></button>`;
 	const changed = one.previous !== null && (one.previous.length !== one.length || one.previous.width !== one.width);
 	return html`
 		<tr>
@@ -31,7 +31,7 @@ function MatchPitch({ one, busy, onSet }) {
 			<td>${one.mixed ? 'several sizes' : pitchSize(one)}</td>
 			<td>${one.problem ?? shownSize(one.estimate)}</td>
 			<td><span class="table__actions">
-				${one.proposed ? button(`Use ${pitchSize(one.proposed)}`, `Solve the ${count(one.groups)} groups of this match on this pitch`, one.proposed, 'button--primary') : null}
+				${one.proposed ? button(`Use ${pitchSize(one.proposed)}`, `Solve the ${count(one.groups)} ${one.match ? 'groups of this match' : 'groups without a match'} on this pitch`, one.proposed, 'button--primary') : null}
 				${one.previous && changed ? button('Take back', `Back to ${pitchSize(one.previous)}`, one.previous, '') : null}
 			</span></td>
 		</tr>`;

@@ -4,8 +4,8 @@
 import { html } from 'htm/preact';
 import { useLayoutEffect, useRef } from 'preact/hooks';
 
-import { helpOpen, helpTab } from '../state/workspace.js';
-import { HelpParts } from './help/parts.js';
+import { helpOpen, helpTab } from '../../state/workspace.js';
+import { HelpParts } from './parts.js';
 
 /** @param {{opening: number}} props */
 export function Help({ opening }) {

@@ -1,13 +1,13 @@
 // @ts-check
-/** Lines proposed for the views of a dataset that have none: looked for, counted, forgotten. */
+/** Lines proposed for the views of a dataset without a camera: looked for, counted, forgotten. */
 
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
+import { sentenceOf } from '../api/problem.js';
 import { forgetProposals, getProposals, proposeForDataset } from '../api/proposals.js';
 import { count, plural } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
-import { sentenceOf } from '../lib/resource.js';
 import { queueAddress } from '../state/navigation.js';
 import { announce } from '../state/notice.js';
 import { JobProgress } from './job_progress.js';
@@ -18,8 +18,8 @@ import { Term } from './term.js';
 /** @import {MatchProposalsJson} from '../api/proposals.js' */
 /** @import {JobJson} from '../api/jobs.js' */
 
-/** Changes of groups after which other views have lines. */
-const CONCERNED = ['import', 'edit', 'undo', 'redo', 'camera', 'station_edit'];
+/** Changes after which other views have a camera; of lines that stand there solving says it. */
+const CONCERNED = ['import', 'edit', 'undo', 'redo', 'camera', 'station_edit', 'station_undo', 'station_redo', 'pitch', 'policy', 'solved'];
 const OUTCOMES = /** @type {const} */ (['proposed', 'unsure', 'nothing']);
 
 /** @param {{one: MatchProposalsJson, dataset: string}} props */
@@ -58,7 +58,7 @@ export function Proposals({ dataset, name }) {
 	const items = (value?.items ?? []).filter(({ views, accepted }) => views || accepted);
 	if (!value || (!items.length && !job)) return null;
 	const [views, looked] = [sum(items, 'views'), sum(items, 'looked')];
-	const why = busy ? 'Under way' : views ? '' : 'Every view with a picture has lines or a camera';
+	const why = busy ? 'Under way' : views ? '' : 'Every view with a picture has a camera, or waits to be solved';
 	async function forget() {
 		if (busy || !looked) return;
 		setProblem('');
@@ -74,14 +74,14 @@ export function Proposals({ dataset, name }) {
 	return html`
 		<section class="card card--flush statistics__matches proposals-card" aria-labelledby="proposals-title" ref=${card}>
 			<h2 id="proposals-title" tabindex="-1"><${Term} word="proposal">Proposed lines<//></h2>
-			<p>Views without lines and camera, whose painted lines may show where the camera stands. What is found counts for nothing until a person accepts it, under review or in the calibration editor.</p>
+			<p>Views without a camera: without lines, or with lines that do not determine one. Their paint may show where the camera stands. What is found counts for nothing until a person accepts it, under review or in the calibration editor.</p>
 			<table class="table">
-				<thead><tr><th>match</th><th data-numeric="true">without lines</th><th data-numeric="true">proposed</th><th data-numeric="true">unsure</th><th data-numeric="true">nothing</th><th data-numeric="true">accepted</th></tr></thead>
+				<thead><tr><th>match</th><th data-numeric="true">no camera</th><th data-numeric="true">proposed</th><th data-numeric="true">unsure</th><th data-numeric="true">nothing</th><th data-numeric="true">accepted</th></tr></thead>
 				<tbody>${items.map((one) => html`<${MatchProposals} key=${one.match} one=${one} dataset=${name} />`)}</tbody>
 			</table>
 			<p class="table__actions">
-				<button class="button button--primary" type="button" aria-disabled=${why !== ''} title=${why || 'Those that were looked at before are only compared'} onClick=${() => { if (!why) send(() => proposeForDataset(dataset)); }}>Propose lines for ${plural(views, 'view')}</button>
-				<button class="button" type="button" aria-disabled=${busy || !looked} title=${busy ? 'Under way' : looked ? 'Lines that were accepted stay' : 'Nothing was proposed yet'} onClick=${forget}>Forget all proposals</button>
+				<button data-needs="lead" class="button button--primary" type="button" aria-disabled=${why !== ''} title=${why || 'Those that were looked at before are only compared'} onClick=${() => { if (!why) send(() => proposeForDataset(dataset)); }}>Propose lines for ${plural(views, 'view')}</button>
+				<button data-needs="lead" class="button" type="button" aria-disabled=${busy || !looked} title=${busy ? 'Under way' : looked ? 'Lines that were accepted stay' : 'Nothing was proposed yet'} onClick=${forget}>Forget all proposals</button>
 			</p>
 			${job ? html`<${JobProgress} job=${job} /><${Outcome} job=${job} />` : null}
 			${refused || problem ? html`<p class="form__error" role="alert">${refused || problem}</p>` : null}

@@ -1,0 +1,58 @@
+// @ts-check
+/** Requests about own annotations, gold groups and guidelines. */
+
+import { request } from './client.js';
+
+/** @import {GroupDocument} from './types.js' */
+
+/** @typedef {{id: number, batch: number | null, group: number, dataset: number, of: number | null, title: string, person: string, place: number, begun: string, handed_in: string | null, verdict: string | null, settled: string | null, handed_back: HandedBackJson | null}} TakeJson */
+/** @typedef {{group: number, title: string, by: string, at: string, reason: string}} HandedBackJson */
+/** @typedef {{count: number, median: number | null, low: number | null, high: number | null}} MiddleJson */
+/** @typedef {{line_px: number | null, lines_missing: number, ball_px: number | null, balls_missing: number, ball_m: number | null}} ErrorJson */
+/** @typedef {{group: number, label: string, handed_in: string, verdict: string | null, true_verdict: string, right: boolean | null, error: ErrorJson}} GoldResultJson */
+/** @typedef {{person: string, results: GoldResultJson[], line_px: MiddleJson, ball_px: MiddleJson, ball_m: MiddleJson, judged: number, right: number, right_low: number | null, right_high: number | null}} PersonResultsJson */
+/** @typedef {{group: number, label: string, start: string, marked: string, marked_by: string, source: 'verdict' | 'sample' | 'version'}} GoldGroupJson */
+/** @typedef {{groups: GoldGroupJson[], people: PersonResultsJson[]}} GoldReportJson */
+/** @typedef {{dataset: number, number: number, text: string, versions: {number: number, written: string, written_by: string}[]}} GuidelinesJson */
+
+/** @param {number} group @returns {Promise<TakeJson>} */
+export const postTake = (group) => request(`/groups/${group}/takes`, { method: 'POST' });
+
+/** @param {number} group a copy @param {AbortSignal} [signal] @returns {Promise<TakeJson>} */
+export const getTake = (group, signal) => request(`/groups/${group}/take`, { signal });
+
+/** @param {number} group a copy @returns {Promise<TakeJson>} */
+export const postHandIn = (group) => request(`/groups/${group}/hand-in`, { method: 'POST' });
+
+/** @param {number} group a copy @param {string} reason @returns {Promise<TakeJson>} */
+export const postTakeBack = (group, reason) => request(`/groups/${group}/hand-back`, { method: 'POST', body: { reason } });
+
+/** @param {number} group a copy @returns {Promise<GroupDocument>} the group that it is of */
+export const postAdoption = (group) => request(`/groups/${group}/adoption`, { method: 'POST' });
+
+/** @param {string} dataset @param {AbortSignal} [signal] @returns {Promise<{items: TakeJson[]}>} */
+export const getTakes = (dataset, signal) => request(`/datasets/${encodeURIComponent(dataset)}/takes`, { signal });
+
+/** @param {number} group @param {string} start @returns {Promise<GoldGroupJson>} */
+export const putGold = (group, start) => request(`/groups/${group}/gold`, { method: 'PUT', body: { start } });
+
+/** @param {number} group @returns {Promise<GoldGroupJson>} */
+export const deleteGold = (group) => request(`/groups/${group}/gold`, { method: 'DELETE' });
+
+/** @param {number} dataset @param {AbortSignal} [signal] @returns {Promise<GoldReportJson>} */
+export const getGold = (dataset, signal) => request(`/datasets/${dataset}/gold`, { signal });
+
+/** @param {number} dataset @param {AbortSignal} [signal] @param {number} [number] of a version; else the newest @returns {Promise<GuidelinesJson>} */
+export const getGuidelines = (dataset, signal, number) => request(`/datasets/${dataset}/guidelines${number ? `?number=${number}` : ''}`, { signal });
+
+/** @param {number} dataset @param {string} text @param {number} based_on @returns {Promise<GuidelinesJson>} */
+export const putGuidelines = (dataset, text, based_on) => request(`/datasets/${dataset}/guidelines`, { method: 'PUT', body: { text, based_on } });
+
+/** @param {number} dataset @param {string} upload @returns {Promise<{digest: string, type: string}>} */
+export const postGuidelinePicture = (dataset, upload) => request(`/datasets/${dataset}/guidelines/pictures`, { method: 'POST', body: { upload } });
+
+/** @param {number} dataset @param {string} digest */
+export const pictureAddress = (dataset, digest) => `/api/v1/datasets/${dataset}/guidelines/pictures/${digest}`;
+
+/** Make gold groups of those whose truth is known. @param {number} dataset @param {{source: 'sample' | 'version', version?: string, start: string}} body @returns {Promise<{groups: number[], left_out: number}>} */
+export const postGold = (dataset, body) => request(`/datasets/${dataset}/gold`, { method: 'POST', body });

@@ -1,0 +1,95 @@
+// @ts-check
+/** What was handed in goes back to its person, or an annotation of somebody's own into the group that it is of. */
+
+import { computed, signal } from '@preact/signals';
+
+import { postAdoption, postTakeBack } from '../api/takes.js';
+import { postHandBack } from '../api/work.js';
+import { navigate } from '../lib/router.js';
+import { groupDocument } from './group.js';
+import { lease, nextOfBatch } from './leases.js';
+import { isTeam, myName } from './me.js';
+import { currentId, reviewAddress } from './navigation.js';
+import { announce, inform } from './notice.js';
+import { whyNot } from './rights.js';
+
+/** @import {TakeJson} from '../api/takes.js' */
+
+/** The group on screen as somebody's own annotation; null: it is none, or nobody knows yet. */
+export const take = signal(/** @type {TakeJson | null} */ (null));
+
+/**
+ * What is asked before it is done; null: nothing.
+ *
+ * @typedef {{kind: 'back' | 'over', person: string, says: string, send: (reason: string) => Promise<void>}} Question
+ */
+export const question = signal(/** @type {Question | null} */ (null));
+
+/** Whether the group on screen is somebody's own annotation that is handed in and open, and that a lead looks at. */
+const isReady = computed(() => {
+	const [one, group] = [take.value, groupDocument.value];
+	return isTeam && one !== null && group?.id === one.group && one.person !== myName.value
+		&& one.handed_in !== null && one.settled === null && whyNot('lead', group.dataset.name) === '';
+});
+
+/** Why nobody judges the annotation on screen now; empty: it can be judged. */
+export const frozen = computed(() => {
+	const one = take.value;
+	if (one === null || one.group !== groupDocument.value?.id) return '';
+	if (one.settled !== null) return 'It was decided about this annotation; it changes no more.';
+	const mine = !isTeam || one.person === myName.value;
+	if (one.handed_in !== null) return mine ? '' : `${one.person} has handed this in; hand it back, or take it over.`;
+	return mine ? '' : `${one.person} judges this annotation.`;
+});
+
+/** Whether it can be taken over into the group that it is of. */
+export const canTakeOver = computed(() => isReady.value);
+
+/** Whether what is on screen can be handed back. */
+export const canHandBack = computed(() => {
+	const held = lease.value;
+	return isReady.value || (held?.state === 'mine' && held.part === 'reviewer' && Boolean(held.handedInBy) && held.handedInBy !== myName.value);
+});
+
+/** Ask why the group on screen goes back to its annotator. */
+export function askHandBack() {
+	const [one, held] = [take.value, lease.value];
+	if (!canHandBack.value) return;
+	if (isReady.value && one) {
+		question.value = {
+			kind: 'back', person: one.person,
+			says: `${one.person} can change this annotation again, is told why, and hands it in anew. Where others annotated the group, too, nothing is decided until then.`,
+			send: async (reason) => {
+				take.value = await postTakeBack(one.group, reason);
+				announce(`${one.person} has it back.`);
+			},
+		};
+	} else if (held?.handedInBy) {
+		const person = held.handedInBy;
+		question.value = {
+			kind: 'back', person, says: `${person} is told why and gets this group next; you get the one that waits for you next.`,
+			send: async (reason) => {
+				await postHandBack(held.batch, held.group, reason);
+				announce(`Handed back to ${person}.`);
+				await nextOfBatch();
+				// Who stays would have open what the annotator gets next.
+				if (currentId() === held.group) navigate('/work');
+			},
+		};
+	}
+}
+
+/** Ask whether the annotation on screen shall count. */
+export function askTakeOver() {
+	const one = take.value;
+	if (!canTakeOver.value || !one) return;
+	question.value = {
+		kind: 'over', person: one.person,
+		says: `What ${one.person} changed here, and their verdict${one.verdict ? ` (${one.verdict})` : ''}, go into the group under their name. This annotation then changes no more; where others annotated the group, too, theirs are set aside. Undo in the group takes the change back.`,
+		send: async () => {
+			const { id } = await postAdoption(one.group);
+			navigate(reviewAddress(id));
+			inform(`${one.person}’s annotation is in the group now. Undo (Ctrl Z) takes the change back.`);
+		},
+	};
+}

@@ -1,0 +1,221 @@
+// @ts-check
+/**
+ * The group of a batch that is on screen is this person's while it is there: nobody else is given it
+ * by accident. A courtesy: what counts is decided by the state that each change names.
+ */
+
+import { computed, effect, signal, untracked } from '@preact/signals';
+
+import { listen } from '../api/events.js';
+import { ApiError } from '../api/problem.js';
+import { deleteLease, postNext, putHandIn, putLease } from '../api/work.js';
+import { navigate, page } from '../lib/router.js';
+import { settle } from './group.js';
+import { me, mustLogIn } from './me.js';
+import { batchId, currentId, goNext, reviewAddress } from './navigation.js';
+import { announce, complain, dismiss, inform } from './notice.js';
+import { outbox } from './outbox.js';
+
+/** @import {HandedBackJson} from '../api/takes.js' */
+/** @import {BatchJson, LeaseJson, Part, Presence} from '../api/work.js' */
+
+/**
+ * @typedef {object} Held
+ * @property {number} batch @property {number} group
+ * @property {'mine' | 'others' | 'lost' | 'none'} state `lost`: somebody has taken it over; `none`: it cannot be had
+ * @property {Part | null} part
+ * @property {Presence[]} here everybody who has it open
+ * @property {string} sentence why it is not mine
+ * @property {string | null} [handedInBy] who has handed it in
+ * @property {HandedBackJson | null} [back] why its annotator has it back
+ */
+
+/** The group on screen as one of a batch; null: it is none, or nobody knows yet. */
+export const lease = signal(/** @type {Held | null} */ (null));
+/** The batch that is walked, as it was when it was asked for last. */
+export const batch = signal(/** @type {BatchJson | null} */ (null));
+/** Whether the next group is being asked for: a second key would speak about the group that is left. */
+export const isMoving = signal(false);
+
+/** Leases last three minutes. */
+const AGAIN_MS = 60_000;
+
+/** Who I am among those who are here. */
+const myself = computed(() => me.value?.name ?? 'local');
+/** Everybody else who has the group open. */
+export const others = computed(() => (lease.value?.here ?? []).filter(({ person }) => person !== myself.value));
+
+/** @param {LeaseJson} answer @param {number} id */
+function got(answer, id) {
+	batch.value = answer.batch;
+	lease.value = { batch: answer.batch.id, group: id, state: 'mine', part: answer.part, here: answer.here, sentence: '', handedInBy: answer.handed_in_by, back: answer.handed_back };
+}
+
+/** @param {number} id @param {number} group */
+const isHere = (id, group) => batchId.value === id && currentId() === group;
+
+/** Take the group on screen, or let it stay mine. @param {number} id @param {number} group @param {boolean} [over] */
+async function take(id, group, over = false) {
+	try {
+		const answer = await putLease(id, group, over);
+		if (isHere(id, group)) got(answer, group);
+		else if (currentId() !== group) giveBack(id, group);
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		// While the server is away, or nobody is logged in, what one has stays one's own.
+		if (!isHere(id, group) || error.status === 0 || error.status === 401) return;
+		const known = lease.value;
+		const state = error.status !== 409 ? 'none' : known?.state === 'mine' || known?.state === 'lost' ? 'lost' : 'others';
+		lease.value = { batch: id, group, state, part: known?.part ?? null, here: error.here ?? known?.here ?? [], sentence: error.message };
+	}
+}
+
+/** Whether a verdict of mine on a group is still on its way. @param {number} group */
+const waits = (group) => outbox.peek().some((item) => item.group === group && (item.verdict || item.edit) && !item.held);
+
+/** @param {number} id @param {number} group */
+function giveBack(id, group) {
+	// Until what was said arrives nobody else shall begin with it; a verdict ends the lease.
+	if (!waits(group)) deleteLease(id, group).catch(() => {});
+}
+
+/** Take the group that somebody else has open. */
+export function takeOver() {
+	const held = lease.value;
+	if (held) take(held.batch, held.group, true);
+}
+
+/** @param {{batch: number, group: number, here: Presence[]}} told */
+function heard({ group, here }) {
+	const held = lease.value;
+	if (!held || held.group !== group) return;
+	const mine = here.some(({ person }) => person === myself.value);
+	const [other] = here.filter(({ person }) => person !== myself.value);
+	if (held.state === 'mine' && !mine && other) {
+		lease.value = { ...held, here, state: 'lost', sentence: '' };
+		announce(`${other.person} has taken this group over.`);
+	} else {
+		lease.value = { ...held, here };
+		if (held.state !== 'mine' && held.state !== 'none' && here.length === 0) take(held.batch, group);
+	}
+}
+
+/**
+ * On to the next group that waits for me; the one that I come from is not given again.
+ *
+ * @param {() => boolean} [stillWanted] asked once it is known which group that is
+ */
+export async function nextOfBatch(stillWanted = () => true) {
+	const [id, from] = [batchId.value, currentId()];
+	if (id === null || from === null || isMoving.value) return;
+	isMoving.value = true;
+	try {
+		const answer = await postNext(id, from);
+		batch.value = answer.batch;
+		if (currentId() !== from || !stillWanted()) {
+			if (answer.group !== null) giveBack(id, answer.group);
+			return;
+		}
+		if (answer.group === null) sayDone(answer.batch);
+		else goTo(answer, answer.group);
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		// Without the server the batch is walked as it is known.
+		if (error.status === 0) await goNext(stillWanted);
+		else complain(`The next group cannot be had: ${error.message}`);
+	} finally {
+		isMoving.value = false;
+	}
+}
+
+/** @param {LeaseJson} answer @param {number} group */
+function goTo(answer, group) {
+	settle();
+	dismiss();
+	got(answer, group);
+	navigate(reviewAddress(group, `batch:${answer.batch.id}`));
+}
+
+/** @param {BatchJson} one */
+function sayDone(one) {
+	const left = one.groups - one.settled;
+	const more = left > 0 ? ' Others have the rest open, or it waits for somebody else.' : '';
+	inform(`Nothing more waits for you in “${one.name}”.${more}`, { label: 'My work', run: () => navigate('/work') });
+}
+
+/** Begin or go on with a batch. @param {number} id @returns {Promise<boolean>} whether there is a group for me */
+export async function goOn(id) {
+	const answer = await postNext(id, null);
+	batch.value = answer.batch;
+	if (answer.group === null) return false;
+	goTo(answer, answer.group);
+	return true;
+}
+
+/** When everything that I said of a group has arrived. @param {number} group @returns {Promise<void>} */
+function arrived(group) {
+	return new Promise((resolve) => {
+		const stop = effect(() => {
+			if (outbox.value.some((item) => item.group === group && !item.held)) return;
+			queueMicrotask(() => { stop(); resolve(); });
+		});
+	});
+}
+
+/** Whether the group on screen can be handed in here. */
+export const canHandIn = computed(() => lease.value?.part === 'annotator' && lease.value.state === 'mine');
+
+/** Done: hand the group in, and go on. */
+export async function handInAndNext() {
+	const held = lease.value;
+	if (!held || !canHandIn.value || isMoving.value) return;
+	settle();
+	await arrived(held.group);
+	if (outbox.value.some((item) => item.group === held.group)) {
+		announce('First choose whose edit counts.');
+		return;
+	}
+	try {
+		await putHandIn(held.batch, held.group);
+		announce('Handed in.');
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		complain(`This group was not handed in: ${error.message}`);
+		return;
+	}
+	await nextOfBatch();
+}
+
+/** Have the group on screen as long as it is there, wherever the address leads. */
+export function startLeases() {
+	effect(() => {
+		const [id, at] = [batchId.value, page.value];
+		if (id === null || at.page !== 'review' || at.group === null || mustLogIn.value) {
+			lease.value = null;
+			return undefined;
+		}
+		const { group } = at;
+		return untracked(() => hold(id, group));
+	});
+}
+
+/** @param {number} id @param {number} group @returns {() => void} ends it */
+function hold(id, group) {
+	if (lease.value?.group !== group || lease.value.batch !== id) lease.value = null;
+	if (!lease.value) take(id, group);
+	// What others have is mine as soon as they have left it, also where they could not say so.
+	const again = () => { if (lease.value && lease.value.state !== 'none') take(id, group); };
+	const timer = setInterval(again, AGAIN_MS);
+	const leave = () => giveBack(id, group);
+	const deaf = listen('work', heard, again);
+	// It was handed back to me while I look at it.
+	const deafToo = listen('group', (told) => { if (told.group === group && told.kind === 'work') again(); });
+	addEventListener('pagehide', leave);
+	return () => {
+		clearInterval(timer);
+		removeEventListener('pagehide', leave);
+		deaf();
+		deafToo();
+		leave();
+	};
+}

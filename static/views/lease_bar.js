@@ -1,0 +1,54 @@
+// @ts-check
+/** Who else has the group on screen open, and handing it in. */
+
+import { html } from 'htm/preact';
+
+import { ago } from '../lib/format.js';
+import { useNow } from '../lib/hooks.js';
+import { groupDocument } from '../state/group.js';
+import { askHandBack, canHandBack } from '../state/hand_back.js';
+import { isCopy } from '../state/takes.js';
+import { batch, canHandIn, handInAndNext, isMoving, lease, nextOfBatch, others, takeOver } from '../state/leases.js';
+
+/** Others who are here, in the header. */
+export function Presence() {
+	const now = useNow(20_000);
+	if (others.value.length === 0 || lease.value?.state !== 'mine') return null;
+	return html`<span class="pill" role="status">${others.value.map(({ person, since }) => `${person} is here, came ${ago(Date.parse(since), now)}`).join(', ')}</span>`;
+}
+
+/** Who handed something back, when and why. @param {{back: import('../api/takes.js').HandedBackJson}} props */
+export function HandedBack({ back }) {
+	const now = useNow(20_000);
+	return html`<strong>${back.by}</strong> handed this back ${ago(Date.parse(back.at), now)}${back.reason ? html`: “${back.reason}”` : '.'}`;
+}
+
+/** The button of who annotates: done, and on; of who reviews: back to them. */
+export function HandIn() {
+	if (canHandBack.value && !isCopy(groupDocument.value)) {
+		return html`<button class="button" type="button" title="Give this group back to who handed it in, and say why (Shift U)" onClick=${askHandBack}>Hand back to ${lease.value?.handedInBy}… <kbd>⇧U</kbd></button>`;
+	}
+	if (!canHandIn.value) return null;
+	return html`<button class="button button--primary" type="button" aria-disabled=${isMoving.value} title="Hand this group in, so that a reviewer gets it (Shift F)" onClick=${handInAndNext}>Done and next <kbd>⇧F</kbd></button>`;
+}
+
+/** Below the header: this group is somebody else's. It blocks nothing. */
+export function LeaseBar() {
+	const now = useNow(20_000);
+	const held = lease.value;
+	if (held?.state === 'mine' && held.back) return html`<div class="bar" data-tone="info" role="status"><p><${HandedBack} back=${held.back} /> Hand it in again when it is mended.</p></div>`;
+	if (!held || held.state === 'mine') return null;
+	const [other] = others.value;
+	const since = other ? `${ago(Date.parse(other.since), now)}` : '';
+	const text = held.state === 'lost' ? `${other ? `${other.person} has taken this group over, ${since}` : held.sentence}. Nothing of yours is lost: what you changed is saved, and what you change now is checked against theirs.`
+		: held.state === 'others' ? `${other ? `${other.person} is here, came ${since}` : held.sentence}. You can look; take it over to work on it.`
+			: `${held.sentence}.`;
+	return html`
+		<div class="bar" data-tone="info" role="status" data-lease=${held.state}>
+			<p>${text}</p>
+			${held.state === 'none' ? html`<a class="button" href="/work">My work</a>` : html`
+				<button class="button" type="button" data-needs="annotate" onClick=${takeOver}>${held.state === 'lost' ? 'Take it back' : 'Take over'}</button>
+				<button class="button" type="button" data-needs="annotate" aria-disabled=${isMoving.value} onClick=${() => nextOfBatch()}>Next group${batch.value ? ` of ${batch.value.name}` : ''}</button>`}
+		</div>
+	`;
+}

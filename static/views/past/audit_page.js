@@ -1,0 +1,130 @@
+// @ts-check
+/** The audit: who said and did what, in the datasets that one leads. */
+
+import { html } from 'htm/preact';
+import { useEffect, useState } from 'preact/hooks';
+
+import { auditFile, getAudit } from '../../api/past.js';
+import { ApiError } from '../../api/problem.js';
+import { address, navigate, param } from '../../lib/router.js';
+import { datasets } from '../../state/datasets.js';
+import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { When } from '../when.js';
+
+/** @import {AuditEntryJson, AuditFilter} from '../../api/past.js' */
+
+const FAMILIES = [
+	{ name: 'edit', label: 'edits' }, { name: 'verdict', label: 'verdicts' }, { name: 'comment', label: 'comments' }, { name: 'policy', label: 'policies' },
+	{ name: 'version', label: 'versions' }, { name: 'import', label: 'imports' }, { name: 'people', label: 'people, rights, tokens, logins' }, { name: 'job', label: 'jobs' }, { name: 'work', label: 'work, own annotations, gold groups' }, { name: 'other', label: 'other' },
+];
+/** Pages of what belongs to no dataset. */
+const PLACES = /** @type {Record<string, string>} */ ({ people: 'People', job: 'Jobs' });
+const FIELDS = /** @type {const} */ (['q', 'person', 'family', 'dataset', 'since', 'until']);
+
+/** What the address asks for. @returns {AuditFilter} */
+function asked() {
+	const found = Object.fromEntries([...FIELDS, 'group'].map((name) => [name, param(name)]).filter(([, value]) => value));
+	// A day ends when the next one begins.
+	if (found.until) found.until = new Date(Date.parse(found.until) + 86_400_000).toISOString();
+	if (found.since) found.since = new Date(Date.parse(found.since)).toISOString();
+	return found;
+}
+
+/** Entries, a page at a time. @param {AuditFilter} filter @param {string} key */
+function useAudit(filter, key) {
+	const [found, setFound] = useState(/** @type {{items: AuditEntryJson[], next: number | null} | null} */ (null));
+	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
+	const [waiting, setWaiting] = useState(true);
+	/** @param {number | null} before @param {AbortSignal} [signal] */
+	async function read(before, signal) {
+		setWaiting(true);
+		try {
+			const more = await getAudit(filter, before, signal);
+			setFound((known) => ({ items: before === null ? more.items : [...(known?.items ?? []), ...more.items], next: more.next }));
+			setError(null);
+		} catch (problem) {
+			if (signal?.aborted) return;
+			if (!(problem instanceof ApiError)) throw problem;
+			setError(problem);
+		}
+		setWaiting(false);
+	}
+	useEffect(() => {
+		const controller = new AbortController();
+		read(null, controller.signal);
+		return () => controller.abort();
+	}, [key]);
+	return { found, error, waiting, retry: () => read(null), more: () => read(found?.next ?? null) };
+}
+
+/** @param {{one: AuditEntryJson}} props */
+function Row({ one }) {
+	const about = one.group ?? one.dataset ?? PLACES[one.family];
+	return html`
+		<tr>
+			<td><${When} at=${one.at} /><small>${new Date(one.at).toLocaleString('en-GB')}</small></td>
+			<th scope="row">${one.actor}${one.network ? html`<small>${one.network}</small>` : null}</th>
+			<td class="past__sentence">${one.sentence}</td>
+			<td>${one.address ? html`<a href=${one.address}>${about ?? 'its page'}<span class="hidden-text">: entry ${one.id}</span></a>` : about ?? '–'}${one.group && one.dataset ? html`<small>${one.dataset}</small>` : null}</td>
+		</tr>
+	`;
+}
+
+/** @param {{name: string, label: string, type: string}} props */
+function Field({ name, label, type }) {
+	return html`<div class="form__row"><label for=${`audit-${name}`}>${label}</label><input class="field" id=${`audit-${name}`} name=${name} type=${type} defaultValue=${param(name)} autocomplete="off" /></div>`;
+}
+
+/** @param {{name: string, label: string, all: string, options: {name: string, label: string}[]}} props */
+function Choice({ name, label, all, options }) {
+	return html`<div class="form__row"><label for=${`audit-${name}`}>${label}</label>
+		<select class="field" id=${`audit-${name}`} name=${name} value=${param(name)}><option value="">${all}</option>${options.map((one) => html`<option key=${one.name} value=${one.name}>${one.label}</option>`)}</select></div>`;
+}
+
+function Filters() {
+	/** @param {Event} event */
+	function choose(event) {
+		event.preventDefault();
+		const said = new FormData(/** @type {HTMLFormElement} */ (event.currentTarget));
+		navigate(address('/audit', Object.fromEntries(FIELDS.map((name) => [name, String(said.get(name) ?? '')]))));
+	}
+	return html`
+		<form class="form audit__filters" onSubmit=${choose} onChange=${choose} role="search" aria-label="What is shown">
+			<${Field} name="q" label="Words" type="search" />
+			<${Field} name="person" label="Person" type="text" />
+			<${Choice} name="family" label="What" all="everything" options=${FAMILIES} />
+			<${Choice} key=${datasets.value?.length} name="dataset" label="Dataset" all="all" options=${(datasets.value ?? []).map(({ name }) => ({ name, label: name }))} />
+			<${Field} name="since" label="From" type="date" />
+			<${Field} name="until" label="Until" type="date" />
+			<button class="button" type="submit">Show</button>
+		</form>
+	`;
+}
+
+export function AuditPage() {
+	const filter = asked();
+	const key = JSON.stringify(filter);
+	const { found, error, waiting, retry, more } = useAudit(filter, key);
+	const where = 'Audit';
+	return html`
+		<${PageFrame} current="audit" title="Audit" where=${html`<strong>${where}</strong>`}>
+			<section class="card" aria-labelledby="audit-title">
+				<h2 id="audit-title">Who did what
+					<span class="card__aside buttons"><a class="button button--small" href=${auditFile(filter, 'csv')} download>CSV</a><a class="button button--small" href=${auditFile(filter, 'jsonl')} download>JSON Lines</a></span></h2>
+				<${Filters} key=${key} />
+				${param('group') ? html`<p>Of group ${param('group')} alone. <a class="link" href="/audit">Show all</a></p>` : null}
+			</section>
+			${error ? html`<${Trouble} title="The audit cannot be shown" error=${error} retry=${retry} />` : null}
+			${!found && !error ? html`<${Loading} what="the log" />` : null}
+			${found ? html`
+				<section class="card card--flush" aria-label="Entries">
+					<div class="table__scroll" tabindex="0" role="group" aria-label="Entries"><table class="table audit__entries">
+						<thead><tr><th>When</th><th>Who</th><th>What</th><th>About</th></tr></thead>
+						<tbody>${found.items.map((one) => html`<${Row} key=${one.id} one=${one} />`)}</tbody>
+					</table></div>
+					${found.items.length ? null : html`<p class="empty-note audit__none">Nothing fits${found.next ? ' so far' : ''}.</p>`}
+					${found.next ? html`<p class="audit__more"><button class="button" type="button" aria-disabled=${waiting} onClick=${() => { if (!waiting) more(); }}>Show more</button></p>` : null}
+				</section>` : null}
+		<//>
+	`;
+}

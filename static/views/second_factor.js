@@ -1,0 +1,93 @@
+// @ts-check
+/** One's second factor: made with an authenticator, confirmed, taken away. */
+
+import { html } from 'htm/preact';
+import { useEffect, useState } from 'preact/hooks';
+
+import { beginSecondFactor, confirmSecondFactor, deleteSecondFactor, getSecondFactor } from '../api/people.js';
+import { ApiError } from '../api/problem.js';
+import { useAttempt } from '../lib/attempt.js';
+import { askWhoIsThere } from '../state/me.js';
+import { FormError } from './form_error.js';
+import { proof } from './proof.js';
+
+/** @import {EnrolmentJson, SecondFactorJson} from '../api/people.js' */
+/** @import {ComponentChildren} from 'preact' */
+
+/** A form with one field. @param {{id: string, label: string, button: string, name: string, type?: string, complete: string, optional?: boolean, error: ApiError | null, send: (text: string) => void, children?: ComponentChildren}} props */
+export function OneField({ id, label, button, name, type = 'text', complete, optional = false, error, send, children }) {
+	/** @param {SubmitEvent} event */
+	function submit(event) {
+		event.preventDefault();
+		send(String(new FormData(/** @type {HTMLFormElement} */ (event.currentTarget)).get(name)));
+	}
+	return html`
+		<form class="form" onSubmit=${submit}>
+			${children}
+			<div class="form__row"><label for=${id}>${label}</label><input class="field" id=${id} name=${name} type=${type} required=${!optional} maxlength=${type === 'password' ? 200 : 40} autocomplete=${complete} /></div>
+			<${FormError} error=${error} />
+			<p><button class="button" type="submit">${button}</button></p>
+		</form>
+	`;
+}
+
+/** @param {{made: EnrolmentJson, error: ApiError | null, confirm: (code: string) => void}} props */
+function Scan({ made, error, confirm }) {
+	return html`
+		<${OneField} key="code" id="factor-code" label="The code that it shows" button="Confirm" name="code" complete="one-time-code" error=${error} send=${confirm}>
+			<p>Scan this with an authenticator on your phone, or type the secret into it.</p>
+			<img class="factor__picture" src=${made.picture} alt="QR code of the secret" />
+			<p class="factor__secret"><code>${made.secret.replace(/(.{4})/g, '$1 ').trim()}</code></p>
+		<//>
+	`;
+}
+
+/** @param {{codes: string[], close: () => void}} props */
+export function Codes({ codes, close }) {
+	return html`
+		<div role="status">
+			<p>From now on a second factor is asked for after your password. If you lose it, each of these codes takes its place once. They are not shown again: print them, or keep them with your passwords.</p>
+			<ul class="factor__codes">${codes.map((code) => html`<li key=${code}><code>${code}</code></li>`)}</ul>
+			<p><button class="button button--primary" type="button" onClick=${close}>I have kept them</button></p>
+		</div>
+	`;
+}
+
+/** What is known of one's second factor, and what can be done about it. @param {number} [again] other numbers read it again */
+function useFactor(again = 0) {
+	const [state, setState] = useState(/** @type {SecondFactorJson | null} */ (null));
+	const [made, setMade] = useState(/** @type {EnrolmentJson | null} */ (null));
+	const [codes, setCodes] = useState(/** @type {string[] | null} */ (null));
+	const { error, attempt: act } = useAttempt();
+	const read = () => act(getSecondFactor(), setState);
+	useEffect(() => { read(); }, [again]);
+	return {
+		state, made, codes, error,
+		begin: (/** @type {string} */ password) => act(beginSecondFactor(password || null), setMade),
+		confirm: (/** @type {string} */ code) => act(confirmSecondFactor(code), (done) => { setCodes(done.codes); setMade(null); read(); }),
+		remove: (/** @type {string} */ password) => act(deleteSecondFactor(password || null), read),
+		close: () => { setCodes(null); askWhoIsThere(); },
+	};
+}
+
+/** @param {{changed?: () => void, again?: number}} props */
+export function SecondFactorCard({ changed = () => {}, again = 0 }) {
+	const { state, made, codes, error, begin, confirm, remove, close } = useFactor(again);
+	useEffect(() => { if (codes) changed(); }, [codes]);
+	return html`
+		<section class="card" aria-labelledby="account-factor">
+			<h2 id="account-factor">Second factor</h2>
+			${codes ? html`<${Codes} codes=${codes} close=${close} />` : null}
+			${made ? html`<${Scan} made=${made} error=${error} confirm=${confirm} />` : null}
+			${state && !made && !codes && !state.authenticator ? html`
+				<${OneField} key="begin" id="factor-begin" ...${proof()} button="Begin" name="password" type="password" complete="current-password" error=${error} send=${begin}>
+					${state.on ? html`<p>Your passkeys are asked for after your password; ${state.codes_left} of 10 recovery codes are left.</p>` : null}
+					<p>With an authenticator (an app on your phone) a password alone, in wrong hands, opens nothing.</p>
+				<//>` : null}
+			${state && !made && !codes && state.authenticator ? html`
+				<p>A code is asked for after your password. ${state.codes_left} of 10 recovery codes are left.</p>
+				${state.required ? html`<p class="note">Everybody needs one here. Has the device changed? An admin takes it away, then you make another one.</p>` : html`
+					<${OneField} key="remove" id="factor-remove" ...${proof()} button="Take it away" name="password" type="password" complete="current-password" error=${error} send=${remove} />`}` : null}
+		</section>
+	`;
+}

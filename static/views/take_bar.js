@@ -1,0 +1,58 @@
+// @ts-check
+/** The bar over a group that is somebody's own annotation: of what, whose, and the way to hand it in. */
+
+import { html } from 'htm/preact';
+import { useEffect, useState } from 'preact/hooks';
+
+import { listen } from '../api/events.js';
+import { getTake, postHandIn } from '../api/takes.js';
+import { ApiError, sentenceOf } from '../api/problem.js';
+import { useResource } from '../lib/resource.js';
+import { groupDocument } from '../state/group.js';
+import { askHandBack, askTakeOver, canHandBack, canTakeOver, take as onScreen } from '../state/hand_back.js';
+import { complain } from '../state/notice.js';
+import { isTeam, myName } from '../state/me.js';
+import { HandedBack } from './lease_bar.js';
+
+/** @import {GroupDocument} from '../api/types.js' */
+
+/** @param {{group: GroupDocument}} props */
+function Bar({ group }) {
+	const { value: found, error, reload } = useResource((signal) => getTake(group.id, signal), [group.id, group.verdict.at]);
+	const [busy, setBusy] = useState(false);
+	useEffect(() => listen('group', (told) => { if (told.group === group.id && told.kind === 'take') reload(); }), [group.id, reload]);
+	useEffect(() => {
+		onScreen.value = found;
+		return () => { onScreen.value = null; };
+	}, [found]);
+	const take = onScreen.value ?? found;
+	async function handIn() {
+		setBusy(true);
+		try {
+			await postHandIn(group.id);
+		} catch (problem) {
+			if (!(problem instanceof ApiError)) throw problem;
+			complain(sentenceOf(problem));
+		}
+		setBusy(false);
+		reload();
+	}
+	if (error || !take) return null;
+	const mine = !isTeam || take.person === myName.value;
+	const whose = mine ? 'your own annotation' : `the annotation of ${take.person}`;
+	const state = take.settled ? 'It was decided about.' : take.handed_in ? 'It is handed in and changes no more.' : mine ? 'Only you and the leads see it.' : 'It is not handed in yet.';
+	return html`
+		<div class="bar take-bar" data-tone=${take.handed_back ? 'info' : undefined} role="status">
+			<p><strong>${take.title}</strong>, ${whose}. ${take.handed_back ? html`<${HandedBack} back=${take.handed_back} />` : state}</p>
+			${canHandBack.value ? html`<button class="button" type="button" onClick=${askHandBack}>Hand back… <kbd>⇧U</kbd></button>` : null}
+			${canTakeOver.value ? html`<button class="button" type="button" onClick=${askTakeOver}>Take over… <kbd>⇧R</kbd></button>` : null}
+			${take.of && take.settled ? html`<a class="button" href=${`/review/${take.of}`}>Open the group</a>` : null}
+			${mine && !take.handed_in && take.batch === null ? html`<button class="button button--primary" type="button" disabled=${busy} onClick=${handIn}>Hand in</button>` : null}
+		</div>
+	`;
+}
+
+export function TakeBar() {
+	const group = groupDocument.value;
+	return group ? html`<${Bar} key=${group.id} group=${group} />` : null;
+}

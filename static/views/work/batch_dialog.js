@@ -1,0 +1,97 @@
+// @ts-check
+/** What is filtered or ticked in the queue becomes a batch that people work on. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { postGold } from '../../api/takes.js';
+import { getVersions } from '../../api/versions.js';
+import { postBatch } from '../../api/work.js';
+import { useAttempt } from '../../lib/attempt.js';
+import { count, plural } from '../../lib/format.js';
+import { useResource } from '../../lib/resource.js';
+import { navigate } from '../../lib/router.js';
+import { inform } from '../../state/notice.js';
+import { withField, wordsOf } from '../../state/query.js';
+import { clearTicks } from '../../state/queue_ticks.js';
+import { FormDialog } from '../dialog.js';
+import { FormError } from '../form_error.js';
+import { STARTS } from '../gold_card.js';
+import { PeopleChoice } from './people_choice.js';
+
+/** @import {DatasetJson} from '../../api/types.js' */
+/** @import {Chosen} from './people_choice.js' */
+
+/** @param {FormData} form @param {string} name */
+const textOf = (form, name) => String(form.get(name) ?? '').trim();
+
+/** The ticked rows in the order of the list. @param {string} ticked @param {string} q */
+function inOrder(ticked, q) {
+	const order = wordsOf(q).filter((word) => word.startsWith('sort:'));
+	return withField(ticked, 'sort', order);
+}
+
+/** Who knows the truth of gold groups; null: leads, who marked them. @param {string} said @returns {{source: 'sample' | 'version', version?: string} | null} */
+function sourceOf(said) {
+	if (said === 'sample') return { source: 'sample' };
+	return said.startsWith('v:') ? { source: 'version', version: said.slice(2) } : null;
+}
+
+/** Gold groups: how many, whose truth, and what people begin with. @param {{dataset: DatasetJson}} props */
+function GoldFields({ dataset }) {
+	const [some, setSome] = useState(false);
+	const versions = useResource(async (signal) => (some ? getVersions(dataset.id, signal) : null), [dataset.id, some]);
+	return html`
+		<div class="form__row"><label for="batch-gold">One gold group in so many</label><input class="field" id="batch-gold" name="gold" type="number" min="1" max="1000" placeholder="none" onInput=${(/** @type {Event} */ event) => setSome(/** @type {HTMLInputElement} */ (event.currentTarget).value !== '')} /></div>
+		${some ? html`
+			<div class="form__row"><label for="batch-truth">Gold groups are</label><select class="field" id="batch-truth" name="truth">
+				<option value="">those that leads marked</option>
+				<option value="sample">also those of a sample: true cameras and ball</option>
+				${versions.value?.items.map(({ name }) => html`<option key=${name} value=${`v:${name}`}>also those of ${name} upon which people agreed</option>`)}
+			</select></div>
+			<div class="form__row"><label for="batch-start">People begin such a group with</label><select class="field" id="batch-start" name="start">
+				${STARTS.map(([name, words]) => html`<option key=${name} value=${name}>${words}</option>`)}
+			</select></div>` : null}
+	`;
+}
+
+/** @param {{dataset: DatasetJson, q: string, total: number, ticked: {count: number, q: string} | null, onClose: () => void}} props */
+export function BatchDialog({ dataset, q, total, ticked, onClose }) {
+	const [people, setPeople] = useState(/** @type {Chosen} */ ({ annotator: [], reviewer: [] }));
+	const { error, busy, attempt } = useAttempt();
+	const matching = ticked?.count ?? total;
+	/** @param {FormData} form */
+	function send(form) {
+		if (busy) return;
+		const known = sourceOf(textOf(form, 'truth')), goldEvery = Number(textOf(form, 'gold')) || null;
+		const first = known && goldEvery ? postGold(dataset.id, { ...known, start: textOf(form, 'start') }) : Promise.resolve();
+		attempt(first.then(() => postBatch(dataset.id, {
+			name: textOf(form, 'name'), q: ticked ? inOrder(ticked.q, q) : q, size: Number(textOf(form, 'size')) || null,
+			annotators: people.annotator, reviewers: people.reviewer, due: textOf(form, 'due') || null, skip_given: form.has('skip'),
+			verdicts: Number(textOf(form, 'verdicts')) || 1, blind: form.has('blind'), gold_every: goldEvery,
+		})), (made) => {
+			clearTicks();
+			onClose();
+			inform(`“${made.name}” was given out: ${plural(made.groups, 'group')}.`, { label: 'See the work', run: () => navigate('/work') });
+		});
+	}
+	return html`
+		<${FormDialog}
+			title="Give out groups" onClose=${onClose} onSubmit=${send}
+			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${busy}>Give out</button>`}
+		>
+			<p>${ticked ? html`${count(ticked.count)} ticked groups` : q ? html`${plural(total, 'group')} that match <code>${q}</code>` : html`All ${plural(total, 'group')} of ${dataset.name}`}, in the order of the list. What comes to match later is not part of it.</p>
+			<div class="form__row"><label for="batch-name">Name</label><input class="field" id="batch-name" name="name" required maxlength="80" autocomplete="off" /></div>
+			<div class="form__columns batch-dialog__fields">
+			<div class="form__row"><label for="batch-size">The first so many</label><input class="field" id="batch-size" name="size" type="number" min="1" max="10000" placeholder=${`all ${count(matching)}`} /></div>
+			<div class="form__row"><label for="batch-due">Due</label><input class="field" id="batch-due" name="due" type="date" /></div>
+			<div class="form__row"><label for="batch-verdicts">People who annotate each group on their own</label><input class="field" id="batch-verdicts" name="verdicts" type="number" min="1" max="5" placeholder="1" /></div>
+			<${GoldFields} dataset=${dataset} />
+			</div>
+			<label class="form__check"><input type="checkbox" name="blind" defaultChecked /> Where several people annotate, nobody sees what the others did</label>
+			<label class="form__check"><input type="checkbox" name="skip" defaultChecked /> Leave out groups that wait in another open batch</label>
+			<${PeopleChoice} dataset=${dataset.name} chosen=${people} choose=${setPeople} />
+			${error ? html`<${FormError} error=${error} />` : null}
+		<//>
+	`;
+}

@@ -1,0 +1,37 @@
+// @ts-check
+/** Who annotates and who reviews a batch: ticks beside the names of those who may. */
+
+import { html } from 'htm/preact';
+
+import { getMembers } from '../../api/people.js';
+import { useResource } from '../../lib/resource.js';
+import { isTeam } from '../../state/me.js';
+
+/** @import {Part} from '../../api/work.js' */
+/** @import {MemberJson, Role} from '../../api/people.js' */
+
+/** @typedef {Record<Part, string[]>} Chosen */
+
+const PARTS = /** @type {{part: Part, title: string, note: string, roles: Role[]}[]} */ ([
+	{ part: 'annotator', title: 'Annotators', note: 'Nobody: reviewers get every group at once.', roles: ['annotator', 'reviewer', 'lead', 'admin'] },
+	{ part: 'reviewer', title: 'Reviewers', note: 'Nobody: whoever may review here.', roles: ['reviewer', 'lead', 'admin'] },
+]);
+
+/** @param {{dataset: string, chosen: Chosen, choose: (chosen: Chosen) => void}} props `dataset`: its name */
+export function PeopleChoice({ dataset, chosen, choose }) {
+	const people = useResource(async (signal) => (isTeam && !signal.aborted ? getMembers(dataset) : { items: /** @type {MemberJson[]} */ ([]) }), [dataset]);
+	if (!isTeam) return html`<p class="note">Nobody has an account on this server: the batch is yours.</p>`;
+	/** @param {Part} part @param {string} name @param {boolean} on */
+	function turn(part, name, on) {
+		choose({ ...chosen, [part]: on ? [...chosen[part], name] : chosen[part].filter((one) => one !== name) });
+	}
+	return html`${PARTS.map(({ part, title, note, roles }) => html`
+		<fieldset class="people-choice" key=${part}>
+			<legend>${title}</legend>
+			<p class="note">${note}</p>
+			<div class="people-choice__names">
+				${people.value?.items.filter(({ role }) => roles.includes(role)).map(({ name }) => html`
+					<label key=${name}><input type="checkbox" checked=${chosen[part].includes(name)} onChange=${(/** @type {Event} */ event) => turn(part, name, /** @type {HTMLInputElement} */ (event.currentTarget).checked)} /> ${name}</label>`)}
+			</div>
+		</fieldset>`)}`;
+}

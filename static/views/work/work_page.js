@@ -1,0 +1,71 @@
+// @ts-check
+/** My work: batches that are mine, and how the team works through its own. */
+
+import { html } from 'htm/preact';
+import { useEffect, useRef } from 'preact/hooks';
+
+import { getMyWork } from '../../api/work.js';
+import { useAttempt } from '../../lib/attempt.js';
+import { plural } from '../../lib/format.js';
+import { useResource } from '../../lib/resource.js';
+import { dataset } from '../../state/datasets.js';
+import { goOn } from '../../state/leases.js';
+import { isTeam } from '../../state/me.js';
+import { reviewAddress } from '../../state/navigation.js';
+import { inform } from '../../state/notice.js';
+import { pageAddress } from '../dataset_menu.js';
+import { FormError } from '../form_error.js';
+import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { When } from '../when.js';
+import { Due, Progress } from './parts.js';
+import { TeamCard } from './team_card.js';
+
+/** @import {MyBatchJson} from '../../api/work.js' */
+
+/** @param {{one: MyBatchJson, first: boolean}} props `first`: Enter goes on with it */
+function MyBatch({ one: { batch, parts, left, handed_back: back }, first }) {
+	const button = useRef(/** @type {HTMLButtonElement | null} */ (null));
+	const { error, attempt } = useAttempt();
+	useEffect(() => { if (first) button.current?.focus(); }, [first]);
+	const go = () => attempt(goOn(batch.id), (some) => {
+		if (!some) inform(`Nothing waits for you in “${batch.name}” now: others have the rest open, or it waits for somebody else.`);
+	});
+	return html`
+		<li class="work__item">
+			<div class="work__head">
+				<div>
+					<h3>${batch.name}</h3>
+					<${Progress} batch=${batch} />
+					<p class="note">${batch.dataset} · you ${parts.map((part) => (part === 'annotator' ? 'annotate' : 'review')).join(' and ')}${batch.verdicts > 1 && parts.includes('reviewer') ? html` · <a class="link" href=${pageAddress(batch.dataset, 'agreement')}>decide where annotations differ</a>` : null} <${Due} due=${batch.due} /></p>
+					${back.length ? html`<ul class="work__back" aria-label="Handed back to you">${back.map((one) => html`
+						<li key=${one.group}><a href=${reviewAddress(one.group, `batch:${batch.id}`)}>${one.title}</a> was handed back by ${one.by}${one.reason ? html`: “${one.reason}”` : ''} <small><${When} at=${one.at} /></small></li>`)}</ul>` : null}
+					${error ? html`<${FormError} error=${error} />` : null}
+				</div>
+				<button ref=${button} class=${first ? 'button button--primary' : 'button'} type="button" data-needs="annotate" onClick=${go}>${left ? `Go on: ${plural(left, 'group')}` : 'Go on'}<span class="hidden-text"> of ${batch.name}</span></button>
+			</div>
+		</li>
+	`;
+}
+
+/** @param {{items: MyBatchJson[]}} props */
+function Mine({ items }) {
+	const first = items.findIndex(({ left }) => left > 0);
+	return html`
+		<section class="card" aria-labelledby="mine-title">
+			<h2 id="mine-title">Mine</h2>
+			${items.length ? null : html`<p>${isTeam ? 'Nobody has given you a batch. A lead can; or review from the queue.' : 'A batch is a part of a dataset that you set yourself to do, or give to others on a server of a team.'}</p>`}
+			<ul class="work__list">${items.map((one, index) => html`<${MyBatch} key=${one.batch.id} one=${one} first=${index === first} />`)}</ul>
+		</section>
+	`;
+}
+
+export function WorkPage() {
+	const mine = useResource((signal) => getMyWork(signal), []);
+	return html`
+		<${PageFrame} current="work" title="My work" where=${html`<strong>My work</strong>`}>
+			${mine.error ? html`<${Trouble} title="Your work cannot be shown" error=${mine.error} retry=${mine.reload} />` : null}
+			${mine.value ? html`<${Mine} items=${mine.value.items} />` : mine.error ? null : html`<${Loading} what="your work" />`}
+			${dataset.value ? html`<${TeamCard} dataset=${dataset.value} />` : null}
+		<//>
+	`;
+}

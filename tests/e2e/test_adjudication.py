@@ -1,0 +1,63 @@
+"""Adjudication in the browser: two annotations beside each other, one is taken by keyboard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+from app.config import Settings
+from app.review.agreement.weigh import after_hand_in
+from app.review.editing.edit import SetBall
+from app.review.editing.submit import load, submit
+from app.review.takes.take import begin_take
+from app.review.verdicts.verdict import set_verdict
+from app.store.session import Store
+from tests.e2e.screen import passing, until, withdraw_verdict
+from tests.e2e.test_access import serious_in_both
+
+
+def annotate(store: Store, group: int, person: str, moved: float) -> str | None:
+    """Hand in what a person made of a group; its ball moved by so many pixels."""
+    copy = begin_take(store, group, person=person).copy_id
+    state = load(store, copy)
+    view = next(view for view in state.group.views if view.ball and view.ball.box)
+    if moved and view.ball and view.ball.box:
+        ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
+        state = submit(store, copy, SetBall(view.key, ball), if_match=state.etag, actor=person)
+    set_verdict(store, copy, "accepted", None, "seen", if_match=state.etag, actor=person)
+    return after_hand_in(store, copy)
+
+
+def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Page]) -> None:
+    page = open_page("/datasets/sample/agreement")
+    expect(page.get_by_text("Nothing waits")).to_be_visible()
+    group = passing(page, 1)
+    store = Store.open(Settings(home=home))
+    try:
+        # The second one is taken, so that it shows which one was meant.
+        assert annotate(store, group, "bob", 25) is None
+        assert annotate(store, group, "ada", 0) == "open"
+    finally:
+        store.close()
+    page.reload()
+    page.get_by_role("link", name="Decide the worst one").click()
+    expect(page.locator(".compare__one")).to_have_count(2)
+    expect(page.locator('.compare__panel .image-panel__stage[data-ready="true"]')).to_have_count(2)
+    expect(page.locator(".compare__difference").first).to_contain_text("px apart")
+    assert serious_in_both(page) == []
+    first = page.locator('.compare__views [aria-current="true"]').inner_text()
+    page.keyboard.press("ArrowRight")
+    expect(page.locator('.compare__views [aria-current="true"]')).not_to_have_text(first)
+    page.keyboard.press("n")
+    expect(page.locator('.compare__difference[aria-pressed="true"]')).to_have_count(1)
+    expect(page.get_by_role("button", name="Decide Enter")).to_be_disabled()
+    page.keyboard.press("2")
+    expect(page.locator('.compare__one[data-chosen="true"]')).to_contain_text("ada")
+    page.keyboard.press("Enter")
+    until(page, lambda: page.url.endswith("/datasets/sample/agreement"))
+    expect(page.get_by_text("Nothing waits")).to_be_visible()
+    expect(page.get_by_role("table").last).to_contain_text("ada’s, by local")
+    withdraw_verdict(page, group)
