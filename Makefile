@@ -10,7 +10,7 @@ export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 unexport PYTHONDONTWRITEBYTECODE
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
-.PHONY: setup run test test-python test-browser test-late check audit release generators readers bench mutate torture fuzz paper chromium clean
+.PHONY: setup run test test-python test-browser test-late test-postgresql check audit release generators readers moto bench mutate torture fuzz paper chromium postgresql clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready static/node_modules/.ready
@@ -36,10 +36,12 @@ run: setup
 # are tested are processes too. Files in their order, so that the long ones (integration, security)
 # come first and no process is left with one at the end. Every line says which half speaks.
 PROCESSES = $(shell n=$$(getconf _NPROCESSORS_ONLN); echo $$(( n < 2 ? 2 : n < 8 ? n : 8 )))
-PYTEST = $(BIN)/python -m pytest --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder
+# What tests write lies in memory where that has much room: they wait for no disk.
+ROOMY = $(shell df -Pk /dev/shm 2>/dev/null | awk 'NR == 2 && $$4 > 8000000 { print "yes" }')
+PYTEST = $(if $(ROOMY),PYTEST_DEBUG_TEMPROOT=/dev/shm) $(BIN)/python -m pytest --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder
 
 # What numba compiles is compiled before: every process would do it anew, until one has saved it.
-test: setup chromium generators readers
+test: setup chromium postgresql generators readers moto
 	@$(BIN)/python -m tests.compiled
 	@$(MAKE) --no-print-directory -j2 test-python test-browser
 	@echo "Every test has passed."
@@ -53,6 +55,12 @@ test-browser:
 # The browser tests before pages whose every request, frame, picture and event is late: who does not wait falls.
 test-late: setup chromium
 	@TOUCHLINE_SLOW_PAGES=$(or $(MS),300) $(PYTEST) tests/e2e
+
+# All tests but those of the browser with every home on a private PostgreSQL: WHAT=tests/unit/store a part, WHAT=tests/e2e those of
+# the browser. What is about the file of SQLite is left out; each says why.
+test-postgresql: setup postgresql generators readers moto
+	@$(BIN)/python -m tests.compiled
+	@$(BIN)/python -m tests.on_postgresql --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder -rs $(or $(WHAT),tests --ignore=tests/e2e)
 
 check: setup
 	$(BIN)/ruff format --check .
@@ -101,6 +109,15 @@ readers: .readers/ready
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps --target .readers -r requirements-readers.lock
 	@touch $@
 
+# The S3 server that tests ask; apart, for its client wants an older python-dateutil than the product's libraries.
+moto: .moto/ready
+
+.moto/ready: requirements-moto.lock .venv/ready
+	@echo "Installing moto into .moto"
+	@rm -rf .moto
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps --target .moto -r requirements-moto.lock
+	@touch $@
+
 bench: setup
 	$(BIN)/python -m tests.bench
 
@@ -119,6 +136,9 @@ paper: setup
 
 chromium: setup
 	@$(BIN)/python tests/e2e/install_chromium.py
+
+postgresql: setup
+	@$(BIN)/python -m tests.install_postgresql
 
 clean:
 	rm -rf .venv .venv-release .venv-generators .readers dist static/node_modules tests/generators/node_modules

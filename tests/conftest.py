@@ -4,8 +4,35 @@ from __future__ import annotations
 
 import gc
 
+import pytest
+from httpx._config import DEFAULT_TIMEOUT_CONFIG
+
+from tests.on_postgresql import MARK, install, shared_cluster
+from tests.starting import end_nursery
+from tests.waiting import SECONDS
+
 YOUNG = 50_000
 """New objects before the collector looks at them: seventy times as many as by default."""
+
+
+if (cluster := shared_cluster()) is not None:
+    # Before any module of the tests has taken what this changes by its name.
+    install(cluster)
+
+
+def pytest_configure() -> None:
+    """Look for no garbage while modules and tests are collected: none of them is."""
+    gc.disable()
+    # Five seconds, which tests that say nothing else would wait, a busy machine takes for little.
+    for part in ("connect", "read", "write", "pool"):
+        setattr(DEFAULT_TIMEOUT_CONFIG, part, SECONDS)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave out what is about the file of SQLite where there is none."""
+    for item in items if cluster is not None else ():
+        if (mark := item.get_closest_marker(MARK)) is not None:
+            item.add_marker(pytest.mark.skip(reason=f"of SQLite alone: {mark.args[0]}"))
 
 
 def pytest_collection_finish() -> None:
@@ -13,3 +40,9 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(YOUNG)
+    gc.enable()
+
+
+def pytest_sessionfinish() -> None:
+    """End the process that the servers and commands of tests are forked from."""
+    end_nursery()

@@ -9,14 +9,19 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from tests.bench.annotators import bench_annotators
 from tests.bench.ball import bench_ball
+from tests.bench.ball_noise import bench_ball_noise
 from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
 from tests.bench.geometry import bench_geometry
 from tests.bench.paint import bench_paint
+from tests.bench.picture_power import bench_picture_power
 from tests.bench.pictures import bench_pictures
+from tests.bench.pitches import bench_pitches
 from tests.bench.propose import bench_propose
 from tests.bench.requests import bench_requests
+from tests.bench.rigs import bench_rigs
 from tests.bench.truth import bench_truth
 
 REAL_DATA = Path(
@@ -27,13 +32,19 @@ REAL_DATA = Path(
 def main() -> None:
     """Run every benchmark; those on real data only where it is."""
     bench_ball()
+    bench_ball_noise()
     bench_truth()
+    bench_annotators()
     bench_pictures()
+    bench_picture_power()
+    bench_pitches()
     bench_geometry()
     if (REAL_DATA / "sn22-dev" / "lines.zip").is_file():
         bench_calibration(REAL_DATA)
     else:
         print(f"\nCalibration on real lines: no data in {REAL_DATA}, left out")
+    if (REAL_DATA / "issia-lines").is_dir():
+        bench_rigs(REAL_DATA)
     bench_paint(REAL_DATA)
     bench_propose(REAL_DATA)
     bench_requests()

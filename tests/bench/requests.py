@@ -19,6 +19,7 @@ import numpy as np
 
 from tests.bench.table import print_table
 from tests.e2e.service import run_touchline, serving
+from tests.starting import end_nursery
 
 GROUPS = 12
 ROUNDS = 5
@@ -39,6 +40,8 @@ def bench_requests() -> None:
             "solve --dataset sample",
         )
         with serving(home) as address, httpx.Client(base_url=address, timeout=60) as client:
+            # The server is the one child of this process then.
+            end_nursery()
             print_table(
                 "Requests, processor time of the server a request",
                 ("what", "ms", "times healthz", "limit, ms on a quiet machine"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,21 +13,25 @@ from app.soccer.camera_sigma import camera_sigma
 from app.soccer.picture import OPEN
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
-from app.soccer.solution import Ball3D, BestBall, Calibration
-from app.solving.ball_noise import estimate_ball_noise, misses_of
+from app.soccer.solution import Ball3D, BestBall, Calibration, Solution
+from app.solving.ball_noise import Miss, estimate_ball_noise, misses_of
+from app.solving.line_noise import LineEvidence, estimate_line_noise
+from app.solving.resect import view_line_evidence
 from app.solving.solve import solve
 from app.solving.triangulate import sights_of
 from tests.bench.cases import Case, Made, make_case
+from tests.bench.pitches import estimate_match
 from tests.bench.table import print_table
 
 GROUPS = 150
 SEED = 20261122
+MATCHES = 10
 WRONG_M = 0.5
 INSIDE_95 = float(chi2.ppf(0.95, 3))
 FOCAL_SIGMAS = 1.96
 
 ORDINARY = Case("as assumed")
-CASES = (
+STRATA = (
     ORDINARY,
     *(Case(f"ball noise {px:g} px", ball_px=px) for px in (0.5, 2.0, 3.0)),
     *(Case(f"{count} views", views=(count, count)) for count in (2, 3, 4)),
@@ -34,6 +39,10 @@ CASES = (
         Case(f"two views, parallax {low:g}-{high:g} degrees", views=(2, 2), parallax=(low, high))
         for low, high in ((5.0, 10.0), (10.0, 30.0), (30.0, 90.0), (90.0, 180.0))
     ),
+)
+"""Cases in which sigma can mean it once the noise is known."""
+CASES = (
+    *STRATA,
     Case("line errors half in common", together=0.5),
     *(Case(f"a view {ms:g} ms later", delay_s=ms / 1000) for ms in (40.0, 80.0, 200.0)),
     Case("pitch 103 x 66", pitch=Pitch(103.0, 66.0)),
@@ -84,16 +93,24 @@ class Row:
 
 def bench_truth() -> None:
     """Print a row for each case."""
-    rows = []
+    rows: list[list[object]] = []
+    strata: list[Row] = []
     for case in CASES:
         made = make_case(case, GROUPS, SEED)
         rows.append([case.name, *vars(judge(made, PAPER)).values()])
         if case.aspect != ORDINARY.aspect or case.shift != ORDINARY.shift:
             solved_so = vars(judge([with_picture(one) for one in made], PAPER))
             rows.append([f"{case.name}, solved so", *solved_so.values()])
-        if case.ball_px != ORDINARY.ball_px or case is ORDINARY:
-            told = [f"{case.name}, noise estimated", *vars(judge(made, with_noise(made))).values()]
-            rows.append(told)
+        if case.pitch != ORDINARY.pitch:
+            accepted = vars(judge(with_found_pitch(made, case), PAPER))
+            rows.append([f"{case.name}, accepted as found", *accepted.values()])
+        if case in STRATA or case.together:
+            told = judge(made, with_noise(made))
+            rows.append([f"{case.name}, noise estimated", *vars(told).values()])
+            strata += [told] if case in STRATA else []
+    whole = np.mean([[row.mean_inside, row.best_inside] for row in strata], axis=0).tolist()
+    rest = [None] * 4
+    rows.append(["all strata, noise estimated", *rest, *whole, None, None])
     header = (
         f"{GROUPS} groups each",
         "pass",
@@ -141,19 +158,48 @@ def with_picture(made: Made) -> Made:
     return replace(made, group=made.group.with_view(said))
 
 
+def with_found_pitch(made: list[Made], case: Case) -> list[Made]:
+    """The groups once the sizes that matches of ten frames show were accepted, match by match."""
+    estimates = (estimate_match(case, SEED + match) for match in range(MATCHES))
+    proposed = (found.proposal(Pitch()) for found in estimates if found is not None)
+    pitches = [pitch for pitch in proposed if pitch is not None]
+    return [
+        replace(one, group=replace(one.group, pitch=pitches[at % len(pitches)]))
+        for at, one in enumerate(made)
+    ]
+
+
 def with_noise(made: list[Made]) -> Policy:
-    """The policy ``paper`` with the noise that the groups themselves show."""
-    misses = []
-    for one in made:
-        solution = solve(one.group, PAPER)
-        if solution.ball is not None:
-            calibrations = [view.calibration for view in solution.views]
-            misses += misses_of(solution.ball, sights_of(one.group.views, calibrations))
-    found = estimate_ball_noise(misses, PAPER)
+    """The policy ``paper`` with the noise that the groups themselves show: lines, then balls."""
+    policy = PAPER
+    told = [item for one in made for item in _line_evidence(one, solve(one.group, policy))]
+    lines = estimate_line_noise(told)
+    assert lines is not None
+    sigma, share = lines.sigma.value, lines.share.value
+    calibration = replace(PAPER.calibration, line_sigma_px=sigma, line_share=share)
+    policy = replace(PAPER, name="estimated", calibration=calibration)
+    misses = [miss for one in made for miss in misses_in(one, policy)]
+    found = estimate_ball_noise(misses, policy)
     assert found.click is not None and found.share is not None
-    return replace(
-        PAPER, name="estimated", click_sigma_px=found.click.value, box_sigma_share=found.share
-    )
+    return replace(policy, click_sigma_px=found.click.value, box_sigma_share=found.share)
+
+
+def misses_in(made: Made, policy: Policy) -> tuple[Miss, ...]:
+    """What the rays to the ball of a group leave unexplained."""
+    solution = solve(made.group, policy)
+    if solution.ball is None:
+        return ()
+    calibrations = [view.calibration for view in solution.views]
+    return misses_of(solution.ball, sights_of(made.group.views, calibrations))
+
+
+def _line_evidence(made: Made, solution: Solution) -> Iterator[LineEvidence]:
+    for view, solved in zip(made.group.views, solution.views, strict=True):
+        found = solved.calibration
+        left_out = [suspect.marking for suspect in found.suspects]
+        lines = {name: at for name, at in view.station.lines.items() if name not in left_out}
+        if found.camera is not None and found.covariance is not None:
+            yield view_line_evidence(found, lines, Pitch(), view.size, PAPER.calibration)
 
 
 def _error(ball: Ball3D | None, made: Made) -> float:

@@ -27,7 +27,7 @@ def fill_sample(folder: Path) -> None:
 
     The whole sample would take three times as long. Pictures are plain, not drawn.
     """
-    run_touchline(folder / "home", f"sample {folder / 'sample'} --labels-only")
+    run_touchline(folder / "home", f"sample {folder / 'sample'} --labels-only --workers 1")
     first, *others, last = sorted((folder / "sample").rglob("Labels-v3.json"))
     for path in others:
         shutil.rmtree(path.parent)

@@ -20,8 +20,8 @@ from typing import Any
 
 from app.commands.options import read_text
 from app.config import Settings
-from app.datasets.archive import Limits
 from app.datasets.export_record import ExportRecord
+from app.datasets.file_tree import Limits
 from app.datasets.format_names import ImportFormat
 from app.datasets.guess_format import guess_format
 from app.datasets.output import output_tree

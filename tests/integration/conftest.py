@@ -23,6 +23,7 @@ import pytest
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.sample.scene import Scene
 from app.soccer.group import Group
+from tests import starting
 from tests.e2e.service import run_touchline, serving
 from tests.homes import copy_home, once_for_all
 from tests.scenes import make_scenes
@@ -111,7 +112,7 @@ def touchline(
 
     def run(*arguments: object) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-c", COMMAND, *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, env=environment(home))
+        return starting.run(command, env=environment(home))
 
     run.home = home  # type: ignore[attr-defined]
     return run
@@ -128,7 +129,7 @@ def address(touchline) -> Iterator[str]:
     """Address of a server over a home with the datasets ``small`` (solved) and ``spoiled``."""
     log = Path(touchline.home) / "server.log"
     with log.open("w") as file:
-        server = subprocess.Popen(
+        server = starting.Process(
             [sys.executable, "-c", COMMAND, "serve", "--port", "0"],
             stdout=subprocess.PIPE,
             # A pipe that nobody reads would fill, and the server wait for ever.

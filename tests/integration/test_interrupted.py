@@ -11,6 +11,7 @@ import time
 from contextlib import closing
 from pathlib import Path
 
+from tests import starting
 from tests.integration.conftest import COMMAND, environment
 from tests.waiting import SECONDS
 
@@ -28,10 +29,9 @@ def test_solve_keeps_what_is_done_and_goes_on_from_there(tmp_path: Path) -> None
     def command(*words: str) -> list[str]:
         return [sys.executable, "-c", COMMAND, *words]
 
-    def run(*words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            command(*words), env=environment(home), capture_output=True, text=True, check=True
-        )
+    def run(*words: str) -> None:
+        done = starting.run(command(*words), env=environment(home))
+        assert done.returncode == 0, done.stderr
 
     tree = tmp_path / "tree"
     run("sample", str(tree), "--groups", str(GROUPS), "--labels-only", "--workers", "1")

@@ -28,6 +28,7 @@ FRAMES, EVERY = 150, 8
 """Whole matches are needed, so the first frames are taken, and one marking in eight is left out;
 ``touchline calibrate --leave-one-out --matches auto`` takes them all."""
 NEAR_PX = 5.5
+MIDDLE = ("Middle line", "Circle central")
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +66,22 @@ class TestShares:
         found = estimate_pitch([PitchFrame(file.lines, SIZE) for file in second], POLICY)
         assert found.length is None
         assert found.width == pytest.approx(68.0, abs=1.5)
+
+    def test_a_short_pitch_that_two_frames_show_is_proposed(self, files, shares):
+        """At its size the middle that both show is predicted from the rest, at 105 m it is not."""
+        names = [share.match for share in shares]
+        match = [file for file, name in zip(files, names, strict=True) if name == names[110]]
+        found = estimate_pitch([PitchFrame(file.lines, SIZE) for file in match], POLICY)
+        proposed = found.proposal(Pitch())
+        assert proposed is not None and proposed.length == pytest.approx(101.2, abs=0.5)
+        middle = [(it, name) for it in match for name in it.lines if name in MIDDLE]
+        errors = np.array(
+            [
+                [
+                    error_without(it.lines, name, pitch, SIZE, POLICY)
+                    for pitch in (Pitch(), proposed)
+                ]
+                for it, name in middle
+            ]
+        )
+        assert (errors[:, 0] > 40).all() and (errors[:, 1] < 15).all()

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.datasets.issia_reader import IssiaOptions, open_issia
 from app.datasets.report import Report
+from app.soccer.annotation import make_lines
+from app.soccer.group import Group
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import RigProposal, propose_rig
+from app.solving.solve import solve
+from tests.bench.rigs import rig_of
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
 pytestmark = pytest.mark.skipif(
@@ -20,23 +25,29 @@ pytestmark = pytest.mark.skipif(
 )
 
 
+EVERY = 10
+"""Instants whose normalised gaps are looked at; neighbours are alike."""
+
+
 @pytest.fixture(scope="module")
-def proposal() -> RigProposal:
+def groups() -> list[Group]:
     options = IssiaOptions(lines=DATA / "issia-lines")
-    groups = list(open_issia(DATA / "issia", options, Report()).groups())
-    stations = {view.station.key: view.station for group in groups for view in group.views}
-    cameras = [
-        RigCamera(key, station.size, station.lines, station.given)
-        for key, station in sorted(stations.items())
-    ]
-    frames = [
-        RigFrame(
-            int(group.key),
-            {view.station.key: view.ball.center for view in group.views if view.ball is not None},
-        )
-        for group in groups
-    ]
-    return propose_rig(cameras, frames, Pitch(), PAPER)
+    return list(open_issia(DATA / "issia", options, Report()).groups())
+
+
+@pytest.fixture(scope="module")
+def proposal(groups) -> RigProposal:
+    return propose_rig(*rig_of(groups), Pitch(), PAPER)
+
+
+def with_sigma(group: Group, proposal: RigProposal) -> Group:
+    """The group with the cameras in use and what is proposed of their errors, without lines."""
+    spreads = {change.key: change.covariance_before for change in proposal.cameras}
+    for view in group.views:
+        spread = spreads.get(view.station.key)
+        station = replace(view.station, given_covariance=spread, lines=make_lines({}))
+        group = group.with_view(replace(view, station=station))
+    return group
 
 
 class TestIssia:
@@ -61,3 +72,11 @@ class TestIssia:
         assert proposal.ball_moved_m < 0.5
         for change in proposal.cameras:
             assert change.lines_after_px < change.lines_before_px
+
+    def test_gaps_are_as_large_as_the_accepted_sigma_says(self, groups, proposal):
+        """In the mean square; their tails are short, because a camera's error is no noise."""
+        pairs = [group for group in groups if sum(v.ball is not None for v in group.views) == 2]
+        solved = [solve(with_sigma(group, proposal), PAPER) for group in pairs[::EVERY]]
+        squares = [it.chi_square.value for it in solved if it.passes and it.chi_square is not None]
+        assert len(squares) > 150
+        assert np.sqrt(np.mean(squares)) == pytest.approx(1.0, abs=0.2)

@@ -13,7 +13,7 @@ import pytest
 from sqlalchemy import select
 
 from app.config import Settings
-from app.datasets.archive import DEFAULT_LIMITS
+from app.datasets.file_tree import DEFAULT_LIMITS
 from app.datasets.issia_reader import IssiaOptions, open_issia
 from app.datasets.report import Report
 from app.review.editing.recompute import solve_dataset

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
+from tests.waiting import SECONDS
+
 PROBLEM = "application/problem+json"
 POLICY_START = "default-src 'self'; img-src 'self' blob: data:;"
 SECRETS = (
@@ -73,7 +75,7 @@ class Asker:
     ) -> Answer:
         if self._connection is None:
             found = http.client.HTTPConnection(
-                self.where.hostname or "", self.where.port, timeout=10
+                self.where.hostname or "", self.where.port, timeout=SECONDS
             )
             self._connection = found
         connection = self._connection

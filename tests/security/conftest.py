@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -13,12 +14,25 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from limits import parse
+from pwdlib import PasswordHash
+from pwdlib.hashers.argon2 import Argon2Hasher
 
+from app.api.application import create_app
+from app.api.security import access, tries
+from app.api.server import listen, make_server
+from app.config import Settings
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
-from tests.e2e.service import run_touchline, serving
+from app.review.people import passwords
+from app.review.people.roles import Role
+from app.store.session import Store
+from tests.e2e.service import NOBODY, run_touchline, serving
 from tests.integration.conftest import bomb, picture
+from tests.provider import CLIENT, SECRET, Provider, providing
 from tests.scenes import make_scenes
 from tests.security.asking import JSON, Asker
+from tests.security.team import HIDDEN, Team
+from tests.waiting import SECONDS
 
 API = "/api/v1"
 FORMULA = "=HYPERLINK(1)"
@@ -116,6 +130,15 @@ def _fill(guarded: Guarded, frame: str) -> None:
     view = json_("POST", "/datasets/small/saved-views", {"name": FORMULA, "q": "status:unreviewed"})
     bulk = {"q": "", "state": "deferred"}
     batch = json_("POST", "/datasets/small/verdicts", bulk, **{"Idempotency-Key": "bulk"})
+    given = json_("POST", "/datasets/small/batches", {"name": FORMULA})["id"]
+    assert given == batch["batch"], "one parameter names either kind of batch"
+    told = {"url": NOBODY, "kinds": ["group.judged"]}
+    webhook = json_("POST", "/datasets/small/webhooks", told)["webhook"]["id"]
+    delivery = json_("POST", f"/datasets/small/webhooks/{webhook}/ping")["id"]
+    talk = json_("POST", "/groups/1/threads", {"text": "=1+1 <script>alert(1)</script>"})
+    ids |= {"entry": "2", "thread": str(talk["id"]), "comment": str(talk["comments"][0]["id"])}
+    ids |= {"webhook": str(webhook), "delivery": str(delivery)}
+    ids |= {"digest": "0" * 64}
     ids |= {"dataset": "small", "group": "1", "station": "1", "view": "1", "job": "1"}
     ids |= {
         "version": "1",
@@ -127,3 +150,46 @@ def _fill(guarded: Guarded, frame: str) -> None:
     ids |= {"figure": "sensitivity", "table": "sensitivity", "upload": upload, "tab": "keys"}
     ids |= {"predictions": str(predictions), "export": str(export["result"]["export"])}
     ids |= {"batch": str(batch["batch"]), "saved": str(view["id"]), "path": "nothing"}
+
+
+@pytest.fixture(scope="session")
+def provider() -> Iterator[Provider]:
+    """By which people of the team come in, too."""
+    with providing() as found:
+        yield found
+
+
+@pytest.fixture(scope="session")
+def team(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Iterator[Team]:
+    settings = Settings(
+        home=tmp_path_factory.mktemp("team"),
+        team=True,
+        sso_issuer=provider.address,
+        sso_client_id=CLIENT,
+        sso_client_secret=SECRET,
+        sso_label="Club",
+    )
+    Store.open(settings).close()
+    cheap = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(passwords, "HASHER", cheap)
+        patch.setattr(access, "LOOK_SECONDS", 0.05)
+        # Everybody of these tests comes from one address within a minute.
+        patch.setattr(tries, "OF_AN_ADDRESS", parse("1000/minute"))
+        patch.setattr(tries, "CHALLENGES_OF_AN_ADDRESS", parse("1000/minute"))
+        passwords._nobodys.cache_clear()
+        app = create_app(settings)
+        app.add_api_route(HIDDEN, lambda: {"secret": 1}, include_in_schema=False)
+        # Before the routes that take whatever is left.
+        app.router.routes.insert(0, app.router.routes.pop())
+        with listen("127.0.0.1", 0) as (socket, address):
+            server = make_server(app)
+            thread = threading.Thread(target=lambda: server.run(sockets=[socket]))
+            thread.start()
+            made = Team(address, app)
+            for role in Role:
+                made.add(role.value, role)
+            yield made
+            server.should_exit = True
+            thread.join(SECONDS)
+        passwords._nobodys.cache_clear()

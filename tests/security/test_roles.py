@@ -5,146 +5,35 @@ from __future__ import annotations
 import http.client
 import json
 import re
-import threading
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Any
 
 import pytest
-from fastapi import FastAPI
-from pwdlib import PasswordHash
-from pwdlib.hashers.argon2 import Argon2Hasher
 
-from app.api.application import create_app
 from app.api.pages import PAGES
 from app.api.security import access
 from app.api.security.rules import OPEN, RULES
-from app.api.server import listen, make_server
 from app.config import Settings
 from app.review.importing.ingest import ensure_dataset
-from app.review.people import links, passwords
-from app.review.people.people import change_person, find_person, invite, renew_link
-from app.review.people.roles import LEAST, Role
-from app.store.log import read_log
+from app.review.people import links
+from app.review.people.members import give_role
+from app.review.people.people import change_person, find_person, renew_link
+from app.review.people.roles import LEAST, Role, Scope
+from app.store.clock import now
+from app.store.log import Entry, append, read_log
 from app.store.session import Store
-from tests.security.asking import Answer, Asker, assert_guarded
+from tests.security.asking import assert_guarded
 from tests.security.table import MISSING, TABLE, Row, rows
+from tests.security.team import API, BYTES, GUARDED, HIDDEN, SECRET, Team, asked, cookie_in
 from tests.waiting import SECONDS
 
-API = "/api/v1"
-SECRET = "three plain words"
-BYTES = "application/octet-stream"
-HIDDEN = "/api/v1/hidden"
-"""A route that nobody has thought of."""
-
-
-@dataclass
-class Team:
-    """A server of a team, on a socket, with somebody of each role."""
-
-    address: str
-    app: FastAPI
-    cookies: dict[str, str] = field(default_factory=dict)
-
-    @property
-    def store(self) -> Store:
-        store: Store = self.app.state.services.store
-        return store
-
-    def ask(
-        self,
-        method: str,
-        target: str,
-        body: Any = None,
-        *,
-        role: str | None = None,
-        only_head: bool = False,
-        kind: str = "application/json",
-        **headers: str,
-    ) -> Answer:
-        """Ask as somebody of a role, or as a stranger; a page of this server asks."""
-        sent = {
-            "Origin": self.address,
-            **{name.replace("_", "-"): headers[name] for name in headers},
-        }
-        if role in self.cookies:
-            sent["Cookie"] = self.cookies[role]
-        data = (
-            body if isinstance(body, bytes) else None if body is None else json.dumps(body).encode()
-        )
-        if data is not None:
-            sent["Content-Type"] = kind
-        asker = Asker(self.address)
-        try:
-            return asker(
-                method, target, {k: v for k, v in sent.items() if v}, data, only_head=only_head
-            )
-        finally:
-            asker.close()
-
-    def log_in(self, name: str, password: str = SECRET, **headers: str) -> Answer:
-        return self.ask("POST", f"{API}/session", {"name": name, "password": password}, **headers)
-
-    def add(self, name: str, role: Role) -> str:
-        """Somebody more, who has logged in; their cookie."""
-        _, link = invite(self.store, name, role, actor="local")
-        links.use(self.store, link.token, SECRET)
-        self.cookies[name] = cookie_in(self.log_in(name))
-        return self.cookies[name]
-
-
-def cookie_in(answer: Answer) -> str:
-    assert answer.status == 200, answer.body
-    return answer.headers["set-cookie"].partition(";")[0]
-
-
-@pytest.fixture(scope="module")
-def team(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Team]:
-    settings = Settings(home=tmp_path_factory.mktemp("team"), team=True)
-    Store.open(settings).close()
-    cheap = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(passwords, "HASHER", cheap)
-        patch.setattr(access, "LOOK_SECONDS", 0.05)
-        passwords._nobodys.cache_clear()
-        app = create_app(settings)
-        app.add_api_route(HIDDEN, lambda: {"secret": 1}, include_in_schema=False)
-        # Before the routes that take whatever is left.
-        app.router.routes.insert(0, app.router.routes.pop())
-        with listen("127.0.0.1", 0) as (socket, address):
-            server = make_server(app)
-            thread = threading.Thread(target=lambda: server.run(sockets=[socket]))
-            thread.start()
-            made = Team(address, app)
-            for role in Role:
-                made.add(role.value, role)
-            yield made
-            server.should_exit = True
-            thread.join(SECONDS)
-        passwords._nobodys.cache_clear()
-
-
-def asked(team: Team, row: Row, role: str | None) -> Answer:
-    """The answer to a route as the table has it; the body is of a shape that nothing is done with."""
-    target = row.target({"ending": "csv", "tab": "keys"})
-    kind, body = "application/json", None if row.kind in ("read", "page", "stream") else []
-    if row.kind == "upload":
-        return team.ask("POST", f"{target}?name=a.zip", b"PK", role=role, kind=BYTES)
-    stream = row.kind == "stream"
-    return team.ask(
-        "HEAD" if stream else row.method,
-        target,
-        body if row.kind == "body" else None,
-        role=role,
-        kind=kind,
-        only_head=stream,
-    )
-
-
 RANKS = [role.value for role in Role]
-GUARDED = [row for row in rows() if row.role != "everybody"]
+SCOPE_OF = dict(zip(RANKS, ("read", "read", "annotate", "review", "lead", "admin"), strict=True))
+"""The scope that lets a token do what a role may."""
+OTHERWISE = {f"POST {API}/exports": "export"}
+OF_PEOPLE = ("/session", "/sessions", "/tokens", "/bell")
+"""What no token may: sessions, passwords, tokens, and what a person is told."""
 
 
 class TestTable:
@@ -165,6 +54,10 @@ class TestTable:
             f"GET {API}/session",
             f"POST {API}/session",
             f"DELETE {API}/session",
+            f"POST {API}/session/passkey/begin",
+            f"POST {API}/session/passkey",
+            f"POST {API}/session/sign-on/begin",
+            f"POST {API}/session/sign-on",
             f"POST {API}/links/look",
             f"POST {API}/links/use",
         }
@@ -185,15 +78,48 @@ class TestEveryRoute:
             assert_guarded(stranger, row)
         assert stranger.headers["www-authenticate"].startswith("Session")
         least = RANKS.index(row.role)
-        if least:
+        if least > RANKS.index("viewer"):
             below = asked(team, row, RANKS[least - 1])
-            assert below.status == 403, (row, below.body)
-            assert row.kind == "stream" or f"needs the role {row.role}".encode() in below.body
+            # What may be somebody's own is looked for before anything is said of it.
+            looked_for = any(f"/{word}/{{" in row.path for word in ("exports", "jobs", "uploads"))
+            assert below.status == (404 if looked_for else 403), (row, below.body)
+            said = f"needs the role {row.role}".encode()
+            assert looked_for or row.kind == "stream" or said in below.body
         if str(row) == f"DELETE {API}/sessions":
             return
         enough = asked(team, row, row.role)
         assert enough.status not in (401, 403), (row, enough.body)
         assert enough.status < 500, (row, enough.body)
+
+    def test_a_token_lets_in_with_its_scope_and_with_no_other(self, team: Team) -> None:
+        for row in GUARDED:
+            scope = OTHERWISE.get(str(row), SCOPE_OF[row.role])
+            private = row.path.removeprefix(API).startswith(OF_PEOPLE)
+            others = tuple(s for s in Scope if private or s not in (scope, Scope.READ))
+            lacks = asked(team, row, None, Authorization=team.bearer(*others), Origin="")
+            if scope == "read" and not private:
+                assert lacks.status not in (401, 403), (row, lacks.body)
+                continue
+            assert lacks.status == 403, (row, lacks.body)
+            says = "no token may do this" if private else f"this token lacks the scope {scope};"
+            assert row.kind == "stream" or says.encode() in lacks.body, (row, lacks.body)
+            if not private:
+                enough = asked(team, row, None, Authorization=team.bearer(scope), Origin="")
+                peoples = b"no token makes people" in enough.body
+                assert enough.status not in (401, 403) or peoples, (row, enough.body)
+
+    def test_a_token_may_no_more_than_its_person(self, team: Team) -> None:
+        every = tuple(Scope)
+        for role in RANKS[1:]:
+            bearer = team.bearer(*every, role=role)
+            for row in (
+                r for r in GUARDED if r.kind == "body" and r.role not in ("none", "viewer")
+            ):
+                answer = asked(team, row, None, Authorization=bearer, Origin="")
+                if RANKS.index(role) >= RANKS.index(row.role):
+                    assert answer.status != 403, (role, row, answer.body)
+                else:
+                    assert answer.status in (403, 404), (role, row, answer.body)
 
     @pytest.mark.parametrize("row", [r for r in rows() if r.role == "everybody"], ids=str)
     def test_what_is_open_answers_strangers(self, team: Team, row: Row) -> None:
@@ -209,7 +135,8 @@ class TestEveryRoute:
         self, team: Team, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """Should the table's addresses ever be read otherwise than the router reads them."""
-        monkeypatch.setattr(access._Rules, "find", lambda *_: (f"GET {API}/session", OPEN))
+        taken = access.Row(f"GET {API}/session", OPEN, {})
+        monkeypatch.setattr(access._Rules, "find", lambda *_: taken)
         assert team.ask("GET", f"{API}/datasets").status == 403
         assert team.ask("GET", "/metrics").status == 403
         assert team.ask("GET", f"{API}/session").status == 200
@@ -246,7 +173,8 @@ class TestSessions:
         from app.api.team import Team as Way
 
         settings = Settings(home=tmp_path, team=True, url="https://touchline.example.org")
-        way = Way.of(settings, None)  # type: ignore[arg-type]
+        with closing(Store.open(settings)) as store:
+            way = Way.of(settings, store)
         assert way is not None
         assert way.cookie.startswith("__Host-")
         assert way.cookie_values("x")["secure"] is True
@@ -369,10 +297,13 @@ class TestWhoActs:
 
 
 class TestStreams:
-    @pytest.mark.parametrize("ends", ["disabled", "logged out"])
-    def test_an_open_stream_ends_with_its_session(self, team: Team, ends: str) -> None:
+    @pytest.mark.parametrize("ends", ["disabled", "logged out", "nobody looks"])
+    def test_an_open_stream_ends_with_its_session(
+        self, team: Team, ends: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         name = f"hears-{ends.replace(' ', '-')}"
-        cookie = team.add(name, Role.VIEWER)
+        looked = ends != "nobody looks"
+        cookie = team.add(name, Role.VIEWER) if looked else team.cookies["viewer"]
         connection = http.client.HTTPConnection(team.address.partition("//")[2], timeout=SECONDS)
         connection.request("GET", f"{API}/events", headers={"Cookie": cookie})
         answer = connection.getresponse()
@@ -381,20 +312,68 @@ class TestStreams:
         if ends == "disabled":
             person = find_person(team.store, name)
             change_person(team.store, person.id, actor="local", disabled=True)
-        else:
+        elif ends == "logged out":
             team.ask("DELETE", f"{API}/session", role=name)
+        else:
+            monkeypatch.setattr(access.Access, "_still_may", None)
         # It says every now and then that it is still there.
         until = time.monotonic() + SECONDS
         while answer.read1(1000):
             assert time.monotonic() < until, "it goes on"
         connection.close()
-        assert team.ask("GET", f"{API}/events", Cookie=cookie).status == 401
+        if looked:
+            assert team.ask("GET", f"{API}/events", Cookie=cookie).status == 401
+
+    def test_it_tells_of_what_is_seen_and_of_no_more_than_that(self, team: Team) -> None:
+        """One dataset of two; and of none, some time after the role in it was taken away."""
+        ids = [ensure_dataset(team.store, name, "local") for name in ("heard", "unheard")]
+        cookie = team.add("listens", Role.NONE)
+        person = find_person(team.store, "listens").id
+        give_role(team.store, "heard", person, Role.VIEWER, actor="local")
+
+        opened = ExitStack()
+
+        def listening() -> http.client.HTTPResponse:
+            where = team.address.partition("//")[2]
+            connection = http.client.HTTPConnection(where, timeout=SECONDS)
+            opened.callback(connection.close)
+            connection.request("GET", f"{API}/events", headers={"Cookie": cookie})
+            answer = connection.getresponse()
+            assert answer.readline().startswith(b":")
+            return answer
+
+        def say(who: str) -> None:
+            with team.store.write() as session:
+                for key in ids[::-1]:
+                    append(session, [Entry("policy", who, now(), {}, dataset_id=key)])
+
+        def heard(answer: http.client.HTTPResponse) -> bytes:
+            line = b":"
+            while line and not line.startswith(b"data:"):
+                line = answer.readline()
+            return line
+
+        with opened:
+            answer = listening()
+            say("first")
+            assert b'"heard"' in (line := heard(answer)) and b"first" in line
+            give_role(team.store, "heard", person, None, actor="local")
+            assert heard(answer) == b"", "it ends, to be asked for again with other rights"
+            again = listening()
+            say("second")
+            give_role(team.store, "heard", person, Role.VIEWER, actor="local")
+            assert heard(again) == b""
+            third = listening()
+            say("third")
+            assert b"third" in (line := heard(third)) and b'"heard"' in line
 
     def test_it_goes_on_while_the_session_does(self, team: Team) -> None:
-        connection = http.client.HTTPConnection(team.address.partition("//")[2], timeout=1)
+        connection = http.client.HTTPConnection(team.address.partition("//")[2], timeout=SECONDS)
         headers = {"Cookie": team.cookies["viewer"]}
         connection.request("GET", f"{API}/events", headers=headers)
         answer = connection.getresponse()
+        assert connection.sock is not None
+        connection.sock.settimeout(1)
         with pytest.raises(TimeoutError):
             answer.read()
         connection.close()

@@ -8,9 +8,21 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tests.torture import commands, conditions, crowd, flood, kills, power, upgrades
+from tests.torture import (
+    cluster,
+    commands,
+    conditions,
+    crowd,
+    flood,
+    kills,
+    people,
+    power,
+    upgrades,
+)
 
 SEED = 20260101
+PEOPLES_GROUPS = 300
+"""So many that a team of fifty finds work for forty seconds."""
 
 
 def main() -> int:
@@ -86,17 +98,71 @@ def _commands(folder: Path, asked: argparse.Namespace) -> list[str]:
     return found.faults
 
 
+def _pictures(folder: Path, asked: argparse.Namespace) -> list[str]:
+    found = commands.torture(
+        folder / "pictures",
+        kills=asked.command_kills,
+        groups=max(2, asked.groups // 6),
+        seed=asked.seed,
+        commands=commands.PICTURES,
+        pictures=True,
+        tell=print,
+    )
+    print(f"{found.commands} commands on pictures, {found.kills} kills: {len(found.faults)} faults")
+    return found.faults
+
+
+def _cluster(folder: Path, asked: argparse.Namespace) -> list[str]:
+    found = cluster.torture(
+        folder / "cluster",
+        kills=4 * asked.command_kills,
+        groups=2 * asked.groups,
+        seed=asked.seed,
+        tell=print,
+    )
+    print(
+        f"{found.commands} times solved on a cluster, {found.kills} of its members killed: "
+        f"{len(found.faults)} faults"
+    )
+    return found.faults
+
+
 def _crowd(folder: Path, asked: argparse.Namespace) -> list[str]:
     home = folder / "crowd"
     kills.prepare(home, folder / "crowd-files", clients=1, groups=60)
     faults = []
-    for people in (1, asked.people):
+    for number in (1, asked.people):
+        # Somebody who says what was said before changes nothing, and is no entry of a history.
+        seed = asked.seed + 1000 * number
         found = crowd.crowd(
-            home, people=people, seconds=asked.seconds, think=asked.think, seed=asked.seed
+            home, people=number, seconds=asked.seconds, think=asked.think, seed=seed
         )
         print("\n".join(found.lines()))
         faults += found.faults
     return faults
+
+
+def _people(folder: Path, asked: argparse.Namespace) -> list[str]:
+    prepared = folder / "people"
+    kills.prepare(prepared, folder / "people-files", clients=1, groups=PEOPLES_GROUPS)
+    loads = []
+    for team in (False, True):
+        home = Path(shutil.copytree(prepared, folder / f"people-{team}"))
+        found = people.people(
+            home,
+            people=asked.people,
+            seconds=asked.seconds,
+            think=asked.think,
+            seed=asked.seed,
+            team=team,
+        )
+        print("in a team, with leases:" if team else "without accounts and leases:")
+        print("\n".join([*people.told(found.costs), *found.lines()]))
+        loads.append(found)
+    lines, ratio = people.compare(*loads)
+    print("\n".join(lines))
+    slow = [f"p99 is {ratio:.2f} times that of the same load alone"] if ratio > people.RATIO else []
+    return [*loads[0].faults, *loads[1].faults, *slow]
 
 
 def _flood(folder: Path, asked: argparse.Namespace) -> list[str]:
@@ -120,7 +186,10 @@ PARTS = {
     "kills": _kills,
     "cuts": _cuts,
     "commands": _commands,
+    "pictures": _pictures,
+    "cluster": _cluster,
     "crowd": _crowd,
+    "people": _people,
     "flood": _flood,
     "conditions": _conditions,
     "upgrades": _upgrades,

@@ -23,6 +23,7 @@ from app.datasets.manifest import MANIFEST
 from app.review.editing.doctor import examine
 from app.store.session import Store
 from tests.e2e.service import ROOT, SERVE, run_touchline
+from tests.starting import Process
 
 COMMANDS = (
     "import soccernet-v3 {tree} --dataset torture",
@@ -32,11 +33,24 @@ COMMANDS = (
     "datasets delete torture --yes",
 )
 """One after the other, each on what the last one left."""
+PICTURES = (
+    "import soccernet-v3 {tree} --dataset torture --policy touchline",
+    "paint torture",
+    "solve --dataset torture --workers 2",
+    "propose --dataset torture",
+    "freeze first --dataset torture --groups passing",
+    "verify first --dataset torture --workers 2",
+)
+"""The same where the pictures count; in each group one view has no line, another a single one."""
 CONTENTS = {
     "groups": "SELECT key, inputs_hash, source_hash FROM groups ORDER BY key",
     "solutions": "SELECT g.key, s.inputs_hash, s.policy_hash, s.summary, hex(s.body)"
     " FROM solution s JOIN groups g ON g.id = s.group_id ORDER BY 1, 2, 3",
     "calibrations": "SELECT key, hex(body) FROM calibration ORDER BY key",
+    "paint": "SELECT digest, reason, hex(body) FROM paint_evidence ORDER BY digest",
+    "proposals": "SELECT g.key, v.key, p.outcome, p.sentence, p.lines, p.beside, p.frame, p.sought_with"
+    " FROM proposal p"
+    " JOIN view v ON v.id = p.view_id JOIN groups g ON g.id = v.group_id ORDER BY 1, 2",
     "queue": "SELECT key, solved, passes, findings, value FROM queue ORDER BY key",
     "versions": "SELECT name, hash FROM version ORDER BY name",
     "log": "SELECT kind, count(*) FROM log GROUP BY kind ORDER BY kind",
@@ -63,6 +77,7 @@ def torture(
     groups: int,
     seed: int,
     commands: tuple[str, ...] = COMMANDS,
+    pictures: bool = False,
     tell: Callable[[str], None] = lambda _sentence: None,
 ) -> Report:
     """Give each command once undisturbed, and once with that many kills before it may end.
@@ -73,12 +88,16 @@ def torture(
         groups: Size of the dataset.
         seed: Decides about the moments.
         commands: Which ones, in order.
+        pictures: Whether the dataset has its frames, and views without enough lines.
         tell: Called with each sentence worth reading.
     """
     shutil.rmtree(folder, ignore_errors=True)
     tree = folder / "tree"
     calm, killed = folder / "calm", folder / "killed"
-    run_touchline(calm, "migrate", f"sample --workers 1 --groups {groups} --labels-only {tree}")
+    whole = "" if pictures else "--labels-only "
+    run_touchline(calm, "migrate", f"sample --workers 1 --groups {groups} {whole}{tree}")
+    if pictures:
+        _take_lines_away(tree)
     shutil.copytree(calm, killed)
     report, chance = Report(), random.Random(seed)
     for command in commands:
@@ -96,10 +115,24 @@ def torture(
         refusal = _run(killed, _filled(command, tree, killed))
         report.commands += 1
         name = command.split(" ", 1)[0]
-        found = [f"{name}: {fault} {refusal}".strip() for fault in _differences(calm, killed)]
+        found = [f"{name}: {fault} {refusal}".strip() for fault in differences(calm, killed)]
         report.faults += found
         tell(f"{name} after {kills} kills: {'; '.join(found) or 'the same'}")
+    if pictures:
+        report.faults += [
+            f"no {name} to compare" for name in ("paint", "proposals") if _is_empty(calm, name)
+        ]
     return report
+
+
+def _take_lines_away(tree: Path) -> None:
+    """Leave the first replay of each group without a line, and one line to the second."""
+    for path in tree.rglob("Labels-v3.json"):
+        labels = json.loads(path.read_text("utf-8"))
+        for name, replay in labels["replays"].items():
+            if name.endswith(("_1.png", "_2.png")):
+                replay["lines"] = replay["lines"][: name.endswith("_2.png")]
+        path.write_text(json.dumps(labels), "utf-8")
 
 
 def _filled(command: str, tree: Path, home: Path) -> str:
@@ -108,7 +141,7 @@ def _filled(command: str, tree: Path, home: Path) -> str:
 
 def _run(home: Path, command: str, kill_after: float | None = None) -> str:
     """Run a command, to its end or until it is killed; returns why it was refused, if it was."""
-    process = subprocess.Popen(
+    process = Process(
         [sys.executable, "-c", SERVE, *command.split(" ")],
         cwd=ROOT,
         env={**os.environ, "TOUCHLINE_HOME": str(home)},
@@ -126,7 +159,7 @@ def _run(home: Path, command: str, kill_after: float | None = None) -> str:
     return errors if process.returncode else ""
 
 
-def _differences(calm: Path, killed: Path) -> list[str]:
+def differences(calm: Path, killed: Path) -> list[str]:
     """What the two homes do not have in common, and what the doctor finds."""
     one, two = _contents(calm), _contents(killed)
     faults = [f"{name} differ" for name in one if one[name] != two[name]]
@@ -163,6 +196,15 @@ def _timeless(path: Path) -> bytes:
         return {key: value for key, value in said.items() if key not in TIMES}
 
     return json.dumps(json.loads(content, object_hook=without_times)).encode()
+
+
+def _is_empty(home: Path, name: str) -> bool:
+    store = Store.open(Settings(home=home))
+    try:
+        with store.read() as session:
+            return session.execute(text(CONTENTS[name])).first() is None
+    finally:
+        store.close()
 
 
 def _digest(content: bytes) -> str:

@@ -33,6 +33,8 @@ class Load:
     statuses: Counter[int] = field(default_factory=Counter)
     milliseconds: dict[str, list[float]] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
+    costs: dict[str, np.ndarray] = field(default_factory=dict)
+    """What each kind of request costs by itself (``counting``), where it was measured."""
 
     def percentiles(self, kind: str) -> tuple[float, float, float]:
         """p50, p95 and p99 of one kind of request."""
@@ -66,8 +68,9 @@ class Person(threading.Thread):
         self._random = random.Random(seed)
 
     def run(self) -> None:
-        """Work until the time is over."""
+        """Come in, not all at the same moment, and work until the time is over."""
         try:
+            self._pause()
             while time.monotonic() < self._until:
                 self._work(self._random.choice(self._groups))
         except Exception as error:

@@ -28,6 +28,7 @@ from app.review.editing.doctor import examine
 from app.store.log import read_log
 from app.store.session import Store
 from tests.e2e.service import ROOT, SERVE, free_port, run_touchline
+from tests.starting import Process
 
 API = "/api/v1"
 START_SECONDS = 120.0
@@ -94,8 +95,10 @@ class Server:
             "TOUCHLINE_HOME": str(self._home),
             "TOUCHLINE_PORT": str(self.port),
         }
+        # What is planted must be there before what it changes is loaded.
+        start = subprocess.Popen if self._plant else Process
         with self._log.open("ab") as log:
-            self._process = subprocess.Popen(
+            self._process = start(
                 [sys.executable, "-c", f"{self._plant}\n{SERVE}", "serve"],
                 cwd=ROOT,
                 env=environment,

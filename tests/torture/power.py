@@ -34,10 +34,10 @@ from app.review.editing.edit import SetBall
 from app.review.editing.submit import load, submit
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
-from app.store import engine
+from app.store.dialect import sqlite
 from app.store.session import Store
 
-engine.PRAGMAS["synchronous"] = {"FULL": ("FULL", 2), "NORMAL": ("NORMAL", 1)}[sys.argv[3]]
+sqlite.PRAGMAS["synchronous"] = {"FULL": ("FULL", 2), "NORMAL": ("NORMAL", 1)}[sys.argv[3]]
 store = Store.open(Settings(home=Path(sys.argv[1])))
 state = load(store, 1)
 view = state.stored.group.views[0].key

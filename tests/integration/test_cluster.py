@@ -1,0 +1,52 @@
+"""A cluster of real processes, over TLS: what it solves is what one process solves."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import time
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from app.errors import ClusterError
+from app.review.datasets.cluster import Cluster, Place
+from tests.certificates import write_keys
+from tests.e2e.service import run_touchline
+from tests.torture.cluster import members
+from tests.torture.commands import differences
+from tests.waiting import SECONDS
+
+GROUPS = 14
+
+
+def solutions(home: Path) -> int:
+    with closing(sqlite3.connect(home / "touchline.db")) as database:
+        return int(database.execute("SELECT count(*) FROM solution").fetchone()[0])
+
+
+def test_a_scheduler_that_goes_and_comes_back_costs_no_group(tmp_path: Path) -> None:
+    alone, shared, tree = (tmp_path / name for name in ("alone", "shared", "tree"))
+    run_touchline(
+        alone,
+        "migrate",
+        f"sample --workers 1 --groups {GROUPS} --labels-only {tree}",
+        f"import soccernet-v3 {tree} --dataset torture",
+    )
+    shutil.copytree(alone, shared)
+    run_touchline(alone, "solve --dataset torture --workers 1")
+    keys = write_keys(tmp_path / "keys")
+    with members(shared, tmp_path, workers=1, keys=keys) as cluster:
+        cluster.wait_for_workers()
+        stranger = Place(cluster.address, write_keys(tmp_path / "others", "stranger"))
+        with pytest.raises(ClusterError, match="no scheduler answers"):
+            Cluster(stranger)
+        cluster.start("solve")
+        until = time.monotonic() + SECONDS
+        while not solutions(shared) and not cluster.is_done and time.monotonic() < until:
+            time.sleep(0.01)
+        cluster.restart("scheduler")
+        assert cluster.wait() == 0, cluster.said("solve")
+        assert "Traceback" not in cluster.said("solve")
+    assert differences(alone, shared) == []

@@ -1,0 +1,215 @@
+"""An S3 server for tests (moto), apart from the product's libraries, and a door before it that fails.
+
+The door counts what goes through, and does what stores do on bad days: refuses, hangs, cuts bodies off.
+"""
+
+from __future__ import annotations
+
+import http.client
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+from app.config import Settings, StoreSettings
+from app.object_store.store import ObjectStore, open_store
+from tests.waiting import SECONDS
+
+ROOT = Path(__file__).parents[1]
+MOTO = ROOT / ".moto"
+PROGRAM = "import sys; from moto.server import main; main(['-H', '127.0.0.1', '-p', sys.argv[1]])"
+_SIGNED = "AWS4-HMAC-SHA256 Credential=k/20260101/us-east-1/s3/aws4_request, SignedHeaders=host, Signature=0"
+_GONE = {
+    "denied": (403, "AccessDenied"),
+    "expired": (400, "ExpiredToken"),
+    "broken": (503, "SlowDown"),
+}
+
+
+@dataclass
+class Door:
+    """What stands before the server.
+
+    Attributes:
+        mode: ``open``, ``denied``, ``expired``, ``broken``, ``hangs``, ``cuts`` or ``closed``.
+        sent: Bytes of bodies that went out to readers.
+        asked: Method and path of every request.
+    """
+
+    port: int
+    mode: str = "open"
+    sent: int = 0
+    asked: list[str] = field(default_factory=list)
+    writes_fail_after: int = -1
+    """So many writes go through, the next ones are refused; -1: all."""
+
+    @property
+    def endpoint(self) -> str:
+        """Its address."""
+        return f"http://127.0.0.1:{self.port}"
+
+    def reset(self) -> None:
+        """Open, nothing counted."""
+        self.mode, self.sent, self.writes_fail_after = "open", 0, -1
+        self.asked.clear()
+
+
+@contextmanager
+def moto_server() -> Iterator[Door]:
+    """A server with an empty bucket ``soccer-data``, behind a door."""
+    if not (MOTO / "ready").is_file():
+        pytest.fail("The S3 server of the tests is missing: run 'make moto'.", pytrace=False)
+    port = _free_port()
+    process = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(port)],
+        env={**os.environ, "PYTHONPATH": str(MOTO)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        _make_bucket(port, "soccer-data")
+        _make_bucket(port, "other-data")
+        with _door(port) as door:
+            yield door
+    finally:
+        process.kill()
+        process.wait()
+
+
+def store_settings(door: Door, **more: object) -> StoreSettings:
+    """The store ``soccer-data/frames`` behind a door, that gives up within seconds."""
+    values: dict[str, object] = {
+        "url": "s3://soccer-data/frames",
+        "endpoint": door.endpoint,
+        "key": "tests",
+        "secret": "of-tests",
+        "exports": True,
+        "seconds": 1.0,
+    }
+    return StoreSettings.model_validate({**values, **more})
+
+
+def stored_settings(home: Path, door: Door, **more: object) -> Settings:
+    """Settings of a home that has the store ``frames``."""
+    return Settings(home=home, stores={"frames": store_settings(door, **more)})
+
+
+def fill_store(settings: Settings, files: Path, below: str = "") -> ObjectStore:
+    """Put a folder's files into the store ``frames``."""
+    store = open_store(settings, "frames")
+    for path in sorted(files.rglob("*")):
+        if path.is_file():
+            name = path.relative_to(files).as_posix()
+            store.put(f"{below}/{name}".lstrip("/"), path.read_bytes())
+    return store
+
+
+def _free_port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+def _make_bucket(port: int, name: str) -> None:
+    end = time.monotonic() + SECONDS
+    while True:
+        with suppress(OSError):
+            line = http.client.HTTPConnection("127.0.0.1", port, timeout=SECONDS)
+            line.request("PUT", f"/{name}", headers={"Authorization": _SIGNED})
+            assert line.getresponse().status == 200
+            return
+        assert time.monotonic() < end, "the S3 server does not start"
+        time.sleep(0.05)
+
+
+@contextmanager
+def _door(behind: int) -> Iterator[Door]:
+    server = ThreadingHTTPServer(("127.0.0.1", 0), _Passing)
+    server.daemon_threads = True
+    door = Door(server.server_address[1])
+    server.door, server.behind = door, behind  # type: ignore[attr-defined]
+    thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
+    thread.start()
+    try:
+        yield door
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+class _Passing(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+
+    def __getattr__(self, name: str) -> object:
+        """Every method is passed on."""
+        if name.startswith("do_"):
+            return self._pass
+        raise AttributeError(name)
+
+    def handle_one_request(self) -> None:
+        with suppress(ConnectionError):
+            super().handle_one_request()
+
+    def _pass(self) -> None:
+        door: Door = self.server.door  # type: ignore[attr-defined]
+        body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
+        door.asked.append(f"{self.command} {self.path}")
+        mode = door.mode
+        if self.command in ("PUT", "POST") and door.writes_fail_after >= 0:
+            door.writes_fail_after -= 1
+            mode = "denied" if door.writes_fail_after < 0 else mode
+            door.writes_fail_after = max(door.writes_fail_after, 0)
+        if mode in _GONE:
+            self._refuse(*_GONE[mode])
+        elif mode == "closed":
+            self.close_connection = True
+            self.connection.shutdown(socket.SHUT_RDWR)
+        else:
+            if mode == "hangs":
+                time.sleep(3)
+            self._forward(door, body, cut=mode == "cuts")
+
+    def _refuse(self, status: int, code: str) -> None:
+        text = f"<Error><Code>{code}</Code><Message>secret-bucket-name</Message></Error>".encode()
+        self.send_response(status)
+        self.send_header("Content-Length", str(len(text)))
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(text)
+
+    def _forward(self, door: Door, body: bytes, *, cut: bool) -> None:
+        line = http.client.HTTPConnection("127.0.0.1", self.server.behind, timeout=SECONDS)  # type: ignore[attr-defined]
+        headers = {name: value for name, value in self.headers.items() if name.lower() != "host"}
+        line.request(
+            self.command,
+            self.path,
+            body or None,
+            {**headers, "Host": f"127.0.0.1:{self.server.behind}"},
+        )
+        answer = line.getresponse()
+        data = answer.read()
+        self.send_response_only(answer.status)
+        for name, value in answer.getheaders():
+            if name.lower() not in ("transfer-encoding", "connection", "content-length"):
+                self.send_header(name, value)
+        length = answer.getheader("Content-Length") if self.command == "HEAD" else str(len(data))
+        self.send_header("Content-Length", length or "0")
+        self.end_headers()
+        if cut and len(data) > 1 and answer.status in (200, 206) and "list-type" not in self.path:
+            self.wfile.write(data[: len(data) // 2])
+            self.close_connection = True
+            return
+        self.wfile.write(data)
+        door.sent += len(data)
+
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002
+        """Nothing."""

@@ -1,0 +1,224 @@
+"""Two datasets side by side with something of everything, and people who see one of them."""
+
+from __future__ import annotations
+
+import json
+import time
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi import FastAPI
+from pwdlib import PasswordHash
+from pwdlib.hashers.argon2 import Argon2Hasher
+
+from app.api.application import create_app
+from app.api.security.about import BODY, QUERY, kind_of_path
+from app.config import Settings
+from app.review.editing.recompute import solve_dataset
+from app.review.importing.ingest import ingest
+from app.review.people import links, passwords
+from app.review.people.logins import Logins
+from app.review.people.members import give_role
+from app.review.people.people import invite
+from app.review.people.roles import Role
+from app.review.people.whereabouts import Kind
+from app.store.session import Store
+from tests.scenes import make_scenes
+from tests.security.table import Row
+
+with warnings.catch_warnings():
+    # It would rather use another HTTP client than the one that is installed.
+    warnings.simplefilter("ignore")
+    from starlette.testclient import TestClient
+
+API = "/api/v1"
+BASE = "http://127.0.0.1:8000"
+MINE, THEIRS = "mine", "theirs"
+NOTHING: Mapping[Kind, Any] = {
+    Kind.DATASET: "nothing of that name",
+    Kind.NEW_DATASET: "nothing of that name",
+    Kind.VERSION: "nothing of that name",
+    Kind.EXPORT: "88888888",
+    Kind.UPLOAD: "8" * 32,
+}
+NO_ID = 88888888
+SECRET = "three plain words"
+BODIES: Mapping[str, dict[str, Any]] = {
+    "POST /api/v1/groups/{group}/threads": {"text": "one"},
+    "POST /api/v1/exports": {"format": "soccernet-v3d", "all": True},
+    "POST /api/v1/imports": {"format": "soccernet-v3", "source": {}, "dry_run": True},
+    "POST /api/v1/predictions/accept": {"q": "", "dry_run": True},
+    "POST /api/v1/datasets/{dataset}/predictions": {"name": "p2", "format": "csv"},
+    "POST /api/v1/datasets/{dataset}/evaluations": {"groups": "all"},
+    "POST /api/v1/datasets/{dataset}/guidelines/pictures": {},
+}
+"""What else a body says that names something."""
+
+
+@dataclass(frozen=True)
+class Mentioned:
+    """A place of a request that names something, and of which kind."""
+
+    place: str
+    field: str
+    kind: Kind
+
+
+def mentioned(row: Row) -> list[Mentioned]:
+    """Every place where a request of a route names something that is in a dataset."""
+    found = []
+    if first := kind_of_path(str(row)):
+        found.append(Mentioned("path", *first))
+    found += [Mentioned("query", *item) for item in QUERY.get(str(row), {}).items()]
+    found += [Mentioned("body", *item) for item in BODY.get(str(row), {}).items() if _one(item[0])]
+    return found
+
+
+def _one(field: str) -> bool:
+    """Without those that are another name of the same kind of field."""
+    return field not in ("options/lines/upload", "images_upload", "cameras_upload", "careful")
+
+
+@dataclass
+class Apart:
+    """A server in this process, and what there is in both datasets, by kind."""
+
+    app: FastAPI
+    client: TestClient
+    cookies: dict[str, str] = field(default_factory=dict)
+    ids: dict[str, dict[Kind, Any]] = field(default_factory=lambda: {MINE: {}, THEIRS: {}})
+
+    @property
+    def store(self) -> Store:
+        store: Store = self.app.state.services.store
+        return store
+
+    def add(self, name: str, everywhere: Role, **single: Role) -> None:
+        """Somebody with a session."""
+        person, link = invite(self.store, name, everywhere, actor="local")
+        links.use(self.store, link.token, SECRET)
+        for dataset, role in single.items():
+            give_role(self.store, dataset, person.id, role, actor="local")
+        token = Logins(self.store).log_in(name, SECRET)
+        self.cookies[name] = f"touchline_session={token}"
+
+    def ask(self, name: str, method: str, target: str, body: Any = None, **headers: str) -> Any:
+        """The answer to somebody."""
+        sent = {"Origin": BASE, "Cookie": self.cookies[name], **headers}
+        content = body if isinstance(body, bytes) or body is None else json.dumps(body).encode()
+        if content is not None:
+            plain = isinstance(body, bytes)
+            sent["Content-Type"] = "application/octet-stream" if plain else "application/json"
+        return self.client.request(method, API + target, content=content, headers=sent)
+
+    def answer(self, name: str, row: Row, where: Mapping[str, str]) -> Any:
+        """The answer to a route, each of whose fields names something of a dataset, or nothing.
+
+        Args:
+            name: Who asks.
+            row: The route.
+            where: ``mine``, ``theirs`` or ``""`` (nothing) by name of the field.
+        """
+        path = {"prediction": str(NO_ID), "user": str(NO_ID), "figure": "sensitivity"}
+        path |= {"table": "sensitivity", "ending": "csv", "digest": "0" * 64}
+        query: list[str] = ["against=nothing"] if row.path.endswith("/diff") else []
+        body: Any = json.loads(json.dumps(BODIES.get(str(row), [])))
+        for item in mentioned(row):
+            value = self.value(item.kind, where[item.field])
+            if item.place == "path":
+                path[item.field] = str(value)
+            elif item.place == "query":
+                query.append(f"{item.field}={value}")
+            else:
+                *outer, last = item.field.split("/")
+                inner = body
+                for key in outer:
+                    inner = inner[key]
+                inner[last] = value
+        target = row.target(path).removeprefix(API) + ("?" + "&".join(query) if query else "")
+        sent = body if row.kind == "body" else None
+        return self.ask(name, row.method, target, sent)
+
+    def value(self, kind: Kind, where: str) -> Any:
+        """The id of something of a kind; of nothing without a dataset."""
+        if where:
+            return self.ids[where][Kind.DATASET if kind is Kind.NEW_DATASET else kind]
+        return NOTHING.get(kind, NO_ID)
+
+    def done(self, answer: Any) -> Any:
+        """The result of a job that was asked for."""
+        assert answer.status_code == 202, answer.text
+        number = answer.json()["id"]
+        for _ in range(600):
+            job = self.ask("admin", "GET", f"/jobs/{number}").json()
+            if job["state"] in ("done", "failed"):
+                assert job["state"] == "done", job
+                return job
+            time.sleep(0.02)
+        raise AssertionError("a job does not end")
+
+    def fill(self) -> None:
+        """Something of everything in both datasets."""
+        group = make_scenes(groups=1, seed=3, faults=False)[0].group
+        for name in (MINE, THEIRS):
+            ingest(self.store, name, [group], source="files", actor="local")
+            solve_dataset(self.store, name)
+        rows = f"image,x,y,w,h,score\n{group.match}/{group.views[0].key},600,300,9,9,0.5\n"
+        for number, name in enumerate((MINE, THEIRS), start=1):
+            found = self.ids[name]
+            found |= {Kind.DATASET: name, Kind.GROUP: number}
+            document = self.ask("admin", "GET", f"/groups/{number}").json()
+            found[Kind.VIEW] = document["views"][0]["id"]
+            found[Kind.STATION] = document["views"][0]["station"]["id"]
+            self._fill(name, rows)
+
+    def _fill(self, name: str, rows: str) -> None:
+        found, at = self.ids[name], f"/datasets/{name}"
+        owner = "mine-lead" if name == MINE else "other-lead"
+        upload = self.ask(owner, "POST", f"/uploads?name={name}.csv", rows.encode())
+        found[Kind.UPLOAD] = upload.json()["id"]
+        body = {"name": "p1", "upload": found[Kind.UPLOAD], "format": "csv"}
+        found[Kind.PREDICTIONS] = self.ask(owner, "POST", f"{at}/predictions", body).json()["id"]
+        body = {"predictions": found[Kind.PREDICTIONS], "groups": "all"}
+        run = self.done(self.ask(owner, "POST", f"{at}/evaluations", body))
+        found[Kind.EVALUATION] = run["result"]["evaluation"]
+        body = {"dataset": name, "format": "soccernet-v3d", "all": True}
+        export = self.done(self.ask(owner, "POST", "/exports", body))
+        found[Kind.JOB] = run["id"]
+        found[Kind.EXPORT] = str(export["id"])
+        body = {"name": "same", "groups": "passing", "split": {"kind": "given"}}
+        frozen = self.done(self.ask(owner, "POST", f"{at}/versions", body))
+        found[Kind.VERSION] = str(frozen["result"]["version"])
+        body = {"name": f"view of {name}", "q": "status:unreviewed"}
+        if name == MINE:
+            # Ids of different kinds shall not be the same by accident.
+            for spare in ("one", "two"):
+                self.ask(owner, "POST", f"{at}/saved-views", {**body, "name": spare})
+        found[Kind.SAVED_VIEW] = self.ask(owner, "POST", f"{at}/saved-views", body).json()["id"]
+        given = self.ask(owner, "POST", f"{at}/verdicts", {"q": "", "state": "deferred"})
+        found[Kind.BATCH] = given.json()["batch"]
+        for spare in (f"work of {name}", "spare one", "spare two"):
+            body = {"name": spare, "skip_given": False}
+            made = self.ask(owner, "POST", f"{at}/batches", body)
+        found[Kind.WORK] = made.json()["id"]
+        assert all(found.values()), found
+
+
+@contextmanager
+def opened(home: Path) -> Iterator[Apart]:
+    """A server of a team over an empty home, whose passwords cost nothing."""
+    settings = Settings(home=home, team=True)
+    Store.open(settings).close()
+    cheap = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(passwords, "HASHER", cheap)
+        passwords._nobodys.cache_clear()
+        app = create_app(settings)
+        with TestClient(app, base_url=BASE, raise_server_exceptions=False) as client:
+            yield Apart(app, client)
+        passwords._nobodys.cache_clear()

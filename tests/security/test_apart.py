@@ -1,0 +1,270 @@
+"""Every route with every role in one dataset: another one is not there, whatever is asked of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from app.api.security.about import BODY, EVERYWHERE, FIXED, LISTS, QUERY, is_known, kind_of_path
+from app.api.security.rules import RULES
+from app.review.people.roles import Action, Role
+from app.review.people.whereabouts import Kind
+from app.store.jobs import NewJob, insert_job, update_job
+from tests.security.apart import (
+    API,
+    MINE,
+    NO_ID,
+    THEIRS,
+    Apart,
+    mentioned,
+    opened,
+)
+from tests.security.table import Row, rows
+
+RANKS = [role.value for role in Role]
+DATA = [
+    row
+    for row in rows()
+    if RULES.get(str(row)) not in (None, Action.ACCOUNT, Action.ADMINISTER) and row.kind != "stream"
+]
+"""Routes about datasets. An open stream has a test of its own."""
+ABOUT = [row for row in DATA if mentioned(row)]
+
+
+@pytest.fixture(scope="module")
+def apart(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Apart]:
+    with opened(tmp_path_factory.mktemp("apart")) as made:
+        made.add("admin", Role.ADMIN)
+        made.add("mine-lead", Role.LEAD)
+        made.add("other-lead", Role.LEAD)
+        made.fill()
+        for role in ("viewer", "annotator", "reviewer", "lead"):
+            made.add(role, Role.NONE, **{MINE: Role(role)})
+        made.add("all-but", Role.LEAD, **{THEIRS: Role.NONE})
+        yield made
+
+
+def plain(answer: Any, apart: Apart, where: str) -> tuple[int, str]:
+    """An answer without what is of this one request."""
+    text = re.sub(r"urn:uuid:[0-9a-f-]+", "", answer.text)
+    for kind in Kind:
+        value = str(apart.value(kind, where))
+        text = re.sub(rf"(?<![\w-]){re.escape(value)}(?![\w-])", "*", text)
+    return answer.status_code, text
+
+
+class TestLists:
+    @pytest.mark.parametrize("path", ["/datasets", "/jobs", "/exports", "/uploads"])
+    def test_a_list_has_what_one_sees_and_counts_nothing_else(
+        self, apart: Apart, path: str
+    ) -> None:
+        every = apart.ask("admin", "GET", path).json()["items"]
+        seen = apart.ask("lead" if path == "/uploads" else "viewer", "GET", path).json()["items"]
+        assert THEIRS in str(every)
+        assert THEIRS not in str(seen)
+        if path == "/uploads":
+            assert seen == []
+            assert len(apart.ask("mine-lead", "GET", path).json()["items"]) == 1
+        else:
+            assert 0 < len(seen) < len(every)
+
+    def test_a_job_that_has_no_dataset_yet_is_its_makers(self, apart: Apart) -> None:
+        upload = apart.ask("other-lead", "POST", "/uploads?name=new.zip", b"PK").json()["id"]
+        body = {"format": "soccernet-v3", "source": {"upload": upload}, "dry_run": True}
+        asked = apart.ask("other-lead", "POST", "/imports", {"dataset": "brand new", **body})
+        number = asked.json()["id"]
+        for name, seen in (("lead", False), ("mine-lead", False), ("other-lead", True)):
+            listed = [one["id"] for one in apart.ask(name, "GET", "/jobs").json()["items"]]
+            assert (number in listed) is seen, name
+            status = apart.ask(name, "GET", f"/jobs/{number}").status_code
+            assert status == (200 if seen else 404), name
+        assert apart.ask("mine-lead", "GET", f"/uploads/{upload}").status_code == 404
+
+    def test_what_is_left_of_a_dataset_that_is_gone_is_for_admins(self, apart: Apart) -> None:
+        new = NewJob("solve", "Solve what is gone", "other-lead", dataset_id=NO_ID)
+        with apart.store.write() as session:
+            number = insert_job(session, new)
+            update_job(session, number, state="done")
+        for name, seen in (("all-but", False), ("other-lead", False), ("admin", True)):
+            listed = [one["id"] for one in apart.ask(name, "GET", "/jobs").json()["items"]]
+            assert (number in listed) is seen, name
+            status = apart.ask(name, "GET", f"/jobs/{number}").status_code
+            assert status == (200 if seen else 404), name
+
+    def test_a_version_of_a_name_that_two_have_is_the_one_that_is_seen(self, apart: Apart) -> None:
+        assert apart.ask("admin", "GET", "/versions/same").status_code == 400
+        seen = apart.ask("viewer", "GET", "/versions/same")
+        assert (seen.status_code, seen.json()["dataset"]) == (200, MINE)
+        assert apart.ask("viewer", "GET", f"/versions/same?dataset={THEIRS}").status_code == 404
+
+    def test_a_person_of_no_role_sees_an_empty_server(self, apart: Apart) -> None:
+        apart.add("nobody-yet", Role.NONE)
+        for path in ("/datasets", "/jobs", "/exports"):
+            assert apart.ask("nobody-yet", "GET", path).json()["items"] == []
+        assert apart.ask("nobody-yet", "POST", "/practice", {}).status_code == 403
+        assert apart.ask("nobody-yet", "GET", "/session").json()["role"] == "none"
+
+
+class TestMatrix:
+    @pytest.mark.parametrize("row", ABOUT, ids=str)
+    def test_what_is_of_another_dataset_is_as_what_is_not_there(
+        self, apart: Apart, row: Row
+    ) -> None:
+        """Field by field, the others naming something of one's own."""
+        for item in mentioned(row):
+            if item.kind is Kind.NEW_DATASET:
+                continue
+            for name in ("viewer", "lead", "all-but"):
+                told = []
+                for where in (THEIRS, ""):
+                    named = {one.field: MINE for one in mentioned(row)} | {item.field: where}
+                    if item.field == "dataset" and item.place == "query" and row.kind != "change":
+                        named = dict.fromkeys(named, where)
+                    told.append(plain(apart.answer(name, row, named), apart, where))
+                assert told[0] == told[1], (row, item, name)
+                assert told[0][0] in (403, 404, 422, 428), (row, item, name, told)
+                assert told[0][0] != 403 or name == "viewer", (row, item, name, told)
+
+    @pytest.mark.parametrize("row", sorted(ABOUT, key=lambda row: row.method == "DELETE"), ids=str)
+    def test_ones_own_is_there_for_whom_the_role_suffices(self, apart: Apart, row: Row) -> None:
+        where = {item.field: MINE for item in mentioned(row)}
+        least = RANKS.index(row.role)
+        mine = {Kind.UPLOAD, Kind.NEW_DATASET} & {item.kind for item in mentioned(row)}
+        if least > RANKS.index("viewer") and not mine:
+            below = apart.answer(RANKS[least - 1], row, where)
+            assert below.status_code == 403, (row, below.text)
+            assert f"needs the role {row.role}" in below.text
+        # An upload is its sender's, who is lead everywhere.
+        enough = apart.answer("mine-lead" if mine else row.role, row, where)
+        assert enough.status_code not in (401, 403), (row, enough.text)
+        if enough.status_code == 404:
+            # It has no picture, is no lesson, has no such prediction: said of what is there.
+            nothing = apart.answer(row.role, row, dict.fromkeys(where, ""))
+            assert plain(enough, apart, MINE) != plain(nothing, apart, ""), (row, enough.text)
+        assert enough.status_code < 500, (row, enough.text)
+        assert THEIRS not in enough.text, (row, enough.text)
+
+    @pytest.mark.parametrize("row", [row for row in DATA if not mentioned(row)], ids=str)
+    def test_what_is_about_no_dataset_tells_of_none_that_is_not_seen(
+        self, apart: Apart, row: Row
+    ) -> None:
+        for name in ("viewer", "all-but"):
+            answer = apart.answer(name, row, {})
+            assert answer.status_code not in (401, 404), (row, answer.text)
+            assert THEIRS not in answer.text, (row, answer.text)
+
+
+class TestNewDatasets:
+    def test_whoever_leads_one_dataset_makes_no_other_and_learns_of_none(
+        self, apart: Apart
+    ) -> None:
+        upload = apart.ask("lead", "POST", "/uploads?name=a.zip", b"PK").json()["id"]
+        body = {"format": "soccernet-v3", "source": {"upload": upload}, "dry_run": True}
+        told = []
+        for dataset in (THEIRS, "quite new"):
+            answer = apart.ask("lead", "POST", "/imports", {"dataset": dataset, **body})
+            told.append((answer.status_code, re.sub("urn:uuid:.{36}", "", answer.text)))
+        assert told[0] == told[1]
+        assert told[0][0] == 403
+        assert apart.ask("lead", "POST", "/imports", {"dataset": MINE, **body}).status_code == 202
+        taken = apart.ask("all-but", "POST", "/imports", {"dataset": THEIRS, **body})
+        assert taken.status_code in (403, 404)
+
+    def test_folders_of_the_operator_are_for_leads_of_all_datasets(self, apart: Apart) -> None:
+        upload = apart.ask("lead", "POST", "/uploads?name=b.zip", b"PK").json()["id"]
+        folder, sent = {"folder": "x"}, {"upload": upload}
+        for source, options in ((folder, {}), (sent, {"lines": folder})):
+            body = {"dataset": MINE, "format": "issia", "source": source, "options": options}
+            refused = apart.ask("lead", "POST", "/imports", {**body, "dry_run": True})
+            assert (refused.status_code, "in all datasets" in refused.text) == (403, True)
+        asked = {"dataset": MINE, "format": "issia", "source": folder, "dry_run": True}
+        assert apart.ask("mine-lead", "POST", "/imports", asked).status_code not in (202, 403)
+
+
+class TestMembers:
+    def test_a_lead_gives_roles_in_their_own_dataset_alone_and_never_to_themselves(
+        self, apart: Apart
+    ) -> None:
+        apart.add("newcomer", Role.NONE)
+        people = apart.ask("lead", "GET", f"/datasets/{MINE}/members").json()["items"]
+        ids = {one["name"]: one["id"] for one in people}
+        at, role = f"/datasets/{MINE}/members", {"role": "reviewer"}
+        assert apart.ask("newcomer", "GET", "/groups/1").status_code == 404
+        given = apart.ask("lead", "PUT", f"{at}/{ids['newcomer']}", role)
+        assert (given.status_code, given.json()["role"]) == (200, "reviewer")
+        assert apart.ask("newcomer", "GET", "/groups/1").status_code == 200
+        assert apart.ask("newcomer", "GET", "/groups/2").status_code == 404
+        assert apart.ask("lead", "PUT", f"{at}/{ids['lead']}", role).status_code == 403
+        assert (
+            apart.ask("lead", "PUT", f"{at}/{ids['newcomer']}", {"role": "admin"}).status_code
+            == 400
+        )
+        assert apart.ask("lead", "PUT", f"{at}/{ids['admin']}", role).status_code == 409
+        theirs = f"/datasets/{THEIRS}/members/{ids['newcomer']}"
+        assert apart.ask("lead", "PUT", theirs, role).status_code == 404
+        assert apart.ask("reviewer", "PUT", f"{at}/{ids['newcomer']}", role).status_code == 403
+        taken = apart.ask("lead", "PUT", f"{at}/{ids['newcomer']}", {"role": None})
+        assert taken.json()["role"] == "none"
+        assert apart.ask("newcomer", "GET", "/groups/1").status_code == 404
+
+    def test_the_session_says_where_somebody_is_what(self, apart: Apart) -> None:
+        told = apart.ask("all-but", "GET", "/session").json()
+        assert (told["role"], told["datasets"]) == ("lead", [])
+        told = apart.ask("viewer", "GET", "/session").json()
+        assert [(one["dataset"], one["role"]) for one in told["datasets"]] == [(MINE, "viewer")]
+        assert told["allows"]["viewer"] == ["account", "describe", "read"]
+
+
+class TestTables:
+    def test_somebody_has_decided_what_each_route_is_about(self) -> None:
+        """A new route of data stands in none of them, and is refused until it does."""
+        undecided = [str(row) for row in DATA if not is_known(str(row))]
+        assert undecided == []
+
+    def test_nothing_is_decided_about_what_is_no_route(self) -> None:
+        known = {str(row) for row in rows()}
+        assert {*QUERY, *BODY, *LISTS, *EVERYWHERE, *FIXED} <= known
+
+    def test_whatever_names_a_thing_is_looked_at(self, apart: Apart) -> None:
+        """Parameters and fields of the OpenAPI document with the name of a kind of thing."""
+        told = {kind.value for kind in Kind} | {"with", "careful", "views", "against"}
+        # Looked for in the dataset that the same request names.
+        within = {"version", "views", "against"}
+        # The key of a view of the group that the address names.
+        keys = {("POST /api/v1/groups/{group}/threads", "view")}
+        document = apart.ask("admin", "GET", "/openapi.json").json()
+        schemas = document["components"]["schemas"]
+        missed = []
+        for path, operations in document["paths"].items():
+            for method, operation in operations.items():
+                route = f"{method.upper()} {path}"
+                if RULES.get(route) in (None, Action.ACCOUNT, Action.ADMINISTER):
+                    continue
+                named = {
+                    item["name"]
+                    for item in operation.get("parameters", [])
+                    if item["in"] == "query"
+                }
+                body = operation.get("requestBody", {}).get("content", {}).get("application/json")
+                if body and "$ref" in body["schema"]:
+                    name = body["schema"]["$ref"].rpartition("/")[2]
+                    named |= set(schemas[name].get("properties", {}))
+                looked = {*QUERY.get(route, {}), *BODY.get(route, {})}
+                things = {
+                    name for name in named if name in told or name.endswith(("upload", "_id"))
+                }
+                # The way to one's own file: the other things of the request are named by its path.
+                missed += [
+                    f"{route} {name}"
+                    for name in things - looked - within
+                    if (route, name) not in keys
+                ]
+        assert missed == []
+
+    def test_the_first_word_of_an_address_says_what_it_is_about(self) -> None:
+        assert kind_of_path(f"GET {API}/saved-views/{{view}}") == ("view", Kind.SAVED_VIEW)
+        assert kind_of_path(f"GET {API}/groups/ids") is None
+        assert str(NO_ID)

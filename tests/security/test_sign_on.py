@@ -1,0 +1,548 @@
+"""Single sign-on over the wire: who comes in by the provider, and every way in which somebody must not."""
+
+from __future__ import annotations
+
+import base64
+import hmac
+import json
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from datetime import timedelta
+from functools import partial
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import httpx
+import pyotp
+import pytest
+from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
+from joserfc import jwk
+
+from app.review.people import provider_answers
+from app.review.people.links import make_first_link
+from app.review.people.logins import Way
+from app.review.people.people import change_person, find_person, invite
+from app.review.people.roles import Role
+from app.review.people.second_factor import SecondFactors
+from app.review.people.sign_on import LASTS, SignOn
+from tests.provider import CLIENT, Provider, send_away, tell
+from tests.provider import SECRET as CLIENT_SECRET
+from tests.security.asking import Answer
+from tests.security.team import API, SECRET, Team, cookie_in
+
+BEGIN, FINISH = f"{API}/session/sign-on/begin", f"{API}/session/sign-on"
+
+
+@dataclass
+class Door:
+    """Somebody before the team's server, who comes by the provider."""
+
+    team: Team
+    provider: Provider
+
+    @property
+    def sign_on(self) -> SignOn:
+        found: SignOn = self.team.app.state.team.sign_on
+        return found
+
+    def begin(self, **said: Any) -> tuple[str, str]:
+        """Address at the provider, and the cookie of the browser."""
+        answer = self.team.ask("POST", BEGIN, said)
+        return json.loads(answer.body)["address"], cookie_in(answer)
+
+    def back(self, address: str) -> dict[str, str]:
+        """What the provider adds to our address once somebody has logged in there."""
+        there = httpx.get(address, follow_redirects=False).headers["location"]
+        assert there.startswith(f"{self.team.address}/login?"), there
+        return {name: values[0] for name, values in parse_qs(urlsplit(there).query).items()}
+
+    def finish(self, told: dict[str, str], cookie: str, **more: str) -> Answer:
+        return self.team.ask("POST", FINISH, {**told, **more}, Cookie=cookie)
+
+    def enter(self, **said: Any) -> Answer:
+        address, cookie = self.begin(**said)
+        return self.finish(self.back(address), cookie)
+
+    def invite(self, name: str, role: Role = Role.ANNOTATOR) -> str:
+        """The link of somebody new."""
+        return invite(self.team.store, name, role, actor="local")[1].token
+
+    def join(self, name: str, role: Role = Role.ANNOTATOR) -> None:
+        """Somebody new, who comes by the provider from now on."""
+        self.provider.who = {"sub": f"s-{name}", "preferred_username": name}
+        assert name_in(self.enter(link=self.invite(name, role))) == name
+
+
+@pytest.fixture
+def door(team: Team, provider: Provider) -> Iterator[Door]:
+    provider.behave()
+    yield Door(team, provider)
+    provider.behave()
+
+
+@pytest.fixture
+def ruled(door: Door, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Lets the operator have said something else of whom to let in."""
+
+    def rule(**other: Any) -> None:
+        monkeypatch.setattr(door.sign_on, "rules", replace(door.sign_on.rules, **other))
+
+    return rule
+
+
+def name_in(answer: Answer) -> str:
+    assert answer.status == 200, answer.body
+    return str(json.loads(answer.body)["session"]["name"])
+
+
+def session_in(answer: Answer) -> str:
+    """The cookie of the session that an answer begins."""
+    found = [
+        part.partition(";")[0]
+        for part in answer.headers["set-cookie"].replace(", touch", "\ntouch").split("\n")
+    ]
+    return next(part for part in found if part.startswith("touchline_session="))
+
+
+def assert_refused(answer: Answer, status: int = 401, word: str = "") -> None:
+    assert answer.status == status, answer.body
+    assert "touchline_session" not in answer.headers.get("set-cookie", "")
+    assert word in answer.body.decode(), answer.body
+
+
+class TestComingIn:
+    def test_an_invitation_links_the_account_which_logs_in_from_then_on(self, door: Door) -> None:
+        link = door.invite("anna")
+        entered = door.enter(link=link, to="/review/3?q=ball:low")
+        assert name_in(entered) == "anna"
+        assert json.loads(entered.body)["to"] == "/review/3?q=ball:low"
+        assert json.loads(entered.body)["session"]["way"] == "sign_on"
+        again = door.enter()
+        assert name_in(again) == "anna"
+        assert session_in(again) != session_in(entered), "every login has a session of its own"
+        assert_refused(door.team.ask("POST", BEGIN, {"link": link}), 404, "not good any more")
+        people = json.loads(door.team.ask("GET", f"{API}/users", role="admin").body)["items"]
+        assert {one["name"]: one["sign_on"] for one in people}["anna"] == "anna"
+        said = json.loads(door.team.ask("GET", f"{API}/audit", role="admin").body)["items"]
+        assert "anna: logged in by single sign-on" in [one["sentence"] for one in said]
+
+    def test_the_session_that_a_browser_had_before_ends(self, door: Door) -> None:
+        door.join("pinned")
+        before = session_in(door.enter())
+        address, cookie = door.begin()
+        after = door.finish(door.back(address), f"{cookie}; {before}")
+        assert session_in(after) != before
+        assert door.team.ask("GET", f"{API}/sessions", Cookie=before).status == 401
+        assert door.team.ask("GET", f"{API}/sessions", Cookie=session_in(after)).status == 200
+
+    def test_somebody_links_their_own_account_and_unlinks_it(self, door: Door) -> None:
+        cookie = door.team.add("lena", Role.LEAD)
+        door.provider.who = {"sub": "s-lena", "email": "lena@club.example"}
+        own = f"{API}/session/identity"
+        wrong = door.team.ask("POST", f"{own}/begin", {"password": "x"}, Cookie=cookie)
+        assert_refused(wrong, 400, "not your password")
+        begun = door.team.ask("POST", f"{own}/begin", {"password": SECRET}, Cookie=cookie)
+        told = door.back(json.loads(begun.body)["address"])
+        other = f"{cookie_in(begun)}; {door.team.cookies['viewer']}"
+        assert_refused(door.finish(told, other), 400, "has ended")
+        begun = door.team.ask("POST", f"{own}/begin", {"password": SECRET}, Cookie=cookie)
+        told = door.back(json.loads(begun.body)["address"])
+        assert name_in(door.finish(told, f"{cookie_in(begun)}; {cookie}")) == "lena"
+        ways = json.loads(door.team.ask("GET", own, Cookie=cookie).body)
+        assert ways["identity"]["shown"] == "lena@club.example"
+        entered = session_in(door.enter())
+        gone = door.team.ask("DELETE", own, {"password": SECRET}, Cookie=cookie)
+        assert gone.status == 204, gone.body
+        assert door.team.ask("GET", own, Cookie=entered).status == 401, "it began with the account"
+        assert_refused(door.enter(), word="nobody here is linked")
+
+    def test_the_first_admin_may_come_by_it(self, door: Door, monkeypatch: Any) -> None:
+        monkeypatch.setattr("app.review.people.links.count_able", lambda *_: 0)
+        link = make_first_link(door.team.store, actor="local")
+        assert link is not None
+        door.provider.who = {"sub": "s-root"}
+        assert_refused(door.team.ask("POST", BEGIN, {"link": link.token}), 400, "/name")
+        assert name_in(door.enter(link=link.token, name="root")) == "root"
+        assert find_person(door.team.store, "root").role is Role.ADMIN
+
+    def test_who_is_linked_is_taken_from_them_by_an_admin_or_with_their_rights(
+        self, door: Door
+    ) -> None:
+        door.join("gone")
+        session = session_in(door.enter())
+        person = find_person(door.team.store, "gone")
+        asked = door.team.ask("DELETE", f"{API}/users/{person.id}/identity", role="admin")
+        assert asked.status == 204
+        assert door.team.ask("GET", f"{API}/sessions", Cookie=session).status == 401
+        assert_refused(door.enter(), word="nobody here is linked")
+        assert_refused(
+            door.team.ask("DELETE", f"{API}/users/{person.id}/identity", role="admin"), 404
+        )
+
+
+class TestStrangers:
+    def test_nobody_is_let_in_whom_nobody_here_knows(self, door: Door) -> None:
+        door.provider.who = {"sub": "s-stranger", "preferred_username": "stranger"}
+        assert_refused(door.enter(), word="nobody here is linked")
+
+    def test_neither_name_nor_address_takes_over_an_account(self, door: Door, ruled: Any) -> None:
+        door.team.add("victim", Role.LEAD)
+        claims = {"preferred_username": "victim", "name": "victim", "email": "victim@club.example"}
+        for verified in (False, True):
+            door.provider.who = {"sub": "s-thief", **claims, "email_verified": verified}
+            assert_refused(door.enter(), word="nobody here is linked")
+            ruled(new_role=Role.VIEWER)
+            assert_refused(door.enter(), word="there is a victim here already")
+            ruled(new_role=None)
+
+    def test_somebody_new_gets_the_role_that_the_operator_said(
+        self, door: Door, ruled: Any
+    ) -> None:
+        ruled(new_role=Role.VIEWER, domains=frozenset({"club.example"}))
+        door.provider.who = {"sub": "s-new", "preferred_username": "Nora.New@club.example"}
+        door.provider.who |= {"email": "nora@club.example", "email_verified": True}
+        assert name_in(door.enter()) == "nora.new"
+        assert find_person(door.team.store, "nora.new").role is Role.VIEWER
+        assert name_in(door.enter()) == "nora.new"
+
+    def test_only_a_verified_address_counts(self, door: Door, ruled: Any) -> None:
+        ruled(new_role=Role.VIEWER, domains=frozenset({"club.example"}))
+        for claims in (
+            {"email": "eve@club.example", "email_verified": False},
+            {"email": "eve@club.example"},
+            {"email": "eve@club.example.org", "email_verified": True},
+            {"email": "eve@evil.example", "email_verified": True},
+            {},
+        ):
+            door.provider.who = {"sub": "s-eve", "preferred_username": "eve", **claims}
+            assert_refused(door.enter(), word="e-mail address")
+
+    def test_who_leaves_the_group_comes_in_no_more(self, door: Door, ruled: Any) -> None:
+        door.join("greta")
+        ruled(group_claim="groups", groups=frozenset({"football"}))
+        door.provider.who["groups"] = ["staff", "football"]
+        assert name_in(door.enter()) == "greta"
+        door.provider.who["groups"] = ["staff"]
+        assert_refused(door.enter(), word="groups")
+
+    def test_who_is_disabled_stays_out(self, door: Door) -> None:
+        door.join("dora")
+        person = find_person(door.team.store, "dora")
+        change_person(door.team.store, person.id, actor="local", disabled=True)
+        assert_refused(door.enter(), word="disabled")
+
+    def test_an_account_is_one_persons(self, door: Door) -> None:
+        door.join("one")
+        link = door.invite("two")
+        assert_refused(door.enter(link=link), 409, "another person")
+        assert door.team.ask("POST", BEGIN, {"link": link}).status == 200, "the link stays good"
+        cookie = door.team.add("three", Role.LEAD)
+        body = {"password": SECRET}
+        begun = door.team.ask("POST", f"{API}/session/identity/begin", body, Cookie=cookie)
+        told = door.back(json.loads(begun.body)["address"])
+        both = f"{cookie_in(begun)}; {cookie}"
+        assert_refused(door.finish(told, both), 409, "another person")
+
+
+class TestState:
+    def test_an_answer_is_of_the_browser_that_asked_and_counts_once(self, door: Door) -> None:
+        door.join("sam")
+        address, cookie = door.begin()
+        told = door.back(address)
+        assert_refused(door.finish({**told, "state": "x" * 43}, cookie), word="another browser")
+        _, other = door.begin()
+        assert_refused(door.finish(told, other), word="another browser")
+        assert_refused(door.finish(told, cookie), word="another browser")
+        address, cookie = door.begin()
+        told = door.back(address)
+        assert name_in(door.finish(told, cookie)) == "sam"
+        assert_refused(door.finish(told, cookie), word="another browser")
+
+    def test_a_code_counts_once_and_only_with_the_secret_of_its_login(self, door: Door) -> None:
+        door.join("cody")
+        first, mine = door.begin()
+        used = door.back(first)
+        assert name_in(door.finish(used, mine)) == "cody"
+        second, cookie = door.begin()
+        fresh = door.back(second)
+        assert_refused(door.finish({**fresh, "code": used["code"]}, cookie), word="not vouch")
+        third, cookie = door.begin()
+        assert_refused(door.finish({**door.back(third), "code": fresh["code"]}, cookie))
+
+    def test_it_waits_ten_minutes(self, door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
+        door.join("tim")
+        address, cookie = door.begin()
+        told, clock = door.back(address), door.sign_on._begun._clock
+        monkeypatch.setattr(door.sign_on._begun, "_clock", lambda: clock() + LASTS)
+        assert_refused(door.finish(told, cookie), word="too long")
+
+    def test_its_cookie_is_out_of_reach_and_short(self, door: Door) -> None:
+        sent = door.team.ask("POST", BEGIN, {}).headers["set-cookie"].lower()
+        assert "httponly" in sent and "samesite=strict" in sent
+        assert f"max-age={LASTS // timedelta(seconds=1)}" in sent
+        door.join("max")
+        address, cookie = door.begin()
+        headers = {"Origin": door.team.address, "Cookie": cookie}
+        ended = httpx.post(door.team.address + FINISH, json=door.back(address), headers=headers)
+        assert ended.headers.get_list("set-cookie")[0].startswith('touchline_sign_on=""; ')
+        assert "Max-Age=0" in ended.headers.get_list("set-cookie")[0]
+
+    def test_nobody_is_sent_elsewhere_then(self, door: Door) -> None:
+        outside = ("https://evil.example", "//evil.example", "/\\evil.example", "/\t/evil.example")
+        for to in (*outside, "groups"):
+            assert_refused(door.team.ask("POST", BEGIN, {"to": to}), 400, "/to")
+
+    def test_another_provider_does_not_answer_in_its_place(self, door: Door) -> None:
+        door.join("ida")
+        address, cookie = door.begin()
+        told = door.back(address)
+        assert_refused(door.finish(told, cookie, iss="https://evil.example"), word="another")
+        address, cookie = door.begin()
+        assert name_in(door.finish(door.back(address), cookie, iss=door.provider.address)) == "ida"
+
+
+def pack(content: bytes) -> str:
+    return base64.urlsafe_b64encode(content).rstrip(b"=").decode()
+
+
+def by_hand(claims: dict[str, Any], header: dict[str, str], secret: bytes | None) -> str:
+    """A token as no library makes it: without a signature, or by a secret that may be a public key."""
+    parts = ".".join(pack(json.dumps(one).encode()) for one in ({"kid": "first", **header}, claims))
+    mac = b"" if secret is None else hmac.digest(secret, parts.encode(), "sha256")
+    return f"{parts}.{pack(mac)}"
+
+
+def public_keys(provider: Provider) -> list[bytes]:
+    """What everybody has of the provider's key, in the forms in which it could be mistaken for a secret."""
+    key = provider.key.raw_value.public_key()
+    forms = (Encoding.PEM, Encoding.DER)
+    return [key.public_bytes(form, PublicFormat.SubjectPublicKeyInfo) for form in forms]
+
+
+class TestToken:
+    def test_says_what_was_asked_or_nobody_comes_in(self, door: Door) -> None:
+        door.join("tom")
+        now = int(time.time())
+        for changed in (
+            {"nonce": "another"},
+            {"nonce": None},
+            {"aud": "another client"},
+            {"aud": "another client", "azp": CLIENT},
+            {"aud": [CLIENT, "another client"]},
+            {"aud": None},
+            {"azp": "another client"},
+            {"iss": "https://evil.example"},
+            {"iss": None},
+            {"exp": now - 3600},
+            {"exp": None},
+            {"iat": now + 3600},
+            {"nbf": now + 3600},
+            {"sub": None},
+            {"sub": 7},
+        ):
+            door.provider.changed = changed
+            assert_refused(door.enter(), word="not vouch")
+
+    def test_the_clocks_may_differ_by_a_minute(self, door: Door) -> None:
+        door.join("clara")
+        now = int(time.time())
+        door.provider.changed = {"exp": now - 40, "iat": now - 300}
+        assert name_in(door.enter()) == "clara"
+
+    def test_is_signed_by_the_provider_and_by_nobody_else(self, door: Door) -> None:
+        door.join("ken")
+        other = jwk.RSAKey.generate_key(2048, {"kid": "first"})
+        signed = door.provider.signed
+        secrets = [*public_keys(door.provider), CLIENT_SECRET.encode()]
+        for sign in (
+            *(
+                partial(by_hand, header={"alg": alg}, secret=None)
+                for alg in ("none", "None", "RS256")
+            ),
+            *(partial(by_hand, header={"alg": "HS256"}, secret=one) for one in secrets),
+            lambda claims: signed(claims, other),
+            lambda claims: signed(claims)[:-8] + "AAAAAAAA",
+            lambda claims: signed(claims, other, jwk=other.as_dict(private=False)),
+            lambda claims: "no token",
+        ):
+            door.provider.sign = sign
+            assert_refused(door.enter(), word="not vouch")
+
+    def test_new_keys_of_the_provider_are_asked_for_but_not_by_everybodys_word(
+        self, door: Door
+    ) -> None:
+        door.join("nina")
+        kept = door.sign_on._provider._keys
+        assert kept is not None
+        door.provider.key = jwk.RSAKey.generate_key(2048, {"kid": "second"})
+        door.provider.asked.clear()
+        assert_refused(door.enter(), word="not vouch")
+        assert "/keys" not in door.provider.asked, "they were asked for within the last minute"
+        old = replace(kept, at=kept.at - timedelta(minutes=2))
+        door.sign_on._provider._keys = old
+        assert name_in(door.enter()) == "nina"
+        door.provider.behave()
+        door.sign_on._provider._keys = old
+
+
+class TestProvider:
+    """One that does not do as it should."""
+
+    @pytest.fixture(autouse=True)
+    def forgetful(self, door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Nothing is remembered of it."""
+        there = door.sign_on._provider
+        monkeypatch.setattr(there, "_description", None)
+        monkeypatch.setattr(there, "_keys", None)
+
+    def test_that_never_ends_holds_nobody_up(
+        self, door: Door, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(provider_answers, "SECONDS", 2.0)
+        answered, heard_out = threading.Event(), []
+
+        def drip(handler: Any) -> None:
+            handler.send_response(200)
+            handler.end_headers()
+            for _ in range(200):
+                if answered.wait(0.1):
+                    return
+                handler.wfile.write(b" ")
+                handler.wfile.flush()
+            heard_out.append(True)
+
+        door.provider.instead["/token"] = drip
+        refused = self.ends(door)
+        answered.set()
+        assert_refused(refused, 409, "does not answer")
+        assert not heard_out
+
+    def test_that_talks_too_much_is_not_heard_out(self, door: Door) -> None:
+        sent = []
+
+        def talk(handler: Any) -> None:
+            handler.send_response(200)
+            handler.end_headers()
+            for _ in range(160):
+                handler.wfile.write(b" " * 2**16)
+                sent.append(2**16)
+
+        door.provider.instead["/token"] = talk
+        assert_refused(self.ends(door), 409, "does not answer")
+        assert sum(sent) < 10 * 2**20
+
+    @pytest.mark.parametrize("path", ["/.well-known/openid-configuration", "/token", "/keys"])
+    def test_that_sends_us_elsewhere_is_not_followed(self, door: Door, path: str) -> None:
+        door.provider.instead["/elsewhere"] = lambda handler: tell(handler, {"keys": []})
+        there = f"{door.provider.address}/elsewhere"
+        door.provider.instead[path] = lambda handler: send_away(handler, there)
+        door.provider.asked.clear()
+        assert_refused(self.ends(door), 409, "does not answer")
+        assert "/elsewhere" not in door.provider.asked
+
+    @pytest.mark.parametrize("name", ["token_endpoint", "jwks_uri", "authorization_endpoint"])
+    def test_that_names_foreign_addresses_is_refused(self, door: Door, name: str) -> None:
+        path = "/.well-known/openid-configuration"
+        for there in ("http://127.0.0.2:9/x", "https://127.0.0.1/x", "file:///etc/passwd", 7):
+            described = {**door.provider.described(), name: there}
+            door.provider.instead[path] = lambda handler, said=described: tell(handler, said)
+            assert_refused(self.ends(door), 409, "TOUCHLINE_SSO_HOSTS")
+
+    def test_that_calls_itself_otherwise_is_refused(self, door: Door) -> None:
+        described = {**door.provider.described(), "issuer": "https://evil.example"}
+        path = "/.well-known/openid-configuration"
+        door.provider.instead[path] = lambda handler: tell(handler, described)
+        assert_refused(self.ends(door), 409, "not what this server was told")
+
+    @pytest.mark.parametrize("said", [b"[1]", b"<html>", b'{"a":' * 9000, b"\xff"])
+    def test_that_talks_nonsense_is_refused(self, door: Door, said: bytes) -> None:
+        door.provider.instead["/token"] = lambda handler: tell(handler, said)
+        assert_refused(self.ends(door), 409, "does not answer")
+
+    def ends(self, door: Door) -> Answer:
+        begun = door.team.ask("POST", BEGIN, {})
+        if begun.status != 200:
+            return begun
+        return door.finish(door.back(json.loads(begun.body)["address"]), cookie_in(begun))
+
+
+class TestSecondFactor:
+    @pytest.fixture
+    def codes(self, door: Door) -> list[str]:
+        """Recovery codes of fay, who comes by the provider."""
+        door.join("fay", Role.LEAD)
+        cookie = session_in(door.enter())
+        own = f"{API}/session/second-factor"
+        begun = door.team.ask("POST", own, {}, Cookie=cookie)
+        assert begun.status == 200, "she has just come in, and has no password"
+        code = pyotp.TOTP(json.loads(begun.body)["secret"]).now()
+        made = door.team.ask("POST", f"{own}/confirm", {"code": code}, Cookie=cookie)
+        found: list[str] = json.loads(made.body)["codes"]
+        return found
+
+    def test_is_asked_for_as_after_a_password_unless_the_provider_vouches(
+        self, door: Door, ruled: Any, codes: list[str]
+    ) -> None:
+        door.provider.who |= {"amr": ["pwd", "mfa"], "acr": "high"}
+        address, cookie = door.begin()
+        told = door.back(address)
+        first = door.finish(told, cookie)
+        assert_refused(first, word="/factor")
+        assert_refused(door.finish(told, cookie, factor="000000"), word="/factor")
+        assert_refused(door.finish({**told, "code": "x"}, cookie, factor="1"), word="/factor")
+        assert name_in(door.finish(told, cookie, factor=codes[0])) == "fay"
+        assert_refused(door.finish(told, cookie, factor=codes[1]), word="another browser")
+        ruled(trusted=frozenset({"hwk"}))
+        assert_refused(door.enter(), word="/factor")
+        ruled(trusted=frozenset({"mfa"}))
+        assert name_in(door.enter()) == "fay"
+        ruled(trusted=frozenset({"high"}))
+        assert name_in(door.enter()) == "fay"
+
+    def test_that_everybody_needs_is_made_first_unless_the_provider_vouches(
+        self, door: Door, ruled: Any
+    ) -> None:
+        door.join("ned")
+        factors = SecondFactors(door.team.store)
+        factors.require(True, actor="local")
+        try:
+            assert json.loads(door.enter().body)["session"]["enrol"] is True
+            ruled(trusted=frozenset({"mfa"}))
+            door.provider.who["amr"] = ["mfa"]
+            assert json.loads(door.enter().body)["session"]["enrol"] is False
+        finally:
+            factors.require(False, actor="local")
+
+    def test_takes_a_fresh_login_where_there_is_no_password(
+        self, door: Door, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        door.join("fresh")
+        cookie, own = session_in(door.enter()), f"{API}/session/second-factor"
+        clock = door.team.app.state.team.factors._clock
+        later = lambda: clock() + timedelta(minutes=11)  # noqa: E731
+        monkeypatch.setattr(door.team.app.state.team.factors, "_clock", later)
+        assert_refused(door.team.ask("POST", own, {}, Cookie=cookie), 400, "ten minutes")
+        assert_refused(door.team.ask("POST", own, {}, role="viewer"), 400, "takes your password")
+
+
+class TestOnly:
+    def test_nothing_else_lets_in_and_what_did_ends(self, door: Door, ruled: Any) -> None:
+        door.join("oksana")
+        entered = session_in(door.enter())
+        asked = {
+            f"{API}/session": {"name": "viewer", "password": SECRET},
+            f"{API}/links/use": {"token": door.invite("otto"), "password": SECRET},
+            f"{API}/session/passkey/begin": None,
+        }
+        ruled(only=True)
+        for target, body in asked.items():
+            assert_refused(door.team.ask("POST", target, body), 409, "by Club alone")
+        ways = json.loads(door.team.ask("GET", f"{API}/session").body)["ways"]
+        assert ways == {"password": False, "sign_on": "Club"}
+        logins = door.team.app.state.team.logins
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(logins, "_only", Way.SIGN_ON)
+            assert door.team.ask("GET", f"{API}/sessions", role="viewer").status == 401
+            assert door.team.ask("GET", f"{API}/sessions", Cookie=entered).status == 200

@@ -1,0 +1,66 @@
+"""Counting: what the requests to a server cost, where times would say how busy the machine is.
+
+A server is told to count (``plant``); ``Meter`` reads what it has counted while it runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from sqlalchemy import Connection, Engine, event
+
+FILE = "torture-counts"
+STATEMENTS, TRANSACTIONS, COMMITS = range(3)
+_SHAPE = (3,)
+
+
+def plant(home: Path) -> str:
+    """Python that lets a server count into a file of its home."""
+    return f"from tests.torture import counting; counting.count({str(home / FILE)!r})"
+
+
+def count(file: str) -> None:
+    """Count every statement, transaction and commit of this process from now on."""
+    counts = np.memmap(file, dtype=np.uint64, mode="w+", shape=_SHAPE)
+
+    def one(place: int) -> Callable[..., None]:
+        def add(*_: object) -> None:
+            counts[place] += np.uint64(1)
+
+        return add
+
+    def written(connection: Connection) -> None:
+        if connection.get_execution_options().get("touchline_write"):
+            counts[COMMITS] += np.uint64(1)
+
+    event.listen(Engine, "before_cursor_execute", one(STATEMENTS))
+    event.listen(Engine, "begin", one(TRANSACTIONS))
+    event.listen(Engine, "commit", written)
+
+
+class Meter:
+    """What a server has used since it was looked at last.
+
+    Args:
+        home: Of the server.
+        pid: Of its process.
+    """
+
+    def __init__(self, home: Path, pid: int):
+        self._counts = np.memmap(home / FILE, dtype=np.uint64, mode="r", shape=_SHAPE)
+        self._tasks = Path(f"/proc/{pid}/task")
+        self._before = self._read()
+
+    def lap(self) -> np.ndarray:
+        """Statements, transactions, commits and milliseconds of processor since the last lap."""
+        now = self._read()
+        used, self._before = now - self._before, now
+        return used
+
+    def _read(self) -> np.ndarray:
+        busy = sum(
+            int((task / "schedstat").read_text().split()[0]) for task in self._tasks.iterdir()
+        )
+        return np.array([*self._counts.astype(float), busy / 1e6])
