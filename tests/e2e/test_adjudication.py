@@ -59,6 +59,6 @@ def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Pa
     page.keyboard.press("Enter")
     until(page, lambda: page.url.endswith("/datasets/sample/agreement"))
     expect(page.get_by_text("Nothing waits")).to_be_visible()
-    groups = page.get_by_role("region", name="Groups, the worst first")
+    groups = page.get_by_role("region", name="Groups, the worst first", exact=True)
     expect(groups).to_contain_text("ada’s, by local")
     withdraw_verdict(page, group)

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.film import write_film
-from tests.e2e.screen import Screen, rows
+from tests.e2e.screen import Screen, at_rest, rows
 from tests.e2e.service import run_touchline, serving
 from tests.e2e.test_queue_walk import SMALL, collisions
 
@@ -86,8 +86,7 @@ class TestLogarithmicHistograms:
         assert sum(height > 1 for height in tall) >= 3
         bar = card.locator("rect").nth(tall.index(max(tall)))
         counted = int(re.search(r"(\d+) groups?$", bar.locator("title").text_content() or "")[1])
-        box = bar.bounding_box()
-        assert box is not None
+        box = at_rest(bar)
         page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         expect(page.locator(".field--query")).to_have_value(re.compile(r">=[\d.]+ \w+<[\d.]+$"))
         expect(page.locator(".save")).to_contain_text(f"{counted} of 14 match")
