@@ -9,10 +9,11 @@ from dataclasses import replace
 
 import structlog
 from sqlalchemy import Engine, event
+from sqlalchemy.exc import TimeoutError as NoConnectionError
 from sqlalchemy.orm import Session as Session
 
 from app.config import Settings
-from app.errors import EXAMINE, DamagedError, StorageError
+from app.errors import EXAMINE, BusyError, DamagedError, StorageError
 from app.store.anchor import (
     move_anchor,
     read_anchor,
@@ -96,6 +97,7 @@ class Store:
         self._reader = dialect_of(settings).reading(engine)
         self._writer = engine.execution_options(**WRITE)
         self._glancer = dialect_of(settings).glancing(engine)
+        self._peeker = dialect_of(settings).peeking(settings)
         # Connections of its own: one that waits for no disk must never carry what was promised.
         self._passing = make_engine(settings, lasting=False).execution_options(**WRITE)
         self.sharing = dialect_of(settings).sharing(engine, lambda: reported(settings))
@@ -146,6 +148,21 @@ class Store:
         """
         with self._watched(), Session(self._glancer, autoflush=False) as session:
             yield session
+
+    @contextmanager
+    def peek(self) -> Iterator[Session]:
+        """A session like that of ``glance`` for whoever may wait for nothing, as the event loop.
+
+        Raises:
+            BusyError: There would be something to wait for; ``glance`` waits for it.
+        """
+        if self._peeker is None:
+            raise BusyError("the database answers nothing at once")
+        try:
+            with self._watched(), Session(self._peeker, autoflush=False) as session:
+                yield session
+        except NoConnectionError as error:
+            raise BusyError("another thread is peeking") from error
 
     @contextmanager
     def write(self, *, lasting: bool = True) -> Iterator[Session]:
@@ -256,8 +273,9 @@ class Store:
     def close(self) -> None:
         """Close all connections."""
         self.sharing.close()
-        self._engine.dispose()
-        self._passing.dispose()
+        for engine in (self._engine, self._passing, self._peeker):
+            if engine is not None:
+                engine.dispose()
         try:
             sync_anchor(self.settings.database_file)
         finally:

@@ -221,6 +221,31 @@ class TestSessions:
         assert team.ask("PATCH", f"{API}/users/{user}", edit, role="admin").status == 200
         assert team.ask("GET", target, role="falls").status == 403
 
+    @pytest.mark.file_of_sqlite("a server of databases is always waited for")
+    def test_it_is_looked_up_without_a_thread_and_by_one_where_there_is_something_to_wait_for(
+        self, team: Team, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        by_threads: list[str] = []
+        look = access.Access._look
+
+        def noted(self, scope, *asked):
+            by_threads.append(scope["path"])
+            return look(self, scope, *asked)
+
+        monkeypatch.setattr(access.Access, "_look", noted)
+        address = f"{API}/datasets"
+        assert team.ask("GET", address, role="reviewer").status == 200
+        assert by_threads == []
+        # Whoever has a role in one dataset alone: it takes a look where each thing is.
+        team.add("here-only", Role.NONE)
+        assert team.ask("GET", f"{API}/jobs/1", role="here-only").status == 404
+        assert by_threads == [f"{API}/jobs/1"]
+        with team.store.peek() as session:
+            session.connection()
+            assert team.ask("GET", address, role="reviewer").status == 200
+        assert by_threads == [f"{API}/jobs/1", address]
+        assert team.ask("GET", address, Cookie="touchline-session=nobody").status == 401
+
     def test_nobody_changes_their_own_rights(self, team: Team) -> None:
         me = find_person(team.store, "admin").id
         for edit in ({"role": "viewer"}, {"disabled": True}):

@@ -196,6 +196,12 @@ def datasets_of(store: Store, asked: Asked, login: Login) -> list[Finding]:
     return found
 
 
+def takes_looking(asked: Asked, login: Login) -> bool:
+    """Whether ``datasets_of`` has to ask the database."""
+    named = (mention.named for mention in asked.mentions)
+    return not login.roles.is_admin and any(_is_looked_for(one, login.roles) for one in named)
+
+
 def require_allowed(asked: Asked, findings: list[Finding], login: Login, action: Action) -> None:
     """Raise ForbiddenError unless somebody may do that wherever they see what a request names."""
     roles = login.roles
@@ -243,12 +249,17 @@ def _require_new(place: Place | None, roles: DatasetRoles, action: Action) -> No
 
 def _place(store: Store, named: Named, login: Login, sight: Sight) -> Place | None:
     roles: DatasetRoles = login.roles
-    if not roles.single and named.kind not in OWNED | {Kind.NEW_DATASET}:
+    if not _is_looked_for(named, roles):
         return None if roles.everywhere is Role.NONE else Place(None, frozenset({login.owner}))
     found = find_place(store, named, sight)
     if found is None or named.kind is Kind.NEW_DATASET:
         return found
     return None if role_at(found, roles, login.owner) is Role.NONE else found
+
+
+def _is_looked_for(named: Named, roles: DatasetRoles) -> bool:
+    """Whether it matters where something is: who is the same everywhere is so there."""
+    return bool(roles.single) or named.kind in OWNED | {Kind.NEW_DATASET}
 
 
 def _mentions(

@@ -231,10 +231,14 @@ class Logins:
             note(session, person.name, person.name, "logged in", person.role, **said)
         return token
 
-    def find(self, token: str) -> Login | None:
-        """Who a token stands for; None where its session has ended."""
+    def find(self, token: str, *, at_once: bool = False) -> Login | None:
+        """Who a token stands for; None where its session has ended.
+
+        Raises:
+            BusyError: It had to be said ``at_once``, and cannot be without waiting.
+        """
         alive = self._alive(self._clock())
-        with self._store.glance() as session:
+        with self._store.peek() if at_once else self._store.glance() as session:
             row = find_login(session, hash_of(token), leading=LEADING, **alive)
         if row is None or self._only not in (None, row.way):
             return None

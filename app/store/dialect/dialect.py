@@ -71,6 +71,10 @@ class Dialect(Protocol):
     def glancing(self, engine: Engine) -> Engine:
         """The same engine without transactions: each statement is one, and sees one snapshot."""
 
+    def peeking(self, settings: Settings) -> Engine | None:
+        """An engine without transactions whose one connection waits for nothing; None where every
+        statement is waited for, because it goes over a line."""
+
     def sharing(
         self, engine: Engine, reported: Callable[[], AbstractContextManager[None]]
     ) -> Sharing:

@@ -92,6 +92,9 @@ class PostgreSQL:
         """See ``Dialect``."""
         return engine.execution_options(**GLANCE, isolation_level="AUTOCOMMIT")
 
+    def peeking(self, settings: Settings) -> None:
+        """See ``Dialect``."""
+
     def sharing(self, engine: Engine, reported: Reported) -> Sharing:
         """See ``Dialect``."""
         return ServerSharing(engine, reported)

@@ -60,17 +60,8 @@ class SQLite:
 
     def make_engine(self, settings: Settings, *, lasting: bool = True) -> Engine:
         """See ``Dialect``."""
-        if pysqlite3.dbapi2.sqlite_version_info < MIN_SQLITE:
-            raise StorageError(f"SQLite {pysqlite3.dbapi2.sqlite_version} can corrupt its file")
         # As many connections as a server has threads; a file that is open costs little.
-        engine = create_engine(
-            settings.database, module=pysqlite3.dbapi2, pool_size=16, max_overflow=48
-        )
-        engine.dialect.statement_compiler = _Hinted
-        event.listen(engine, "connect", partial(_set_pragmas, lasting))
-        event.listen(engine, "begin", _begin)
-        event.listen(engine, "commit", _count)
-        return engine
+        return _make_engine(settings, lasting, pool_size=16, max_overflow=48)
 
     def reading(self, engine: Engine) -> Engine:
         """See ``Dialect``; a deferred transaction sees one snapshot already."""
@@ -78,6 +69,12 @@ class SQLite:
 
     def glancing(self, engine: Engine) -> Engine:
         """See ``Dialect``."""
+        return engine.execution_options(**GLANCE)
+
+    def peeking(self, settings: Settings) -> Engine:
+        """See ``Dialect``; readers of a write-ahead log wait for nobody, but while it is recovered."""
+        engine = _make_engine(settings, True, pool_size=1, max_overflow=0, pool_timeout=0)
+        event.listen(engine, "connect", _wait_for_nobody)
         return engine.execution_options(**GLANCE)
 
     def sharing(
@@ -144,6 +141,21 @@ class _Hinted(SQLiteCompiler):
     def get_from_hint_text(self, table: FromClause, text: str | None) -> str | None:
         """What stands behind the table's name."""
         return text
+
+
+def _make_engine(settings: Settings, lasting: bool, **pool: int) -> Engine:
+    if pysqlite3.dbapi2.sqlite_version_info < MIN_SQLITE:
+        raise StorageError(f"SQLite {pysqlite3.dbapi2.sqlite_version} can corrupt its file")
+    engine = create_engine(settings.database, module=pysqlite3.dbapi2, **pool)
+    engine.dialect.statement_compiler = _Hinted
+    event.listen(engine, "connect", partial(_set_pragmas, lasting))
+    event.listen(engine, "begin", _begin)
+    event.listen(engine, "commit", _count)
+    return engine
+
+
+def _wait_for_nobody(connection: Any, _record: object) -> None:
+    connection.execute("PRAGMA busy_timeout=0")
 
 
 def _set_pragmas(lasting: bool, connection: Any, _record: object) -> None:

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
 import pysqlite3.dbapi2 as sqlite
@@ -12,7 +13,7 @@ from sqlalchemy import text
 from structlog.testing import capture_logs
 
 from app.config import Settings
-from app.errors import DamagedError, InputError, StorageError
+from app.errors import BusyError, DamagedError, InputError, StorageError
 from app.store.anchor import read_anchor
 from app.store.dialect.sqlite import PRAGMAS
 from app.store.log import Entry, append, read_log
@@ -243,6 +244,44 @@ class TestWrite:
         )
         assert (done.stdout, done.returncode) == ("saved\n", -9)
         assert names(store) == ["acknowledged"]
+
+
+class TestPeek:
+    @pytest.mark.file_of_sqlite("a server of databases is always waited for")
+    def test_answers_at_once_while_others_write_and_all_connections_are_taken(
+        self, store: Store
+    ) -> None:
+        add(store, "kept")
+        with ExitStack() as held, store.write() as writing:
+            writing.execute(text(INSERT.format("not yet")))
+            for _ in range(20):
+                held.enter_context(store.read()).connection()
+            with store.peek() as session:
+                found = session.scalars(text("SELECT name FROM dataset")).all()
+                promise = session.execute(text("PRAGMA busy_timeout")).scalar()
+        assert (found, promise) == (["kept"], 0)
+
+    @pytest.mark.file_of_sqlite("a server of databases is always waited for")
+    def test_sees_what_was_written_since(self, store: Store) -> None:
+        for name in ("one", "two"):
+            add(store, name)
+            with store.peek() as session:
+                found = session.scalars(text("SELECT name FROM dataset ORDER BY id")).all()
+            assert found[-1] == name
+
+    @pytest.mark.file_of_sqlite("a server of databases is always waited for")
+    def test_who_would_wait_for_another_thread_is_told(self, store: Store) -> None:
+        with store.peek() as first:
+            first.connection()
+            with pytest.raises(BusyError), store.peek() as second:
+                second.connection()
+
+    def test_where_every_statement_is_waited_for_it_is_refused(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(store, "_peeker", None)
+        with pytest.raises(BusyError), store.peek():
+            pytest.fail("it was answered")
 
 
 class TestAfterTheCommit:
