@@ -11,10 +11,11 @@ from typing import Any, Protocol
 
 import pysqlite3.dbapi2 as sqlite
 import pytest
-from sqlalchemy import event
+from sqlalchemy import Connection, event, inspect
 
 from app.config import Settings
 from app.store.dialect.dialect import dialect_in
+from app.store.engine import WRITE, make_engine
 from app.store.session import Session, Store
 from tests.cluster import ADVICE, Cluster, find_programs, running_cluster
 from tests.on_postgresql import shared_cluster
@@ -181,6 +182,32 @@ def _emptied(database: Any) -> str:
         f"SELECT setval('{name}', 1, false)" for (name,) in database.execute(_SEQUENCES).fetchall()
     ]
     return "; ".join((*gone, *again))
+
+
+def count_rows(home: Path) -> dict[str, int]:
+    """How many rows each table of a home's database has, beside whoever works in it."""
+    engine = make_engine(Settings(home=home))
+    try:
+        with engine.connect() as connection:
+            return {
+                name: int(connection.exec_driver_sql(f'SELECT count(*) FROM "{name}"').scalar_one())
+                for name in inspect(connection).get_table_names()
+            }
+    finally:
+        engine.dispose()
+
+
+@contextmanager
+def holding_the_write_lock(home: Path) -> Iterator[Connection]:
+    """A connection that writes to a home's database, and keeps everybody else from it."""
+    engine = make_engine(Settings(home=home))
+    try:
+        with engine.execution_options(**WRITE).connect() as connection:
+            connection.begin()
+            yield connection
+            connection.rollback()
+    finally:
+        engine.dispose()
 
 
 @contextmanager

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import shutil
-import sqlite3
 import time
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -13,6 +11,7 @@ import pytest
 from app.errors import ClusterError
 from app.review.datasets.cluster import Cluster, Place
 from tests.certificates import write_keys
+from tests.databases import count_rows
 from tests.e2e.service import run_touchline
 from tests.torture.cluster import members
 from tests.torture.commands import differences
@@ -22,8 +21,7 @@ GROUPS = 14
 
 
 def solutions(home: Path) -> int:
-    with closing(sqlite3.connect(home / "touchline.db")) as database:
-        return int(database.execute("SELECT count(*) FROM solution").fetchone()[0])
+    return count_rows(home)["solution"]
 
 
 def test_a_scheduler_that_goes_and_comes_back_costs_no_group(tmp_path: Path) -> None:

@@ -7,8 +7,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import httpx
-import pysqlite3.dbapi2 as sqlite
 import pytest
+from sqlalchemy import Connection
+
+from tests.databases import holding_the_write_lock
 
 API = "/api/v1"
 WRITERS = 60
@@ -17,12 +19,8 @@ WRITERS = 60
 @pytest.fixture
 def held(touchline):
     """The write lock of the home, as a stopped import of the command line holds it."""
-    path = Path(touchline.home) / "touchline.db"
-    with sqlite.connect(str(path), isolation_level=None) as other:
-        other.execute("BEGIN IMMEDIATE")
+    with holding_the_write_lock(Path(touchline.home)) as other:
         yield other
-        if other.in_transaction:
-            other.execute("ROLLBACK")
 
 
 def waiting(client: httpx.Client) -> float:
@@ -35,7 +33,7 @@ def waiting(client: httpx.Client) -> float:
 
 
 def test_sixty_changes_that_wait_do_not_keep_a_page_or_a_reader_waiting(
-    client: httpx.Client, address: str, held: sqlite.Connection
+    client: httpx.Client, address: str, held: Connection
 ) -> None:
     views = f"{API}/datasets/small/saved-views"
 
@@ -52,7 +50,7 @@ def test_sixty_changes_that_wait_do_not_keep_a_page_or_a_reader_waiting(
                 assert client.get(path, timeout=10).status_code == 200, path
             assert not any(answer.done() and answer.result().status_code == 201 for answer in sent)
         finally:
-            held.execute("ROLLBACK")
+            held.rollback()
         statuses = [answer.result().status_code for answer in sent]
     assert set(statuses) <= {201, 409, 503}
     assert 201 in statuses

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
-from contextlib import closing
 from pathlib import Path
 
 from tests import starting
+from tests.databases import count_rows
 from tests.integration.conftest import COMMAND, environment
 from tests.waiting import SECONDS
 
@@ -19,8 +18,7 @@ GROUPS = 60
 
 
 def solved(home: Path) -> int:
-    with closing(sqlite3.connect(home / "touchline.db")) as database:
-        return int(database.execute("SELECT count(*) FROM solution").fetchone()[0])
+    return count_rows(home)["solution"]
 
 
 def test_solve_keeps_what_is_done_and_goes_on_from_there(tmp_path: Path) -> None:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import io
 import json
 import re
 import socket
-import sqlite3
 import time
 import uuid
 import warnings
@@ -24,6 +22,7 @@ import yaml
 from app.api.application import create_app
 from app.config import Settings
 from app.store.session import Store
+from tests.databases import count_rows
 from tests.security.asking import JSON, Answer, assert_guarded
 from tests.security.conftest import API, FORMULA, Guarded
 from tests.security.table import CORPUS, MISSING, TABLE, Row, lines_of, rows, served
@@ -329,12 +328,8 @@ class TestEveryRoute:
 
 def _state(home: Path) -> dict[str, int]:
     """How many rows each table has, and how long the log of changes is."""
-    path = f"file:{home / 'touchline.db'}?mode=ro"
-    with contextlib.closing(sqlite3.connect(path, uri=True)) as database:
-        names = database.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
-        counts = {name: f'SELECT count(*) FROM "{name}"' for (name,) in names}
-        state = {name: database.execute(query).fetchone()[0] for name, query in counts.items()}
-    return state | {"version": sum(path.is_file() for path in (home / "exports").rglob("*"))}
+    exported = sum(path.is_file() for path in (home / "exports").rglob("*"))
+    return count_rows(home) | {"version": exported}
 
 
 class TestFilesOfOthers:

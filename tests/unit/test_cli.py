@@ -287,7 +287,7 @@ class TestMigrate:
         code, out, _ = run("migrate")
         assert code == 0
         assert out.startswith("schema ")
-        assert (tmp_path / "home" / "touchline.db").exists()
+        assert (tmp_path / "home" / "home.json").exists()
 
 
 class TestServe:

@@ -20,6 +20,7 @@ API = "/api/v1"
 
 
 class TestCreateApp:
+    @pytest.mark.file_of_sqlite("a file that is none of SQLite")
     def test_a_home_that_is_no_database_is_refused_at_once(self, tmp_path: Path) -> None:
         (tmp_path / "touchline.db").write_bytes(b"not a database, but long enough" * 100)
         with pytest.raises(StorageError):

@@ -14,6 +14,8 @@ from app.config import Settings
 from app.store.session import Store
 from tests.unit.store.homes import say
 
+pytestmark = pytest.mark.file_of_sqlite("copies of the file")
+
 
 @pytest.fixture
 def home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:

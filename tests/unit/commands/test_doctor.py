@@ -49,6 +49,7 @@ class TestDoctor:
         assert refused.exit_code == 1
         assert "another Touchline server" in str(refused.exception)
 
+    @pytest.mark.file_of_sqlite("a file that is empty")
     def test_a_home_that_is_refused_is_explained(self, settings: Settings) -> None:
         settings.database_file.write_bytes(b"")
         done = CliRunner().invoke(app, ["doctor", "--json"])

@@ -29,7 +29,7 @@ def run(touchline: Run) -> Run:
 
 @pytest.fixture
 def frozen(run: Run, home: Path) -> Path:
-    if not (home / "touchline.db").exists():
+    if not (home / "home.json").exists():
         options = ("--groups", 4, "--labels-only", "--no-faults", "--workers", 1)
         assert run("sample", "--dataset", "demo", *options)[0] == 0
         assert run("freeze", "--dataset", "demo", "--groups", "passing")[0] == 0

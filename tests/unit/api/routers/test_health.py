@@ -115,6 +115,7 @@ def readable(app: FastAPI) -> list[str]:
     return found
 
 
+@pytest.mark.file_of_sqlite("a file that is changed behind the server's back")
 class TestDamage:
     @pytest.mark.parametrize("change", [overwrite_root("view"), forge_solutions])
     def test_the_first_sign_of_it_ends_all_changes(

@@ -182,6 +182,7 @@ class TestUpkeep:
         assert [(entry["event"], entry["step"]) for entry in logs] == [("upkeep failed", "answers")]
         assert not old.exists()
 
+    @pytest.mark.file_of_sqlite("a look at every page of the file")
     def test_a_look_at_the_whole_database_ends_when_the_server_stops(
         self, there: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
