@@ -42,7 +42,7 @@ class Archives:
         """
         archive, name = self._find(path, member)
         try:
-            # ZipFile locks its own file; a closed one stays readable for a member under way.
+            # ZipFile locks its own file.
             with archive.open(name) as file:
                 data = file.read(limit + 1)
         except KeyError as error:
@@ -91,7 +91,9 @@ class Archives:
                 self._open[key] = open_it()
             self._open.move_to_end(key)
             while len(self._open) > self._most:
-                self._open.popitem(last=False)[1].close()
+                # Not closed here: another thread may have found it, and not opened its member yet.
+                # It closes with whoever holds it last.
+                self._open.popitem(last=False)
             return self._open[key]
 
 

@@ -6,6 +6,7 @@ import zipfile
 import zlib
 from contextlib import nullcontext
 from pathlib import Path
+from typing import IO
 
 import cv2
 import numpy as np
@@ -108,6 +109,22 @@ class TestFrameOfAZipInsideAZip:
         for thread in threads:
             thread.join()
         assert got == [True] * 80
+
+    def test_one_that_is_pushed_out_before_its_member_is_opened_is_read(
+        self, tmp_path, archive, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        other = tmp_path / "other.zip"
+        with zipfile.ZipFile(other, "w") as target:
+            target.writestr("1.png", PNG)
+        archives, opened = Archives(most=1), zipfile.ZipFile.open
+
+        def late(self: zipfile.ZipFile, name: str) -> IO[bytes]:
+            if name != "1.png":
+                assert archives.read(other, "1.png", 10**6) == PNG
+            return opened(self, name)
+
+        monkeypatch.setattr(zipfile.ZipFile, "open", late)
+        assert archives.read(archive, "v3_frames/7.png", 10**6) == PNG
 
     def test_a_damaged_nested_zip_is_named(self, tmp_path, archive) -> None:
         archive.write_bytes(archive.read_bytes()[:-30])
