@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 
 from app.errors import DamagedError
 from app.store.codecs import Json, canonical, unpack
+from app.store.dialect.dialect import dialect_in
 from app.store.models import LogModel
 
 GENESIS = "0" * 64
@@ -198,7 +199,7 @@ def verify_chain(session: Session) -> int:
         if entry.id != count or entry.hash != previous:
             raise DamagedError(
                 f"row {entry.id} of the log is not what was written",
-                hint="Run touchline restore BACKUP.",
+                hint=dialect_in(session).restoring,
             )
     return count
 

@@ -25,6 +25,11 @@ def count_lost_references(session: Session) -> int:
     return dialect_in(session).count_lost_references(session)
 
 
+def restoring(session: Session) -> str:
+    """How a copy is put into the place of this database, as a sentence."""
+    return dialect_in(session).restoring
+
+
 def no_fault(session: Session) -> str:
     """What is said where neither was found."""
     return dialect_in(session).no_fault

@@ -13,10 +13,9 @@ from app.review.editing.recompute import stale_groups
 from app.review.editing.replay import replay
 from app.store.log import newest_entry
 from app.store.session import Session, Store
-from app.store.soundness import count_lost_references, file_faults, no_fault
+from app.store.soundness import count_lost_references, file_faults, no_fault, restoring
 
 REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
-RESTORE = "Run touchline restore BACKUP: it takes the place of the database, which is kept."
 SHOWN = 5
 """Records that a sentence names."""
 REBUILT = {
@@ -37,31 +36,32 @@ def examine(store: Store) -> list[Check]:
     log is broken: then nothing follows from it.
     """
     with store.read() as session:
-        checks = [_file(session)]
+        restore = restoring(session)
+        checks = [_file(session, restore)]
         entries = newest_entry(session)
         try:
             said = replay(session)
         except StorageError as error:
-            checks.append(Check("log", False, error.message, error.hint or RESTORE))
+            checks.append(Check("log", False, error.message, error.hint or restore))
         else:
             checks.append(Check("log", True, f"{entries:,} entries, each as it was written"))
-            checks += _tables(said, read_ledger(session))
+            checks += _tables(said, read_ledger(session), restore)
     return [*checks, *_solutions(store)]
 
 
-def _file(session: Session) -> Check:
+def _file(session: Session, restore: str) -> Check:
     """The database's own look at its pages and indexes, and at references to rows that are gone."""
     faults, lost = file_faults(session), count_lost_references(session)
     if faults:
-        return Check("file", False, f"SQLite finds it damaged: {'; '.join(faults)}", RESTORE)
+        return Check("file", False, f"SQLite finds it damaged: {'; '.join(faults)}", restore)
     if lost:
-        return Check("file", False, f"{lost} rows refer to rows that are gone", RESTORE)
+        return Check("file", False, f"{lost} rows refer to rows that are gone", restore)
     return Check("file", True, no_fault(session))
 
 
-def _tables(said: Ledger, present: Ledger) -> list[Check]:
+def _tables(said: Ledger, present: Ledger, restore: str) -> list[Check]:
     checks = []
-    for names, mend in ((REBUILT, REBUILD), (KEPT, RESTORE)):
+    for names, mend in ((REBUILT, REBUILD), (KEPT, restore)):
         for name, words in names.items():
             ours, theirs = getattr(said, name), getattr(present, name)
             apart = _apart(ours, theirs)

@@ -45,12 +45,14 @@ class Dialect(Protocol):
     Attributes:
         name: What people call it.
         no_fault: What is said of a database without a fault.
+        restoring: How a copy is put into the place of a database, as a sentence.
         is_file: Whether the database is a file, which is looked at before it is opened and copied
             as a whole, and lies in the home.
     """
 
     name: str
     no_fault: str
+    restoring: str
     is_file: bool
 
     def make_engine(self, settings: Settings, *, lasting: bool = True) -> Engine:

@@ -56,6 +56,7 @@ class PostgreSQL:
 
     name = "PostgreSQL"
     no_fault = "PostgreSQL looks after its own files, and lets no reference be lost"
+    restoring = "Stop the server, and restore the database with pg_restore: docs/operations.md."
     is_file = False
 
     def make_engine(self, settings: Settings, *, lasting: bool = True) -> Engine:

@@ -56,6 +56,7 @@ class SQLite:
 
     name = "SQLite"
     no_fault = "SQLite finds no fault"
+    restoring = "Run touchline restore BACKUP: it takes the place of the database, which is kept."
     is_file = True
 
     def make_engine(self, settings: Settings, *, lasting: bool = True) -> Engine:

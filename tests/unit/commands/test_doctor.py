@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from app.cli import app
 from app.config import Settings
 from app.review.importing.ingest import ensure_dataset
+from app.store.dialect.dialect import dialect_of
 from app.store.locks import server_lock
 from app.store.session import Store
 
@@ -40,7 +41,8 @@ class TestDoctor:
         done = CliRunner().invoke(app, ["doctor", "--json"])
         assert done.exit_code == 1
         (fault,) = (check for check in json.loads(done.stdout) if not check["ok"])
-        assert (fault["name"], "touchline restore" in fault["mend"]) == ("datasets", True)
+        mended_by = "touchline restore" if dialect_of(settings).is_file else "pg_restore"
+        assert (fault["name"], mended_by in fault["mend"]) == ("datasets", True)
 
     def test_rebuilding_waits_for_no_server(self, settings: Settings) -> None:
         assert CliRunner().invoke(app, ["doctor", "--rebuild"]).exit_code == 0

@@ -6,10 +6,11 @@ import pytest
 from sqlalchemy import text
 
 from app.review.editing.check import Check
-from app.review.editing.doctor import REBUILD, RESTORE, examine
+from app.review.editing.doctor import REBUILD, examine
 from app.review.editing.replay import rebuild
 from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict
+from app.store.dialect.dialect import dialect_of
 from app.store.session import Store
 from tests.databases import said_for_sqlite
 
@@ -54,7 +55,7 @@ class TestExamine:
     def test_a_verdict_that_was_changed_needs_a_backup(self, store: Store, ids) -> None:
         trigger = "DROP TRIGGER verdict_refuses_update"
         change(store, trigger, f"UPDATE verdict SET actor = 'eve' WHERE group_id = {ids[0]}")
-        assert faults(store)["groups' verdicts"].mend == RESTORE
+        assert faults(store)["groups' verdicts"].mend == dialect_of(store.settings).restoring
 
     def test_a_log_that_was_changed_ends_the_comparison(self, store: Store, ids) -> None:
         change(
