@@ -32,6 +32,7 @@ class TestServices:
         monkeypatch.setattr(upkeep, "FIRST_SECONDS", 0.0)
         monkeypatch.setattr(upkeep, "tidy", tidy)
         services = Services.open(Settings(home=tmp_path / "home"))
+        services.jobs.start()
         services.upkeep.start()
         assert tidying.wait(20)
         services.close()
