@@ -14,7 +14,7 @@ import pytest
 from sqlalchemy import Connection, event, inspect
 
 from app.config import Settings
-from app.store.dialect.dialect import dialect_in
+from app.store.dialect.dialect import dialect_in, dialect_of
 from app.store.engine import WRITE, make_engine
 from app.store.session import Session, Store
 from tests.cluster import ADVICE, Cluster, find_programs, running_cluster
@@ -195,6 +195,21 @@ def count_rows(home: Path) -> dict[str, int]:
             }
     finally:
         engine.dispose()
+
+
+def all_that_is_kept(home: Path, *, but: Path | None = None) -> bytes:
+    """The files of a home but one, and every row of its database where that is a server's."""
+    files = [path for path in home.iterdir() if path.is_file() and path != but]
+    kept = [path.read_bytes() for path in files]
+    settings = Settings(home=home)
+    if not dialect_of(settings).is_file:
+        engine = make_engine(settings)
+        with engine.connect() as connection:
+            for name in inspect(connection).get_table_names():
+                rows = connection.exec_driver_sql(f'SELECT x::text FROM "{name}" AS x').scalars()
+                kept += [str(row).encode() for row in rows]
+        engine.dispose()
+    return b"".join(kept)
 
 
 @contextmanager

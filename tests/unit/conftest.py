@@ -181,7 +181,9 @@ def counted() -> Callable[[Store], AbstractContextManager[Cost]]:
             options = connection.get_execution_options()
             write = bool(options.get("touchline_write"))
             cost.writes += write
-            cost.reads += not (write or options.get("touchline_glance"))
+            # Claims among processes are statements without a transaction, as glances are.
+            alone = options.get("isolation_level") == "AUTOCOMMIT"
+            cost.reads += not (write or alone or options.get("touchline_glance"))
 
         def commit(connection: Any) -> None:
             cost.commits += bool(connection.get_execution_options().get("touchline_write"))

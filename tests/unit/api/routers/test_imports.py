@@ -15,6 +15,7 @@ import pytest
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.review.datasets.dataset import get_dataset
 from app.review.jobs.imports import resume_imports
+from app.review.jobs.solve import resume_solving
 from app.soccer.group import Group
 from app.soccer.policy import PAPER, STRICT, TOUCHLINE
 from app.store.jobs import NewJob, insert_job, update_job
@@ -195,6 +196,7 @@ class TestStartImport:
             identity = insert_job(session, NewJob("import", "Import", "ann", None, request))
             update_job(session, identity, state="running")
         resume_imports(services.jobs, services.store, services.settings)
+        resume_solving(services.jobs, services.store)
         services.jobs.start()
         job = services.jobs.wait(identity, SECONDS)
         assert (job.state, job.result["new"]) == ("done", 1)

@@ -22,6 +22,7 @@ from app.soccer.actors import person_of
 from app.store.log import read_log
 from app.store.people import update_person
 from app.store.session import Store
+from tests.databases import all_that_is_kept
 
 READ = [Scope.READ]
 
@@ -171,7 +172,7 @@ class TestMake:
     def test_the_database_holds_no_secret(self, home, tokens, anna) -> None:
         made, text = tokens.make(anna, "deploy", READ)
         home.close()
-        kept = b"".join(p.read_bytes() for p in home.settings.home.iterdir() if p.is_file())
+        kept = all_that_is_kept(home.settings.home)
         assert made.start.encode() in kept
         assert text[len(made.start) :].encode() not in kept
         assert text[len(made.start) : -6].encode() not in kept

@@ -21,6 +21,7 @@ from app.review.people.people import find_person, invite
 from app.review.people.roles import Role
 from app.review.people.second_factor import SecondFactors
 from app.store.session import Store
+from tests.databases import all_that_is_kept
 
 SECRET = "correct horse battery"
 
@@ -184,8 +185,7 @@ class TestEnrolling:
         desk.store.close()
         key = home / "second-factor.key"
         assert stat.S_IMODE(key.stat().st_mode) == 0o600
-        files = [path for path in home.iterdir() if path.is_file() and path != key]
-        kept = b"".join(path.read_bytes() for path in files)
+        kept = all_that_is_kept(home, but=key)
         secret = base64.b32decode(desk.totp.secret)
         texts = (desk.totp.secret.encode(), secret, secret.hex().encode(), key.read_bytes())
         for text in (*texts, *(code.replace("-", "").encode() for code in desk.codes)):
