@@ -9,7 +9,7 @@ from sqlalchemy import Engine
 from sqlalchemy.exc import DBAPIError, OperationalError
 
 from app.config import Settings
-from app.errors import EXAMINE, BusyError, DamagedError, StorageError
+from app.errors import EXAMINE, BusyError, DamagedError, InputError, StorageError
 from app.store.dialect.dialect import WRITE as WRITE
 from app.store.dialect.dialect import Failure, dialect_of
 
@@ -29,11 +29,19 @@ def make_engine(settings: Settings, *, lasting: bool = True) -> Engine:
 
 @contextmanager
 def reported(settings: Settings) -> Iterator[None]:
-    """Turn what the disk or the database refuses into a ``StorageError`` with a sentence."""
+    """Turn what the disk or the database refuses into a ``StorageError`` with a sentence.
+
+    A text that no database of its kind can hold is the caller's: an ``InputError``.
+    """
     try:
         yield
     except DBAPIError as error:
         kind, name = dialect_of(settings).failure(error)
+        if kind is Failure.TEXT:
+            raise InputError(
+                "a text holds a character that the database cannot keep, such as U+0000",
+                hint="Leave it out.",
+            ) from error
         if kind is not Failure.OTHER or isinstance(error, OperationalError):
             raise _storage_error(error, kind, name, settings) from error
         raise StorageError(

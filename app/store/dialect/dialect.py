@@ -36,6 +36,7 @@ class Failure(Enum):
     UNREADABLE = "unreadable"
     DISK = "disk"
     AWAY = "away"
+    TEXT = "text"
     OTHER = "other"
 
 

@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any
 
 from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url
-from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError, OperationalError
+from sqlalchemy.exc import ArgumentError, DataError, DBAPIError, NoSuchModuleError, OperationalError
 from sqlalchemy.orm import Session
 
 from app.config import Settings
@@ -43,6 +43,8 @@ _FAILURES = {
     "25006": Failure.UNREADABLE,
     "42501": Failure.UNREADABLE,
     "58030": Failure.DISK,
+    "22021": Failure.TEXT,
+    "22P05": Failure.TEXT,
     "53300": Failure.AWAY,
     "57P01": Failure.AWAY,
     "57P02": Failure.AWAY,
@@ -83,6 +85,7 @@ class PostgreSQL:
         dialect.type_compiler_instance = Types(dialect)
         event.listen(engine, "connect", partial(_set_up, lasting))
         event.listen(engine, "begin", _begin)
+        _close_late_ones(engine)
         return engine
 
     def reading(self, engine: Engine) -> Engine:
@@ -123,6 +126,9 @@ class PostgreSQL:
         # Nobody answered, so nobody said why.
         if not state and isinstance(error, OperationalError):
             return Failure.AWAY, state
+        # The driver itself refuses U+0000, which no text of the server can hold.
+        if not state and isinstance(error, DataError):
+            return Failure.TEXT, state
         # Who we are (28) and what there is (3D) is asked before anything else.
         if state.startswith(("28", "3D")):
             return Failure.AWAY, state
@@ -222,6 +228,26 @@ def _set_up(lasting: bool, connection: Any, _record: object) -> None:
     connection.execute(f"SET lock_timeout = '{LOCK_SECONDS}s'")
     connection.execute("SET TIME ZONE 'UTC'")
     connection.autocommit = was
+
+
+def _close_late_ones(engine: Engine) -> None:
+    """Close what a thread gives back after the engine was disposed of: no pool would."""
+    disposals = 0
+
+    def disposed(_engine: Engine) -> None:
+        nonlocal disposals
+        disposals += 1
+
+    def connected(_connection: Any, record: Any) -> None:
+        record.info["disposals"] = disposals
+
+    def returned(_connection: Any, record: Any) -> None:
+        if record.info.get("disposals", disposals) != disposals:
+            record.invalidate()
+
+    event.listen(engine, "engine_disposed", disposed)
+    event.listen(engine, "connect", connected)
+    event.listen(engine, "checkin", returned)
 
 
 def _begin(connection: Connection) -> None:

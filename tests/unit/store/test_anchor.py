@@ -1,9 +1,11 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from sqlalchemy import Engine
 
 from app.errors import DamagedError
 from app.store import anchor
@@ -17,6 +19,13 @@ def anchored(store: Store) -> Anchor:
     found = read_anchor(store.settings.database_file)
     assert found is not None
     return found
+
+
+@pytest.fixture
+def engine(store: Store) -> Iterator[Engine]:
+    engine = make_engine(store.settings)
+    yield engine
+    engine.dispose()
 
 
 class TestReadAnchor:
@@ -36,21 +45,21 @@ class TestReadAnchor:
 
 class TestRequireOwnDatabase:
     def test_an_anchor_of_two_halves_is_no_damage_when_the_next_look_finds_it_whole(
-        self, store: Store, monkeypatch: pytest.MonkeyPatch
+        self, store: Store, engine: Engine, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         say(store, 2)
         whole = anchored(store)
         found = iter([replace(whole, hash="of another entry")])
         monkeypatch.setattr(anchor, "read_anchor", lambda _database: next(found, whole))
-        anchor.require_own_database(make_engine(store.settings), store.settings)
+        anchor.require_own_database(engine, store.settings)
 
 
 class TestRenewAnchor:
     def test_beside_a_writer_an_anchor_that_knows_less_is_left_to_the_writer(
-        self, store: Store
+        self, store: Store, engine: Engine
     ) -> None:
         say(store, 2)
-        engine, file = make_engine(store.settings), store.settings.database_file
+        file = store.settings.database_file
         behind = replace(anchored(store), entries=0, hash="")
         make_anchor(file, behind)
         renew_anchor(engine, store.settings, alone=False)
@@ -60,15 +69,15 @@ class TestRenewAnchor:
 
     @pytest.mark.parametrize("value", ["installation", "schema"])
     def test_beside_a_writer_one_of_another_database_or_schema_is_made_anew(
-        self, store: Store, value: str
+        self, store: Store, engine: Engine, value: str
     ) -> None:
         whole = anchored(store)
         make_anchor(store.settings.database_file, replace(whole, **{value: "another"}))
-        renew_anchor(make_engine(store.settings), store.settings, alone=False)
+        renew_anchor(engine, store.settings, alone=False)
         assert anchored(store) == whole
 
-    def test_one_that_is_missing_is_made_anew(self, store: Store) -> None:
+    def test_one_that_is_missing_is_made_anew(self, store: Store, engine: Engine) -> None:
         whole = anchored(store)
         anchor_file(store.settings.database_file).unlink()
-        renew_anchor(make_engine(store.settings), store.settings, alone=False)
+        renew_anchor(engine, store.settings, alone=False)
         assert anchored(store) == whole

@@ -4,6 +4,7 @@ import threading
 import time
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sqlalchemy import insert, select, text
@@ -45,6 +46,25 @@ class TestText:
             # Of ASCII letters alone, as in SQLite.
             found = select(DatasetModel.name).where(DatasetModel.name.contains("Ä"))
             assert not list(session.scalars(found))
+
+    def test_a_character_that_no_text_can_hold_is_a_mistake_of_who_sends_it(
+        self, store: Store
+    ) -> None:
+        asked = select(DatasetModel.id).where(DatasetModel.name == "a\0b")
+        with pytest.raises(InputError, match=r"U\+0000"), store.read() as session:
+            session.scalar(asked)
+        cast = text("SELECT CAST(:said AS jsonb) ->> 'a'")
+        with pytest.raises(InputError, match=r"U\+0000"), store.read() as session:
+            session.scalar(cast, {"said": '{"a": "\\u0000"}'})
+
+
+class TestConnections:
+    def test_one_that_comes_back_after_the_end_is_closed(self, store: Store) -> None:
+        with closing(Store.open(store.settings)) as other, other.read() as late:
+            driver: Any = late.connection().connection.driver_connection
+            other.close()
+            assert not driver.closed
+        assert driver.closed
 
 
 class TestWrite:
