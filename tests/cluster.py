@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -20,6 +20,8 @@ ADVICE = (
 )
 _UNSAFE = {"fsync": "off", "synchronous_commit": "off", "full_page_writes": "off"}
 """A cluster that is gone after the tests need not survive a power cut."""
+DATA = "data"
+"""The folder of its files, beside the socket."""
 _ROOM = {"max_connections": "500"}
 """Every store of every process of the tests has some."""
 
@@ -51,6 +53,11 @@ class Cluster:
         self.folder = folder
         self._count = 0
 
+    @property
+    def pid(self) -> int:
+        """Of its first process, the parent of all others."""
+        return int((self.folder / DATA / "postmaster.pid").read_text().split()[0])
+
     def url(self, database: str) -> str:
         """The address of a database."""
         return f"postgresql://postgres@/{database}?host={self.folder}"
@@ -76,8 +83,12 @@ def _name(url: str) -> str:
 
 
 @contextmanager
-def running_cluster() -> Iterator[Cluster]:
-    """A cluster for as long as it is asked for; it ends with this process at the latest."""
+def running_cluster(*, lasting: bool = False) -> Iterator[Cluster]:
+    """A cluster for as long as it is asked for; it ends with this process at the latest.
+
+    Args:
+        lasting: Whether it syncs what it has promised, as one of people does.
+    """
     programs = find_programs()
     if programs is None:
         raise FileNotFoundError(ADVICE)
@@ -86,25 +97,27 @@ def running_cluster() -> Iterator[Cluster]:
     user = "postgres" if os.geteuid() == 0 else None
     if user is not None:
         shutil.chown(folder, user, user)
-    data = folder / "data"
+    data = folder / DATA
     try:
         # Text is sorted as a language does it, so that our own order shows.
         language = ("--encoding=UTF8", "--locale-provider=icu", "--icu-locale=en")
         who = ("-U", "postgres", "-A", "trust")
         _run(programs / "initdb", "-D", data, *who, *language, "--no-sync", user=user)
-        with _server(programs / "postgres", folder, data, user):
+        with _server(programs / "postgres", folder, {} if lasting else _UNSAFE, user):
             yield Cluster(folder)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextmanager
-def _server(program: Path, folder: Path, data: Path, user: str | None) -> Iterator[None]:
-    options = {**_UNSAFE, **_ROOM, "listen_addresses": "", "unix_socket_directories": str(folder)}
+def _server(
+    program: Path, folder: Path, promises: Mapping[str, str], user: str | None
+) -> Iterator[None]:
+    options = {**promises, **_ROOM, "listen_addresses": "", "unix_socket_directories": str(folder)}
     words = [word for name, value in options.items() for word in ("-c", f"{name}={value}")]
     log = (folder / "log").open("w")
     keeper = ["setpriv", "--pdeathsig", "TERM"] if shutil.which("setpriv") else []
-    command = [*keeper, str(program), "-D", str(data), *words]
+    command = [*keeper, str(program), "-D", str(folder / DATA), *words]
     with log, subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, **_as(user)) as server:
         try:
             _wait(folder, server)

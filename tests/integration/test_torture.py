@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import random
 import shutil
+import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from tests.torture import commands, conditions, crowd, flood, kills, power, upgrades
+from tests.cluster import ADVICE, find_programs
+from tests.torture import commands, conditions, crowd, engines, flood, kills, power, upgrades
+from tests.torture.counting import processor
+from tests.torture.crowd import Load
 from tests.torture.power import Acknowledge, Sync, Unlink, Write, cut_power, disk_at, parse
 
 
@@ -49,6 +54,7 @@ class TestKills:
         ]
 
 
+@pytest.mark.file_of_sqlite("what is written into the file, and synced")
 @pytest.mark.skipif(shutil.which("strace") is None, reason="strace records what is synced")
 class TestPower:
     def test_what_was_acknowledged_is_there_after_the_power_was_cut(
@@ -134,6 +140,50 @@ class TestCrowd:
         assert found.lines()[0].startswith("4 people, 3 s: ")
 
 
+class TestEngines:
+    @pytest.mark.skipif(find_programs() is None, reason=ADVICE)
+    @pytest.mark.file_of_sqlite("one of the two that are compared")
+    def test_the_same_people_work_on_both_in_turns(self, home: Path, tmp_path: Path) -> None:
+        told: list[str] = []
+        folder = tmp_path / "engines"
+        folder.mkdir()
+        faults = engines.compare(
+            home, folder, people=2, seconds=1, think=0, seed=1, tell=told.append
+        )
+        assert faults == []
+        assert [line.split()[2] for line in told[3:5]] == ["SQLite", "PostgreSQL"]
+        assert told[5].startswith("  0 s  PostgreSQL to SQLite: changes/s ")
+        # Its database has processes of its own, which do something; a file has none.
+        database = [float(line.split()[-1]) for line in told[3:5]]
+        assert database[0] == 0 < database[1]
+
+    def test_turns_of_one_engine_are_one_row(self) -> None:
+        turns = [
+            Load(3, 2.0, changes=10, milliseconds={"ball": [10.0] * 99}, processor=(0.2, 0.1)),
+            Load(3, 2.0, changes=30, milliseconds={"verdict": [90.0] * 2}, processor=(0.6, 0.1)),
+        ]
+        found = engines.row("PostgreSQL", 0.5, turns)
+        assert (found.engine, found.think, found.changes) == ("PostgreSQL", 0.5, 10.0)
+        assert (found.p50, found.p95, found.p99) == (10.0, 10.0, 90.0)
+        assert (found.server, found.database) == pytest.approx((20.0, 5.0))
+
+
+class TestProcessor:
+    def test_children_count_while_they_run_and_once_they_have_ended(self) -> None:
+        busy = "from time import process_time as t; end = t() + 0.2\nwhile t() < end: pass\n"
+        script = (
+            "import subprocess, sys\n"
+            "def run(program): subprocess.run([sys.executable, '-c', program])\n"
+            f"run({busy!r}); run({busy + 'print(flush=True); input()'!r})"
+        )
+        pipe = subprocess.PIPE
+        with subprocess.Popen([sys.executable, "-c", script], stdin=pipe, stdout=pipe) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            assert processor(process.pid) >= 0.38
+            process.communicate(b"\n")
+
+
 class TestFlood:
     def test_too_many_clients_are_refused_and_a_reader_is_served(self, home: Path) -> None:
         # `make torture` has all attacks; these are the ones that hold on to something.
@@ -172,11 +222,13 @@ class TestConditions:
     def test_a_clock_that_is_set_back_disturbs_nothing(self, home: Path) -> None:
         assert conditions.clock_set_back(home) == []
 
+    @pytest.mark.file_of_sqlite("the disk that the file lies on")
     @pytest.mark.skipif(not conditions.can_mount(), reason="only root can mount a disk")
     def test_a_disk_that_fills_stops_changes_alone(self, home: Path) -> None:
         assert conditions.full_disk(home) == []
 
 
+@pytest.mark.file_of_sqlite("homes of released versions, which had a file")
 class TestUpgrades:
     def test_a_full_home_that_was_killed_midway_migrates_and_can_be_taken_back(
         self, tmp_path: Path

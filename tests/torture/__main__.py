@@ -8,11 +8,13 @@ import sys
 import tempfile
 from pathlib import Path
 
+from tests.cluster import ADVICE, find_programs
 from tests.torture import (
     cluster,
     commands,
     conditions,
     crowd,
+    engines,
     flood,
     kills,
     people,
@@ -21,6 +23,7 @@ from tests.torture import (
 )
 
 SEED = 20260101
+ENGINES_GROUPS = 60
 PEOPLES_GROUPS = 300
 """So many that a team of fifty finds work for forty seconds."""
 
@@ -142,6 +145,23 @@ def _crowd(folder: Path, asked: argparse.Namespace) -> list[str]:
     return faults
 
 
+def _engines(folder: Path, asked: argparse.Namespace) -> list[str]:
+    if find_programs() is None:
+        print(f"Skipped: {ADVICE}")
+        return [ADVICE] if "engines" in (asked.only or []) else []
+    home = folder / "engines"
+    kills.prepare(home, folder / "engines-files", clients=1, groups=ENGINES_GROUPS)
+    return engines.compare(
+        home,
+        folder,
+        people=asked.people,
+        seconds=asked.seconds,
+        think=asked.think,
+        seed=asked.seed,
+        tell=print,
+    )
+
+
 def _people(folder: Path, asked: argparse.Namespace) -> list[str]:
     prepared = folder / "people"
     kills.prepare(prepared, folder / "people-files", clients=1, groups=PEOPLES_GROUPS)
@@ -190,6 +210,7 @@ PARTS = {
     "cluster": _cluster,
     "crowd": _crowd,
     "people": _people,
+    "engines": _engines,
     "flood": _flood,
     "conditions": _conditions,
     "upgrades": _upgrades,

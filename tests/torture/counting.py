@@ -5,6 +5,7 @@ A server is told to count (``plant``); ``Meter`` reads what it has counted while
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -38,6 +39,27 @@ def count(file: str) -> None:
     event.listen(Engine, "before_cursor_execute", one(STATEMENTS))
     event.listen(Engine, "begin", one(TRANSACTIONS))
     event.listen(Engine, "commit", written)
+
+
+def processor(pid: int) -> float:
+    """Seconds of the processor that a process and all below it have taken, ended ones too."""
+    parents: dict[int, int] = {}
+    ticks: dict[int, int] = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            # The name, in brackets, may hold anything.
+            fields = stat.read_text().rpartition(")")[2].split()
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        number = int(stat.parent.name)
+        parents[number] = int(fields[1])
+        ticks[number] = sum(map(int, fields[11:15]))
+    counted, left = 0, [pid]
+    while left:
+        one = left.pop()
+        counted += ticks.get(one, 0)
+        left += [child for child, parent in parents.items() if parent == one]
+    return counted / os.sysconf("SC_CLK_TCK")
 
 
 class Meter:

@@ -10,6 +10,7 @@ import random
 import threading
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from typing import Any
 import httpx
 import numpy as np
 
+from tests.torture.counting import processor
 from tests.torture.kills import API, Server
 
 SHARED_GROUPS = 20
@@ -35,6 +37,8 @@ class Load:
     faults: list[str] = field(default_factory=list)
     costs: dict[str, np.ndarray] = field(default_factory=dict)
     """What each kind of request costs by itself (``counting``), where it was measured."""
+    processor: tuple[float, float] = (0.0, 0.0)
+    """Seconds of the processor that the server took meanwhile, and others that were named."""
 
     def percentiles(self, kind: str) -> tuple[float, float, float]:
         """p50, p95 and p99 of one kind of request."""
@@ -117,7 +121,16 @@ class Person(threading.Thread):
             time.sleep(self._random.expovariate(1 / self._think))
 
 
-def crowd(home: Path, *, people: int, seconds: float, think: float, seed: int) -> Load:
+def crowd(
+    home: Path,
+    *,
+    people: int,
+    seconds: float,
+    think: float,
+    seed: int,
+    server: Server | None = None,
+    others: Sequence[int] = (),
+) -> Load:
     """Let a crowd work on the dataset ``client0`` of a home.
 
     Args:
@@ -126,8 +139,10 @@ def crowd(home: Path, *, people: int, seconds: float, think: float, seed: int) -
         seconds: For how long.
         think: Mean of the seconds between two requests of a person; 0: none.
         seed: Decides what they do.
+        server: Of the home, not started yet; None: one with the usual settings.
+        others: Processes that work for the server, whose time is told, too.
     """
-    server = Server(home)
+    server = Server(home) if server is None else server
     server.start()
     try:
         server.wait()
@@ -145,13 +160,18 @@ def crowd(home: Path, *, people: int, seconds: float, think: float, seed: int) -
                 )
                 for number in range(people)
             ]
+            watched = ((server.pid,), tuple(others))
+            begun = [sum(map(processor, pids)) for pids in watched]
             for person in team:
                 person.start()
             for person in team:
                 person.join()
-            return _load(
+            ended = [sum(map(processor, pids)) for pids in watched]
+            load = _load(
                 team, seconds, {group: _history(http, group) - before[group] for group in ids}
             )
+            load.processor = (ended[0] - begun[0], ended[1] - begun[1])
+            return load
     finally:
         server.kill()
 
