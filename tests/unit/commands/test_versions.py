@@ -12,6 +12,7 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.store.session import Store
+from tests.databases import said_for_sqlite
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -99,7 +100,7 @@ class TestVerify:
     def test_a_changed_one_is_exit_code_1_and_names_the_place(self, run: Run, frozen: Path) -> None:
         store = Store.open(Settings(home=frozen))
         change = "UPDATE version_group SET split = 'x' WHERE position = 0 AND version_id = 1"
-        with store.write() as session:
+        with store.write() as session, said_for_sqlite(session):
             session.execute(text("DROP TRIGGER version_group_refuses_update"))
             session.execute(text(change))
         store.close()

@@ -14,6 +14,7 @@ from app.solving.facts import COLUMNS, group_facts, join
 from app.store.group_changes import groups_from
 from app.store.models import SolutionModel
 from app.store.session import Store
+from tests.databases import said_for_sqlite
 
 
 def read(store: Store) -> tuple[YieldTable, YieldTable]:
@@ -25,7 +26,7 @@ def read(store: Store) -> tuple[YieldTable, YieldTable]:
 
 def forget_facts(store: Store) -> None:
     """Leave the solutions as they were before facts were kept beside them."""
-    with store.write() as session:
+    with store.write() as session, said_for_sqlite(session):
         session.execute(text("DROP TRIGGER solution_refuses_update"))
         session.execute(update(SolutionModel).values(facts=None))
 
