@@ -151,6 +151,9 @@ class TestEngines:
             home, folder, people=2, seconds=1, think=0, seed=1, tell=told.append
         )
         assert faults == []
+        turns, told = told[: 2 * engines.ROUNDS], told[2 * engines.ROUNDS :]
+        # Who is first in one round is last in the next.
+        assert [line.split(",")[0] for line in turns] == [*engines.ENGINES, *engines.ENGINES[::-1]]
         assert [line.split()[2] for line in told[3:5]] == ["SQLite", "PostgreSQL"]
         assert told[5].startswith("  0 s  PostgreSQL to SQLite: changes/s ")
         # Its database has processes of its own, which do something; a file has none.

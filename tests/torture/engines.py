@@ -61,7 +61,7 @@ def compare(
         seconds: For how long a turn.
         think: Mean of the seconds between two requests of a person; once more without any.
         seed: Decides what they do, on both engines alike.
-        tell: Takes each line.
+        tell: Takes each line: one of each turn, then the table.
     """
     loads: dict[tuple[float, str], list[Load]] = {}
     with running_cluster(lasting=True) as cluster:
@@ -72,6 +72,7 @@ def compare(
                     copied = Path(shutil.copytree(home, folder / f"{engine}{turn}-{pause}"))
                     load = _turn(cluster, copied, engine, people, seconds, pause, seed + turn)
                     loads.setdefault((pause, engine), []).append(load)
+                    tell(f"{engine}, {pause:g} s of pause: {load.lines()[0]}")
                     shutil.rmtree(copied)
     rows = [row(engine, pause, turns) for (pause, engine), turns in loads.items()]
     for line in table(rows, people):

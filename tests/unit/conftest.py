@@ -172,18 +172,22 @@ def counted() -> Callable[[Store], AbstractContextManager[Cost]]:
     def run(store: Store) -> Iterator[Cost]:
         cost, engine = Cost(), store._engine
 
-        def execute(_connection: Any, _cursor: Any, statement: str, *_: Any) -> None:
-            cost.statements += not statement.startswith(
-                ("BEGIN", "SELECT pg_advisory", "SELECT pg_notify")
+        def claims(connection: Any) -> bool:
+            """Whether it is the one by which processes leave work to each other."""
+            options = connection.get_execution_options()
+            return options.get("isolation_level") == "AUTOCOMMIT" and not options.get(
+                "touchline_glance"
             )
+
+        def execute(connection: Any, _cursor: Any, statement: str, *_: Any) -> None:
+            locks = ("BEGIN", "SELECT pg_advisory", "SELECT pg_notify")
+            cost.statements += not (statement.startswith(locks) or claims(connection))
 
         def begin(connection: Any) -> None:
             options = connection.get_execution_options()
             write = bool(options.get("touchline_write"))
             cost.writes += write
-            # Claims among processes are statements without a transaction, as glances are.
-            alone = options.get("isolation_level") == "AUTOCOMMIT"
-            cost.reads += not (write or alone or options.get("touchline_glance"))
+            cost.reads += not (write or options.get("touchline_glance") or claims(connection))
 
         def commit(connection: Any) -> None:
             cost.commits += bool(connection.get_execution_options().get("touchline_write"))
