@@ -81,7 +81,7 @@ def compare(
         f"{engine}, {pause:g} s of pause: {fault}"
         for (pause, engine), turns in loads.items()
         for load in turns
-        for fault in load.faults
+        for fault in [*load.faults, *([] if load.changes else ["nothing was changed"])]
     ]
 
 
@@ -113,7 +113,6 @@ def row(engine: str, think: float, turns: list[Load]) -> Row:
         together.changes += load.changes
         for times in load.milliseconds.values():
             together.milliseconds.setdefault(_ALL, []).extend(times)
-    # A crowd that changed nothing is a fault of its own, and must not hide here as another.
     each = 1000 / max(together.changes, 1)
     server, database = (sum(load.processor[place] for load in turns) * each for place in (0, 1))
     pace = together.changes / together.seconds
@@ -138,8 +137,13 @@ def table(rows: list[Row], people: int) -> list[str]:
             for engine in ENGINES
         )
         lines.append(
-            f"{think:3g} s  PostgreSQL to SQLite: changes/s {server.changes / file.changes:.2f},"
-            f" p99 {server.p99 / file.p99:.2f},"
-            f" processor {(server.server + server.database) / (file.server + file.database):.2f}"
+            f"{think:3g} s  PostgreSQL to SQLite: changes/s {_ratio(server.changes, file.changes):.2f},"
+            f" p99 {_ratio(server.p99, file.p99):.2f}, processor"
+            f" {_ratio(server.server + server.database, file.server + file.database):.2f}"
         )
     return lines
+
+
+def _ratio(one: float, other: float) -> float:
+    """How often the other goes into one; nan where it is nothing."""
+    return one / other if other else float("nan")
