@@ -20,6 +20,9 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from app.errors import InputError
+from app.private_file import read_private
+
 
 def _user_data_folder() -> Path:
     root = os.environ.get("XDG_DATA_HOME")
@@ -122,6 +125,8 @@ class Settings(BaseSettings):
     """The folder that holds the database, the media cache and the exports."""
     database_url: str | None = Field(default=None, repr=False)
     """Another database than the SQLite file in ``home``: ``postgresql://USER:PASSWORD@HOST/NAME``."""
+    database_url_file: Path | None = None
+    """Or a file with that address, which its owner alone may read (``chmod 600``)."""
     host: str = "127.0.0.1"
     """Address the server listens on."""
     port: int = 8000
@@ -231,6 +236,19 @@ class Settings(BaseSettings):
         raise ValueError(
             "must be the beginning of an address, such as https://touchline.example.org"
         )
+
+    @model_validator(mode="after")
+    def _database_of_file(self) -> Settings:
+        if self.database_url_file is None:
+            return self
+        if self.database_url is not None:
+            raise InputError(
+                "the database is given twice: by TOUCHLINE_DATABASE_URL and by TOUCHLINE_DATABASE_URL_FILE"
+            )
+        self.database_url = read_private(self.database_url_file, "TOUCHLINE_DATABASE_URL_FILE")
+        if not self.database_url:
+            raise InputError(f"{self.database_url_file} is empty, and should hold an address")
+        return self
 
     @property
     def uploads(self) -> Path:

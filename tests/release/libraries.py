@@ -13,7 +13,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[2]
 LOCK = ROOT / "requirements.lock"
-EXTRAS = ("export", "library", "charts", "detect", "postgres", "s3")
+EXTRAS = ("export", "library", "charts", "detect", "postgres", "s3", "cluster")
 """What a user may add; ``dev`` is for who works on the product."""
 
 

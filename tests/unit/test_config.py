@@ -1,4 +1,4 @@
-"""Settings that depend on what the machine gives."""
+"""Settings that depend on what the machine gives, and on files that they name."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.config import memory_bytes
+from app.config import Settings, memory_bytes
+from app.errors import InputError
 
 MB = 2**20
 
@@ -40,3 +41,43 @@ def test_without_a_limit_it_is_the_machines(tmp_path: Path) -> None:
     (own := tmp_path / "cgroup").write_text("0::/\n")
     (tmp_path / "memory.max").write_text("max\n")
     assert memory_bytes(own, tmp_path) == memory_bytes(tmp_path / "none") > 256 * MB
+
+
+class TestDatabaseUrlFile:
+    URL = "postgresql://ann:pass@database/touchline"
+
+    @pytest.fixture(autouse=True)
+    def _no_url(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.delenv("TOUCHLINE_DATABASE_URL", raising=False)
+
+    @pytest.fixture
+    def file(self, tmp_path: Path) -> Path:
+        """A file with the address, of its owner alone."""
+        (file := tmp_path / "url").write_text(f"{self.URL}\n")
+        file.chmod(0o600)
+        return file
+
+    def test_the_address_is_what_the_file_says(
+        self, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("TOUCHLINE_DATABASE_URL_FILE", str(file))
+        settings = Settings(home=tmp_path)
+        assert settings.database == self.URL
+        assert "pass" not in repr(settings)
+
+    def test_it_is_given_once(self, file: Path) -> None:
+        with pytest.raises(InputError, match="given twice"):
+            Settings(database_url="postgresql://other/x", database_url_file=file)
+
+    @pytest.mark.parametrize("mode", [0o640, 0o604, 0o620])
+    def test_a_file_that_others_may_use_is_refused(self, file: Path, mode: int) -> None:
+        file.chmod(mode)
+        with pytest.raises(InputError, match="others than its owner may use") as caught:
+            Settings(database_url_file=file)
+        assert "pass" not in f"{caught.value.message} {caught.value.hint}"
+
+    @pytest.mark.parametrize("content", [b" \n", b"\xff\xfe", None], ids=["empty", "bytes", "none"])
+    def test_a_file_without_an_address_is_refused(self, file: Path, content: bytes | None) -> None:
+        file.unlink() if content is None else file.write_bytes(content)
+        with pytest.raises(InputError, match="is empty|cannot be read"):
+            Settings(database_url_file=file)

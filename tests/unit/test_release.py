@@ -94,6 +94,8 @@ class TestLibraries:
         assert base < everything < pinned()
         assert {"uvicorn", "starlette", "numba", "llvmlite"} <= base
         assert {"pyarrow", "matplotlib", "onnxruntime"} <= everything - base
+        # Of an image that is database client, store client, scheduler and worker.
+        assert {"psycopg", "obstore", "distributed"} <= everything - base
         assert not everything & {"pytest", "ruff", "mypy", "playwright", "hatchling"}
 
     def test_entries_keep_their_hashes_and_say_whether_they_are_for_here(

@@ -6,15 +6,14 @@ Everything stands in the settings; no request changes any of it.
 from __future__ import annotations
 
 import re
-import stat
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 from app.config import Settings
 from app.errors import InputError, NotLoggedInError
+from app.private_file import read_private
 from app.review.people.roles import Role
 
 ALL = "*"
@@ -185,22 +184,7 @@ def _secret(settings: Settings) -> str:
         return given.get_secret_value().strip() if given else ""
     if given:
         raise _half("the client's secret is given twice, by a file and without")
-    return _read_private(path)
-
-
-def _read_private(path: Path) -> str:
-    try:
-        if stat.S_IMODE(path.stat().st_mode) & 0o077:
-            raise InputError(
-                f"others than its owner may use {path}, which has the client's secret",
-                hint=f"chmod 600 {path}",
-            )
-        return path.read_text("utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"{path}, which TOUCHLINE_SSO_CLIENT_SECRET_FILE names, cannot be read",
-            hint="Is it there, and a plain text file of whoever runs the server?",
-        ) from error
+    return read_private(path, _variable("client_secret_file"))
 
 
 def _domain(claims: Mapping[str, Any]) -> str | None:

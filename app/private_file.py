@@ -1,0 +1,32 @@
+"""Private file: a secret that its owner alone may read, as operators give it to the service."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from app.errors import InputError
+
+
+def read_private(path: Path, variable: str) -> str:
+    """The text of a file that nobody but its owner may use, without white space around it.
+
+    Args:
+        path: The file.
+        variable: The setting that names it, for the sentence of an error.
+
+    Raises:
+        InputError: Others may use it, or it cannot be read as text. What it holds is in no sentence.
+    """
+    try:
+        if stat.S_IMODE(path.stat().st_mode) & 0o077:
+            raise InputError(
+                f"others than its owner may use {path}, which {variable} names",
+                hint=f"chmod 600 {path}",
+            )
+        return path.read_text("utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{path}, which {variable} names, cannot be read",
+            hint="Is it there, and a plain text file of whoever runs Touchline?",
+        ) from error
