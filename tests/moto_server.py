@@ -64,8 +64,8 @@ class Door:
 
 
 @contextmanager
-def moto_server() -> Iterator[Door]:
-    """A server with an empty bucket ``soccer-data``, behind a door."""
+def moto_server(*more: str) -> Iterator[Door]:
+    """A server with an empty bucket ``soccer-data``, and ``more``, behind a door."""
     if not (MOTO / "ready").is_file():
         pytest.fail("The S3 server of the tests is missing: run 'make moto'.", pytrace=False)
     port = _free_port()
@@ -76,8 +76,8 @@ def moto_server() -> Iterator[Door]:
         stderr=subprocess.DEVNULL,
     )
     try:
-        _make_bucket(port, "soccer-data")
-        _make_bucket(port, "other-data")
+        for bucket in ("soccer-data", "other-data", *more):
+            _make_bucket(port, bucket)
         with _door(port) as door:
             yield door
     finally:

@@ -13,6 +13,7 @@ from app.review.datasets.cluster import Cluster, Place
 from tests.certificates import write_keys
 from tests.databases import count_rows
 from tests.e2e.service import run_touchline
+from tests.team_at_scale import is_healthy, make_secrets, together
 from tests.torture.cluster import members
 from tests.torture.commands import differences
 from tests.waiting import SECONDS
@@ -34,9 +35,14 @@ def test_a_scheduler_that_goes_and_comes_back_costs_no_group(tmp_path: Path) -> 
     )
     shutil.copytree(alone, shared)
     run_touchline(alone, "solve --dataset torture --workers 1")
-    keys = write_keys(tmp_path / "keys")
-    with members(shared, tmp_path, workers=1, keys=keys) as cluster:
+    # Keys and checks are those of an installation with Docker.
+    secrets, services = make_secrets(tmp_path / "secrets"), together()["services"]
+    with members(shared, tmp_path, workers=1, keys=secrets / "cluster") as cluster:
+        port = Place(cluster.address).port
         cluster.wait_for_workers()
+        assert is_healthy(services["scheduler"], secrets, port)
+        assert is_healthy(services["worker"], secrets, port)
+        assert not is_healthy(services["scheduler"], make_secrets(tmp_path / "strange"), port)
         stranger = Place(cluster.address, write_keys(tmp_path / "others", "stranger"))
         with pytest.raises(ClusterError, match="no scheduler answers"):
             Cluster(stranger)
@@ -47,4 +53,6 @@ def test_a_scheduler_that_goes_and_comes_back_costs_no_group(tmp_path: Path) -> 
         cluster.restart("scheduler")
         assert cluster.wait() == 0, cluster.said("solve")
         assert "Traceback" not in cluster.said("solve")
+    assert not is_healthy(services["scheduler"], secrets, port)
+    assert not is_healthy(services["worker"], secrets, port)
     assert differences(alone, shared) == []

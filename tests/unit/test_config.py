@@ -79,5 +79,5 @@ class TestDatabaseUrlFile:
     @pytest.mark.parametrize("content", [b" \n", b"\xff\xfe", None], ids=["empty", "bytes", "none"])
     def test_a_file_without_an_address_is_refused(self, file: Path, content: bytes | None) -> None:
         file.unlink() if content is None else file.write_bytes(content)
-        with pytest.raises(InputError, match="is empty|cannot be read"):
+        with pytest.raises(InputError, match=r"is empty|cannot be read"):
             Settings(database_url_file=file)

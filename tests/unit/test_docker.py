@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import re
+import stat
+import subprocess
 from configparser import RawConfigParser
+from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
-from tests.release.libraries import ROOT
-
-FOLDER = ROOT / "docker"
+from app.config import Settings, StoreSettings
+from app.object_store.keys import read_keys
+from app.review.datasets.cluster import read_place
+from tests.team_at_scale import FOLDER, make_secrets, settings_of, together
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +59,166 @@ class TestCompose:
         assert "${TOUCHLINE_BACKUPS:-backups}:/backups" in services["touchline"]["volumes"]
         text = (FOLDER / "Dockerfile").read_text("utf-8")
         assert re.search(r"install -d .* -o 10001 .* /backups$", text, re.M)
+
+    def test_settings_are_those_that_the_product_knows(self, services: dict[str, Any]) -> None:
+        given = services["touchline"]["environment"]
+        assert {name for name in given if name.startswith("TOUCHLINE_")} <= KNOWN
+
+    def test_the_proxy_is_asked_whether_it_listens(self, services: dict[str, Any]) -> None:
+        # Touchline's own is in its image.
+        assert "healthcheck" in services["proxy"]
+
+
+KNOWN = {f"TOUCHLINE_{name.upper()}" for name in Settings.model_fields}
+AS_ROOT = {"proxy"}
+"""Caddy's image has no other user; it has no capability but for ports below 1024."""
+OWN_IMAGE = {"touchline", "scheduler", "worker"}
+"""Whose image says who they are."""
+
+
+@pytest.fixture(scope="module")
+def scaled() -> dict[str, Any]:
+    """compose.yaml with scale.yaml laid over it."""
+    return together()
+
+
+@pytest.fixture(scope="module")
+def secrets(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What make-secrets.sh makes, for whoever runs the tests."""
+    return make_secrets(tmp_path_factory.mktemp("made") / "secrets")
+
+
+class TestScale:
+    def test_nobody_reaches_anything_but_the_proxy(self, scaled: dict[str, Any]) -> None:
+        services = scaled["services"]
+        assert [name for name, one in services.items() if "ports" in one] == ["proxy"]
+        assert services["touchline"]["network_mode"] == "service:proxy"
+        inner = {name: (text or {}).get("internal") for name, text in scaled["networks"].items()}
+        assert all(inner.values())
+        assert set(services["proxy"]["networks"]) == {"default", *inner}
+
+    def test_workers_reach_neither_database_nor_store(self, scaled: dict[str, Any]) -> None:
+        joined = {name: set(one.get("networks", ())) for name, one in scaled["services"].items()}
+        for name in ("worker", "scheduler"):
+            assert not joined[name] & (joined["database"] | joined["store"])
+            read = {one["source"] for one in scaled["services"][name]["secrets"]}
+            assert read == {"cluster_ca", "cluster_certificate", "cluster_key"}
+
+    def test_every_service_is_confined(self, scaled: dict[str, Any]) -> None:
+        for name, service in scaled["services"].items():
+            assert service["read_only"] is True, name
+            assert service["cap_drop"] == ["ALL"], name
+            assert service["security_opt"] == ["no-new-privileges:true"], name
+            assert {"mem_limit", "pids_limit", "restart"} <= service.keys(), name
+            assert "healthcheck" in service or name == "touchline", name
+            added = service.get("cap_add", [])
+            assert added == (["NET_BIND_SERVICE"] if name in AS_ROOT else []), name
+            user = str(service.get("user", "root")).partition(":")[0]
+            assert name in AS_ROOT | OWN_IMAGE or user not in ("root", "0"), name
+            if name in OWN_IMAGE:
+                assert service["image"] == "touchline" and "user" not in service
+
+    def test_images_are_named_by_version(self, scaled: dict[str, Any]) -> None:
+        for name, service in scaled["services"].items():
+            if name not in OWN_IMAGE:
+                repository, _, version = service["image"].partition(":")
+                assert re.fullmatch(r"\d+(\.\d+)*", version), name
+                # No address of a registry.
+                assert "." not in repository
+
+    def test_the_image_has_the_libraries_that_it_needs(self, scaled: dict[str, Any]) -> None:
+        for name in OWN_IMAGE:
+            assert scaled["services"][name]["build"]["args"]["LIBRARIES"] == "requirements-all.txt"
+
+    def test_settings_are_those_that_the_product_knows(self, scaled: dict[str, Any]) -> None:
+        for name in OWN_IMAGE:
+            given = scaled["services"][name]["environment"]
+            assert {key for key in given if key.startswith("TOUCHLINE_")} <= KNOWN
+
+    def test_no_secret_stands_in_an_environment(self, scaled: dict[str, Any]) -> None:
+        for service in scaled["services"].values():
+            for name, text in service.get("environment", {}).items():
+                assert not re.search(r"(PASSWORD|SECRET|KEY|TOKEN)$", name)
+                # Nor in an address.
+                assert not re.search(r"://[^/]*@", str(text))
+        stores = json.loads(scaled["services"]["touchline"]["environment"]["TOUCHLINE_STORES"])
+        for store in stores.values():
+            assert not {"key", "secret", "token"} & store.keys()
+
+    def test_each_begins_when_what_it_needs_is_healthy(self, scaled: dict[str, Any]) -> None:
+        services = scaled["services"]
+        for service in services.values():
+            for other, how in service.get("depends_on", {}).items():
+                ready = services[other].get("healthcheck", {"disable": True})
+                wanted = {"service_healthy"}
+                if ready.get("disable"):
+                    wanted = {"service_completed_successfully"}
+                if other == "proxy":
+                    # Whose network Touchline lives in: it cannot wait for what waits for it.
+                    wanted = {"service_started"}
+                assert how["condition"] in wanted
+        assert {"database", "bucket", "scheduler"} <= services["touchline"]["depends_on"].keys()
+        assert "store" in services["bucket"]["depends_on"]
+        assert "scheduler" in services["worker"]["depends_on"]
+
+    def test_what_is_named_is_there(self, scaled: dict[str, Any], secrets: Path) -> None:
+        for secret in scaled["secrets"].values():
+            name = Path(secret["file"]).relative_to("secrets")
+            assert (secrets / name).is_file()
+        for service in scaled["services"].values():
+            for volume in service.get("volumes", ()):
+                source = volume.partition(":")[0]
+                assert source in scaled["volumes"] or source[0] in ".$"
+            for secret in service.get("secrets", ()):
+                assert (secret if isinstance(secret, str) else secret["source"]) in scaled[
+                    "secrets"
+                ]
+
+    def test_two_web_processes_and_two_workers(self, scaled: dict[str, Any]) -> None:
+        services = scaled["services"]
+        assert services["touchline"]["environment"]["TOUCHLINE_WEB_WORKERS"] == "2"
+        assert services["worker"]["scale"] == 2
+
+
+class TestSecrets:
+    def test_touchline_takes_them(self, scaled: dict[str, Any], secrets: Path) -> None:
+        settings = settings_of(scaled["services"]["touchline"], secrets)
+        assert re.fullmatch(r"postgresql://touchline:\w{48}@database/touchline", settings.database)
+        store: StoreSettings = settings.stores["store"]
+        key, secret, _ = read_keys(store) or ("", "", "")
+        (identity,) = json.loads((secrets / "store.json").read_text())["identities"]
+        assert identity["credentials"] == [{"accessKey": key, "secretKey": secret}]
+        assert {right.partition(":")[2] for right in identity["actions"]} == {store.bucket}
+        assert settings.cluster is not None
+        assert read_place(settings.cluster, settings.cluster_keys).security()
+        password = (secrets / "database_password").read_text()
+        assert f":{password}@" in settings.database
+
+    def test_nobody_else_comes_past_the_folder(self, secrets: Path) -> None:
+        assert stat.S_IMODE(secrets.stat().st_mode) == 0o700
+        open_ = {
+            path.name
+            for path in secrets.rglob("*")
+            if path.is_file() and stat.S_IMODE(path.stat().st_mode) & 0o077
+        }
+        # Of users whose numbers other images choose.
+        assert open_ == {"database_password", "store.json"}
+
+    def test_two_installations_share_nothing(self, secrets: Path, tmp_path: Path) -> None:
+        make_secrets(tmp_path / "other")
+        for path in secrets.rglob("*"):
+            if path.is_file():
+                assert (tmp_path / "other" / path.relative_to(secrets)).read_bytes() != (
+                    path.read_bytes()
+                )
+
+    def test_what_is_there_is_not_replaced(self, secrets: Path) -> None:
+        before = (secrets / "database_url").read_text()
+        with pytest.raises(subprocess.CalledProcessError) as caught:
+            make_secrets(secrets)
+        assert b"is there already" in caught.value.stderr
+        assert (secrets / "database_url").read_text() == before
+        assert [path.name for path in secrets.parent.iterdir()] == [secrets.name]
 
 
 class TestDockerfile:
