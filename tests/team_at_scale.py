@@ -44,6 +44,8 @@ GROUPS = 420
 """So many that the server gives them to the cluster."""
 PICTURED = 2
 INSIDE = "/run/secrets"
+PATIENCE_S = 8 * SECONDS
+"""A dozen processes that start at once, on a machine that does much else."""
 PASSWORD = "four plain words here"
 
 Json = dict[str, Any]
@@ -161,13 +163,13 @@ class Installation:
         """What a program has said."""
         return (self.folder / f"{name}.log").read_text("utf-8", "replace")
 
-    def until(self, what: str, ready: Callable[[], Any], seconds: float = 2 * SECONDS) -> Any:
+    def until(self, what: str, ready: Callable[[], Any], seconds: float = PATIENCE_S) -> Any:
         """What a function says, once that is something; a fault where it stays nothing."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             if found := ready():
                 return found
-            time.sleep(0.2)
+            time.sleep(0.5)
         logs = "\n".join(f"--- {name}\n{self.said(name)[-2000:]}" for name in self.running)
         raise SystemExit(f"{what}: did not happen\n{logs}")
 
@@ -197,6 +199,7 @@ def installed(folder: Path, caddy: str) -> Iterator[tuple[Installation, ObjectSt
         server = {
             "TOUCHLINE_PORT": str(ports["server"]),
             "TOUCHLINE_HOME": str(folder / "home"),
+            "TOUCHLINE_IMAGE_WORKERS": "1",
             "TOUCHLINE_IMPORT_FOLDERS": "",
         }
         it.start("server", "touchline", "serve", **server)
@@ -260,7 +263,7 @@ def walk(it: Installation, store: ObjectStore, groups: int) -> None:
     root = ssl.create_default_context(cafile=it.folder / "caddy/pki/authorities/local/root.crt")
     headers = {"Origin": it.address}
     with httpx.Client(
-        base_url=f"{it.address}/api/v1", verify=root, headers=headers, timeout=120
+        base_url=f"{it.address}/api/v1", verify=root, headers=headers, timeout=300
     ) as ask:
         it.until("the proxy answers", lambda: _status(ask, f"{it.address}/readyz") == 200)
         it.expect("nobody is let in without a session", ask.get("/datasets").status_code == 401)
@@ -274,7 +277,7 @@ def walk(it: Installation, store: ObjectStore, groups: int) -> None:
             job = _finished(it, ask, ask.post("/imports", json=body))
             it.expect(f"{name} is imported from the store", job["result"].get("new") == count)
         before = _processor(it)
-        it.until("all is solved", lambda: _solved(ask, "league", groups), 600)
+        it.until("all is solved", lambda: _solved(ask, "league", groups))
         spent = _processor(it) - before
         it.expect(f"workers solved, {spent:.1f} s of their processor", spent > 0.01 * groups)
         _look(it, ask)
@@ -365,7 +368,7 @@ def _finished(it: Installation, ask: httpx.Client, answer: httpx.Response) -> Js
         job = ask.get(f"/jobs/{job['id']}").json()
         return job if job["state"] not in ("waiting", "running") else None
 
-    it.until(f"the end of {answer.url}", over, 600)
+    it.until(f"the end of {answer.url}", over)
     it.expect(f"job {job['id']} {job['state']}: {job['message']}", job["state"] == "done")
     return job
 
