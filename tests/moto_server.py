@@ -40,7 +40,8 @@ class Door:
     """What stands before the server.
 
     Attributes:
-        mode: ``open``, ``denied``, ``expired``, ``broken``, ``hangs``, ``cuts`` or ``closed``.
+        mode: ``open``, ``denied``, ``expired``, ``broken``, ``hangs``, ``cuts``, ``closed`` or, of a store
+            that gives out whatever is there, ``unconditional``.
         sent: Bytes of bodies that went out to readers.
         asked: Method and path of every request.
     """
@@ -188,7 +189,8 @@ class _Passing(BaseHTTPRequestHandler):
 
     def _forward(self, door: Door, body: bytes, *, cut: bool) -> None:
         line = http.client.HTTPConnection("127.0.0.1", self.server.behind, timeout=SECONDS)  # type: ignore[attr-defined]
-        headers = {name: value for name, value in self.headers.items() if name.lower() != "host"}
+        dropped = ("host", "if-match") if door.mode == "unconditional" else ("host",)
+        headers = {n: value for n, value in self.headers.items() if n.lower() not in dropped}
         line.request(
             self.command,
             self.path,

@@ -435,6 +435,14 @@ class TestDoctor:
         (check,) = examine_stores(settings)
         assert "ExpiredToken" in check.sentence
 
+    def test_a_store_that_gives_out_whatever_is_there_is_told(
+        self, settings: Settings, filled_store: str, door: Door
+    ) -> None:
+        door.mode = "unconditional"
+        (check,) = examine_stores(settings)
+        assert not check.ok
+        assert "If-Match" in check.sentence and "soccer-data" not in check.sentence
+
 
 class TestServer:
     def test_a_dataset_of_a_store_is_imported_shown_and_exported_there(

@@ -7,11 +7,19 @@ from itertools import islice
 
 from app.config import Settings
 from app.errors import ReviewError
+from app.object_store.refusal import ChangedObjectError
 from app.object_store.store import ObjectStore, open_store
 from app.review.editing.check import Check
 
 KEYS = "Correct TOUCHLINE_STORES or the file of keys: docs/operations.md says what a store needs."
+CONDITIONS = "Update the store, or use another one: docs/operations.md says which."
+_UNCONDITIONAL = (
+    "reads whatever is there, although another content was asked for (If-Match): a frame that was"
+    " changed would be shown as the imported one"
+)
 _PROBE = ".touchline-check"
+_NO_CONTENT = '"touchline-asks-for-no-content"'
+"""What no store calls any content."""
 
 
 def examine_stores(settings: Settings) -> list[Check]:
@@ -28,6 +36,8 @@ def _examine(settings: Settings, name: str) -> Check:
         if found is not None and found.size:
             store.read(found.key, 0, 1, found.etag)
             done.append("reads")
+            if not _keeps_apart(store, found.key):
+                return Check(title, False, _UNCONDITIONAL, CONDITIONS)
         if store.settings.exports:
             _write(store)
             done.append("writes")
@@ -36,6 +46,15 @@ def _examine(settings: Settings, name: str) -> Check:
         return Check(title, False, f"{error.message}{can}", KEYS)
     empty = "" if found is not None else ", and nothing is in it"
     return Check(title, True, f"{', '.join(done)}{empty}")
+
+
+def _keeps_apart(store: ObjectStore, key: str) -> bool:
+    """Whether an object is not given out as the content that it is not."""
+    try:
+        store.read(key, 0, 1, _NO_CONTENT)
+    except ChangedObjectError:
+        return True
+    return False
 
 
 def _write(store: ObjectStore) -> None:
