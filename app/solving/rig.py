@@ -49,6 +49,11 @@ ANCHOR_POINTS = 8.0
 POSITION_SIGMA_M = 2.0
 FOCAL_SIGMA = 0.05
 """How far off a camera's position (metres) and focal length (share) may be before."""
+PRIOR_SIGMA = np.full(PARAMETERS, np.inf)
+PRIOR_SIGMA[X : Z + 1] = POSITION_SIGMA_M
+PRIOR_SIGMA[LOG_FOCAL] = FOCAL_SIGMA
+PRIOR_SIGMA[KAPPA] = 0.02
+"""Of the parameters; nothing is said of how the camera is turned."""
 WIDE, TIGHT = 10.0, 2.0
 """Scales of the robust loss, in sigmas: on the way, and at the end."""
 GROSS = 5.0
@@ -252,9 +257,9 @@ class _Problem:
     ) -> tuple[float, FloatArray, FloatArray]:
         """The weak prior: the grass where the camera showed it, the camera where it stood."""
         before, grass = camera.parameters, self.anchors[place]
-        off = (parameters - before) / _PRIOR_SIGMA
-        cost, gradient = 0.5 * float(off @ off), off / _PRIOR_SIGMA
-        information = np.diag(1 / _PRIOR_SIGMA**2)
+        off = (parameters - before) / PRIOR_SIGMA
+        cost, gradient = 0.5 * float(off @ off), off / PRIOR_SIGMA
+        information = np.diag(1 / PRIOR_SIGMA**2)
         if len(grass) == 0:
             return cost, gradient, information
         pixels = camera.with_parameters(parameters).project(grass, folded=True)
@@ -271,10 +276,6 @@ class _Problem:
 
 
 _NO_PRIOR = Prior(np.zeros(PARAMETERS), np.full(PARAMETERS, np.inf))
-_PRIOR_SIGMA = np.full(PARAMETERS, np.inf)
-_PRIOR_SIGMA[X : Z + 1] = POSITION_SIGMA_M
-_PRIOR_SIGMA[LOG_FOCAL] = FOCAL_SIGMA
-_PRIOR_SIGMA[KAPPA] = 0.02
 
 
 def _sharing(cameras: Sequence[RigCamera], frames: Sequence[RigFrame]) -> list[RigCamera]:

@@ -19,6 +19,8 @@ from app.geometry.resection import X, Z, projection_jacobians
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.rig import (
+    ANCHOR_POINTS,
+    PRIOR_SIGMA,
     Rig,
     RigCamera,
     RigFit,
@@ -29,6 +31,8 @@ from app.solving.rig import (
     make_rig,
 )
 
+PROPOSAL_VERSION = 2
+"""Part of what a proposal's digest is of; raised by one whenever it says another number."""
 BLOCK = 50
 """Frames in a block of time: two seconds at 25 frames a second."""
 MIN_OFFSET_FRAMES = 50
@@ -47,7 +51,7 @@ class CameraChange:
         after: The adjusted camera.
         covariance: Of the adjusted camera's parameters, 8 x 8, row by row.
         covariance_before: The same for the camera in use: what is unknown of the adjusted one,
-            and how far that one lies from it.
+            and an error as large in the picture as its distance from it.
         moved_m: How far its position moves.
         turned_degrees: How far it turns.
         focal_percent: How much longer its focal length becomes.
@@ -140,13 +144,14 @@ def propose_rig(
     odd = rig.times // BLOCK % 2 == 1
     fit = adjust(rig)
     halved = adjust(rig.only(~odd)) if odd.any() and not odd.all() else None
-    moved = np.linalg.norm(
-        best_points(fit.parameters, rig.rays, np.inf) - best_points(rig.start, rig.rays, np.inf),
-        axis=1,
-    )
+    balls = best_points(fit.parameters, rig.rays, np.inf)
+    moved = np.linalg.norm(balls - best_points(rig.start, rig.rays, np.inf), axis=1)
     used = {camera.key for camera in rig.cameras}
     return RigProposal(
-        cameras=tuple(_camera_change(rig, fit, row) for row in range(len(rig.cameras))),
+        cameras=tuple(
+            _camera_change(rig, fit, row, balls[rig.rays.point[rig.rays.camera == row]])
+            for row in range(len(rig.cameras))
+        ),
         pairs=tuple(_pair_changes(rig, fit, halved, odd)),
         left_alone=tuple(camera.key for camera in cameras if camera.key not in used),
         frames=rig.rays.points,
@@ -158,14 +163,49 @@ def propose_rig(
     )
 
 
-def _camera_change(rig: Rig, fit: RigFit, row: int) -> CameraChange:
+def error_covariance(camera: RigCamera, parameters: FloatArray, balls: FloatArray) -> FloatArray:
+    """Covariance of the camera in use about the adjusted one, shape (8, 8).
+
+    Of its error one example is known. The square of that would say that the error can be no other
+    one: two rays could then not miss each other by more than the root of two in sigmas, and balls
+    elsewhere would count as exact. What is kept of it is how large it is in the picture, in the
+    mean square over the balls; its shape is that of any error which moves the grass alike.
+
+    Args:
+        camera: With the camera in use.
+        parameters: Of the adjusted camera, shape (8,).
+        balls: That it shows, pitch frame, metres, shape (N, 3).
+    """
+    after, step = camera.with_parameters(parameters), camera.parameters - parameters
+    moved = camera.camera.project(balls, folded=True) - after.project(balls, folded=True)
+    shown = np.isfinite(moved).all(axis=1)
+    grass = grass_in_view(camera)
+    slopes = _slopes(camera, parameters, grass)
+    information = np.einsum("nia,nib->ab", slopes, slopes) / max(len(grass), 1)
+    square = float(step @ information @ step)
+    if not (square > 0 and shown.any()):
+        return np.outer(step, step)
+    information *= ANCHOR_POINTS / square
+    covariance = np.linalg.inv(information + np.diag(1 / PRIOR_SIGMA**2))
+    slopes = _slopes(camera, parameters, balls[shown])
+    expected = np.einsum("nia,ab,nib->", slopes, covariance, slopes)
+    scaled: FloatArray = covariance * float((moved[shown] ** 2).sum() / expected)
+    return scaled
+
+
+def _slopes(camera: RigCamera, parameters: FloatArray, points: FloatArray) -> FloatArray:
+    """Derivatives of points' pixels by the parameters of their camera, shape (N, 2, 8)."""
+    rows = np.repeat(parameters[None], len(points), axis=0)
+    return projection_jacobians(rows, points, np.full(len(points), camera.half_diagonal))
+
+
+def _camera_change(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> CameraChange:
     camera, parameters, spread = rig.cameras[row], fit.parameters[row], fit.covariance_of(row)
-    after, step = camera.with_parameters(parameters), rig.start[row] - parameters
+    after = camera.with_parameters(parameters)
     turn = after.rotation @ camera.camera.rotation.T
     grass = grass_in_view(camera)
     moved = after.project(grass) - camera.camera.project(grass)
-    rows = np.repeat(parameters[None], len(grass), axis=0)
-    slopes = projection_jacobians(rows, grass, np.full(len(grass), camera.half_diagonal))
+    slopes = _slopes(camera, parameters, grass)
     variances = np.trace(slopes @ spread @ slopes.transpose(0, 2, 1), axis1=1, axis2=2)
     lines = any(camera.lines.values())
     return CameraChange(
@@ -173,7 +213,9 @@ def _camera_change(rig: Rig, fit: RigFit, row: int) -> CameraChange:
         before=camera.camera,
         after=after,
         covariance=tuple(spread.ravel().tolist()),
-        covariance_before=tuple((spread + np.outer(step, step)).ravel().tolist()),
+        covariance_before=tuple(
+            (spread + error_covariance(camera, parameters, balls)).ravel().tolist()
+        ),
         moved_m=float(np.linalg.norm(after.position - camera.camera.position)),
         turned_degrees=float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))),
         focal_percent=100 * (after.focal_length[0] / camera.camera.focal_length[0] - 1),

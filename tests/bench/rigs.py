@@ -15,6 +15,7 @@ import numpy as np
 
 from app.datasets.issia_reader import IssiaOptions, open_issia
 from app.datasets.report import Report
+from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
@@ -45,6 +46,9 @@ def bench_rigs(data: Path) -> None:
     noise, factors = learn_noise(learnt)
     proposal = propose_rig(*rig_of([one for one in every if not _odd(one)]), Pitch(), PAPER)
     spreads = {change.key: change.covariance_before for change in proposal.cameras}
+    adjusted = {change.key: (change.after, change.covariance) for change in proposal.cameras}
+    rigged = [with_cameras(one, adjusted) for one in judged]
+    own = learn_click([with_cameras(one, adjusted) for one in learnt])
     rows = [
         _row("cameras exact, policy paper", judged, PAPER),
         _row("noise of given cameras, estimated", judged, noise),
@@ -52,6 +56,8 @@ def bench_rigs(data: Path) -> None:
         _row(
             "covariance of the rig accepted", [with_spread(one, spreads) for one in judged], PAPER
         ),
+        _row("cameras of the rig accepted", rigged, PAPER),
+        _row("the same, noise of clicks estimated", rigged, own),
     ]
     header = (
         "ISSIA, gaps by their sigma",
@@ -81,6 +87,18 @@ def with_spread(group: Group, spreads: Mapping[str, tuple[float, ...] | None]) -
     )
 
 
+def with_cameras(group: Group, cameras: Mapping[str, tuple[Camera, tuple[float, ...]]]) -> Group:
+    """The group with other cameras and what is known of their errors."""
+
+    def change(station: Station) -> Station:
+        if station.key not in cameras:
+            return station
+        camera, covariance = cameras[station.key]
+        return replace(station, given=camera, given_covariance=covariance)
+
+    return _with_stations(group, change)
+
+
 def with_factors(group: Group, factors: SourceFactors) -> Group:
     """The group with each camera's own noise."""
     views = tuple(
@@ -98,6 +116,13 @@ def learn_noise(groups: Sequence[Group]) -> tuple[Policy, SourceFactors]:
     given = found.given.value
     factors = estimate_sources(seen, PAPER.click_sigma_px, PAPER.box_sigma_share, given)
     return replace(PAPER, given_sigma_px=given), factors
+
+
+def learn_click(groups: Sequence[Group]) -> Policy:
+    """The policy ``paper`` with the noise of clicks that groups show."""
+    found = estimate_ball_noise([miss for group in groups for miss in _misses(group)], PAPER)
+    assert found.click is not None
+    return replace(PAPER, click_sigma_px=found.click.value)
 
 
 def rig_of(groups: Sequence[Group]) -> tuple[list[RigCamera], list[RigFrame]]:

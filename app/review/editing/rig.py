@@ -28,7 +28,7 @@ from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION
 from app.solving.calibrate import calibrate_station
 from app.solving.rig import RigCamera, RigFrame
-from app.solving.rig_proposal import RigProposal, propose_rig
+from app.solving.rig_proposal import PROPOSAL_VERSION, RigProposal, propose_rig
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import lines_to_json
 from app.store.digest import digest
@@ -101,6 +101,7 @@ def propose(
     inputs = digest(
         [
             SOLVER_VERSION,
+            PROPOSAL_VERSION,
             policy.hash,
             asdict(pitch),
             [state.etag for state in states],

@@ -1,12 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from app.geometry.bundle import best_points, linearize, ray_gaps
+from app.geometry.resection import parameters_from_camera
 from app.soccer.frames import ImagePoint
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.solving.rig import RigFrame
-from app.solving.rig_proposal import BLOCK, propose_rig
-from tests.rigs import GIVEN, TRUTH, cameras, frames
+from app.solving.rig import RigFrame, make_rig
+from app.solving.rig_proposal import BLOCK, error_covariance, propose_rig
+from tests.cameras import SIZE
+from tests.rigs import GIVEN, TRUTH, cameras, frames, off
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +86,64 @@ class TestProposeRig:
     def test_nothing_can_be_held_out_of_one_block(self):
         found = pair(propose_rig(cameras(), frames(45), Pitch(), PAPER))
         assert (found.held_out, found.held_out_after_px) == (0, None)
+
+
+TRUE = np.array([parameters_from_camera(camera, SIZE.diagonal / 2) for camera in TRUTH.values()])
+ERRORS = np.array([0.003, 0.002, 0.0015, 0.5, 0.8, 0.4, 0.01, 0.004])
+"""Standard deviations of the parameters of cameras that are off."""
+RIGS = 12
+
+
+def gaps_of(seed: int) -> np.ndarray:
+    """Gaps of the rays of two cameras that are off, each in units of its sigma."""
+    rng = np.random.default_rng(seed)
+    given = {key: off(camera, rng.normal(size=8) * ERRORS) for key, camera in TRUTH.items()}
+    rig, _ = make_rig(cameras(lines=False, given=given), frames(120), Pitch(), PAPER)
+    balls = best_points(TRUE, rig.rays, np.inf)
+    covariances = np.array(
+        [
+            error_covariance(camera, TRUE[row], balls[rig.rays.point[rig.rays.camera == row]])
+            for row, camera in enumerate(rig.cameras)
+        ]
+    )
+    rays, _ = rig.rays.of_cameras(0, 1)
+    _, signed, free = ray_gaps(rig.start, rays)
+    at = linearize(rig.start, best_points(rig.start, rays, np.inf), rays)
+    order = np.argsort(rays.point, kind="stable").reshape(-1, 2)
+    slopes = np.einsum("nsi,nsia->nsa", free.reshape(-1, 2, 2), at.by_camera[order])
+    carried = np.einsum("nsa,nsab,nsb->n", slopes, covariances[rays.camera[order]], slopes)
+    return np.abs(signed) / np.sqrt(1 + carried)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return make_rig(cameras(), frames(60), Pitch(), PAPER)[0]
+
+
+class TestErrorCovariance:
+    def test_moves_balls_in_the_mean_square_as_far_as_the_error_does(self, rig):
+        camera, balls = rig.cameras[0], best_points(TRUE, rig.rays, np.inf)
+        covariance = error_covariance(camera, TRUE[0], balls)
+        moved = camera.camera.project(balls) - TRUTH["cam1"].project(balls)
+        rng = np.random.default_rng(5)
+        draws = rng.multivariate_normal(TRUE[0], covariance, 400)
+        apart = [
+            camera.with_parameters(row).project(balls) - TRUTH["cam1"].project(balls)
+            for row in draws
+        ]
+        assert np.mean(np.square(apart)) == pytest.approx(np.mean(moved**2), rel=0.2)
+
+    def test_any_error_is_possible(self, rig):
+        covariance = error_covariance(rig.cameras[0], TRUE[0], best_points(TRUE, rig.rays, np.inf))
+        lengths = np.sqrt(np.diag(covariance))
+        assert np.linalg.eigvalsh(covariance / np.outer(lengths, lengths))[0] > 1e-6
+
+    def test_gaps_of_rays_are_as_large_as_chi_square_has_them(self):
+        gaps = np.concatenate([gaps_of(seed) for seed in range(RIGS)])
+        assert np.sqrt(np.mean(gaps**2)) == pytest.approx(1.0, abs=0.2)
+        assert np.percentile(gaps, 95) == pytest.approx(1.96, rel=0.2)
+
+    def test_a_camera_that_stands_right_is_not_off(self, rig):
+        camera = replace(rig.cameras[0], camera=rig.cameras[0].with_parameters(TRUE[0]))
+        own = camera.parameters
+        assert (error_covariance(camera, own, best_points(TRUE, rig.rays, np.inf)) == 0).all()
