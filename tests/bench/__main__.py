@@ -15,6 +15,7 @@ from tests.bench.ball_noise import bench_ball_noise
 from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
 from tests.bench.geometry import bench_geometry
+from tests.bench.line_coverage import bench_line_coverage
 from tests.bench.paint import bench_paint
 from tests.bench.picture_power import bench_picture_power
 from tests.bench.pictures import bench_pictures
@@ -38,6 +39,7 @@ def main() -> None:
     bench_pictures()
     bench_picture_power()
     bench_pitches()
+    bench_line_coverage(REAL_DATA, 3)
     bench_geometry()
     if (REAL_DATA / "sn22-dev" / "lines.zip").is_file():
         bench_calibration(REAL_DATA)
