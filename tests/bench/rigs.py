@@ -48,7 +48,6 @@ def bench_rigs(data: Path) -> None:
     spreads = {change.key: change.covariance_before for change in proposal.cameras}
     adjusted = {change.key: (change.after, change.covariance) for change in proposal.cameras}
     rigged = [with_cameras(one, adjusted) for one in judged]
-    own = learn_click([with_cameras(one, adjusted) for one in learnt])
     rows = [
         _row("cameras exact, policy paper", judged, PAPER),
         _row("noise of given cameras, estimated", judged, noise),
@@ -57,7 +56,6 @@ def bench_rigs(data: Path) -> None:
             "covariance of the rig accepted", [with_spread(one, spreads) for one in judged], PAPER
         ),
         _row("cameras of the rig accepted", rigged, PAPER),
-        _row("the same, noise of clicks estimated", rigged, own),
     ]
     header = (
         "ISSIA, gaps by their sigma",
@@ -116,13 +114,6 @@ def learn_noise(groups: Sequence[Group]) -> tuple[Policy, SourceFactors]:
     given = found.given.value
     factors = estimate_sources(seen, PAPER.click_sigma_px, PAPER.box_sigma_share, given)
     return replace(PAPER, given_sigma_px=given), factors
-
-
-def learn_click(groups: Sequence[Group]) -> Policy:
-    """The policy ``paper`` with the noise of clicks that groups show."""
-    found = estimate_ball_noise([miss for group in groups for miss in _misses(group)], PAPER)
-    assert found.click is not None
-    return replace(PAPER, click_sigma_px=found.click.value)
 
 
 def rig_of(groups: Sequence[Group]) -> tuple[list[RigCamera], list[RigFrame]]:
