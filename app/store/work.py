@@ -211,8 +211,9 @@ def waiting_group(
         person: Who asks. What others have open, in any batch, is left out.
         at: Now.
         handed_in: Whether it must have been handed in, or must not; None: either.
-        after: Place after which to look first; 0: where the person has a group open already, that
-            comes first. Otherwise neither that one, nor the group at that place, is meant.
+        after: Place after which to look first, and which is never meant; what else the person has
+            open comes last then: they may have it in another window, or had it in one that is gone.
+            0: what they have open comes first.
     """
     given = {"batch": batch_id, "person": person, "at": at, "after": after}
     return session.scalar(_waiting(handed_in, bool(after)), given)
@@ -235,10 +236,9 @@ def _waiting(handed_in: bool | None, goes_on: bool) -> Select[int]:
     waits = case((table.handed_in.is_not(None), case((theirs, 1), else_=0)), else_=back)
     order: list[ColumnElement[Any]] = [case((table.handed_in_by.is_(None), 0), else_=waits)]
     if goes_on:
-        where += [table.place != after, ~mine]
+        where.append(table.place != after)
         order.append(case((table.place > after, 0), else_=1))
-    else:
-        order.insert(0, case((mine, 0), else_=1))
+    order.insert(0, case((mine, int(goes_on)), else_=int(not goes_on)))
     return select(table.group_id).where(*where).order_by(*order, table.place).limit(1)
 
 

@@ -73,6 +73,9 @@ async function take(id, group, over = false) {
 /** Whether a verdict of mine on a group is still on its way. @param {number} group */
 const waits = (group) => outbox.peek().some((item) => item.group === group && (item.verdict || item.edit) && !item.held);
 
+/** @param {number} group */
+const isJudged = (group) => outbox.peek().some((item) => item.group === group && item.verdict && !item.held);
+
 /** @param {number} id @param {number} group */
 function giveBack(id, group) {
 	// Until what was said arrives nobody else shall begin with it; a verdict ends the lease.
@@ -101,6 +104,22 @@ function heard({ group, here }) {
 }
 
 /**
+ * The next group of a batch. A verdict of mine that is still on its way has not ended its lease: what it is about
+ * comes back as mine when nothing else waits, and does not wait any more.
+ *
+ * @param {number} id @param {number} from @returns {Promise<LeaseJson>}
+ */
+async function nextThatWaits(id, from) {
+	const judged = new Set([from]);
+	let answer = await postNext(id, from);
+	while (answer.group !== null && !judged.has(answer.group) && isJudged(answer.group)) {
+		judged.add(answer.group);
+		answer = await postNext(id, answer.group);
+	}
+	return answer.group !== null && judged.has(answer.group) ? { ...answer, group: null } : answer;
+}
+
+/**
  * On to the next group that waits for me; the one that I come from is not given again.
  *
  * @param {() => boolean} [stillWanted] asked once it is known which group that is
@@ -110,7 +129,7 @@ export async function nextOfBatch(stillWanted = () => true) {
 	if (id === null || from === null || isMoving.value) return;
 	isMoving.value = true;
 	try {
-		const answer = await postNext(id, from);
+		const answer = await nextThatWaits(id, from);
 		batch.value = answer.batch;
 		if (currentId() !== from || !stillWanted()) {
 			if (answer.group !== null) giveBack(id, answer.group);

@@ -14,7 +14,7 @@ from app.errors import ConflictError, HeldGroupError, NotFoundError
 from app.review.takes.hand_back import checked_reason, note_hand_back
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.review.work.batches import WORK, Batch, Here, Part, read_batch
-from app.review.work.own import hand_in_own, next_own, own_of, takes_part
+from app.review.work.own import hand_in_own, next_own, own_of, returned_to, takes_part
 from app.store.log import Entry, append
 from app.store.session import Session, Store
 from app.store.work import (
@@ -107,6 +107,10 @@ class Leases:
             batch = _open_batch(session, batch_id)
             if not takes_part(batch, worker.parts(batch)):
                 return self._next(session, batch, worker, after)
+            back = returned_to(session, batch, worker.name)
+            mine = next((group for group in back if group != after), None)
+            if mine is not None:
+                return self._kept(session, batch, mine, Part.ANNOTATOR, worker)
         take = next_own(self._store, batch, worker.name)
         return Lease(batch, None if take is None else take.copy_id, Part.ANNOTATOR)
 
@@ -250,8 +254,8 @@ def open_for(
         batch: The batch, open.
         worker: Who asks.
         at: Now; leases that end before count no more.
-        after: Id of the group that they come from: never that one, and those behind it first. None:
-            where they have a group open, that one.
+        after: Id of the group that they come from: never that one, those behind it first, and what
+            else they have open last. None: where they have a group open, that one.
 
     Returns:
         None where there is none for them now.

@@ -12,9 +12,14 @@ from app.review.takes.mixing import Terms, begin_next
 from app.review.takes.take import Take, hand_in, read_take, reopen
 from app.review.work.batches import Batch, Part
 from app.soccer.actors import person_of
+from app.store.clock import now
 from app.store.session import Session, Store
 from app.store.takes import INDEPENDENT, count_left, take_of_copy, takes_of_batch
-from app.store.work import groups_of
+from app.store.work import groups_of, groups_returned
+from app.store.work import hand_in as hand_in_group
+
+OVER = ("accepted", "rejected")
+"""Verdicts after which a group waits for nobody."""
 
 
 def takes_part(batch: Batch, parts: Collection[Part]) -> bool:
@@ -50,26 +55,41 @@ def next_own(store: Store, batch: Batch, person: str) -> Take | None:
     return begin_next(store, terms, person=person)
 
 
+def returned_to(session: Session, batch: Batch, person: str) -> list[int]:
+    """Groups whose annotation somebody handed in, was taken over, and was handed back to them."""
+    return [row.group_id for row in groups_returned(session, [batch.id], person_of(person))]
+
+
 def own_left(session: Session, batch: Batch, person: str) -> int:
-    """Of how many groups somebody may still make an annotation of their own, begun ones included."""
+    """Of how many groups somebody may still make an annotation of their own, begun ones and those
+    that they have back included."""
     name = person_of(person)
-    return count_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
+    left = count_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
+    return left + len(returned_to(session, batch, person))
 
 
 def take_over_handed_in(store: Store, batch: Batch, person: str) -> None:
-    """Take over what somebody handed in, where nobody else annotates the same groups."""
+    """Take over what somebody handed in, where nobody else annotates the same groups.
+
+    What an annotator has not judged waits for a reviewer then, as if they had handed the group in.
+    """
     if batch.verdicts > 1:
         return
     with store.read() as session:
         ready = [
-            row.id
+            row
             for row in takes_of_batch(session, batch.id, batch.dataset_id)
             if row.person == person_of(person)
             and (row.kind, row.settled) == (INDEPENDENT, None)
             and row.handed_in is not None
         ]
-    for take_id in ready:
-        adopt_take(store, take_id, actor=person)
+    for row in ready:
+        waits = batch.annotators and row.verdict not in OVER
+
+        def note(session: Session, group: int = row.group_id) -> None:
+            hand_in_group(session, batch.id, group, at=now(), by=person_of(person))
+
+        adopt_take(store, row.id, actor=person, also=note if waits else None)
 
 
 def own_of(session: Session, batch: Batch, group: int, person: str) -> Take | None:

@@ -53,13 +53,13 @@ class Pace:
 
     @property
     def minutes_a_group(self) -> float | None:
-        """None where it cannot be known: they did one thing, or all at once."""
-        return self.minutes / self.groups if self.groups and self.minutes else None
+        """None where it cannot be known: what they did took less than a minute."""
+        return self.minutes / self.groups if self.groups and self.minutes >= 1 else None
 
     @property
     def groups_an_hour(self) -> float | None:
         """The same the other way round."""
-        return 60 * self.groups / self.minutes if self.groups and self.minutes else None
+        return 60 * self.groups / self.minutes if self.groups and self.minutes >= 1 else None
 
 
 @dataclass(frozen=True)

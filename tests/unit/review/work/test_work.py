@@ -15,6 +15,7 @@ from app.review.people.audit import read_audit
 from app.review.people.people import invite
 from app.review.people.roles import EVERYTHING, Role
 from app.review.queue.listing import list_groups
+from app.review.takes.gold import mark
 from app.review.verdicts.verdict import set_verdict
 from app.review.work.batches import (
     NewBatch,
@@ -168,6 +169,20 @@ class TestLeases:
         assert leases.give_back(batch, groups[0], CY).here == ()
         assert leases.next(batch, BO).group == groups[0]
 
+    def test_what_a_window_left_open_that_is_gone_comes_back_once_nothing_else_waits(
+        self, store, dataset, groups, leases
+    ):
+        batch = make_batch(store, dataset, NewBatch("a", size=3), actor="lead").id
+        # The window of the first group crashes: it says nothing, and another one goes on.
+        assert leases.next(batch, BO).group == groups[0]
+        leases.take(batch, groups[1], BO)
+        judge(store, groups[1], "bo")
+        assert leases.next(batch, BO, after=groups[1]).group == groups[2]
+        assert leases.next(batch, CY, after=groups[1]).group is None
+        judge(store, groups[2], "bo")
+        assert leases.next(batch, BO, after=groups[2]).group == groups[0]
+        assert leases.next(batch, BO, after=groups[0]).group is None
+
     def test_a_verdict_ends_it_and_the_work_and_taking_it_back_brings_both(
         self, store, dataset, groups, leases
     ):
@@ -232,6 +247,31 @@ class TestLeases:
         assert lease.batch.handed_in == 1 and my_work(store, lambda _: ADA)[0].handed_back == []
         with store.read() as session:
             assert groups[3] in replay(session).groups
+
+    def test_what_is_annotated_among_gold_waits_for_its_reviewer_who_may_hand_it_back(
+        self, store, dataset, groups, leases
+    ):
+        judge(store, groups[5], "cy")
+        mark(store, groups[5], "imported", actor="cy")
+        new = NewBatch("a", size=2, annotators=["ada"], reviewers=["bo"], gold_every=2)
+        batch = make_batch(store, dataset, new, actor="lead").id
+        had = 0
+        while (copy := leases.next(batch, ADA).group) is not None:
+            leases.hand_in(batch, copy, ADA, actor="ada")
+            had += 1
+        assert had == 3
+        assert get_batch(store, batch).handed_in == 2
+        found = leases.next(batch, BO)
+        assert (found.group, found.part, found.handed_in_by) == (groups[0], Part.REVIEWER, "ada")
+        leases.hand_back(batch, groups[0], BO, "too wide", actor="bo")
+        (mine,) = my_work(store, lambda _: ADA)
+        assert (mine.left, [one.group for one in mine.handed_back]) == (1, [groups[0]])
+        back = leases.next(batch, ADA)
+        assert (back.group, back.handed_back.reason) == (groups[0], "too wide")
+        leases.hand_in(batch, groups[0], ADA, actor="ada")
+        assert leases.next(batch, ADA).group is None
+        judge(store, groups[0], "bo")
+        assert leases.next(batch, BO).group == groups[1]
 
     def test_nothing_is_given_out_of_a_closed_one(self, store, dataset, leases):
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
