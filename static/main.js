@@ -5,6 +5,7 @@ import { effect, untracked } from '@preact/signals';
 
 import { html, render } from 'htm/preact';
 
+import { beginsAt } from './api/events.js';
 import { startKeys } from './lib/keys.js';
 import { startRouter } from './lib/router.js';
 import { startArrivals } from './state/arrival.js';
@@ -44,7 +45,7 @@ startRouter();
 startKeys((needs) => refuses(needs, datasetHere()));
 startNeeds();
 if (isTeam) {
-	await askWhoIsThere();
+	beginsAt((await askWhoIsThere())?.moment);
 	let begun = false;
 	effect(() => {
 		if (!me.value || begun) return;

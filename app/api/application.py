@@ -164,7 +164,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
     install_handlers(app)
     app.include_router(health.router, dependencies=[Depends(require_decided)])
     # Before the API: nobody asks for as much at once as somebody who opens the first page.
-    install_pages(app, site)
+    install_pages(app, site, None if settings.team else services.events.moment)
     for router in ROUTERS:
         app.include_router(
             router.router,

@@ -22,7 +22,13 @@ from app.api.schemas.job import JobDocument
 from app.errors import OverloadedError, StorageError
 from app.review.jobs.jobs import Jobs
 from app.review.people.roles import EVERYTHING, Sight
-from app.review.queue.changes import Change, read_news, read_position
+from app.review.queue.changes import (
+    Change,
+    read_moment,
+    read_news,
+    read_position,
+    read_solved_since,
+)
 from app.review.work.leases import Lease
 from app.store.jobs import OPEN, Job
 from app.store.session import Store
@@ -139,6 +145,15 @@ class Events:
     def position(self) -> int:
         """Id of the newest entry of the log."""
         return read_position(self._store)
+
+    def moment(self) -> str:
+        """How things stand, as a page that begins to read them tells the stream later on."""
+        return "-".join(map(str, read_moment(self._store)))
+
+    def solved_since(self, solution: int, feed: Feed) -> list[ServerSentEvent]:
+        """Solutions that arrived after one, for a listener that has read what was there then."""
+        found = read_solved_since(self._store, solution)
+        return [_change_event(item) for item in found if feed.is_told(item)]
 
     @property
     def counts(self) -> Counts:

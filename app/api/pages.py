@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
+
 from fastapi import APIRouter, FastAPI, Request, Response
 from starlette.convertors import StringConvertor, register_url_convertor
 from starlette.exceptions import HTTPException
@@ -9,6 +12,7 @@ from starlette.types import Receive, Scope, Send
 
 from app.api.modules import FOR_GOOD, REVALIDATED, Modules
 from app.api.site import IndexPage, Site
+from app.errors import StorageError
 
 PAGES = (
     "/",
@@ -55,8 +59,12 @@ ELSEWHERE = f"/{{path:{_Elsewhere.NAME}}}"
 register_url_convertor(_Elsewhere.NAME, _Elsewhere())
 
 
-def install_pages(app: FastAPI, site: Site) -> None:
-    """Serve the pages and the modules of the browser application."""
+def install_pages(app: FastAPI, site: Site, moment: Callable[[], str] | None = None) -> None:
+    """Serve the pages and the modules of the browser application.
+
+    ``moment`` says how things stand, so that a page hears of all that happens after it was asked
+    for; None: the page asks who is there before it reads anything, and is told with the answer.
+    """
     router = APIRouter(include_in_schema=False)
 
     def found() -> IndexPage:
@@ -67,6 +75,10 @@ def install_pages(app: FastAPI, site: Site) -> None:
 
     def page(request: Request) -> Response:
         index = found()
+        if moment is not None:
+            # A page without it asks once more for what it has read when its stream begins.
+            with suppress(StorageError):
+                index = index.at(moment())
         headers = {"ETag": index.etag, "Cache-Control": REVALIDATED}
         if index.etag in request.headers.get("if-none-match", ""):
             return Response(status_code=304, headers=headers)

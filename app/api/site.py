@@ -6,7 +6,7 @@ import base64
 import hashlib
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.api.security.headers import content_security_policy
@@ -39,6 +39,11 @@ class IndexPage:
     """All style sheets of the page, in its order."""
     modules: tuple[str, ...]
     """What the page asks for beside them: paths below the folder of the application."""
+
+    def at(self, moment: str) -> IndexPage:
+        """The page that says how things stood when it was asked for."""
+        html = self.html.replace(b"<html ", f'<html data-moment="{moment}" '.encode(), 1)
+        return replace(self, html=html, etag=f'{self.etag[:-1]}-{moment}"')
 
     @staticmethod
     def make(folder: Path, version: str, *, team: bool = False) -> IndexPage:

@@ -20,6 +20,19 @@ const listeners = new Map(KINDS.map((kind) => [kind, new Set()]));
 let end = null;
 /** Whether there was a stream before the next one: between the two something may have happened. */
 let resumes = false;
+/** How things stood when the page began to read, for its first stream; '' where nobody said. */
+let moment = (typeof document !== 'undefined' && document.documentElement.dataset.moment) || '';
+/** What the server tells while it happens and never again. */
+const FLEETING = /** @type {const} */ (['job', 'work']);
+
+/**
+ * Say how things stood before the page read anything, where the page itself does not.
+ *
+ * @param {string | null | undefined} said
+ */
+export function beginsAt(said) {
+	moment ||= said ?? '';
+}
 
 const isHeard = () => [...listeners.values()].some((set) => set.size > 0);
 
@@ -32,8 +45,10 @@ function told(kind, text) {
 /** @param {boolean} late */
 function opened(late) {
 	connected.value = true;
-	const behind = resumes || late ? [...listeners.values()].flatMap((set) => [...set]) : [];
+	const kinds = resumes || late ? KINDS : FLEETING;
+	const behind = kinds.flatMap((kind) => [...(listeners.get(kind) ?? [])]);
 	resumes = true;
+	moment = '';
 	for (const { missed } of behind) missed();
 }
 
@@ -43,7 +58,7 @@ function lost() {
 
 function open() {
 	if (end || document.hidden || !isHeard()) return;
-	end = readStream(KINDS, { opened, lost, told });
+	end = readStream(KINDS, { opened, lost, told }, resumes ? '' : moment);
 }
 
 function rest() {
@@ -83,8 +98,8 @@ export function listenToGroups(heard, missed) {
  * Hear of what happens, wherever it was done, until the returned function is called.
  *
  * @param {EventKind} kind @param {(data: any) => void} heard
- * @param {() => void} [missed] the stream is there again after a while without one: what was shown
- *   may be old
+ * @param {() => void} [missed] the stream is there after a while without one, in which something may have happened
+ *   that it does not tell: what was shown may be old
  * @returns {() => void}
  */
 export function listen(kind, heard, missed = () => {}) {

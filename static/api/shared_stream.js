@@ -6,8 +6,8 @@
 
 /**
  * @typedef {object} Reader
- * @property {(late: boolean) => void} opened the stream is there; `late`: it was before, so that
- *   something may have been missed
+ * @property {(late: boolean) => void} opened the stream is there; `late`: it was before, or nobody knows since when
+ *   it tells, so that something may have been missed
  * @property {() => void} lost
  * @property {(kind: string, data: string) => void} told
  */
@@ -21,11 +21,12 @@ const AGAIN = 5000;
  *
  * @param {readonly string[]} kinds names of events
  * @param {Reader} reader
+ * @param {string} [moment] how things stood when the page began to read: what came after it is told first
  * @returns {() => void}
  */
-export function readStream(kinds, reader) {
+export function readStream(kinds, reader, moment = '') {
 	// Without a secure context there are no locks; then each window has a stream of its own.
-	if (!navigator.locks) return lead(kinds, reader);
+	if (!navigator.locks) return lead(kinds, reader, moment);
 	const channel = new BroadcastChannel(NAME);
 	const ended = new AbortController();
 	let leads = false;
@@ -66,7 +67,7 @@ export function readStream(kinds, reader) {
 	navigator.locks
 		.request(NAME, { signal: ended.signal }, () => {
 			leads = true;
-			const close = lead(kinds, all);
+			const close = lead(kinds, all, moment);
 			return new Promise((release) => {
 				ended.signal.addEventListener('abort', () => {
 					close();
@@ -82,17 +83,17 @@ export function readStream(kinds, reader) {
 /**
  * Read the stream in this window.
  *
- * @param {readonly string[]} kinds @param {Reader} reader
+ * @param {readonly string[]} kinds @param {Reader} reader @param {string} moment
  * @returns {() => void}
  */
-function lead(kinds, reader) {
+function lead(kinds, reader, moment) {
 	/** @type {EventSource} */
 	let source;
 	/** @type {ReturnType<typeof setTimeout> | undefined} */
 	let retry;
-	let late = false;
+	let late = moment === '';
 	const open = () => {
-		const stream = new EventSource(ADDRESS);
+		const stream = new EventSource(late ? ADDRESS : `${ADDRESS}?since=${moment}`);
 		source = stream;
 		stream.onopen = () => {
 			reader.opened(late);

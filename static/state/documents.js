@@ -26,14 +26,23 @@ export function remember(document) {
 	if (documents.size > KEPT && oldest !== undefined) documents.delete(oldest);
 }
 
+/** Groups of which something was told while they are read: the answer may be older than that. @type {Set<number>} */
+const outdated = new Set();
+
+/** Something was told of a group: an answer that is on its way counts no more. @param {number} id */
+export function outdate(id) {
+	if (loading.has(id)) outdated.add(id);
+}
+
 /** Read a group again before it is shown. @param {number} id */
 export function forget(id) {
 	documents.delete(id);
+	outdate(id);
 }
 
 /** Read every group but this one again before it is shown. @param {number | null} id */
 export function forgetOthers(id) {
-	for (const other of [...documents.keys()]) if (other !== id) documents.delete(other);
+	for (const other of [...documents.keys(), ...loading.keys()]) if (other !== id) forget(other);
 }
 
 /** Answers to writes, by group: what was asked before one knows less than it. @type {Map<number, number>} */
@@ -49,15 +58,21 @@ export function rememberAnswer(document) {
 export function load(id) {
 	const present = loading.get(id);
 	if (present) return present;
-	const before = answers.get(id);
-	const request = getGroup(id).then((document) => {
-		const newer = answers.get(id) === before ? undefined : known(id);
-		if (newer) return newer;
-		remember(document);
-		return document;
-	}).finally(() => loading.delete(id));
+	const request = read(id).finally(() => loading.delete(id));
 	loading.set(id, request);
 	return request;
+}
+
+/** @param {number} id @returns {Promise<GroupDocument>} */
+async function read(id) {
+	const before = answers.get(id);
+	outdated.delete(id);
+	const document = await getGroup(id);
+	const newer = answers.get(id) === before ? undefined : known(id);
+	if (newer) return newer;
+	if (outdated.has(id)) return read(id);
+	remember(document);
+	return document;
 }
 
 /**

@@ -6,7 +6,7 @@ import { effect, signal, untracked } from '@preact/signals';
 import { listenToGroups } from '../api/events.js';
 import { ApiError } from '../api/problem.js';
 import { page } from '../lib/router.js';
-import { forget, forgetOthers, known, load } from './documents.js';
+import { forget, forgetOthers, known, load, outdate } from './documents.js';
 import { draft, groupDocument, renew } from './group.js';
 import { announce } from './notice.js';
 import { outbox } from './outbox.js';
@@ -21,6 +21,7 @@ let open = null;
 
 /** @param {Told} told */
 function heard(told) {
+	outdate(told.group);
 	const present = known(told.group);
 	if (!present || present.etag === told.etag) return;
 	if (told.group !== groupDocument.value?.id) {

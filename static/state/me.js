@@ -60,11 +60,12 @@ export function startRights() {
 	addEventListener('focus', () => { if (!mustLogIn.value) askWhoIsThere(); });
 }
 
-/** Ask the server who is there. */
+/** Ask the server who is there. @returns {Promise<SessionJson | null>} null: it did not say */
 export async function askWhoIsThere() {
 	const session = await getSession().catch(() => null);
 	if (session?.ways) ways.value = session.ways;
-	if (session?.name) welcome({ ...session, ways: null });
+	if (session?.name) welcome({ ...session, ways: null, moment: null });
+	return session;
 }
 
 /** Log out, and leave nothing of it in this window. */

@@ -20,7 +20,7 @@ import { HandedBack } from './lease_bar.js';
 function Bar({ group }) {
 	const { value: found, error, reload } = useResource((signal) => getTake(group.id, signal), [group.id, group.verdict.at]);
 	const [busy, setBusy] = useState(false);
-	useEffect(() => listen('group', (told) => { if (told.group === group.id && told.kind === 'take') reload(); }), [group.id, reload]);
+	useEffect(() => listen('group', (told) => { if (told.group === group.id && told.kind === 'take') reload(); }, reload), [group.id, reload]);
 	useEffect(() => {
 		onScreen.value = found;
 		return () => { onScreen.value = null; };

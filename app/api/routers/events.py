@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import AsyncIterator
 from typing import Annotated
 
@@ -14,6 +15,8 @@ from app.api.problem import Responses, responses
 from app.api.schemas.event import EVENTS
 from app.api.security.requests import is_head
 from app.review.datasets.dataset import dataset_id
+
+_MOMENT = re.compile(r"(\d{1,18})-(\d{1,18})", re.ASCII)
 
 router = APIRouter(prefix="/events", tags=["events"])
 
@@ -50,12 +53,25 @@ class Start:
                 "first. Anything that is no such id counts as none.",
             ),
         ] = None,
+        since: Annotated[
+            str | None,
+            Query(
+                max_length=40,
+                description="`moment` of the session, or of the page: what came after it is told "
+                "first, where no `Last-Event-ID` says more. Anything else counts as none.",
+            ),
+        ] = None,
     ):
         self.dataset_id = None if dataset is None else dataset_id(services.store, dataset)
         newest = self.newest = services.events.position()
         seen = last_event_id or ""
         self.resumed = seen.isascii() and seen.isdigit() and len(seen) < 19 and int(seen) <= newest
-        self.position = int(seen) if self.resumed else newest
+        moment = None if self.resumed else _MOMENT.fullmatch(since or "")
+        known = moment is not None and int(moment[1]) <= newest
+        self.position = (
+            int(seen) if self.resumed else int(moment[1]) if moment and known else newest
+        )
+        self.solution = int(moment[2]) if moment and known else None
 
 
 async def begin(
@@ -79,10 +95,13 @@ def under_way(
     services: AppServices,
     sight: Sees,
     start: Annotated[Start, Depends()],
-    _feed: Annotated[Feed, Depends(begin)],
+    feed: Annotated[Feed, Depends(begin)],
 ) -> list[ServerSentEvent]:
-    """Jobs that are under way, read once the feed hears of what becomes of them."""
-    return services.events.open_jobs(start.dataset_id, sight)
+    """Jobs that are under way and solutions that arrived, read once the feed hears of later ones."""
+    jobs = services.events.open_jobs(start.dataset_id, sight)
+    if start.solution is None:
+        return jobs
+    return [*services.events.solved_since(start.solution, feed), *jobs]
 
 
 @router.get(
@@ -95,7 +114,7 @@ async def listen(
     request: Request,
     start: Annotated[Start, Depends()],
     feed: Annotated[Feed, Depends(begin)],
-    jobs: Annotated[list[ServerSentEvent], Depends(under_way)],
+    first: Annotated[list[ServerSentEvent], Depends(under_way)],
 ) -> AsyncIterator[ServerSentEvent]:
     """What changes, as it changes: by anybody, in a browser or on the command line.
 
@@ -103,7 +122,7 @@ async def listen(
     went on or ended. `work`: who has a group of a batch open. The stream begins with the jobs that are under way.
     """
     yield hello(start.position)
-    for event in jobs:
+    for event in first:
         yield event
     if is_head(request.scope):
         return

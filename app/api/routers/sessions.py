@@ -7,7 +7,7 @@ from typing import Annotated
 import structlog
 from fastapi import APIRouter, Depends, Request, Response
 
-from app.api.deps import AppStore, Id
+from app.api.deps import AppServices, AppStore, Id
 from app.api.problem import responses
 from app.api.schemas.people import (
     LinkLook,
@@ -75,20 +75,26 @@ def session_of(login: Login | None, store: Store) -> SessionDocument:
 
 
 @router.get("/session", operation_id="getSession", responses=responses(401, 429))
-def get_session(request: Request, store: AppStore) -> SessionDocument:
+def get_session(request: Request, services: AppServices) -> SessionDocument:
     """Who asks; nobody, before they have logged in. With a token: whose it is, and what it may."""
     team: Team | None = request.app.state.team
     if team is None:
         every = ALLOWS[Role.ADMIN]
         return SessionDocument(
-            team=False, name=LOCAL_USER, role=Role.ADMIN, may=every, allows=ALLOWS
+            team=False,
+            name=LOCAL_USER,
+            role=Role.ADMIN,
+            moment=services.events.moment(),
+            may=every,
+            allows=ALLOWS,
         )
     bearer = bearer_of(request.scope)
     login = team.login(request) if bearer is None else team.login_with(bearer, request)
-    found = session_of(login, store)
+    found = session_of(login, services.store)
     rules = team.sign_on and team.sign_on.rules
     ways = WaysIn(password=not (rules and rules.only), sign_on=rules.label if rules else None)
-    return found.model_copy(update={"ways": ways})
+    moment = None if login is None else services.events.moment()
+    return found.model_copy(update={"ways": ways, "moment": moment})
 
 
 @router.post("/session", operation_id="createSession", responses=responses(401, 409, 413, 415, 429))

@@ -162,6 +162,11 @@ class SessionDocument(Document):
     ways: WaysIn | None = Field(
         default=None, description="How people log in; told to whoever asks who they are."
     )
+    moment: str | None = Field(
+        default=None,
+        description="How things stand, for `since` of the events: what comes after this answer is "
+        "told then. Null: nobody is logged in, or they have just come.",
+    )
     may: list[Action] = Field(description="What the role lets them do.")
     datasets: list[SingleRoleDocument] = Field(
         default=[], description="Where they are something else."

@@ -69,6 +69,18 @@ def read_position(store: Store) -> int:
         return newest_entry(session)
 
 
+def read_moment(store: Store) -> tuple[int, int]:
+    """Ids of the log's last entry and of the last solution; 0 where there is none."""
+    with store.read() as session:
+        return newest_entry(session), newest_solution(session)
+
+
+def read_solved_since(store: Store, solution: int) -> list[Change]:
+    """Groups that got a solution after another one, or their dataset where they are many."""
+    with store.read() as session:
+        return read_solved(session, solution) if newest_solution(session) > solution else []
+
+
 def read_news(store: Store, places: Collection[int], solution: int | None) -> News:
     """What has changed since some entries of the log, and since a solution (None: none is told)."""
     with store.read() as session:

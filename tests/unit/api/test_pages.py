@@ -50,6 +50,21 @@ class TestPages:
         (digest,) = script_hashes(new.content)
         assert f"'{digest}'" in new.headers["content-security-policy"]
 
+    def test_a_page_says_how_things_stood_and_is_another_one_once_they_stand_otherwise(
+        self, plain_app, client_of, static_folder: Path
+    ) -> None:
+        (static_folder / "index.html").write_text('<html lang="en"><p>')
+        now = ["12-3"]
+        install_pages(plain_app, Site(static_folder), lambda: now[0])
+        client = client_of(plain_app)
+        first = client.get("/")
+        assert first.text == '<html data-moment="12-3" lang="en"><p>'
+        known = {"If-None-Match": first.headers["etag"]}
+        assert client.get("/", headers=known).status_code == 304
+        now[0] = "13-3"
+        again = client.get("/", headers=known)
+        assert (again.status_code, again.text[:24]) == (200, '<html data-moment="13-3"')
+
     def test_modules_are_asked_for_below_their_version_and_kept_for_good(
         self, pages_client, static_folder: Path
     ) -> None:

@@ -18,6 +18,7 @@ from fastapi import FastAPI
 from app.api import events as module
 from app.api.server import Server, listen
 from app.review.editing.edit import IncludeView
+from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
 from app.review.policies.policy import change_policy
 from app.review.verdicts.verdict import set_verdict
@@ -162,6 +163,37 @@ class TestListen:
                     {"dataset": "static", "kind": "policy", "actor": "bob"},
                 )
 
+    def test_a_page_that_read_before_it_listened_is_told_what_came_between(
+        self, app, served
+    ) -> None:
+        services, (address, _) = app.state.services, served
+        moment = httpx.get(f"{address}/api/v1/session").json()["moment"]
+        judged = set_verdict(
+            services.store, 2, "deferred", if_match=load(services.store, 2).etag, actor="bob"
+        )
+        with opened(address, since=moment) as stream:
+            assert stream.next()[1]["etag"] == judged.etag
+        change_policy(services.store, "broadcast", STRICT, if_match=None, actor="bob")
+        moment = httpx.get(f"{address}/api/v1/session").json()["moment"]
+        solve_dataset(services.store, "broadcast")
+        with opened(address, since=moment) as stream:
+            told = {stream.until(lambda name, _: name == "group")["group"] for _ in range(3)}
+            assert told == {1, 2, 3}
+
+    @pytest.mark.parametrize("since", ["", "1", "x-1", "-1-1", "999999-1", "1-" + "9" * 19, "1-٣"])
+    def test_a_moment_that_is_none_counts_as_none(self, app, served, since) -> None:
+        with opened(served[0], since=since) as stream:
+            change_policy(app.state.services.store, "static", STRICT, if_match=None, actor="bob")
+            assert stream.next()[1]["dataset"] == "static"
+
+    def test_the_last_event_says_more_than_the_moment(self, app, served) -> None:
+        store, (address, _) = app.state.services.store, served
+        change_policy(store, "static", STRICT, if_match=None, actor="bob")
+        last = str(app.state.services.events.position())
+        change_policy(store, "broadcast", STRICT, if_match=None, actor="bob")
+        with opened(address, {"Last-Event-ID": last}, since="0-0") as stream:
+            assert stream.next()[1]["dataset"] == "broadcast"
+
     def test_a_job_is_told_of_from_its_beginning_to_its_end(self, app, served) -> None:
         jobs, (address, _) = app.state.services.jobs, served
         finish = threading.Event()
@@ -184,8 +216,6 @@ class TestListen:
         with opened(address, dataset="broadcast") as stream:
             change_policy(services.store, "broadcast", STRICT, if_match=None, actor="bob")
             assert stream.next()[0] == "dataset"
-            from app.review.editing.recompute import solve_dataset
-
             solve_dataset(services.store, "broadcast")
             told = {stream.until(lambda name, _: name == "group")["group"] for _ in range(3)}
             assert told == {1, 2, 3}
