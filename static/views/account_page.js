@@ -82,7 +82,7 @@ export function AccountPage() {
 			${!sessions && !error ? html`<${Loading} what="sessions" />` : null}
 			${sessions && ways ? html`
 				<div class="page__columns">
-					<section class="card card--flush" aria-labelledby="account-sessions">
+					<section class="card card--flush account__sessions" aria-labelledby="account-sessions">
 						<h2 id="account-sessions">Where ${me.value?.name} (${me.value?.role}) is logged in</h2>
 						<table class="table">
 							<thead><tr><th>Browser</th><th>Since</th><th>Used</th><td></td></tr></thead>

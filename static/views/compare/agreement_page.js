@@ -226,7 +226,7 @@ function LeadCards({ dataset }) {
 export function AgreementPage() {
 	const dataset = pageDataset.value;
 	return html`
-		<${PageFrame} current="agreement" title=${`Agreement in ${dataset}`} where=${html`Agreement in <strong>${dataset}</strong>`}>
+		<${PageFrame} current="agreement" title=${`Agreement in ${dataset}`} where=${html`<strong>${dataset}</strong> <span class="header__place">Agreement</span>`}>
 			<${WaitingCard} dataset=${dataset} />
 			${whyNot('lead', dataset) === '' ? html`<${LeadCards} dataset=${dataset} />` : null}
 		<//>

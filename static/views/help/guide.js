@@ -20,7 +20,7 @@ function Inline({ text }) {
 
 /** @param {{block: Block}} props */
 function Part({ block }) {
-	if (block.kind === 'heading') return block.level < 2 ? null : html`<h3>${block.text}</h3>`;
+	if (block.kind === 'heading') return html`<h3>${block.text}</h3>`;
 	if (block.kind === 'list') return html`<ul>${block.items.map((item) => html`<li><${Inline} text=${item} /></li>`)}</ul>`;
 	if (block.kind === 'paragraph') return html`<p><${Inline} text=${block.text} /></p>`;
 	const [head, ...rows] = block.rows;
@@ -37,8 +37,11 @@ export function MarkdownBlocks({ text }) {
 	return blocksOf(text).map((block) => html`<${Part} block=${block} />`);
 }
 
+/** The page has the title already. @param {string} text */
+const withoutTitle = (text) => text.replace(/^# .*\n/, '');
+
 export function Guide() {
 	const { value, error } = useResource(() => getOwn(new URL('../../help/guide.json', import.meta.url).href), []);
 	if (error) return html`<p role="alert">The guide could not be read. Is the server still running?</p>`;
-	return html`<div class="guide">${value ? html`<${MarkdownBlocks} text=${value.text} />` : null}</div>`;
+	return html`<div class="guide">${value ? html`<${MarkdownBlocks} text=${withoutTitle(value.text)} />` : null}</div>`;
 }

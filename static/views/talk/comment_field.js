@@ -2,7 +2,7 @@
 /** Where a comment is written: Ctrl+Enter sends it, @ completes the names of people who see the group. */
 
 import { html } from 'htm/preact';
-import { useLayoutEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 
 import { getPeopleOfGroup } from '../../api/threads.js';
 import { useAttempt } from '../../lib/attempt.js';
@@ -38,6 +38,8 @@ export function CommentField({ id, group, label, button, text = '', focus, send,
 	const [active, setActive] = useState(0);
 	const { error, busy, attempt } = useAttempt();
 	useLayoutEffect(() => { if (focus) field.current?.focus(); }, [focus]);
+	// Buttons included, also once what was said above has grown.
+	useEffect(() => { if (field.current && field.current === document.activeElement) field.current.form?.scrollIntoView({ block: 'nearest' }); });
 
 	async function offer() {
 		const at = field.current;

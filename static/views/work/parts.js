@@ -27,5 +27,5 @@ export function Due({ due }) {
 	if (!due) return null;
 	const late = due < new Date().toISOString().slice(0, 10);
 	const day = new Date(`${due}T00:00`).toLocaleDateString('en-GB', { day: 'numeric', month: 'short', year: 'numeric' });
-	return html`<span class="note" data-grade=${late ? 'bad' : undefined}>${late ? `was due ${day}` : `due ${day}`}</span>`;
+	return html` · <span class="work__due" data-grade=${late ? 'bad' : undefined}>${late ? `was due ${day}` : `due ${day}`}</span>`;
 }

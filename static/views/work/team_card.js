@@ -48,7 +48,7 @@ function TeamBatch({ one, act, give }) {
 				<div>
 					<h3><a class="link" href=${queueAddress(batch.dataset, `batch:${batch.id}`)}>${batch.name}</a>${open ? null : html` <span class="pill">closed</span>`}${stalled ? html` <span class="pill" data-status="rejected">stalled</span>` : null}</h3>
 					<${Progress} batch=${batch} />
-					<p class="note">${given}${several}${goldEvery ? ` · one gold group in ${goldEvery}` : ''}${here.length ? ` · here now: ${here.map(({ person }) => person).join(', ')}` : ''}${stalled ? html` · nobody since <${When} at=${stalled} />` : null} <${Due} due=${batch.due} /></p>
+					<p class="note">${given}${several}${goldEvery ? ` · one gold group in ${goldEvery}` : ''}${here.length ? ` · here now: ${here.map(({ person }) => person).join(', ')}` : ''}${stalled ? html` · nobody since <${When} at=${stalled} />` : null}<${Due} due=${batch.due} /></p>
 				</div>
 				<span class="table__actions">
 					<button class=${stalled ? 'button button--small button--primary' : 'button button--small'} type="button" onClick=${() => give(one)}>Give on…<span class="hidden-text"> ${batch.name}</span></button>

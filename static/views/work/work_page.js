@@ -36,7 +36,7 @@ function MyBatch({ one: { batch, parts, left, handed_back: back }, first }) {
 				<div>
 					<h3>${batch.name}</h3>
 					<${Progress} batch=${batch} />
-					<p class="note">${batch.dataset} · you ${parts.map((part) => (part === 'annotator' ? 'annotate' : 'review')).join(' and ')}${batch.verdicts > 1 && parts.includes('reviewer') ? html` · <a class="link" href=${pageAddress(batch.dataset, 'agreement')}>decide where annotations differ</a>` : null} <${Due} due=${batch.due} /></p>
+					<p class="note">${batch.dataset} · you ${parts.map((part) => (part === 'annotator' ? 'annotate' : 'review')).join(' and ')}${batch.verdicts > 1 && parts.includes('reviewer') ? html` · <a class="link" href=${pageAddress(batch.dataset, 'agreement')}>decide where annotations differ</a>` : null}<${Due} due=${batch.due} /></p>
 					${back.length ? html`<ul class="work__back" aria-label="Handed back to you">${back.map((one) => html`
 						<li key=${one.group}><a href=${reviewAddress(one.group, `batch:${batch.id}`)}>${one.title}</a> was handed back by ${one.by}${one.reason ? html`: “${one.reason}”` : ''} <small><${When} at=${one.at} /></small></li>`)}</ul>` : null}
 					${error ? html`<${FormError} error=${error} />` : null}
