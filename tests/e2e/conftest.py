@@ -17,6 +17,8 @@ from tests.e2e.screen import Screen, passing
 from tests.e2e.service import ROOT, serving
 from tests.e2e.windows import TIMEOUT_MS, Windows
 from tests.homes import copy_home, once_for_all
+from tests.provider import CLIENT, Provider, providing
+from tests.provider import SECRET as CLIENT_SECRET
 
 FEW_PROCESSES = [
     "--disable-gpu",
@@ -62,6 +64,30 @@ def server(home: Path) -> Iterator[str]:
     """Address of a server over the home."""
     with serving(home) as address:
         yield address
+
+
+@pytest.fixture(scope="module")
+def team_home(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home that one person worked in alone so far."""
+    return copy_home(sample, tmp_path_factory)
+
+
+@pytest.fixture(scope="module")
+def provider() -> Iterator[Provider]:
+    """By which people of the team may come in."""
+    with providing() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def team(team_home: Path, provider: Provider) -> Iterator[str]:
+    """Address of a team's server over it."""
+    said = {"ISSUER": provider.address, "CLIENT_ID": CLIENT, "CLIENT_SECRET": CLIENT_SECRET}
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in {**said, "LABEL": "Club"}.items():
+            patch.setenv(f"TOUCHLINE_SSO_{name}", value)
+        with serving(team_home, "--team") as address:
+            yield address
 
 
 @pytest.fixture(scope="session")

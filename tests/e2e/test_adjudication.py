@@ -3,32 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
 from app.config import Settings
-from app.review.agreement.weigh import after_hand_in
-from app.review.editing.edit import SetBall
-from app.review.editing.submit import load, submit
-from app.review.takes.take import begin_take
-from app.review.verdicts.verdict import set_verdict
 from app.store.session import Store
 from tests.e2e.screen import passing, until, withdraw_verdict
+from tests.e2e.team import annotate
 from tests.e2e.test_access import serious_in_both
-
-
-def annotate(store: Store, group: int, person: str, moved: float) -> str | None:
-    """Hand in what a person made of a group; its ball moved by so many pixels."""
-    copy = begin_take(store, group, person=person).copy_id
-    state = load(store, copy)
-    view = next(view for view in state.group.views if view.ball and view.ball.box)
-    if moved and view.ball and view.ball.box:
-        ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
-        state = submit(store, copy, SetBall(view.key, ball), if_match=state.etag, actor=person)
-    set_verdict(store, copy, "accepted", None, "seen", if_match=state.etag, actor=person)
-    return after_hand_in(store, copy)
 
 
 def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Page]) -> None:
