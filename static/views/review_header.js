@@ -88,7 +88,9 @@ function Place() {
 	const at = standing.value;
 	const group = groupDocument.value;
 	if (!group || !at) return null;
-	const queue = (batch.value?.id === batchId.value && batch.value?.name) || query.value || group.dataset.name;
+	// Who does not have the group has not been told what its batch is called.
+	const named = batch.value?.id === batchId.value && batch.value?.name;
+	const queue = named || (batchId.value === null ? query.value || group.dataset.name : 'a batch');
 	const { done, left } = at;
 	return html`
 		<span class="header__place">

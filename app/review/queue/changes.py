@@ -76,9 +76,13 @@ def read_moment(store: Store) -> tuple[int, int]:
 
 
 def read_solved_since(store: Store, solution: int) -> list[Change]:
-    """Groups that got a solution after another one, or their dataset where they are many."""
+    """Groups that got a solution after another one; datasets as a whole where they are many."""
     with store.read() as session:
-        return read_solved(session, solution) if newest_solution(session) > solution else []
+        behind = newest_solution(session) - solution
+        if behind > FAR:
+            names = dataset_names(session)
+            return [Change(None, key, name, SOLVED, None) for key, name in names.items()]
+        return read_solved(session, solution) if behind > 0 else []
 
 
 def read_news(store: Store, places: Collection[int], solution: int | None) -> News:

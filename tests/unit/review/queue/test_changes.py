@@ -17,6 +17,7 @@ from app.review.queue.changes import (
     Change,
     read_changes,
     read_solved,
+    read_solved_since,
 )
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.policy import STRICT
@@ -119,3 +120,15 @@ class TestReadSolved:
             (two, "solved", None),
         ]
         assert [item.group_id for item in rest] == [two]
+
+    def test_who_read_long_before_is_told_of_datasets_as_a_whole(
+        self, store: Store, fill, make_group, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        fill(*(make_group(number) for number in (1, 2, 3)))
+        with store.read() as session:
+            newest = newest_solution(session)
+        assert read_solved_since(store, newest) == []
+        assert [one.group_id for one in read_solved_since(store, newest - 3)] == [1, 2, 3]
+        monkeypatch.setattr(module, "FAR", 2)
+        (whole,) = read_solved_since(store, newest - 3)
+        assert (whole.dataset, whole.kind, whole.group_id) == ("demo", "solved", None)
