@@ -95,7 +95,7 @@ class TestWork:
             expect(page.get_by_text("Nothing more waits for you in “Slow”")).to_be_visible()
             assert screen.group == 12
         for group in (11, 12):
-            until(page, lambda at=group: verdict(page, at)["by"] == "quinn")  # type: ignore[misc]
+            until(page, lambda at=group: verdict(page, at).get("by") == "quinn")  # type: ignore[misc]
 
     def test_what_is_handed_in_goes_back_with_a_sentence_and_comes_again(
         self, open_page: OpenPage, team: str, team_home: Path, console: Any
