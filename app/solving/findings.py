@@ -138,16 +138,20 @@ def _view_disagrees(
     ]
     if solved.included or not judged or not any(pair.valid for pair in pairs):
         return
-    tau = policy.tau_percent / 100 * view.size.diagonal
-    apart = min(max(pair.errors_px) for pair in judged)
-    yield Finding(
+    tau_px = policy.tau_percent / 100 * view.size.diagonal
+    yield view_disagrees(view.key, min(max(pair.errors_px) for pair in judged), tau_px)
+
+
+def view_disagrees(view: str, apart_px: float, tau_px: float) -> Finding:
+    """What is said of a view that misses the others' ball by so many pixels."""
+    return Finding(
         "view_disagrees",
-        f"This view does not see the ball where another view sees it: {apart:.1f} px apart at "
-        f"best, {tau:.1f} px are allowed. Correct its ball, or leave the view out.",
-        view.key,
-        number=apart,
-        threshold=tau,
-        fix=Fix("exclude_view", view.key),
+        f"This view does not see the ball where another view sees it: {apart_px:.1f} px apart at "
+        f"best, {tau_px:.1f} px are allowed. Correct its ball, or leave the view out.",
+        view,
+        number=apart_px,
+        threshold=tau_px,
+        fix=Fix("exclude_view", view),
     )
 
 
@@ -173,7 +177,7 @@ def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Ite
     judged = [pair for pair in pairs if pair.failed == "reprojection"]
     if not judged or all(view.station.shared for view in group.views):
         return
-    best = min(judged, key=lambda pair: max(pair.errors_px))
+    best = closest(judged)
     sizes = [view.size.diagonal for view in group.views if view.key in (best.a, best.b)]
     apart = f"{max(best.errors_px):.0f} px apart"
     sentence = (
@@ -188,6 +192,11 @@ def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Ite
         number=max(best.errors_px),
         threshold=policy.tau_percent / 100 * max(sizes),
     )
+
+
+def closest(pairs: Sequence[Pair]) -> Pair:
+    """The pair whose larger error is the smallest."""
+    return min(pairs, key=lambda pair: max(pair.errors_px))
 
 
 def _views_contradict(item: Contradiction, group: Group) -> Finding:

@@ -220,37 +220,49 @@ def _baseline(group: _Group, widest: float, policy: Policy) -> Gate:
 
 
 def _reprojection(group: _Group, pairs: Sequence[Pair]) -> Gate:
-    """Judged by the best pair: its error that is larger in units of tau."""
-    views = {view.key: view for view in group.left}
+    letters = {view.key: view.letter for view in group.left}
+    return reprojection(pairs, letters, {view.key: view.tau_px for view in group.left})
+
+
+def reprojection(
+    pairs: Sequence[Pair], letters: Mapping[str, str], tau_px: Mapping[str, float]
+) -> Gate:
+    """The gate of the best pair: its error that is larger in units of tau.
+
+    Args:
+        pairs: Of the group.
+        letters: What people call the views, by key.
+        tau_px: Largest reprojection error of a valid pair in each view, pixels, by key.
+    """
     judged = [
-        (max(_shares(pair, views), key=lambda share: share[0]), pair)
+        (max(_shares(pair, tau_px), key=lambda share: share[0]), pair)
         for pair in pairs
         if pair.failed in (None, "reprojection")
     ]
     if not judged:
         return _unjudged("reprojection", None)
     (_, error, tau), best = min(judged, key=lambda item: (not item[1].valid, item[0][0]))
-    sentence = f"{_name(best, views)} {error:.1f} px"
+    sentence = f"{_name(best, letters)} {error:.1f} px"
     left_out = [pair for _, pair in judged if not pair.valid]
     if best.valid and left_out:
-        sentence += f"; {', '.join(_name(pair, views) for pair in left_out)} left out"
+        sentence += f"; {', '.join(_name(pair, letters) for pair in left_out)} left out"
     margin = margin_of(error, tau, at_most=True)
     return Gate("reprojection", best.valid, error, tau, margin, sentence)
 
 
 def _shares(
-    pair: Pair, views: Mapping[str, JudgedView]
+    pair: Pair, tau_px: Mapping[str, float]
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """For both views: error in units of tau, error, tau."""
-    first, second = views[pair.a].tau_px, views[pair.b].tau_px
+    first, second = tau_px[pair.a], tau_px[pair.b]
     return (
         (pair.errors_px[0] / first, pair.errors_px[0], first),
         (pair.errors_px[1] / second, pair.errors_px[1], second),
     )
 
 
-def _name(pair: Pair, views: Mapping[str, JudgedView]) -> str:
-    return f"{views[pair.a].letter}–{views[pair.b].letter}"
+def _name(pair: Pair, letters: Mapping[str, str]) -> str:
+    return f"{letters[pair.a]}–{letters[pair.b]}"
 
 
 def _parallax(group: _Group, ball: Ball3D | None, policy: Policy) -> Gate:

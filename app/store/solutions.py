@@ -91,14 +91,14 @@ def encode_solution(
         calibrations=calibrations,
         calibration_keys=tuple(view.calibration_key for view in solution.views),
         summary=summarize(group, solution),
-        body=_compress(value_codec.to_json(replace(solution, views=bare))),
+        body=compress(value_codec.to_json(replace(solution, views=bare))),
         facts=facts,
     )
 
 
 def encode_calibration(calibration: Calibration) -> bytes:
     """A calibration as compressed JSON."""
-    return _compress(value_codec.to_json(calibration))
+    return compress(value_codec.to_json(calibration))
 
 
 @lru_cache(maxsize=256)
@@ -119,7 +119,8 @@ def decode_camera(body: bytes) -> Calibration:
     return value_codec.from_json(Calibration, parse(text))
 
 
-def _compress(value: object) -> bytes:
+def compress(value: object) -> bytes:
+    """A value of ``value_codec.to_json`` as it is stored."""
     return zlib.compress(value_codec.dumps(value).encode())
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from app.soccer.frames import height_above_grass
 from app.soccer.group import Group
@@ -54,17 +55,10 @@ class Summary:
 
 def summarize(group: Group, solution: Solution) -> Summary:
     """The summary of a group's solution."""
-    failing, ball = solution.first_failing, solution.ball
-    decisive = failing or _nearest(solution.gates)
-    margin = decisive.margin if decisive else None
+    ball = solution.ball
     error_px, error_percent = _error(group, solution)
     return Summary(
-        passes=solution.passes,
-        gate=failing.name if failing else None,
-        gate_view=failing.view if failing else None,
-        gate_sentence=failing.sentence if failing else None,
-        margin=margin,
-        value=None if margin is None else abs(margin),
+        **_decided(solution),
         min_jac=_min_jac(solution),
         error_px=error_px,
         error_percent=error_percent,
@@ -79,6 +73,26 @@ def summarize(group: Group, solution: Solution) -> Summary:
         y_m=ball.point[1] if ball else None,
         agreement=_agreement(group, solution),
     )
+
+
+def summarize_gates(before: Summary, solution: Solution) -> Summary:
+    """The summary of a solution that is that of ``before`` but for what its gates say."""
+    return replace(before, **_decided(solution))
+
+
+def _decided(solution: Solution) -> dict[str, Any]:
+    """What a summary says of gates."""
+    failing = solution.first_failing
+    decisive = failing or _nearest(solution.gates)
+    margin = decisive.margin if decisive else None
+    return {
+        "passes": solution.passes,
+        "gate": failing.name if failing else None,
+        "gate_view": failing.view if failing else None,
+        "gate_sentence": failing.sentence if failing else None,
+        "margin": margin,
+        "value": None if margin is None else abs(margin),
+    }
 
 
 COUNTED = frozenset({"calibratable", "two_views", "ball"})

@@ -13,7 +13,8 @@ from app.progress import Progress
 from app.review.datasets.dataset import Dataset, get_dataset, need_dataset, read_dataset
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.known import calibration_keys
-from app.review.editing.solve_encoded import solve_encoded
+from app.review.editing.retell import retell_task, retell_tasks
+from app.review.editing.solve_encoded import Result, solve_encoded
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
@@ -24,7 +25,6 @@ from app.store.groups import read_groups
 from app.store.queue import refresh_queue
 from app.store.session import Session, Store
 from app.store.solutions import (
-    EncodedSolution,
     SolutionKey,
     decode_calibration,
     encode_calibration,
@@ -60,17 +60,6 @@ class Task:
     calibrations: Mapping[str, bytes]
 
 
-@dataclass(frozen=True)
-class Result:
-    """What a worker sends back for one group: a solution, or the reason why there is none."""
-
-    key: SolutionKey
-    group: str
-    passes: bool = False
-    solution: EncodedSolution | None = None
-    problem: str = ""
-
-
 def stale_groups(store: Store, dataset: str | int) -> list[int]:
     """Ids of groups without a solution for their present state, policy and solver, in order."""
     with store.read() as session:
@@ -96,15 +85,22 @@ def solve_dataset(
     """
     found, ids = get_dataset(store, dataset), stale_groups(store, dataset)
     report = SolveReport(total=len(ids))
-    if progress is not None:
-        progress(0, report.total)
+
+    def keep(results: Sequence[Result]) -> None:
+        _save(store, results, report)
+        if progress is not None:
+            progress(report.solved + len(report.failed), report.total)
+
+    keep([])
+    for results in fan_out(retell_task, retell_tasks(store, found, ids), executor, stop):
+        keep(results)
+    if report.solved:
+        ids = stale_groups(store, dataset)
     _calibrate_shared(store, found)
     largest = CHUNK if executor is not None else min(CHUNK, CHUNK_HERE)
     tasks = (_task(store, found, chunk) for chunk in _chunks(ids, largest))
     for results in fan_out(solve_task, tasks, executor, stop):
-        _save(store, results, report)
-        if progress is not None:
-            progress(report.solved + len(report.failed), report.total)
+        keep(results)
     return report
 
 
@@ -134,6 +130,8 @@ def _solve_one(key: SolutionKey, group: Group, task: Task, known: dict[str, Cali
 
 def _save(store: Store, results: Sequence[Result], report: SolveReport) -> None:
     solutions = [(item.key, item.solution) for item in results if item.solution is not None]
+    if not results:
+        return
     with store.write() as session:
         insert_solutions(session, solutions)
         refresh_queue(session, [key.group_id for key, _ in solutions])

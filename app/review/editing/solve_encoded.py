@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
 from app.solving.facts_codec import facts_to_bytes
 from app.solving.solve import solve_with_facts
-from app.store.solutions import EncodedSolution, encode_solution
+from app.store.solutions import EncodedSolution, SolutionKey, encode_solution
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a worker sends back for one group: a solution, or the reason why there is none."""
+
+    key: SolutionKey
+    group: str
+    passes: bool = False
+    solution: EncodedSolution | None = None
+    problem: str = ""
 
 
 def solve_encoded(

@@ -1,0 +1,81 @@
+"""Another tau: a solution retold under it from numbers that are kept, where it decides nothing new.
+
+Nothing is calibrated or triangulated. Of what ``solve`` computes, tau decides which pairs are
+valid; where those stay as they were, it is told in one gate and two findings, and in which views
+look turned. The last needs the cameras again, but never under a smaller tau: a turned view must
+meet the others within tau, so one that did not before does not now.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from app.geometry.arrays import BoolArray
+from app.soccer.finding import Finding
+from app.soccer.policy import Policy
+from app.soccer.solution import Pair, Solution
+from app.solving.facts import Facts
+from app.solving.findings import closest, view_disagrees
+from app.solving.gates import reprojection
+from app.solving.solve import view_letter
+from app.solving.verdict import failures, view_jac
+
+
+def has_smaller_tau(policy: Policy, before: Policy) -> bool:
+    """Whether a policy differs from another in its name and a smaller tau alone."""
+    alike = replace(before, name=policy.name, tau_percent=policy.tau_percent)
+    return alike == policy and policy.tau_percent < before.tau_percent
+
+
+def undecided(facts: Facts, before: Policy, policy: Policy) -> BoolArray:
+    """Groups whose views and pairs fail what they failed under the policy before, shape (G,).
+
+    Args:
+        facts: The groups.
+        before: A policy.
+        policy: The same with another tau.
+    """
+    jac = view_jac(facts, policy.jac_gamma_percent)
+    _, then = failures(facts, jac, before)
+    _, now = failures(facts, jac, policy)
+    same = np.ones(facts.groups, bool)
+    same[facts.pair_group[then != now]] = False
+    return same
+
+
+def retold(solution: Solution, diagonals: Sequence[float], policy: Policy) -> Solution | None:
+    """What ``solve`` says under a smaller tau, bit for bit; None where it has to be asked.
+
+    Args:
+        solution: Under a policy that this one ``has_smaller_tau`` than, of a group that is
+            ``undecided``; its calibrations are not read.
+        diagonals: Of the pictures of its views, pixels.
+        policy: The policy with that tau.
+    """
+    if any(item.kind == "sides_swapped" for item in solution.findings):
+        return None
+    keys = [view.view for view in solution.views]
+    tau_px = {
+        key: policy.tau_percent / 100 * diagonal
+        for key, diagonal in zip(keys, diagonals, strict=True)
+    }
+    letters = {key: view_letter(place) for place, key in enumerate(keys)}
+    gate = reprojection(solution.pairs, letters, tau_px)
+    return replace(
+        solution,
+        gates=tuple(gate if item.name == gate.name else item for item in solution.gates),
+        findings=tuple(_finding(item, solution.pairs, tau_px) for item in solution.findings),
+        policy_hash=policy.hash,
+    )
+
+
+def _finding(found: Finding, pairs: Sequence[Pair], tau_px: Mapping[str, float]) -> Finding:
+    if found.kind == "view_disagrees" and found.view is not None and found.number is not None:
+        return view_disagrees(found.view, found.number, tau_px[found.view])
+    if found.kind == "not_synchronous":
+        best = closest([pair for pair in pairs if pair.failed == "reprojection"])
+        return replace(found, threshold=max(tau_px[best.a], tau_px[best.b]))
+    return found
