@@ -10,9 +10,9 @@ import hashlib
 import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
-from sqlalchemy import insert, select
+from sqlalchemy import Table, insert, select
 from sqlalchemy.orm import Session
 
 from app.soccer.group import Group, Station, View
@@ -36,6 +36,7 @@ from app.store.version_models import FrozenModel
 SAID, STATION, SOLUTION, CALIBRATION = "said:", "station:", "solution:", "calibration:"
 PAINT = "paint:"
 
+_FROZEN = cast(Table, FrozenModel.__table__)
 Frames = Mapping[str, Mapping[str, Any]]
 """By view: ``path``, ``member``, ``frame``, ``flipped``, and the frame's size and checksum."""
 
@@ -155,7 +156,7 @@ def insert_frozen(session: Session, dataset_id: int, bodies: Mapping[str, bytes 
         rows = [
             {"dataset_id": dataset_id, "key": key, "body": body} for key, body in bodies.items()
         ]
-        session.execute(insert(FrozenModel), rows, execution_options={"render_nulls": True})
+        session.execute(insert(_FROZEN), rows)
 
 
 def read_frozen(session: Session, dataset_id: int, keys: Iterable[str]) -> dict[str, bytes]:

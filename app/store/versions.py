@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
-from sqlalchemy import func, insert, select
+from sqlalchemy import Table, func, insert, select
 from sqlalchemy.orm import Session
 
 from app.store.aliases import columns_shown
@@ -16,6 +16,7 @@ from app.store.models import DatasetModel, QueueModel, VerdictModel
 from app.store.version_models import VersionGroupModel, VersionModel
 
 BATCH = 200
+_GROUPS = cast(Table, VersionGroupModel.__table__)
 _VERSIONS = select(*columns_shown(VersionModel), DatasetModel.name.label("dataset")).join(
     DatasetModel, DatasetModel.id == VersionModel.dataset_id
 )
@@ -71,11 +72,7 @@ def insert_version(
     previous = session.scalar(
         select(func.max(VersionModel.id)).where(VersionModel.dataset_id == values["dataset_id"])
     )
-    session.execute(
-        insert(VersionGroupModel),
-        [{**row, "version_id": identity} for row in rows],
-        execution_options={"render_nulls": True},
-    )
+    session.execute(insert(_GROUPS), [{**row, "version_id": identity} for row in rows])
     # Its own row comes last: from here on nothing can be added to the version.
     session.execute(insert(VersionModel), [{**values, "id": identity, "previous": previous}])
     return identity

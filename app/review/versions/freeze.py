@@ -220,17 +220,22 @@ class _Run:
         if len(solutions) < len(ids):
             raise ConflictError("a group lost its solution", hint="Solve the dataset first.")
         texts: dict[str, str] = {}
+        bodies: dict[str, bytes] = {}
+        names: set[str] = set()
         rows = {}
         for number, item in stored.items():
-            said = freeze_said(item.group)
+            said, body = freeze_said(item.group), solutions[number]
+            key, solved = SOLUTION + digest_of(body), json_of(body)
             texts.update(said.texts)
-            rows[number] = self._member(item.group, said.key, solutions[number])
-        self._keep(texts, solutions.values())
+            bodies[key] = body
+            names |= calibration_names(solved)
+            rows[number] = self._member(item.group, said.key, key, solved)
+        self._keep(texts, bodies, names)
         return rows
 
-    def _member(self, group: Group, said: str, body: bytes) -> dict[str, Any]:
+    def _member(self, group: Group, said: str, solution: str, solved: Json) -> dict[str, Any]:
         views = [view.key for view in group.views]
-        solved, splits = json_of(body), self._splitter.views(views)
+        splits = self._splitter.views(views)
         split = self._splitter.group(group.match, group.split, views)
         self._cameras.update(views)
         for view in solved["views"]:
@@ -244,15 +249,13 @@ class _Run:
             "split": split,
             "splits": None if splits is None else canonical(splits),
             "said": said,
-            "solution": SOLUTION + digest_of(body),
+            "solution": solution,
             "ball": canonical(solved["ball"]["point"]) if solved["ball"] else None,
             "frames": None if frames is None else pack(frames),
         }
 
-    def _keep(self, texts: Mapping[str, str], solutions: Iterable[bytes]) -> None:
+    def _keep(self, texts: Mapping[str, str], bodies: Mapping[str, bytes], names: set[str]) -> None:
         """Bring what is not frozen yet into the database, in a transaction of its own."""
-        bodies = {SOLUTION + digest_of(body): body for body in solutions}
-        names = {name for body in bodies.values() for name in calibration_names(json_of(body))}
         known = known_frozen(self._session, self._dataset.id, {*texts, *bodies, *names})
         fresh: dict[str, bytes | None] = dict.fromkeys(names - known)
         fresh |= {key: body for key, body in bodies.items() if key not in known}
