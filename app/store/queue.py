@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, fields
+from dataclasses import fields
 from typing import Any, cast
 
 from sqlalchemy import (
@@ -40,6 +40,7 @@ from app.store.verdicts import StoredVerdict
 
 _BATCH = 1000
 _QUEUE = cast(Table, QueueModel.__table__)
+_REPLACE = insert_or_replace(_QUEUE)
 _ROW = update(_QUEUE).where(_QUEUE.c.group_id == bindparam("row"))
 _NOTICE = ImportFindingModel.__table__
 _VIEW = ViewModel.__table__
@@ -130,8 +131,7 @@ def _refresh(session: Session, ids: Sequence[int]) -> None:
         row.update(_computed(summary, [item.kind for item in findings[head.id]]))
         rows.append(row)
     if rows:
-        statement = insert_or_replace(QueueModel)
-        session.execute(statement, rows, execution_options={"render_nulls": True})
+        session.execute(_REPLACE, rows)
 
 
 def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, Summary | None]]:
@@ -247,8 +247,13 @@ def _computed(summary: Summary | None, noticed: Sequence[str]) -> dict[str, Any]
     if summary is None:
         nothing: dict[str, Any] = dict.fromkeys(_NUMBERS)
         return {**nothing, "solved": False, "passes": None, "findings": _list(noticed)}
-    values = asdict(summary)
-    return {**values, "solved": True, "findings": _list([*summary.findings, *noticed])}
+    values = {name: getattr(summary, name) for name in _NUMBERS}
+    return {
+        **values,
+        "passes": summary.passes,
+        "solved": True,
+        "findings": _list([*summary.findings, *noticed]),
+    }
 
 
 def _list(items: Sequence[str]) -> str:
