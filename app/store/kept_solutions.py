@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -84,7 +85,8 @@ def kept_solutions(
         policies: Hashes of policies.
     """
     group, model = GroupModel, SolutionModel
-    statement = (
+    # mypy would have it that facts may be None; the condition says that they are not.
+    statement: Any = (
         select(
             group.id, group.key, model.inputs_hash, model.policy_hash,
             model.calibrations, model.summary, model.body, model.facts,
