@@ -15,6 +15,7 @@ from app.review.queue.listing import list_groups
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from app.store.session import Store
+from tests.databases import said_for_sqlite
 
 TIGHT = replace(PAPER, name="tight", tau_percent=0.6)
 BETWEEN = replace(PAPER, name="between", tau_percent=0.8)
@@ -92,8 +93,8 @@ class TestRetell:
         assert len(solved) == 4
 
     def test_facts_that_are_not_kept_are_computed(self, store, ids, solved) -> None:
-        with store.write() as session:
-            session.execute(text("DROP TRIGGER IF EXISTS solution_refuses_update"))
+        with store.write() as session, said_for_sqlite(session):
+            session.execute(text("DROP TRIGGER solution_refuses_update"))
             session.execute(
                 text("UPDATE solution SET facts = NULL WHERE group_id = :id"), {"id": ids[0]}
             )
@@ -102,8 +103,8 @@ class TestRetell:
         assert "1.png" in solved
 
     def test_what_is_damaged_is_solved(self, store, ids, solved) -> None:
-        with store.write() as session:
-            session.execute(text("DROP TRIGGER IF EXISTS solution_refuses_update"))
+        with store.write() as session, said_for_sqlite(session):
+            session.execute(text("DROP TRIGGER solution_refuses_update"))
             session.execute(
                 text("UPDATE solution SET body = :body WHERE group_id = :id"),
                 {"body": b"nothing", "id": ids[0]},
