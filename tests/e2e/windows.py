@@ -96,7 +96,16 @@ class _Window:
         context = browser.new_context(base_url=address, accept_downloads=True)
         context.set_default_timeout(TIMEOUT_MS)
         blank = context.new_page()
-        return cls(address, context, blank, context.new_cdp_session(blank))
+        window = cls(address, context, blank, context.new_cdp_session(blank))
+        if SLOW:
+            cut = context.set_offline
+
+            def set_offline(offline: bool) -> None:
+                cut(offline)
+                window._answer_late(offline)
+
+            context.set_offline = set_offline  # type: ignore[method-assign]
+        return window
 
     def page(self) -> Page:
         """The tab; a new one where there is none that can be used again.
@@ -114,9 +123,16 @@ class _Window:
         if SLOW:
             assert self.history
             self.history.send("Network.enable")
-            self.history.send("Network.emulateNetworkConditions", {**LATE_ANSWERS})
+            self._answer_late()
             self.history.send("Emulation.setCPUThrottlingRate", {"rate": PROCESSOR})
         return self.tab
+
+    def _answer_late(self, offline: bool = False) -> None:
+        """Let answers be late, or none: of two sessions that ask for conditions the later one counts,
+        and that of Playwright cannot be late."""
+        asked = {**LATE_ANSWERS, "offline": offline}
+        if self.history is not None and self.tab is not None and not self.tab.is_closed():
+            self.history.send("Network.emulateNetworkConditions", asked)
 
     def _watch(self, tab: Page) -> None:
         """Remember what somebody asks of the tab that would outlive their test."""
