@@ -137,7 +137,7 @@ class TestLiveUpdates:
         for _ in range(MORE_THAN_CONNECTIONS):
             page.wait_for_selector(".page__main > :nth-child(2)")
             hears(page)
-            with page.expect_event("requestfailed", lambda gone: gone.url.endswith("/events")):
+            with page.expect_event("requestfailed", lambda gone: "/api/v1/events" in gone.url):
                 see(page, False)
             page = page.context.new_page()
             page.goto("/jobs")
