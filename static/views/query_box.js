@@ -52,9 +52,11 @@ export function QueryBox({ field, invalid, onQuery }) {
 	const known = facets.value;
 	const fields = queryFields.value;
 	useEffect(() => {
-		// What arrives while somebody waits for it; what they have chosen meanwhile stays chosen.
-		if (document.activeElement !== field.current || !/\S$/.test(text)) return;
-		const found = completionOf(text);
+		// What arrives while somebody waits for it; what they have chosen meanwhile stays chosen. They may have typed on
+		// since this was drawn.
+		const now = field.current?.value ?? '';
+		if (document.activeElement !== field.current || !/\S$/.test(now)) return;
+		const found = completionOf(now);
 		setActive(found.offers.findIndex((one) => one.text === offers[active]?.text));
 		setCompletion(found);
 	}, [known, fields]);
@@ -70,8 +72,10 @@ export function QueryBox({ field, invalid, onQuery }) {
 	}
 	/** @param {Offer} chosen */
 	function choose(chosen) {
-		const next = text.slice(0, completion.from) + chosen.text + text.slice(completion.to);
-		caret.current = completion.from + chosen.text.length;
+		const now = field.current?.value ?? text;
+		const { from, to } = completionOf(now);
+		const next = now.slice(0, from) + chosen.text + now.slice(to);
+		caret.current = from + chosen.text.length;
 		setText(next);
 		setActive(-1);
 		setCompletion(complete(next, caret.current, facets.value, queryFields.value));

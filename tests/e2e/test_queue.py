@@ -15,6 +15,21 @@ from tests.e2e.test_access import serious
 OpenPage = Callable[..., Page]
 ROW_HEIGHT = 72
 MILLION = 1_000_000
+TYPE_WHILE_VALUES_ARRIVE = """async () => {
+  const { facets } = await import(
+    document.querySelector('script[src$="main.js"]').src.replace('main.js', 'state/facets.js'));
+  const type = (text) => {
+    const field = document.querySelector('.field--query');
+    field.value = text;
+    field.dispatchEvent(new InputEvent('input', { bubbles: true }));
+  };
+  type('number<=9 s');
+  facets.value = { ...facets.value };
+  type('number<=9 sp');
+  // It is drawn, and what follows a drawing is still to come.
+  await new Promise(requestAnimationFrame);
+  type('number<=9 spl');
+}"""
 
 
 def opened(open_page: OpenPage, query: str = "") -> Page:
@@ -48,6 +63,19 @@ class TestQueryBox:
         page.get_by_role("option", name="train").click()
         expect(page.locator(".field--query")).to_have_value("number<=9 split:train ")
         page.wait_for_url("**split**")
+
+    def test_completion_replaces_the_word_however_fast_it_is_typed(
+        self, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page)
+        page.keyboard.press("/")
+        box = page.locator(".field--query")
+        expect(box).to_be_focused()
+        page.evaluate(TYPE_WHILE_VALUES_ARRIVE)
+        expect(page.get_by_role("option", name="split:")).to_be_visible()
+        page.keyboard.press("ArrowDown")
+        page.keyboard.press("Enter")
+        expect(box).to_have_value("number<=9 split:")
 
     def test_a_status_button_filters_and_a_header_sorts(self, open_page: OpenPage) -> None:
         page = opened(open_page)
