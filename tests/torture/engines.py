@@ -49,8 +49,21 @@ class Row:
     database: float
 
 
+def order(turn: int) -> tuple[str, ...]:
+    """The engines in one round; who is first in it is last in the next."""
+    return ENGINES if turn % 2 == 0 else ENGINES[::-1]
+
+
 def compare(
-    home: Path, folder: Path, *, people: int, seconds: float, think: float, seed: int, tell: Tell
+    home: Path,
+    folder: Path,
+    *,
+    people: int,
+    seconds: float,
+    think: float,
+    seed: int,
+    tell: Tell,
+    rounds: int = ROUNDS,
 ) -> list[str]:
     """Print both engines' rows in one table; what was wrong in any turn, none where all is well.
 
@@ -62,13 +75,13 @@ def compare(
         think: Mean of the seconds between two requests of a person; once more without any.
         seed: Decides what they do, on both engines alike.
         tell: Takes each line: one of each turn, then the table.
+        rounds: How often each engine has its turn.
     """
     loads: dict[tuple[float, str], list[Load]] = {}
     with running_cluster(lasting=True) as cluster:
-        for turn in range(ROUNDS):
+        for turn in range(rounds):
             for pause in dict.fromkeys((think, 0.0)):
-                # Who is first in one round is last in the next.
-                for engine in ENGINES if turn % 2 == 0 else reversed(ENGINES):
+                for engine in order(turn):
                     copied = Path(shutil.copytree(home, folder / f"{engine}{turn}-{pause}"))
                     load = _turn(cluster, copied, engine, people, seconds, pause, seed + turn)
                     loads.setdefault((pause, engine), []).append(load)

@@ -29,6 +29,7 @@ PLAIN_WORDS = """
     comment comments talk threads mentions bells past deed deeds window before after
     tall scroll stalls settling
     cluster serving hosts
+    private kept another smaller
     stored tree trees safe path refusal attempt cookie fit stack
     compiler dialect postgresql sqlite statements transfer triggers
     attempts lived processes shared sharing short web

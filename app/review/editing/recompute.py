@@ -13,7 +13,7 @@ from app.progress import Progress
 from app.review.datasets.dataset import Dataset, get_dataset, need_dataset, read_dataset
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.known import calibration_keys
-from app.review.editing.retell import retell_task, retell_tasks
+from app.review.editing.smaller_tau import retell_task, retell_tasks
 from app.review.editing.solve_encoded import Result, solve_encoded
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
