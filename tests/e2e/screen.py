@@ -114,7 +114,7 @@ class Held:
     def hear(self, route: Route) -> None:
         """Keep a request; those that come after the release pass."""
         if self._goes_on:
-            route.continue_()
+            route.fallback()
         else:
             self.routes.append(route)
 
@@ -128,7 +128,7 @@ class Held:
         while self.routes:
             # Its page may have gone to another address meanwhile.
             with suppress(Error):
-                self.routes.pop(0).continue_()
+                self.routes.pop(0).fallback()
 
 
 @contextmanager
@@ -139,9 +139,28 @@ def holding(page: Page, url: str | Pattern[str]) -> Iterator[Held]:
     try:
         yield held
     finally:
-        # A route that is taken away before its requests went on waits for them for ever.
+        # The route stays, and lets pass: a request that is on its way, of whatever address, when
+        # the last route is taken away may never arrive.
         held.release()
-    page.unroute(url, held.hear)
+
+
+@contextmanager
+def refusing(page: Page, *urls: str) -> Iterator[None]:
+    """Let what a page asks for at some addresses fail; afterwards it passes, as with ``holding``."""
+    refuses = True
+
+    def hear(route: Route) -> None:
+        if refuses:
+            route.abort()
+        else:
+            route.fallback()
+
+    for url in urls:
+        page.route(url, hear)
+    try:
+        yield
+    finally:
+        refuses = False
 
 
 def at_rest(element: Locator) -> Box:

@@ -11,6 +11,7 @@ from tests.e2e.screen import (
     Screen,
     go_offline,
     lie_ready,
+    refusing,
     rows,
     undo_edit,
     until,
@@ -74,12 +75,11 @@ class TestOutbox:
         screen, chain = at_last_groups(open_page, console)
         page = screen.page
         box = screen.document()["views"][0]["balls"][0]["box"]
-        page.route("**/api/v1/views/**", lambda route: route.abort())
-        screen.press("i", "Shift+ArrowLeft")
-        expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
-        page.reload()
-        expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
-        page.unroute("**/api/v1/views/**")
+        with refusing(page, "**/api/v1/views/**"):
+            screen.press("i", "Shift+ArrowLeft")
+            expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
+            page.reload()
+            expect(page.locator(".save")).to_contain_text("Offline · 1 change waits")
         screen.saved()
         assert screen.document()["views"][0]["balls"][0]["box"][0] == box[0] - 5
         leave_as_found(page, [], edited=chain[0])
@@ -147,7 +147,6 @@ class TestOutbox:
         screen.press("1", "q")
         screen.saved()
         assert occluded() != before
-        page.unroute_all()
         leave_as_found(page, [], edited=chain[0])
 
     def test_an_unsent_edit_can_be_undone(self, open_page: OpenPage, console: Any) -> None:

@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 from app.review.people.people import list_people
 from app.review.people.roles import Role
 from app.review.takes.guidelines import read_guidelines, write_guidelines
-from tests.e2e.screen import Screen, hears, until
+from tests.e2e.screen import Screen, hears, refusing, until
 from tests.e2e.team import (
     REFUSED,
     SECRET,
@@ -158,15 +158,12 @@ class TestPeople:
         # What it has asked before is answered, and it does not hear more before it asks for something.
         hears(page)
         page.evaluate(WHO_IS_THERE)
-        page.route("**/api/v1/session", lambda route: route.abort())
-        page.route("**/api/v1/events*", lambda route: route.abort())
-        in_store(team_home, lambda store: give(store, "vera", Role.VIEWER))
-        page.keyboard.press("s")
-        bar = page.get_by_role("alert").filter(has_text="waits here")
-        expect(bar).to_contain_text("needs the role reviewer")
-        assert verdict(page, 3)["state"] is None
-        page.unroute("**/api/v1/session")
-        page.unroute("**/api/v1/events*")
+        with refusing(page, "**/api/v1/session", "**/api/v1/events*"):
+            in_store(team_home, lambda store: give(store, "vera", Role.VIEWER))
+            page.keyboard.press("s")
+            bar = page.get_by_role("alert").filter(has_text="waits here")
+            expect(bar).to_contain_text("needs the role reviewer")
+            assert verdict(page, 3)["state"] is None
         page.evaluate("() => dispatchEvent(new Event('focus'))")
         expect(page.get_by_text("Your rights were changed: viewer in ")).to_be_visible()
         expect(accept).to_have_attribute("aria-disabled", "true")
