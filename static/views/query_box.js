@@ -32,9 +32,11 @@ export function QueryBox({ field, invalid, onQuery }) {
 	const asked = param('q');
 	const [text, setText] = useState(asked);
 	const [completion, setCompletion] = useState(NOTHING);
-	const [active, setActive] = useState(-1);
+	/** The text of the chosen offer: offers may change while one chooses. */
+	const [chosen, setChosen] = useState('');
 	const caret = useRef(/** @type {number | null} */ (null));
 	const { offers } = completion;
+	const active = offers.findIndex((one) => one.text === chosen);
 	useEffect(() => {
 		if (document.activeElement !== field.current) setText(asked);
 	}, [asked]);
@@ -56,9 +58,7 @@ export function QueryBox({ field, invalid, onQuery }) {
 		// since this was drawn.
 		const now = field.current?.value ?? '';
 		if (document.activeElement !== field.current || !/\S$/.test(now)) return;
-		const found = completionOf(now);
-		setActive(found.offers.findIndex((one) => one.text === offers[active]?.text));
-		setCompletion(found);
+		setCompletion(completionOf(now));
 	}, [known, fields]);
 
 	/** @param {string} now */
@@ -67,17 +67,17 @@ export function QueryBox({ field, invalid, onQuery }) {
 	}
 	/** @param {string} now */
 	function offer(now) {
-		setActive(-1);
+		setChosen('');
 		setCompletion(completionOf(now));
 	}
-	/** @param {Offer} chosen */
-	function choose(chosen) {
+	/** @param {Offer} one */
+	function choose(one) {
 		const now = field.current?.value ?? text;
 		const { from, to } = completionOf(now);
-		const next = now.slice(0, from) + chosen.text + now.slice(to);
-		caret.current = from + chosen.text.length;
+		const next = now.slice(0, from) + one.text + now.slice(to);
+		caret.current = from + one.text.length;
 		setText(next);
-		setActive(-1);
+		setChosen('');
 		setCompletion(complete(next, caret.current, facets.value, queryFields.value));
 	}
 	/** @param {KeyboardEvent} event */
@@ -86,7 +86,7 @@ export function QueryBox({ field, invalid, onQuery }) {
 		else if (event.key === 'ArrowDown' || event.key === 'ArrowUp') {
 			// One place before the first: what was typed, taken as it is.
 			const next = active + (event.key === 'ArrowDown' ? 1 : -1);
-			setActive(next >= offers.length ? -1 : next < -1 ? offers.length - 1 : next);
+			setChosen(offers[next < -1 ? offers.length - 1 : next]?.text ?? '');
 		} else if ((event.key === 'Enter' || event.key === 'Tab') && offers[active]) choose(offers[active]);
 		else if (event.key === 'Enter') submit();
 		else if (event.key === 'Escape' && offers.length) setCompletion(NOTHING);
