@@ -6,6 +6,7 @@ import argparse
 import shutil
 import sys
 import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 
 from tests.cluster import ADVICE, find_programs
@@ -24,8 +25,8 @@ from tests.torture import (
 
 SEED = 20260101
 ENGINES_GROUPS = 60
-PEOPLES_GROUPS = 300
-"""So many that a team of fifty finds work for forty seconds."""
+PEOPLES_GROUPS = 360
+"""So many that fifty people find work for a minute."""
 
 
 def main() -> int:
@@ -163,22 +164,24 @@ def _engines(folder: Path, asked: argparse.Namespace) -> list[str]:
 
 
 def _people(folder: Path, asked: argparse.Namespace) -> list[str]:
-    prepared = folder / "people"
-    kills.prepare(prepared, folder / "people-files", clients=1, groups=PEOPLES_GROUPS)
-    loads = []
-    for team in (False, True):
-        home = Path(shutil.copytree(prepared, folder / f"people-{team}"))
-        found = people.people(
-            home,
-            people=asked.people,
-            seconds=asked.seconds,
-            think=asked.think,
-            seed=asked.seed,
-            team=team,
-        )
-        print("in a team, with leases:" if team else "without accounts and leases:")
-        print("\n".join([*people.told(found.costs), *found.lines()]))
-        loads.append(found)
+    homes = [folder / "people-alone", folder / "people-team"]
+    kills.prepare(homes[0], folder / "people-files", clients=1, groups=PEOPLES_GROUPS)
+    shutil.copytree(*homes)
+    with ExitStack() as stack:
+        offices = [
+            stack.enter_context(
+                people.office(
+                    home, people=asked.people, think=asked.think, seed=asked.seed, team=team
+                )
+            )
+            for home, team in zip(homes, (False, True), strict=True)
+        ]
+        for turn in range(people.TURNS):
+            for office in offices[:: 1 if turn % 2 == 0 else -1]:
+                office.work(asked.seconds / people.TURNS / 2)
+    loads = [office.ended() for office in offices]
+    for load, words in zip(loads, ("without accounts and leases", "in a team"), strict=True):
+        print("\n".join([f"{words}:", *people.told(load.costs), *load.lines()]))
     lines, ratio = people.compare(*loads)
     print("\n".join(lines))
     slow = [f"p99 is {ratio:.2f} times that of the same load alone"] if ratio > people.RATIO else []

@@ -3,9 +3,9 @@
 Each takes the next group of the batch, looks at it, drags a ball (previews), judges, and goes on. No group
 may be judged by two, no verdict that was answered with 200 may be missing from its group's history, and
 nobody may be refused. How long answers take is printed beside the same people on a server without
-accounts, sessions and leases, who take the next group from a list of their own. Both go through all
-groups, and nobody ends before the last one is taken: whoever had a share of their own would leave the
-server to fewer and fewer, and a crowd that thins out waits less.
+accounts, sessions and leases, who take the next group from a list of their own. Both have their turns,
+so that whatever else the machine does hits both, and none lasts until the groups come to an end: a crowd
+that thins out waits less.
 """
 
 from __future__ import annotations
@@ -45,6 +45,8 @@ MEASURED = 8
 SETTLED = 0.02
 """Seconds after which an answer has cost what it costs."""
 COMPARED = ("look", "drag", "judge")
+TURNS = 4
+"""So often each of the two works."""
 
 
 class TeamServer(Server):
@@ -153,15 +155,87 @@ class Worker(threading.Thread):
             time.sleep(self._random.expovariate(1 / self._think))
 
 
-def people(home: Path, *, people: int, seconds: float, think: float, seed: int, team: bool) -> Load:
-    """Let people work on the dataset ``client0`` of a home that ``kills.prepare`` has made.
+class Office:
+    """A server, and the people who work on its dataset ``client0``, a turn at a time.
+
+    Args:
+        home: The home of the server, which ``kills.prepare`` has made.
+        clients: A connection of each of them.
+        batch: What they take their groups from; None: all share a list of their own.
+        ids: The groups.
+        think: Mean of the seconds before and after a drag; 0: none.
+        seed: Decides when they do what.
+    """
+
+    def __init__(
+        self,
+        home: Path,
+        clients: Sequence[httpx.Client],
+        batch: int | None,
+        ids: Sequence[int],
+        think: float,
+        seed: int,
+    ):
+        self.load = Load(len(clients), 0)
+        """All turns so far."""
+        self._home, self._clients, self._batch = home, clients, batch
+        self._shared, self._think, self._seed = deque(ids), think, seed
+        self._judged: Counter[int] = Counter()
+
+    def measure(self, meter: counting.Meter) -> None:
+        """What each kind of request costs somebody who works alone for a moment."""
+        worker = Worker(self._clients[0], self._batch, self._shared, 0, self._seed)
+        self.load.costs = measure(worker, meter)
+        self._judged.update(worker.judged)
+
+    def work(self, seconds: float) -> None:
+        """A turn of everybody, until the time is over or nothing is left."""
+        crowd = [
+            Worker(client, self._batch, self._shared, self._think, self._seed + number)
+            for number, client in enumerate(self._clients)
+        ]
+        self._seed += len(crowd)
+        start = time.monotonic()
+        for one in crowd:
+            one.until = start + seconds
+            one.start()
+        for one in crowd:
+            one.join()
+        self.load.seconds += min(seconds, time.monotonic() - start)
+        for one in crowd:
+            self._judged.update(one.judged)
+            self.load.changes += len(one.judged)
+            self.load.faults += [one.fault] if one.fault else []
+            self.load.statuses += one.statuses
+            for kind, times in one.milliseconds.items():
+                if times:
+                    self.load.milliseconds.setdefault(kind, []).extend(times)
+
+    def ended(self) -> Load:
+        """All turns, with what was done twice or got lost."""
+        judged = self._judged
+        with closing(Store.open(Settings(home=self._home))) as store, store.read() as session:
+            given = read_verdicts(session, list(judged))
+        kept = {group: len(verdicts) for group, verdicts in given.items()}
+        self.load.faults += [
+            f"group {group} was judged by {n} people" for group, n in judged.items() if n > 1
+        ]
+        self.load.faults += [
+            f"group {group}: {number} verdicts accepted, {kept.get(group, 0)} kept"
+            for group, number in judged.items()
+            if kept.get(group, 0) != number
+        ]
+        return self.load
+
+
+@contextmanager
+def office(home: Path, *, people: int, think: float, seed: int, team: bool) -> Iterator[Office]:
+    """A running server over a home, and people who have come to work.
 
     Args:
         home: The home; ``team``: with an account for each of them, and a batch.
         people: How many.
-        seconds: For how long.
-        think: Mean of the seconds before and after a drag; 0: none.
-        seed: Decides when they do what.
+        think: See ``Office``; ``seed`` likewise.
         team: Whether there are accounts and leases; else all share a list.
     """
     names = [f"person{number}" for number in range(people)]
@@ -182,16 +256,9 @@ def people(home: Path, *, people: int, seconds: float, think: float, seed: int, 
                 batch = made.raise_for_status().json()["id"]
             found = lead.get(f"{API}/groups/ids", params={"dataset": "client0"})
             ids = found.raise_for_status().json()["ids"]
-            meter = counting.Meter(home, server.pid)
-            shared = deque(ids)
-            costs = measure(Worker(clients[0], batch, shared, 0, seed), meter)
-            crowd = [
-                Worker(client, batch, shared, think, seed + number)
-                for number, client in enumerate(clients)
-            ]
-            load = _worked(home, crowd, seconds)
-            load.costs = costs
-            return load
+            begun = Office(home, clients, batch, ids, think, seed)
+            begun.measure(counting.Meter(home, server.pid))
+            yield begun
         finally:
             for client in (lead, *clients):
                 client.close()
@@ -239,35 +306,6 @@ def log_in(client: httpx.Client, name: str) -> None:
             answer.raise_for_status()
             return
         time.sleep(float(answer.headers.get("retry-after", "1")))
-
-
-def _worked(home: Path, crowd: list[Worker], seconds: float) -> Load:
-    start = time.monotonic()
-    for one in crowd:
-        one.until = start + seconds
-        one.start()
-    for one in crowd:
-        one.join()
-    load = Load(len(crowd), min(seconds, time.monotonic() - start))
-    load.faults = [one.fault for one in crowd if one.fault]
-    for one in crowd:
-        load.statuses += one.statuses
-        for kind, times in one.milliseconds.items():
-            if times:
-                load.milliseconds.setdefault(kind, []).extend(times)
-    judged = Counter(group for one in crowd for group in one.judged)
-    load.changes = judged.total()
-    load.faults += [
-        f"group {group} was judged by {n} people" for group, n in judged.items() if n > 1
-    ]
-    with closing(Store.open(Settings(home=home))) as store, store.read() as session:
-        kept = {group: len(given) for group, given in read_verdicts(session, list(judged)).items()}
-    load.faults += [
-        f"group {group}: {number} verdicts accepted, {kept.get(group, 0)} kept"
-        for group, number in judged.items()
-        if kept.get(group, 0) != number
-    ]
-    return load
 
 
 def compare(alone: Load, beside: Load) -> tuple[list[str], float]:

@@ -2,6 +2,9 @@
 
 Threads are few. A request waits for its turn on the event loop, where waiting costs next to
 nothing, so that changes behind a held write lock never take the threads that reads need.
+
+Lanes of what is computed are narrow: threads that compute take turns within one process, and each
+more makes all of them slower, with the event loop (decision 0049).
 """
 
 from __future__ import annotations
@@ -35,11 +38,16 @@ class Lane:
     queue: int
 
 
-READS = Lane("reads", 16, 200)
-CHANGES = Lane("changes", 8, 100)
+LOOKS = Lane("looks", 2, 200)
+"""What one group, view or camera is, and what a window asks again and again."""
+READS = Lane("reads", 4, 200)
+"""All other reading: lists and counts of many groups, which the database takes its time for."""
+CHANGES = Lane("changes", 3, 100)
 """One at a time is written; the others read, solve and encode meanwhile."""
-PREVIEWS = Lane("previews", 4, 100)
-"""Questions that are answered by solving and change nothing."""
+PREVIEWS = Lane("previews", 1, 100)
+"""What a drag asks: some milliseconds of solving."""
+QUESTIONS = Lane("questions", 2, 100)
+"""What is answered by solving many times, or many groups; it takes up to seconds."""
 STREAMS = Lane("streams", 4, 200)
 """Those that begin: who listens takes nobody's place. All windows of a team come back at the same
 moment when a server starts again, and what each asks first would keep readers waiting."""
@@ -51,7 +59,19 @@ LOGINS = Lane("logins", 4, 50)
 """Passwords, whose hashes take some tenths of a second of a processor."""
 SIGN_ONS = Lane("sign-ons", 4, 50)
 """Single sign-on, whose provider may take its time, or never answer."""
-LANES = (READS, CHANGES, PREVIEWS, STREAMS, IMAGES, UPLOADS, ZIPS, LOGINS, SIGN_ONS)
+LANES = (
+    LOOKS,
+    READS,
+    CHANGES,
+    PREVIEWS,
+    QUESTIONS,
+    STREAMS,
+    IMAGES,
+    UPLOADS,
+    ZIPS,
+    LOGINS,
+    SIGN_ONS,
+)
 THREADS = sum(lane.width for lane in LANES) + 6
 """A thread for each request at work, and some for files of the browser application."""
 
@@ -59,7 +79,9 @@ _API = re.compile(r"/api/v\d+/")
 _STREAM = re.compile(r"/events$")
 _IMAGE = re.compile(r"/(?:image|figures/[^/]+|views/[^/]+/(?:neighbours|paint|propose))$")
 _ZIP = re.compile(r"/exports/[^/]+/content$")
-_SOLVING = re.compile(r"/(?:preview|comparison|influence|remedies|yield|noise)$")
+_PREVIEW = re.compile(r"/preview$")
+_QUESTION = re.compile(r"/(?:comparison|influence|remedies|yield|noise)$")
+_LOOK = re.compile(r"/(?:groups/(?!ids$)|views/|stations/|session$|bell$|work$)")
 _LOGIN = re.compile(r"/(?:session|session/password|links/use)$")
 _SIGN_ON = re.compile(r"/session/(?:sign-on|sign-on/begin|identity/begin)$")
 _UPLOAD = re.compile(r"/uploads$")
@@ -71,12 +93,14 @@ def lane_of(method: str, path: str) -> Lane | None:
         return None
     if _STREAM.search(path):
         return STREAMS
-    if _SOLVING.search(path):
+    if _PREVIEW.search(path):
         return PREVIEWS
+    if _QUESTION.search(path):
+        return QUESTIONS
     if _IMAGE.search(path):
         return IMAGES
     if method in SAFE_METHODS:
-        return ZIPS if _ZIP.search(path) else READS
+        return ZIPS if _ZIP.search(path) else LOOKS if _LOOK.search(path) else READS
     if _LOGIN.search(path):
         return LOGINS
     if _SIGN_ON.search(path):
